@@ -6,7 +6,7 @@ READY := .venv/.ready
 STAMP := .venv/.installed
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
-.PHONY: demo reproduce test test-fast test-interpreted campaign check bench clean
+.PHONY: demo reproduce docs test test-fast test-interpreted campaign check bench clean
 
 demo: $(READY)
 	@$(BIN)/pfabrik demo
@@ -14,6 +14,11 @@ demo: $(READY)
 # The experiments of the paper, next to what it printed: a report, pictures and CSV files in out/.
 reproduce: $(STAMP)
 	@$(BIN)/python -m paper
+
+# The documentation as a site, in site/; no page needs the network. It stops at a link that leads nowhere.
+docs: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@$(BIN)/zensical build --clean --strict
 
 # In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
 # are tested as plain Python: compiled alone, each would take longer than its tests.
@@ -44,7 +49,7 @@ bench: $(STAMP)
 	@$(BIN)/python benchmarks/run.py
 
 clean:
-	rm -rf .venv out build dist htmlcov .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv out site build dist htmlcov .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(READY): pyproject.toml

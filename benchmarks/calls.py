@@ -10,6 +10,7 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from pfabrik.closure.closure_engine import ClosureEngine
+from pfabrik.model import model_of
 from pfabrik.motion.displacements import rate_units
 from pfabrik.motion.joint_rates import actuated_columns
 from pfabrik.motion.singularities import measures
@@ -44,7 +45,7 @@ def near(mechanism: pf.Mechanism, rng: np.random.Generator) -> list[Array]:
 def questions(name: str, what: str, rng: np.random.Generator, runs: int) -> Iterator[Row]:
     """Inverse and forward kinematics of a machine of legs, next to the closure engine on the same call."""
     mechanism = pf.load(name)
-    targets, solver, engine = near(mechanism, rng), pf.Solver(mechanism), ClosureEngine(mechanism)
+    targets, solver, engine = near(mechanism, rng), pf.Solver(mechanism), ClosureEngine(model_of(mechanism))
     values = [pf.solve_ik(mechanism, target).actuators for target in targets]
 
     def closed(target: Array) -> object:

@@ -12,6 +12,7 @@ import pfabrik as pf
 from closed_forms import Array, Struts
 from newton import StrutNewton
 from pfabrik.closure.closure_engine import ClosureEngine
+from pfabrik.model import model_of
 from table import Row
 from timing import best_times, draw
 from yardstick import one_core
@@ -142,7 +143,7 @@ def with_joints(mechanism: pf.Mechanism, targets: Array) -> object:
 def closed_chains(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
     """The 6-UPS answered by the closure engine, next to its legs in closed form."""
     mechanism = pf.load("stewart")
-    engine = ClosureEngine(mechanism)
+    engine = ClosureEngine(model_of(mechanism))
     drawn = draw(mechanism, rng, 8 * n, 0.2, 0.2)
     reached = Struts(mechanism).solve(drawn)[1]
     far = draw(mechanism, rng, 8 * n, 1.0, 0.5)

@@ -12,7 +12,7 @@ from PIL import Image
 
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
-from pfabrik.decomposition.leg_table import leg_table
+from pfabrik.model import model_of
 from pfabrik.view.canvas import new_axes
 from pfabrik.view.plane import plane_of
 
@@ -104,8 +104,8 @@ def rods(chain: pf.SubChain, mechanism: pf.Mechanism) -> str:
 
 def engine(mechanism: pf.Mechanism) -> str:
     """The engine that answers first, and why it is not the quick one."""
-    reason = leg_table(mechanism)
-    return f"closure, without closed forms: {reason}" if isinstance(reason, str) else "legs"
+    reason = model_of(mechanism).why_no_legs
+    return f"closure, without closed forms: {reason}" if reason else "legs"
 
 
 def picture(name: str) -> Path:

@@ -210,3 +210,20 @@ def test_a_mechanism_is_shown_and_checked_and_a_wrong_name_told_without_the_kern
     told, said = loaded_by("numba", [["info", "stewart"], ["check", "stewart"], *wrong])
     assert told == [(None, []), (0, []), (0, []), (2, []), (2, [])]
     assert "did you mean 'stewart'" in said
+
+
+KIND = re.compile(r'\["kind"\]|\b(ROD|PIVOT|REDUNDANT|IDLE)\b')
+
+
+def test_the_guide_names_every_file_that_asks_for_the_kind_of_a_leg() -> None:
+    """A new kind of leg must be looked after in each of them: `Add a leg kind` in CONTRIBUTING.md."""
+    guide = (PACKAGE.parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w/]+\.(?:py|c))`", guide.split("## Add a leg kind")[1].split("\n## ")[0]))
+    sources = {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in SOURCES}
+    asking = {
+        name
+        for name, text in sources.items()
+        if re.search(r"legs(\.| import )records|\.legs\.legs\b", text) and KIND.search(text)
+    }
+    assert asking <= named, sorted(asking - named)
+    assert all((PACKAGE / name).exists() for name in named)

@@ -12,10 +12,10 @@ import oracles
 import pfabrik as pf
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.leg_forms import RedundantJoint
-from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.files import loads
+from pfabrik.model import model_of
 from pfabrik.options import Options
 from pfabrik.platform.legs_engine import LegsEngine
 
@@ -83,8 +83,7 @@ NAMES = ("nrpm", "rails", "rails_above")
 
 def redundant(mechanism: pf.Mechanism) -> list[int]:
     """Places of the arms' actuators."""
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
+    table = model_of(mechanism).legs
     own = [form.elements[0].joint.name for form in table.forms if isinstance(form, RedundantJoint)]
     return [mechanism.actuator_names.index(name) for name in own]
 
@@ -107,7 +106,7 @@ def moved(mechanism: pf.Mechanism, actuators: np.ndarray, begin: np.ndarray) -> 
 
 def behind(mechanism: pf.Mechanism, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Statuses, actuators and position errors of the closure engine, which knows no legs."""
-    found = ClosureEngine(mechanism).answer(wanted, None, Options(), keep_mode=False).rows
+    found = ClosureEngine(model_of(mechanism)).answer(wanted, None, Options(), keep_mode=False).rows
     return found.status, found.actuators, found.measures[:, 0]
 
 

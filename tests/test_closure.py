@@ -8,8 +8,9 @@ import pytest
 import pfabrik as pf
 from machines import MACHINES
 from pfabrik.answers.active_limits import active_limits
-from pfabrik.closure.close import HELD, close, closure_of, platform_poses
+from pfabrik.closure.close import HELD, close, platform_poses
 from pfabrik.description.paths import independent_paths
+from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns, displacements, gaps, stepped
 from pfabrik.tolerances import TOLERANCES
 
@@ -24,7 +25,7 @@ def machine(name: str) -> pf.Mechanism:
 
 def around_home(mechanism: pf.Mechanism, n: int, size: float, seed: int = 0) -> np.ndarray:
     """Coordinates (n, columns) near home, loops open; angles and lengths relative to L up to `size`."""
-    q = np.zeros((n, len(closure_of(mechanism).scale)))
+    q = np.zeros((n, len(model_of(mechanism).closure.scale)))
     return stepped(mechanism, q, size * np.random.default_rng(seed).uniform(-1, 1, q.shape))
 
 
@@ -32,7 +33,7 @@ def around_home(mechanism: pf.Mechanism, n: int, size: float, seed: int = 0) -> 
 def test_a_step_leaves_open_only_the_square_of_what_was_open(name: str) -> None:
     """So the Jacobian is right in every entry: a wrong one leaves a share of the gap, however small the gap."""
     mechanism = machine(name)
-    closure = closure_of(mechanism)
+    closure = model_of(mechanism).closure
     start = around_home(mechanism, 20, 0.1)
     on_it = close(closure, start, platform_poses(mechanism, start), max_iterations=60)
     assert on_it.gap.max() <= 1e-12
@@ -48,7 +49,7 @@ def test_a_step_leaves_open_only_the_square_of_what_was_open(name: str) -> None:
 def test_paths_end_where_displacements_put_the_platform(name: str) -> None:
     mechanism = machine(name)
     start = around_home(mechanism, 20, 0.3, seed=2)
-    found = close(closure_of(mechanism), start, platform_poses(mechanism, start))
+    found = close(model_of(mechanism).closure, start, platform_poses(mechanism, start))
     closed = found.gap <= 1e-10
     assert closed.mean() > 0.5
     q, length = found.coordinates[closed], mechanism.characteristic_length
@@ -62,7 +63,7 @@ def test_gaps_are_those_between_displaced_bodies(name: str) -> None:
     mechanism = machine(name)
     q = around_home(mechanism, 10, 0.2, seed=3)
     poses = np.repeat(mechanism.home_pose[None], 10, axis=0)
-    found = close(closure_of(mechanism), q, poses, limits=True, max_iterations=0)
+    found = close(model_of(mechanism).closure, q, poses, limits=True, max_iterations=0)
     bodies = displacements(mechanism, q)
     serial = len(independent_paths(mechanism)) == 1
     ends = bodies[mechanism.end_effector_body] @ mechanism.home_pose
@@ -79,12 +80,12 @@ def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
     """A limit moved to where the configuration is, is met; the excess over the old one is how far it was moved."""
     mechanism = machine(name)
     start = around_home(mechanism, 60, 1.5, seed=4)
-    found = close(closure_of(mechanism), start, platform_poses(mechanism, start))
+    found = close(model_of(mechanism).closure, start, platform_poses(mechanism, start))
     closed = found.gap <= 1e-12
     if any(
         mechanism.joint(each).along for each in mechanism.actuator_names
     ):  # pulled through its foot, a strut points back
-        closed &= (closure_of(mechanism).actuators(found.coordinates) > 0.0).all(axis=1)
+        closed &= (model_of(mechanism).closure.actuators(found.coordinates) > 0.0).all(axis=1)
     excess = found.excess[closed]
     length = mechanism.characteristic_length
     for row, limits in zip(excess, active_limits(mechanism, found.coordinates[closed]), strict=True):
@@ -100,7 +101,7 @@ def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
 def test_limits_are_bounds_of_the_search(name: str) -> None:
     mechanism = machine(name)
     start = around_home(mechanism, 20, 0.5, seed=5)
-    found = close(closure_of(mechanism), start, platform_poses(mechanism, start), limits=True, margin=1e-10)
+    found = close(model_of(mechanism).closure, start, platform_poses(mechanism, start), limits=True, margin=1e-10)
     closed = found.gap <= TOLERANCES.position
     assert (found.excess[closed] <= TOLERANCES.limit).mean() > 0.5
     assert np.isfinite(found.coordinates).all()
@@ -108,7 +109,7 @@ def test_limits_are_bounds_of_the_search(name: str) -> None:
 
 def test_locked_joints_and_a_held_platform_stay() -> None:
     mechanism = pf.load("stewart")
-    closure = closure_of(mechanism)
+    closure = model_of(mechanism).closure
     q = around_home(mechanism, 5, 0.1, seed=6)
     poses = platform_poses(mechanism, q)
     own = [column for name in ("BL1", "AR2") for column in range(*columns(mechanism)[name].indices(q.shape[1]))]
@@ -123,7 +124,7 @@ def test_locked_joints_and_a_held_platform_stay() -> None:
 def test_actuated_values_survive_the_way_into_coordinates_and_back() -> None:
     mechanism = pf.load("nrpm")
     values = np.random.default_rng(7).uniform(50, 150, (4, len(mechanism.actuator_names)))
-    closure = closure_of(mechanism)
+    closure = model_of(mechanism).closure
     q = np.zeros((4, len(closure.scale)))
     closure.put_actuators(q, values)
     np.testing.assert_allclose(closure.actuators(q), values)
@@ -136,8 +137,8 @@ def test_paths_are_as_many_as_loops_and_one() -> None:
 
 def test_configurations_that_are_not_finite_end_the_search_without_harm() -> None:
     mechanism = pf.load("stewart")
-    q = np.full((2, len(closure_of(mechanism).scale)), np.nan)
+    q = np.full((2, len(model_of(mechanism).closure.scale)), np.nan)
     q[1] = 0.0
-    found = close(closure_of(mechanism), q, np.repeat(mechanism.home_pose[None], 2, axis=0))
+    found = close(model_of(mechanism).closure, q, np.repeat(mechanism.home_pose[None], 2, axis=0))
     assert found.gap[1] <= 1e-13
     assert not found.gap[0] <= 1.0

@@ -102,6 +102,7 @@ def test_every_page_is_on_the_map(page: Path) -> None:
     [
         pytest.param(code, id=f"{page.relative_to(ROOT)}-{number}")
         for page in PAGES
+        if page.parent.name != "tasks"  # each of these is one program
         for number, code in enumerate(blocks(page, "python"), 1)
     ],
 )
@@ -116,6 +117,21 @@ def test_python_blocks_run_as_they_are_written(code: str) -> None:
 def test_examples_run(example: Path, capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(example), run_name="__main__")
     assert capsys.readouterr().out
+
+
+def test_the_page_of_python_names_everything_public() -> None:
+    named = re.findall(r"^::: pfabrik\.([\w.]+)$", (ROOT / "docs" / "api.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {name.rpartition(".")[2] for name in named} == {name for name in pf.__all__ if name != "__version__"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", sorted(ROOT.glob("examples/tasks/*.py")), ids=lambda program: program.stem)
+def test_the_page_of_a_task_is_what_its_program_prints(program: Path) -> None:
+    """Each is run in an empty folder; `python docs/pages.py` writes the pages and their pictures."""
+    page = runpy.run_path(str(ROOT / "docs" / "pages.py"))["page_of"](program)
+    written = ROOT / "docs" / "tasks" / f"{program.stem}.md"
+    assert page.text == written.read_text(encoding="utf-8")
+    assert all((written.parent / name).exists() for name in page.pictures)
 
 
 def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) -> None:

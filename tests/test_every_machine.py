@@ -14,11 +14,10 @@ from checks import INTERPRETED, actuator_units, assert_feasible, assert_honest, 
 from machines import EVERY, closure, machine, redescribed
 from oracles import any_targets, any_values, targets_about
 from pfabrik import Mechanism, Options, Status
-from pfabrik.closure.close import closure_of
-from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
+from pfabrik.model import model_of
 from pfabrik.platform.legs_engine import LegsEngine
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -167,9 +166,8 @@ def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, coun
 
     But now and then where redundant joints are to be searched for, which at a border have but one place.
     """
-    mechanism, table = machine(name), leg_table(machine(name))
-    is_legs = isinstance(table, LegTable)
-    count, is_redundant = (count, len(table.redundant) > 0) if is_legs else (1 + count // 20, False)
+    mechanism, model = machine(name), model_of(machine(name))
+    count, is_redundant = (count, len(model.legs.redundant) > 0) if model.has_legs else (1 + count // 20, False)
     targets = targets_about(mechanism, np.random.default_rng(2), count, 2.0, 1.2)
     answers = pf.solve_ik(mechanism, targets, options=Options(hold=None))
     again = pf.solve_ik(mechanism, answers.pose)
@@ -243,6 +241,6 @@ def test_answers_asked_again_from_themselves_stay(name: str, count: int, seed: i
         apart = np.abs(answers.pose - other.pose)[rows]
         apart[:, :3, 3] /= length
         assert apart.max(initial=0.0) <= NEARER
-    closed = closure_of(mechanism)
+    closed = model_of(mechanism).closure
     turned = np.abs(there.actuators - answers.actuators) * closed.scale[closed.actuated]
     assert turned.max() <= 10.0 * NEARER  # next to dead points a pose tells of its actuators less well than of itself

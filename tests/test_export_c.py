@@ -16,13 +16,13 @@ from click.testing import CliRunner
 import pfabrik as pf
 from machines import closure, published
 from pfabrik.cli import main
-from pfabrik.decomposition.leg_table import leg_table
 from pfabrik.description.joint_types import KINDS
 from pfabrik.description.task import task_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.export.export_c import c_source
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.wording import in_words
+from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns
 from pfabrik.motion.limited_coordinates import coned
 
@@ -113,7 +113,7 @@ def truth(name: str, count: int) -> Truth:
 
 def limit_units(mechanism: pf.Mechanism) -> np.ndarray:
     """Of every limit, in the order of the file: L of lengths, 1 of angles."""
-    table = leg_table(mechanism)
+    table = model_of(mechanism).legs
     return np.concatenate([np.repeat(table.limited["unit"], 2), np.ones(len(table.cones))])
 
 
@@ -121,7 +121,7 @@ def slack_of(mechanism: pf.Mechanism, q: np.ndarray, home: np.ndarray) -> np.nda
     """Room left before every limit, in the order of the file, (n, limits) [L or rad]."""
     turning = {joint.name: angles for joint, angles, _ in coned(mechanism, q - home)}
     rooms, ranged_so_far = [], {}
-    for joint, bound in leg_table(mechanism).limits:
+    for joint, bound in model_of(mechanism).legs.limits:
         described = mechanism.joint(joint)
         if bound == "cone":
             rooms.append(described.cone.half_angle - turning[joint])
@@ -129,7 +129,7 @@ def slack_of(mechanism: pf.Mechanism, q: np.ndarray, home: np.ndarray) -> np.nda
         place = ranged_so_far.setdefault((joint, bound), 0)
         ranged_so_far[joint, bound] += 1
         kinds = KINDS[described.type].coordinates
-        table = leg_table(mechanism)
+        table = model_of(mechanism).legs
         column = columns(mechanism)[joint].start + (place if len(kinds) > 1 else 0)
         if len(kinds) > 1:  # a leg may tell the two coordinates of a joint in either order
             own = [int(each["column"]) for each in table.limited if columns(mechanism)[joint].start <= each["column"]]

@@ -15,6 +15,7 @@ from checks import INTERPRETED
 from machines import MACHINES, machine
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import Mechanism, Solution, Status
+from pfabrik.model import model_of
 from pfabrik.platform.seeds import seeds_of
 
 ROWS = 2 if INTERPRETED else 12
@@ -167,7 +168,7 @@ def test_searches_start_from_the_same_places_however_a_machine_is_described(name
     """What is drawn is a leg's by where it is, and counts along its axis whichever way that is described."""
     original = machine(name)
     other, _, _ = relabelled(original, np.random.default_rng(0))
-    np.testing.assert_allclose(seeds_of(other).poses, seeds_of(original).poses, atol=1e-6)
+    np.testing.assert_allclose(seeds_of(model_of(other)).poses, seeds_of(model_of(original)).poses, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -13,29 +13,29 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import closure, machine
 from pfabrik.closure.configurations import new_rows
-from pfabrik.decomposition.leg_table import LegTable, leg_table, table_of_poses
+from pfabrik.decomposition.leg_table import LegTable
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.feasibility import _margins
 from pfabrik.kernels.platform.evaluate import evaluate_poses
+from pfabrik.model import Model, model_of
 from pfabrik.motion.displacements import home_coordinates
 from pfabrik.options import Options
 from pfabrik.platform.answers import sides_at
 from pfabrik.platform.coordinates import read_coordinates
 from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.platform.reach import reach
 from pfabrik.platform.table import reading_scratch
 from pfabrik.platform.table import table_handle as legs_of
 
-SERVED = [name for name in pf.catalog() if isinstance(table_of_poses(pf.load(name)), LegTable)]
+SERVED = [name for name in pf.catalog() if not model_of(pf.load(name)).why_poses_do_not_suffice]
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
-COMPLETED = [name for name in IN_FRONT if leg_table(pf.load(name)).task["unset"][0]]
+COMPLETED = [name for name in IN_FRONT if model_of(pf.load(name)).legs.task["unset"][0]]
 TARGETS = 300
 
 
 def table(name: str) -> LegTable:
-    found = leg_table(machine(name))
-    assert isinstance(found, LegTable)
-    return found
+    return model_of(machine(name)).legs
 
 
 def poses_around_home(name: str, n: int, shift: float, turn: float, seed: int = 1) -> np.ndarray:
@@ -68,8 +68,8 @@ def both(name: str) -> tuple[np.ndarray, Any, Any]:
     engine = engine_of(machine(name))
     assert isinstance(engine, LegsEngine)
     targets = targets_around_home(name, TARGETS, 0.25, 0.45)
-    rows = new_rows(machine(name), TARGETS)
-    engine._reach(targets, None, engine._table.home_sides, False, rows)
+    rows = new_rows(model_of(machine(name)), TARGETS)
+    reach(engine._model, targets, None, engine._table.home_sides, False, rows)
     return targets, rows, engine._joint_space.answer(targets, None, Options(), keep_mode=False)
 
 
@@ -166,8 +166,8 @@ def test_a_start_keeps_its_working_mode(name: str) -> None:
     near = poses_around_home(name, 30, 0.01, 0.02)
     engine = engine_of(mechanism)
     assert isinstance(engine, LegsEngine)
-    rows = new_rows(mechanism, len(near))
-    engine._reach(near, start._configurations, sides_at(mechanism, engine._table, start._configurations), True, rows)
+    rows = new_rows(model_of(mechanism), len(near))
+    reach(engine._model, near, start._configurations, sides_at(engine._model, start._configurations), True, rows)
     behind = engine._joint_space.answer(near, start._configurations, Options(), keep_mode=True)
     assert (rows.status == pf.Status.REACHED).all()
     assert off(name, rows.actuators, behind.rows.actuators).max() <= 1e-9
@@ -201,7 +201,7 @@ def test_a_slide_counts_as_its_joint_says_whichever_way_that_points() -> None:
             joint = pf.Joint(joint.name, "prismatic", bodies, axis=axis, actuated=True, range=(-40.0, 40.0))
         joints.append(joint)
     mechanism = pf.Mechanism("slides both ways", joints, "platform", machine("stewart").reference_point)
-    assert isinstance(leg_table(mechanism), LegTable)
+    assert model_of(mechanism).has_legs
     answers = pf.solve_ik(mechanism, poses_around_home("stewart", 20, 0.05, 0.1))
     assert (answers.status == pf.Status.REACHED).all()
     assert pf.closure_residual(answers).max() <= 1e-9 * mechanism.characteristic_length
@@ -209,8 +209,7 @@ def test_a_slide_counts_as_its_joint_says_whichever_way_that_points() -> None:
 
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 def test_a_chain_that_is_no_leg_is_named_with_the_reason() -> None:
-    reason = leg_table(closure.crooked_upr())
-    assert isinstance(reason, str)
+    reason = model_of(closure.crooked_upr()).why_no_legs
     assert reason.startswith("sub-chain R*-U-P*-U: ")
 
 
@@ -323,13 +322,14 @@ def test_feasibility_tells_where_three_hinges_through_a_point_cannot_point() -> 
 
 @pytest.mark.parametrize("name", ["stewart", "hexaglide", "delta", "rrr"])
 def test_blocks_measure_what_is_measured_one_by_one(name: str) -> None:
-    mechanism, table = machine(name), leg_table(machine(name))
-    singly = replace(table)
-    vars(singly)["is_for_blocks"] = False
+    mechanism, model = machine(name), Model(machine(name))
+    table = model.legs
+    singly = Model(mechanism)
+    vars(singly.legs)["is_for_blocks"] = False
     poses = targets_around_home(name, 200, 0.4, 0.8)
     poses[7] = np.nan
     asked = poses, mechanism.home_pose[None].copy(), table.home_sides
-    (margins, _), (each, _) = (_margins(mechanism, legs, *asked) for legs in (table, singly))
+    (margins, _), (each, _) = (_margins(legs, *asked) for legs in (model, singly))
     assert table.is_for_blocks
     np.testing.assert_allclose(margins, each, rtol=1e-9, atol=1e-9)
     assert (each > 0.0).any() and (each < 0.0).any()

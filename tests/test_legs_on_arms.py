@@ -11,10 +11,9 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
 from machines import closure, machine
-from pfabrik.closure.close import closure_of
 from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.engine import engine_of
+from pfabrik.model import model_of
 from pfabrik.options import Options
 from pfabrik.platform.legs_engine import LegsEngine
 
@@ -52,7 +51,7 @@ def assert_as_on_joint_coordinates(
 ) -> None:
     """Same statuses, and no projection farther than those of the engine that knows no legs; all of it kept exactly."""
     assert isinstance(engine_of(mechanism), LegsEngine)
-    rows = ClosureEngine(mechanism).answer(wanted, None, Options(), keep_mode=False).rows
+    rows = ClosureEngine(model_of(mechanism)).answer(wanted, None, Options(), keep_mode=False).rows
     np.testing.assert_array_equal(np.asarray(answers.status), rows.status)
     own = far(mechanism, np.asarray(answers.position_error), np.asarray(answers.rotation_error))
     other = far(mechanism, rows.measures[:, 0], rows.measures[:, 1])
@@ -98,7 +97,7 @@ def test_along_a_path_nothing_leaps_and_a_start_may_be_a_joint_vector(name: str)
     path = [pf.pose(*(share * (end - mechanism.home_pose)[:3, 3],)) @ mechanism.home_pose for share in (0.25, 0.5, 1.0)]
     track = pf.track(mechanism, np.array(path), start=begin)
     assert (np.asarray(track.status) == pf.Status.REACHED).all()
-    unit = np.where(closure_of(mechanism, whole=False).turning > 0.0, 1.0, length)
+    unit = np.where(model_of(mechanism).path_closure.turning > 0.0, 1.0, length)
     steps = np.abs(np.diff(np.concatenate([begin.q[None], np.asarray(track.q)]), axis=0)) / unit
     assert steps.max() <= 0.5
     by_vector = pf.solve_ik(mechanism, path[-1], start=np.asarray(track.q)[-1])
@@ -111,8 +110,8 @@ def test_legs_with_two_carriers_answer_in_all_four_of_their_ways() -> None:
     """Without limits each leg of the 3-RRRS takes hip and knee as it likes; its answers follow where it starts."""
     joints = [dataclasses.replace(each, range=None, cone=None) for each in closure.rrrs().joints]
     mechanism = pf.Mechanism("3-RRRS", joints, "platform", (0, 0, 190))
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable) and not table.has_free_redundant and not table.has_implicit_joints
+    table = model_of(mechanism).legs
+    assert not table.has_free_redundant and not table.has_implicit_joints
     wanted = targets(mechanism, 1, 0.05, 0.1, (1, 1, 1))[0]
     modes = pf.working_modes(mechanism, wanted)
     assert modes.total == 4**3

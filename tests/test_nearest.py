@@ -16,11 +16,12 @@ from machines import closure, five_bar
 from oracles import targets_about
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
-from pfabrik.closure.close import close, closure_of
+from pfabrik.closure.close import close
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.closure.projection import projection_modes
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
+from pfabrik.model import model_of
 from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.rotations import angles_between
 
@@ -349,7 +350,7 @@ def test_without_a_start_nothing_is_given_up_for_home(by_legs: bool) -> None:
     heights = pf.solve_ik(mechanism, leaning, options=Options(hold=None)).pose[:, 2, 3]
     targets = np.tile(mechanism.home_pose, (count, 1, 1))
     targets[:, 2, 3] = heights
-    engine = engine_of(mechanism) if by_legs else ClosureEngine(mechanism)
+    engine = engine_of(mechanism) if by_legs else ClosureEngine(model_of(mechanism))
     assert isinstance(engine, LegsEngine) == by_legs
     rows = engine.answer(targets, None, Options(hold="position"), keep_mode=False).rows
     assert (rows.status == Status.PROJECTED).all()
@@ -495,12 +496,12 @@ def test_what_holds_a_projection_back_is_the_same_in_the_platforms_pose_and_on_a
     targets[:, :3, 3] += rng.normal(size=(12, 3)) * machine.characteristic_length
     targets[:, :3, :3] = Rotation.from_rotvec(rng.normal(size=(12, 3))).as_matrix()
     answers = pf.solve_ik(machine, targets, options=pf.Options(hold=None))
-    (way,) = projection_modes(machine, None, None)
+    (way,) = projection_modes(model_of(machine).closure, None, None)
     rows = np.flatnonzero(answers.status == Status.PROJECTED)
     found = answers._configurations.at(rows)
     told = engine.limit_multipliers(found, targets[rows], way)
     assert (told > 0).any(axis=1).sum() >= 4
-    on_joints = ClosureEngine(machine).limit_multipliers(found, targets[rows], way)
+    on_joints = ClosureEngine(model_of(machine)).limit_multipliers(found, targets[rows], way)
     np.testing.assert_allclose(told, on_joints, atol=1e-5 * on_joints.max())
 
 
@@ -603,7 +604,9 @@ def test_a_target_that_a_search_starts_on_is_reached() -> None:
     turned, lowest = np.array([0.327, -0.306, -0.9, 1.508, 0.206]), [-0.03, -0.029, -0.802, 0.22, 0.03]
     count, rng = 2 if INTERPRETED else 200, np.random.default_rng(0)
     around = [*turned, *lowest, *turned[[4, 1, 2, 3, 0]] * (-1, 1, 1, 1, -1)] + 0.05 * rng.normal(size=(count, 15))
-    closed = close(closure_of(mechanism), around, np.repeat(mechanism.home_pose[None], count, axis=0), limits=True)
+    closed = close(
+        model_of(mechanism).closure, around, np.repeat(mechanism.home_pose[None], count, axis=0), limits=True
+    )
     starts = pf.configuration(mechanism, closed.coordinates)
     assert (starts.status == Status.REACHED).all()
     assert (pf.solve_ik(mechanism, starts.pose, start=starts).status == Status.REACHED).all()

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from conftest import INTERPRETED
 from machines import closure, published
-from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.decomposition.leg_table import LegTable
 from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
 from pfabrik.kernels.holding import limit_multipliers
 from pfabrik.kernels.legs import records as K
@@ -23,6 +23,7 @@ from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involv
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
 from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
+from pfabrik.model import model_of
 from pfabrik.platform.carriages import stays_there
 from pfabrik.platform.table import kernel_table
 
@@ -51,8 +52,7 @@ def moved(state: E.PlatformState, unknown: int, step: float, columns: np.ndarray
 def table_of(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
     """A machine, its legs, and their kernel table."""
     mechanism = closure.ON_ARMS[name]() if name in closure.ON_ARMS else pf.load(name)
-    legs = leg_table(mechanism)
-    assert isinstance(legs, LegTable)
+    legs = model_of(mechanism).legs
     return mechanism, legs, kernel_table(legs)
 
 
@@ -174,8 +174,7 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
 
 def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     """For an arm with one limit: scratch memory suffices, and the multiplier is the pull along the limit."""
-    table = leg_table(published.planar_arm())
-    assert isinstance(table, LegTable)
+    table = model_of(published.planar_arm()).legs
     settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
     plan = MultistartPlan(
         np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), stays_there(table)

@@ -16,8 +16,8 @@ import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
 from machines import closure
 from pfabrik import Cone, Joint, Mechanism, Options, Status
-from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.kernels.legs.records import CARRIAGE
+from pfabrik.model import model_of
 from pfabrik.platform.carriages import carriages_along
 
 Z = (0.0, 0.0, 1.0)
@@ -258,8 +258,7 @@ def test_a_forked_child_solves_batches_too() -> None:
     ("name", "along"), [("hexaglide", [0, 1, 0]), ("prs", [0, 0, 1]), ("orthoglide", [0, 0, 0]), ("delta", [0, 0, 0])]
 )
 def test_parallel_rails_alone_take_a_whole_machine_along(name: str, along: list[float]) -> None:
-    table = leg_table(pf.load(name))
-    assert isinstance(table, LegTable)
+    table = model_of(pf.load(name)).legs
     found = carriages_along(table)
     np.testing.assert_allclose(found.part, np.outer(along, along), atol=1e-9)
     rails = table.legs["proximal"] == CARRIAGE

@@ -25,8 +25,8 @@ MAGNIFIED = 60.0
 """How many units of the last digit poses may be off: loops add up the roundings of all their joints."""
 
 
-def told(found: Imported) -> str:
-    return "\n".join(map(str, found.notes))
+def notes_of(imported: Imported) -> str:
+    return "\n".join(map(str, imported.notes))
 
 
 def imported(linkage: Linkage, text: str, **asked: str) -> Imported:
@@ -49,30 +49,22 @@ def answers_as_mujoco_does(found: Imported, linkage: Linkage, tolerance: float, 
         assert np.abs(solution.pose[:3, :3] - turned @ begin[1].T).max() <= 10.0 * tolerance
 
 
-@pytest.mark.parametrize("digits", [7, 6, 4])
-@pytest.mark.parametrize("name", LINKAGES)
-def test_what_rounding_locks_moves_as_the_exact_machine_does(name: str, digits: int) -> None:
+WRITTEN = [
+    *((name, digits, "quat", 1.0) for name in LINKAGES for digits in (7, 6, 4)),
+    *((name, 6, turned, 1.0) for name in ("spherical", "mixture") for turned in ("euler", "xyaxes")),
+    ("spherical", 6, "quat", 1e3),
+]
+"""Linkages, the digits of their files, how bodies are turned there, and the unit of length over a metre."""
+
+
+@pytest.mark.parametrize(("name", "digits", "turned", "scale"), WRITTEN)
+def test_what_rounding_locks_moves_as_the_exact_machine_does(name: str, digits: int, turned: str, scale: float) -> None:
     linkage = LINKAGES[name]()
-    found = imported(linkage, model_text(linkage, digits))
+    found = imported(linkage, model_text(linkage, digits, turned, scale))
     counted = pf.mobility(found.mechanism)
     assert counted.mobility == linkage.freedoms
     assert not counted.nearly_free
-    answers_as_mujoco_does(found, linkage, MAGNIFIED * 10.0**-digits)
-
-
-@pytest.mark.parametrize("turned", ["euler", "xyaxes"])
-@pytest.mark.parametrize("name", ["spherical", "mixture"])
-def test_however_a_file_turns_its_bodies(name: str, turned: str) -> None:
-    linkage = LINKAGES[name]()
-    found = imported(linkage, model_text(linkage, 6, turned))
-    assert "made to meet in one point" in told(found)
-    answers_as_mujoco_does(found, linkage, MAGNIFIED * 1e-6)
-
-
-def test_numbers_in_millimetres_are_as_exact() -> None:
-    linkage = spherical_three_legs()
-    found = imported(linkage, model_text(linkage, 6, scale=1e3))
-    answers_as_mujoco_does(found, linkage, MAGNIFIED * 1e-6, scale=1e3)
+    answers_as_mujoco_does(found, linkage, MAGNIFIED * 10.0**-digits, scale)
 
 
 def test_what_was_made_exact_is_named_with_how_much() -> None:
@@ -84,9 +76,9 @@ def test_what_was_made_exact_is_named_with_how_much() -> None:
     ]
     by = float(notes[0].what.split("up to ")[1].split()[0])
     assert 1e-9 < by < 1e-6
-    planar = told(imported(planar_four_bar(), model_text(planar_four_bar(), 7)))
+    planar = notes_of(imported(planar_four_bar(), model_text(planar_four_bar(), 7)))
     assert "axes made parallel within the digits of the file, turned by up to" in planar
-    assert "made the nearest machine that moves" in told(
+    assert "made the nearest machine that moves" in notes_of(
         imported(LINKAGES["bennett"](), model_text(LINKAGES["bennett"](), 6))
     )
 
@@ -110,7 +102,7 @@ def test_an_axis_that_is_off_by_more_than_rounding_is_left_where_it_is(by: float
     joint = found.mechanism.joint("p0")
     at, axis = np.array(joint.at), np.array(joint.axis)
     assert np.linalg.norm(np.cross(axis, at - linkage.hinges[1].at)) <= 1e-6
-    assert "made the nearest machine" not in told(found)
+    assert "made the nearest machine" not in notes_of(found)
     assert not any("p0" in note.names for note in found.notes if "meet in one point" in note.what)
 
 
@@ -172,16 +164,10 @@ def spoiled(by: float) -> pf.Mechanism:
     """A four-bar with one axis that leans by an angle."""
     linkage = planar_four_bar()
     lean = linkage.hinges[1].axis + by * np.cross(linkage.hinges[1].axis, [0.3, 0.2, -0.9])
+    axes = [lean if place == 1 else hinge.axis for place, hinge in enumerate(linkage.hinges)]
     joints = [
-        pf.Joint(
-            each.name,
-            "revolute",
-            (each.parent, each.child),
-            each.at,
-            axis=lean if place == 1 else each.axis,
-            actuated=place == 0,
-        )
-        for place, each in enumerate(linkage.hinges)
+        pf.Joint(each.name, "revolute", (each.parent, each.child), each.at, axis=axis, actuated=each.name == "h0")
+        for each, axis in zip(linkage.hinges, axes, strict=True)
     ]
     return pf.Mechanism("spoiled", joints, "coupler", (0.0, 0.0, 0.0), "world", length_unit="m")
 

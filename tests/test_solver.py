@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import copy
-import gc
 import pickle
-import weakref
 
 import numpy as np
 import pytest
@@ -13,10 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from pfabrik import Options, Status
-from pfabrik.decomposition.leg_table import LegTable, leg_table
-from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
-from pfabrik.platform.table import local_table, table_handle
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
@@ -146,25 +141,6 @@ def test_a_refused_question_leaves_no_answer(name: str) -> None:
         assert np.isnan(solver.pose).all() and np.isnan(solver.actuators).all()
         with pytest.raises(InvalidArgument, match="solution: found no answer"):
             solver.jacobian()
-
-
-@pytest.mark.parametrize("started", [False, True])
-def test_what_kernels_are_given_is_kept_as_long_as_a_solver(started: bool) -> None:
-    """Kernels take an address: what it leads to must not go when a cache has forgotten the machine."""
-    engine_of.cache_clear()  # an engine of before may have been given what its cache has forgotten since
-    mechanism = pf.load("stewart")
-    home = mechanism.home_pose
-    solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, home) if started else None)
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
-    taken = local_table if started else table_handle
-    given = weakref.ref(taken(table))
-    solver.ik(home)
-    taken.cache_clear()
-    gc.collect()
-    assert given() is not None
-    assert solver.ik(home) == Status.REACHED and solver.fk(solver.actuators.copy()) == Status.REACHED
-    np.testing.assert_allclose(solver.pose, home, atol=1e-9 * mechanism.characteristic_length)
 
 
 @pytest.mark.parametrize("started", [False, True])

@@ -12,6 +12,7 @@ Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, wor
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 Look over   workspace, singularity_map
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
+Look into  search_log (every attempt behind an answer)
 See        plot, plot_track, plot_travel, animate; view (in the browser)
 Structure  decompose, SubChain; errors
 Exchange   interop (MuJoCo and URDF, in and out)
@@ -61,6 +62,7 @@ _NAMES = {
     "options": ("Options",),
     "paths.read_path": ("read_path",),
     "poses": ("pose",),
+    "search_log": ("SearchLog", "search_log"),
     "solver": ("Solver",),
     "timing.platform_speed": ("PlatformSpeed", "platform_speed"),
     "timing.time_path": ("time_path",),
@@ -116,6 +118,7 @@ if TYPE_CHECKING:
     from .options import Options as Options
     from .paths.read_path import read_path as read_path
     from .poses import pose as pose
+    from .search_log import SearchLog as SearchLog, search_log as search_log
     from .solver import Solver as Solver
     from .timing.platform_speed import PlatformSpeed as PlatformSpeed, platform_speed as platform_speed
     from .timing.time_path import time_path as time_path

@@ -11,6 +11,7 @@ from .answers.status import Status
 from .closure.close import CLOSED, measure_configurations
 from .description.mechanism import Mechanism
 from .engine import engine_of
+from .model import model_of
 
 
 def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
@@ -31,7 +32,7 @@ def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
     InvalidArgument : coordinates of the wrong shape, or not finite.
     """
     deviations, shape = joint_vectors(mechanism, q, "q")
-    closing = measure_configurations(mechanism, deviations)
+    closing = measure_configurations(model_of(mechanism), deviations)
     configurations = engine_of(mechanism).as_configurations(closing)
     within = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
     configurations.rows.status[:] = np.where(closing.gap <= CLOSED, within, Status.FAILED)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +10,12 @@ from .answers.start_configuration import Start, start_of
 from .arrays import Floats, Ints, shaped
 from .closure.parasitic import has_parasitic_motion
 from .decomposition.leg_forms import LegForm, Rod
-from .decomposition.leg_table import LegTable, table_of_poses
+from .decomposition.leg_table import LegTable
+from .derived import derived
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism
 from .kernels.threads import in_blocks
+from .model import Model, model_of
 from .platform.answers import sides_at
 from .platform.table import table_handle
 from .targets import Target, as_targets
@@ -60,30 +61,30 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     UnsupportedMechanism : some chain is no leg in closed form; the message names it, with the reason.
     InvalidArgument : targets of the wrong shape.
     """
-    table = table_of_poses(checked_mechanism(mechanism))
-    if not isinstance(table, LegTable):
-        raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"])
+    model = model_of(checked_mechanism(mechanism))
+    if model.why_poses_do_not_suffice:
+        raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"])
+    table = model.legs
     start_pose, sides = mechanism.home_pose[None].copy(), table.home_sides
     if start is not None:
         configuration = start_of(mechanism, start, ())
         assert configuration is not None
         start_pose = np.require(configuration.rows.poses, requirements=["C", "W"])
-        sides = sides_at(mechanism, table, configuration)
+        sides = sides_at(model, configuration)
     poses, shape = as_targets(mechanism, targets)
-    margin, binding = _margins(mechanism, table, poses, start_pose, sides)
-    return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(mechanism))
+    margin, binding = _margins(model, poses, start_pose, sides)
+    return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(table))
 
 
-def _margins(
-    mechanism: Mechanism, table: LegTable, poses: Floats, start_pose: Floats, sides: Floats
-) -> tuple[Floats, Ints]:
+def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> tuple[Floats, Ints]:
     """Margins (n,) of poses (n, 4, 4), and the indices of their limits: in blocks, then unsolved rows one by one."""
     margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
+    table = model.legs
     legs, unsolved = table_handle(table), np.arange(len(poses))
     if table.is_for_blocks:
         from .kernels.legs.margin_blocks import margins_in_blocks
 
-        follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(mechanism))
+        follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(model.path_closure))
 
         def run(block: slice) -> int:
             return margins_in_blocks(
@@ -105,11 +106,9 @@ def _margins(
     return margin, binding
 
 
-@lru_cache(maxsize=64)
-def _limits(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
+@derived
+def _limits(table: LegTable) -> tuple[tuple[str, str], ...]:
     """Limits in the order of the kernel: ranges and cones, then the reach of legs, then their closure."""
-    table = table_of_poses(mechanism)
-    assert isinstance(table, LegTable)
     reach = tuple((_proximal_joint(form), "reach") for form in table.forms)
     closed = tuple((form.elements[0].joint.name if form.elements else "", "closed") for form in table.forms)
     return table.limits + reach + closed

@@ -16,6 +16,7 @@ from .closure.close import measure_configurations
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
+from .model import model_of
 from .options import Options, checked_options
 from .poses import as_floats
 from .tolerances import TOLERANCES
@@ -71,9 +72,9 @@ def solve_fk(
 
 def solution_at(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:
     """The answer to actuated values (n, n_a) at given joint coordinates (n, columns): measured, not changed."""
-    closing = measure_configurations(mechanism, coordinates)
+    closing = measure_configurations(model_of(mechanism), coordinates)
     configurations = engine_of(mechanism).as_configurations(closing)
-    solutions = forward_answers(mechanism, configurations, closing, values, TOLERANCES.position)
+    solutions = forward_answers(model_of(mechanism).closure, configurations, closing, values, TOLERANCES.position)
     return Solution(mechanism, solutions, (len(values),))
 
 

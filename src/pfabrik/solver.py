@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -15,12 +14,12 @@ from .answers.status import Status
 from .arrays import Floats
 from .closure.configurations import new_rows
 from .description.mechanism import Mechanism, checked_mechanism
-from .engine import inverse_engine_of
+from .engine import engine_of, inverse_engine_of
 from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
+from .model import model_of
 from .options import Options, checked_options
-from .platform.legs_engine import LegsEngine
 from .poses import DOUBLE
 from .targets import Target
 from .warm_up import warm_up
@@ -59,14 +58,11 @@ class Solver:
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
         self._start, begin = start, start_of(mechanism, start, ())
         warm_up(mechanism)
-        self._engine = inverse_engine_of(mechanism, self.options)
-        self._rows, self._target = new_rows(mechanism, 1), np.eye(4)[None]
-        self._reach: Callable[[], int] | None = None
-        self._assemble: Callable[[], int] | None = None
-        if isinstance(self._engine, LegsEngine):
-            keep_mode = keeps_mode(self.options, start)
-            self._reach = self._engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
-            self._assemble, self._kept = self._engine.prepared_forward(begin, self._rows)
+        inverse, keep_mode = inverse_engine_of(mechanism, self.options), keeps_mode(self.options, start)
+        self._rows, self._target = new_rows(model_of(mechanism), 1), np.eye(4)[None]
+        self._prepared = inverse.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
+        self._prepared_forward = engine_of(mechanism).prepared_forward(begin, self._rows)
+        self._reach, self._assemble = (call and call[0] for call in (self._prepared, self._prepared_forward))
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
         self.status = Status.INVALID

@@ -22,6 +22,7 @@ from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
+from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
 from .poses import as_floats
 from .rotations import from_rotvec
@@ -225,7 +226,7 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
     is_able = bool(np.linalg.norm(remainder) <= TOLERANCES.stretched * np.linalg.norm(blocked))
     if has_dependent_coordinates(mechanism):
         return "" if is_able else task_remark(mechanism)
-    if are_stretched(mechanism, end._coordinates).any():
+    if are_stretched(model_of(mechanism), end._coordinates).any():
         return STRETCHED
     return "" if is_able else NO_FREEDOM
 

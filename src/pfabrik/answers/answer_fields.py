@@ -26,6 +26,7 @@ from ..kernels.rows import (
     ROUNDS,
     Rows,
 )
+from ..model import model_of
 from ..motion.displacements import columns, home_coordinates
 from .active_limits import ActiveLimit, active_limits, binding_limits, has_passive_limits, holding_limits
 from .status import Status
@@ -176,7 +177,9 @@ class Answer:
         """The limits that block projected rows from their targets."""
         limits: dict[int, tuple[ActiveLimit, ...]] = {}
         engine, holds = engine_of(self.mechanism), self._rows.holds[projected]
-        for projection in projection_modes(self.mechanism, request.hold, request.rotation_length):
+        for projection in projection_modes(
+            model_of(self.mechanism).path_closure, request.hold, request.rotation_length
+        ):
             rows = projected[holds == projection.hold]
             if len(rows):
                 configurations = self._configurations.at(rows)

@@ -10,6 +10,7 @@ from ..arrays import Floats, shaped
 from ..closure.configurations import Configurations
 from ..closure.first_order import singularities
 from ..description.mechanism import Mechanism, checked_mechanism
+from ..model import Model, model_of
 from ..motion.mobility import Mobility, NearlyFree, generic_of
 from ..motion.singularities import NUMBERS, Singularity
 from ..platform.jacobians import forward_map, inverse_map
@@ -23,7 +24,7 @@ def mobility(mechanism: Mechanism) -> Mobility:
 
     Overconstrained mechanisms count right: the loops are closed exactly before conditions are compared.
     """
-    return generic_of(checked_mechanism(mechanism)).mobility
+    return generic_of(model_of(checked_mechanism(mechanism)).mechanism).mobility
 
 
 def forward_jacobian(solution: Solution) -> Floats:
@@ -55,13 +56,13 @@ def inverse_jacobian(solution: Solution) -> Floats:
 
 def singularity(solution: Solution) -> Singularity:
     """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
-    mechanism, configurations = _of(solution)
-    found = singularities(mechanism, configurations.coordinates)
+    model, configurations = _of(solution)
+    found = singularities(model, configurations.coordinates)
     numbers = {name: shaped(np.asarray(getattr(found, name)), solution.shape) for name in NUMBERS}
     kinds = cast(list[tuple[str, ...]], found.kinds)
     return Singularity(**numbers, kinds=kinds[0] if solution.shape == () else kinds)
 
 
-def _of(solution: Solution) -> tuple[Mechanism, Configurations]:
-    """The mechanism of a solution, and its configurations."""
-    return checked_solution(solution).mechanism, solution._configurations
+def _of(solution: Solution) -> tuple[Model, Configurations]:
+    """The model of a solution's machine, and its configurations."""
+    return model_of(checked_solution(solution).mechanism), solution._configurations

@@ -14,6 +14,7 @@ from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.rows import FAILED
+from ..model import model_of
 from ..motion.displacements import home_coordinates
 from ..poses import as_floats
 from .solution import Solution
@@ -35,7 +36,7 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
     if not isinstance(start, Solution):
         deviations, start_shape = joint_vectors(mechanism, start, "start")
         _require_shape(start_shape, shape)
-        return engine_of(mechanism).as_configurations(measure_configurations(mechanism, deviations))
+        return engine_of(mechanism).as_configurations(measure_configurations(model_of(mechanism), deviations))
     if start.mechanism != mechanism:
         found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")

@@ -12,6 +12,7 @@ from ..arrays import Floats
 from ..closure.first_order import are_stretched, forward_map
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
+from ..model import model_of
 from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from ..tolerances import TOLERANCES
 
@@ -62,7 +63,7 @@ def given_up(answer: Answer) -> list[str]:
     request = answer._request
     if request is None or answer.held is not None:
         return []
-    preferred, *_ = projection_modes(answer.mechanism, request.hold, request.rotation_length)
+    preferred, *_ = projection_modes(model_of(answer.mechanism).path_closure, request.hold, request.rotation_length)
     if preferred.hold == HOLD_NOTHING:
         return []
     free_part = "position" if request.hold == "orientation" else "orientation"
@@ -75,7 +76,7 @@ def why_without_limits(answer: Answer) -> str:
         return task_remark(answer.mechanism)
     inside, outside = missed(answer)
     phrases = []
-    if inside and are_stretched(answer.mechanism, answer._coordinates).any():
+    if inside and are_stretched(model_of(answer.mechanism), answer._coordinates).any():
         phrases.append(STRETCHED)
     if outside:
         phrases.append(NO_FREEDOM)
@@ -94,7 +95,7 @@ def missed(answer: Answer) -> tuple[bool, bool]:
     offset = (request.targets[0] - answer.pose)[:3, 3][axes]
     offset = offset / (np.abs(offset).max(initial=0.0) or 1.0)  # so that no square is too large
     q = answer._coordinates
-    motions = np.hstack(list(forward_map(mechanism, np.concatenate([0.0 * q, q]))[:, :3][:, axes]))
+    motions = np.hstack(list(forward_map(model_of(mechanism), np.concatenate([0.0 * q, q]))[:, :3][:, axes]))
     along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
     least = TOLERANCES.alignment * float(np.linalg.norm(offset))
     return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)

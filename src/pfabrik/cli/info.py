@@ -14,10 +14,10 @@ import click
 import pfabrik as pf
 
 from ..answers.aligned_text import aligned
-from ..decomposition.leg_table import leg_table, legs_answer
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
+from ..model import model_of
 from ..tolerances import TOLERANCES
 from .mech import MECH, load
 
@@ -195,13 +195,13 @@ def chain_table(mechanism: Mechanism) -> str:
 
 def shown_engine(mechanism: Mechanism) -> str:
     """The engine that answers first."""
-    return "legs" if legs_answer(mechanism) else "closure"
+    return "legs" if model_of(mechanism).has_legs else "closure"
 
 
 def why(mechanism: Mechanism) -> str:
     """Why an engine answers for a mechanism."""
-    reason = leg_table(mechanism)
-    return f"no closed forms: {reason}" if isinstance(reason, str) else "closed forms; closure where they do not reach"
+    reason = model_of(mechanism).why_no_legs
+    return f"no closed forms: {reason}" if reason else "closed forms; closure where they do not reach"
 
 
 def parallelogram_tables(mechanism: Mechanism) -> list[str]:

@@ -117,11 +117,11 @@ def workspace(
 
 def note_slow(mechanism: Mechanism) -> None:
     """Say at once that it takes longer where no closed forms answer, and why."""
-    from ..decomposition.leg_table import LegTable, table_of_poses
+    from ..model import model_of
 
-    table = table_of_poses(mechanism)
-    if not isinstance(table, LegTable):
-        complain(f"note: no closed forms, {table}: points are tried one by one, for about a minute")
+    reason = model_of(mechanism).why_poses_do_not_suffice
+    if reason:
+        complain(f"note: no closed forms, {reason}: points are tried one by one, for about a minute")
 
 
 def told_in_lines() -> OnProgress:

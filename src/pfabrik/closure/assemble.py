@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
 from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..description.mechanism import Mechanism
+from ..batch import put
+from ..derived import derived
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
+from ..motion.closure import Closure
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
-from .close import CLOSED, Closing, Closure, close, closure_of, platform_poses
+from .close import CLOSED, Closing, close, platform_poses
 from .configurations import Configurations
 from .descend import MOST_STEPS, nearest_actuators
 from .effort import descents_within
@@ -43,7 +44,7 @@ LONGEST_SEARCH = 3.0
 """Largest change of an actuator value, if the target values are too far for a search to converge [L or rad]."""
 
 
-def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, has_start: bool) -> Closing:
+def assemble(closure: Closure, coordinates: Floats, values: Floats, *, has_start: bool) -> Closing:
     """Close the loops at actuated values (n, n_a), or at the nearest feasible values that a local search finds.
 
     First Newton's method with the actuators locked; then continuation of the actuators to their values; then random
@@ -59,10 +60,10 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, has_s
     -------
     Closing : judge by `feasible`, and by `actuator_errors`.
     """
-    closure, poses = closure_of(mechanism), platform_poses(mechanism, coordinates)
+    poses = platform_poses(closure.mechanism, coordinates)
     best = _locked(closure, coordinates, poses, values)
     if not best.feasible.all():
-        attempts = [] if is_over_determined(mechanism) else [_continue_to]
+        attempts = [] if is_over_determined(closure) else [_continue_to]
         for attempt in attempts if has_start else [*attempts, _from_random_starts]:
             unsolved = np.flatnonzero(~best.feasible)
             if len(unsolved):
@@ -75,7 +76,7 @@ def assemble(mechanism: Mechanism, coordinates: Floats, values: Floats, *, has_s
     _project(closure, best, unsolved, (coordinates[unsolved], poses[unsolved]), values[unsolved], has_start)
     if has_start:
         errors = np.abs(actuator_errors(closure, best.coordinates[unsolved], values[unsolved])).max(axis=1, initial=0.0)
-        near = NOISE if is_over_determined(mechanism) else NEAR
+        near = NOISE if is_over_determined(closure) else NEAR
         missed = unsolved[was_open & ((errors > near) | ~best.feasible[unsolved])]
         if len(missed):
             _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
@@ -91,15 +92,15 @@ def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp],
         scattered = _from_random_starts(closure, home[0][unsolved], poses[unsolved], values[unsolved])
         solutions.put_better(unsolved, scattered)
     reached = np.flatnonzero(solutions.feasible)
-    best.put(rows[reached], solutions, reached)
+    put(best, rows[reached], solutions, reached)
 
 
-@lru_cache(maxsize=64)
-def is_over_determined(mechanism: Mechanism) -> bool:
+@derived
+def is_over_determined(closure: Closure) -> bool:
     """True if there are more actuators than motions, so that most values contradict each other; False without loops."""
-    if len(closure_of(mechanism).loops.paths) <= 2:
+    if len(closure.loops.paths) <= 2:
         return False
-    counted = generic_of(mechanism).mobility
+    counted = generic_of(closure.mechanism).mobility
     return counted.actuators > counted.mobility - counted.idle
 
 
@@ -129,7 +130,7 @@ def _from_random_starts(closure: Closure, coordinates: Floats, poses: Floats, va
         is_equal = np.abs(infeasibility - least) <= SAME * least
         better = np.flatnonzero(np.where(is_equal, distances < nearest, infeasibility < least))
         least[better], nearest[better] = infeasibility[better], distances[better]
-        best.put(better, trial, better)
+        put(best, better, trial, better)
     return best
 
 
@@ -176,7 +177,7 @@ def _project(
         trial = nearest_actuators(closure, start[0][pending], start[1][pending], clipped, steps)
         _put_nearer(closure, solutions, distances, pending, trial, values)
     feasible = np.flatnonzero(solutions.feasible)
-    best.put(rows[feasible], solutions, feasible)
+    put(best, rows[feasible], solutions, feasible)
 
 
 def _newton_ends(closure: Closure, values: Floats) -> Iterator[tuple[Floats, Floats]]:
@@ -193,7 +194,7 @@ def _put_nearer(
     errors = np.linalg.norm(actuator_errors(closure, trial.coordinates, values[rows]), axis=1)
     better = np.flatnonzero(trial.feasible & (errors < (1.0 - SAME) * distances[rows]))
     distances[rows[better]] = errors[better]
-    best.put(rows[better], trial, better)
+    put(best, rows[better], trial, better)
 
 
 def _clip_values(closure: Closure, coordinates: Floats, values: Floats) -> Floats:
@@ -210,10 +211,10 @@ def actuator_errors(closure: Closure, coordinates: Floats, values: Floats) -> Fl
 
 
 def forward_answers(
-    mechanism: Mechanism, configurations: Configurations, closing: Closing, values: Floats, tolerance: float
+    closure: Closure, configurations: Configurations, closing: Closing, values: Floats, tolerance: float
 ) -> Configurations:
     """Set status and actuator error of configurations that answer actuated values (n, n_a); the same object."""
-    error = np.abs(actuator_errors(closure_of(mechanism), closing.coordinates, values)).max(axis=1, initial=0.0)
+    error = np.abs(actuator_errors(closure, closing.coordinates, values)).max(axis=1, initial=0.0)
     configurations.rows.measures[:, ACTUATOR_ERROR] = error
     has_values, feasible = error <= tolerance, closing.feasible
     infeasible_status = np.where((closing.gap <= TOLERANCES.position) & has_values, EXCEEDED, FAILED)

@@ -7,22 +7,24 @@ with the reaching engine, so that each can check the other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
+from ..batch import put, take
+from ..derived import derived
 from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
 from ..kernels.closure import loops as K
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
+from ..model import Model
+from ..motion.closure import Closure
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
-from .loops import loops_of
 
 if TYPE_CHECKING:
     from ..kernels.closure.close import ClosingScratch
@@ -34,89 +36,13 @@ CLOSED = 0.3 * TOLERANCES.position
 """Gap up to which a path counts as closed [L or rad]: a loop consists of two paths, whose gaps add up."""
 
 
-@dataclass(frozen=True)
-class Closure:
-    """A mechanism compiled for the closure kernel.
-
-    Attributes
-    ----------
-    loops : the table of loops that kernels read.
-    scale : factor that makes a coordinate dimensionless: 1 / L for lengths, 1 for angles, (columns,).
-    turning : 1 for angles, 0 for lengths, (columns,).
-    last_balls : columns of ball joints at the platform, each at the end of a path that shares no joint.
-    actuated, home : columns of the actuators, and their values at home, (n_a,).
-    driven : columns of actuators and locked joints, which stay fixed in forward kinematics.
-    whole : with all loops of the mechanism; see `closure_of`.
-    """
-
-    mechanism: Mechanism
-    loops: K.Loops
-    scale: Floats
-    turning: Floats
-    actuated: Ints
-    driven: frozenset[int]
-    last_balls: frozenset[int]
-    home: Floats
-    whole: bool
-
-    @property
-    def idle(self) -> Mask:
-        """Mask of coordinates on no path, such as a tool's hinge: they do not move, and only their limits matter."""
-        idle = np.ones(len(self.scale), bool)
-        idle[self.loops.row_columns] = False
-        return idle
-
-    @cached_property
-    def cubes(self) -> float:
-        """Sum over groups of the cubed number of coordinates, at least 1: the cost of one closing step."""
-        on_paths = self.loops.group_of[~self.idle]
-        return float(max(1.0, (np.bincount(on_paths).astype(float) ** 3).sum()))
-
-    def actuators(self, coordinates: Floats) -> Floats:
-        """The actuated values (n, n_a) in coordinates (n, columns) [length or rad]."""
-        return np.asarray(coordinates[:, self.actuated] + self.home)
-
-    def put_actuators(self, coordinates: Floats, values: Floats) -> None:
-        """Write actuated values (n, n_a), and zero for locked joints, into coordinates (n, columns)."""
-        coordinates[:, list(self.driven)] = 0.0
-        coordinates[:, self.actuated] = values - self.home
-
-    @cached_property
-    def machine(self) -> Handle[K.Loops]:
-        """The handle by which kernels open the loops."""
-        return Handle(self.loops)
-
-
-@lru_cache(maxsize=64)
-def closure_of(mechanism: Mechanism, whole: bool = True) -> Closure:
-    """Compile a mechanism for the closure kernel.
-
-    Parameters
-    ----------
-    whole : with all loops; else with those on paths to the end effector only, the joints of other loops (a gripper's)
-        being idle.
-    """
-    loops = loops_of(mechanism, whole=whole)
-    turning = np.array([float(coordinate.kind == "angle") for coordinate in mechanism.coordinates])
-    scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
-    actuated = np.array([drive.column for drive in mechanism.drives], np.int64)
-    home = np.array([drive.home for drive in mechanism.drives])
-    ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
-    balls = frozenset((ending[:, None] + np.arange(3)).ravel().tolist())
-    locked = [coordinate.column for coordinate in mechanism.coordinates if coordinate.joint.is_rigid]
-    driven = frozenset([*actuated.tolist(), *locked])
-    return Closure(mechanism, loops, scale, turning, actuated, driven, balls, home, whole)
-
-
-@lru_cache(maxsize=256)
-def _locking(
-    mechanism: Mechanism, whole: bool, locked: frozenset[int]
-) -> tuple[Handle[K.Layout], Scratch[ClosingScratch]]:
+@derived
+def _locking(closure: Closure, locked: frozenset[int]) -> tuple[Handle[K.Layout], Scratch[ClosingScratch]]:
     """The layout with the coordinates of some columns locked, and scratch memory to close loops in it."""
     from ..kernels.closure.close import new_closing_scratch
 
-    loops = closure_of(mechanism, whole).loops
-    free = column_moves(mechanism) > 0.0
+    loops = closure.loops
+    free = column_moves(closure.mechanism) > 0.0
     free[list(locked)] = False
     slots = np.full(len(free), -1)
     sizes = np.zeros(len(loops.groups) - 1, np.int64)
@@ -178,12 +104,7 @@ class Closing(NamedTuple):
     def put_better(self, places: NDArray[np.intp], trial: Closing) -> None:
         """Write the rows of a trial that are feasible, or less infeasible, at these places."""
         better = np.flatnonzero(trial.feasible | (trial.off.max(axis=1) < self.off[places].max(axis=1)))
-        self.put(places[better], trial, better)
-
-    def put(self, places: NDArray[np.intp], source: Closing, rows: Any = slice(None)) -> None:
-        """Write rows of another closing at these places."""
-        for array, source_array in zip(self, source, strict=True):
-            array[places] = source_array[rows]
+        put(self, places[better], trial, better)
 
 
 def close(
@@ -249,9 +170,9 @@ def closing_of(closure: Closure, closed: K.Closed) -> Closing:
     return Closing(closed.coordinates / closure.scale, poses, *closed[2:])
 
 
-def measure_configurations(mechanism: Mechanism, coordinates: Floats) -> Closing:
+def measure_configurations(model: Model, coordinates: Floats) -> Closing:
     """Measure loop gaps and limit excesses at joint coordinates (n, columns), deviations from home."""
-    return close(closure_of(mechanism), coordinates, platform_poses(mechanism, coordinates), max_iterations=0)
+    return close(model.closure, coordinates, platform_poses(model.mechanism, coordinates), max_iterations=0)
 
 
 ROWS_A_BLOCK = 64
@@ -262,11 +183,11 @@ def _run(closure: Closure, locked: frozenset[int], problem: K.ClosureProblem, cl
     from ..kernels.closure.close import close as close_rows
 
     machine = closure.machine.address
-    layout, scratch = _locking(closure.mechanism, closure.whole, locked)
+    layout, scratch = _locking(closure, locked)
 
     def run(block: slice) -> None:
         part = problem._replace(centres=problem.centres[block])
-        close_rows(machine, layout.address, scratch.address, part, K.Closed._make(array[block] for array in closed))
+        close_rows(machine, layout.address, scratch.address, part, take(closed, block))
 
     n = len(closed.poses)
     if n <= ROWS_A_BLOCK:

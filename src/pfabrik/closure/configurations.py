@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism
+from ..batch import put, take
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
-from .close import Closing, Closure, closure_of
+from ..model import Model
+from ..motion.closure import Closure
+from .close import Closing
 
 Places: TypeAlias = NDArray[np.intp] | slice
 """Indices of rows of a batch."""
@@ -24,28 +26,17 @@ STEPS_A_REPORT = 16
 """Steps along a path between two reports of progress."""
 
 
-def new_rows(mechanism: Mechanism, n: int) -> Rows:
+def new_rows(model: Model, n: int) -> Rows:
     """Allocate n results.
 
     All but the actuators, which callers keep, share one block of memory: allocators retain about as much as was freed
     at once, and requesting more, page by page, takes longer than solving.
     """
-    block, actuators = np.empty((25, n)), np.empty((n, len(mechanism.actuator_names)))
+    block, actuators = np.empty((25, n)), np.empty((n, len(model.mechanism.actuator_names)))
     block[16:] = 0.0
     counters, status = block[21:24].view(np.int64).reshape(n, N_COUNTERS), block[24].view(np.int64)
     status[:] = PENDING
     return Rows(status, counters, block[:16].reshape(n, 4, 4), actuators, block[16:21].reshape(n, 5))
-
-
-def rows_at(rows: Rows, places: Any) -> Rows:
-    """The rows at some places: an integer array (copied), a mask (copied) or a slice (shared)."""
-    return Rows._make(array[places] for array in rows)
-
-
-def put_rows(rows: Rows, places: Any, source: Rows) -> None:
-    """Write rows at some places."""
-    for array, source_array in zip(rows, source, strict=True):
-        array[places] = source_array
 
 
 def steps_of(is_valid: Mask, on_progress: Callable[[int, int], None] | None) -> Iterator[int]:
@@ -111,21 +102,21 @@ class Configurations:
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""
-        rows = Rows._make(np.ascontiguousarray(array[places]) for array in self.rows)
+        rows = take(self.rows, places)
         if self.were_given:
             return Configurations(rows, self.coordinates[places])
         return Configurations(rows, lambda selected: self.coordinates_at(places[selected]))
 
     def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
         """A copy with other configurations at some places."""
-        rows, coordinates = rows_at(self.rows, np.arange(len(self))), self.coordinates.copy()
-        put_rows(rows, places, source.rows)
+        rows, coordinates = take(self.rows, np.arange(len(self))), self.coordinates.copy()
+        put(rows, places, source.rows)
         coordinates[places] = source.coordinates
         return Configurations(rows, coordinates)
 
     def put(self, places: NDArray[np.intp], source: Configurations, rows: Mask) -> None:
         """Write some rows of other configurations at some places."""
-        put_rows(self.rows, places, rows_at(source.rows, rows))
+        put(self.rows, places, take(source.rows, rows))
         if self.were_given:
             self.coordinates[places] = source.coordinates[rows]
 
@@ -136,7 +127,7 @@ class Configurations:
         n = len(mask)
         rows = Rows._make(_blank(array, n) for array in self.rows)
         rows.status[:] = INVALID
-        put_rows(rows, mask, self.rows)
+        put(rows, mask, self.rows)
         coordinates = _blank(self.coordinates, n)
         coordinates[mask] = self.coordinates
         return Configurations(rows, coordinates)
@@ -147,12 +138,12 @@ def _blank(array: NDArray[Any], n: int) -> NDArray[Any]:
     return np.full((n, *array.shape[1:]), np.nan if array.dtype.kind == "f" else 0, array.dtype)
 
 
-def joint_coordinates(mechanism: Mechanism, start: Configurations | None) -> Floats:
+def joint_coordinates(model: Model, start: Configurations | None) -> Floats:
     """Joint coordinates of the start, (n, columns) or (1, columns), as deviations from home; zero without a start."""
-    return np.zeros((1, len(closure_of(mechanism).scale))) if start is None else start.coordinates
+    return np.zeros((1, len(model.mechanism.coordinates))) if start is None else start.coordinates
 
 
-def coordinates_for(mechanism: Mechanism, start: Configurations | None, n: int) -> Floats:
+def coordinates_for(model: Model, start: Configurations | None, n: int) -> Floats:
     """A copy of the joint coordinates of the start, one row for each of n targets, (n, columns)."""
-    coordinates = joint_coordinates(mechanism, start)
+    coordinates = joint_coordinates(model, start)
     return np.repeat(coordinates, 1 if start is not None and len(start) > 1 else n, axis=0)

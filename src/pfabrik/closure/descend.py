@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Floats
+from ..batch import take
+from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObjective
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
+from ..motion.closure import Closure
 from ..tolerances import TOLERANCES
-from .close import EVERYTHING_FREE, Closing, Closure, close, closing_of, closure_of, new_closed
+from .close import EVERYTHING_FREE, Closing, close, closing_of, new_closed
 from .effort import steps_within
 
 if TYPE_CHECKING:
@@ -106,11 +108,11 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
     from ..kernels.closure.descend import nearest_configuration
 
     closed = new_closed(closure, coordinates, np.tile(np.eye(4), (len(coordinates), 1, 1)), 0.0)
-    scratch = _scratch(closure.mechanism, closure.whole)
+    scratch = _scratch(closure)
     multipliers = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
 
     def run(block: slice) -> None:
-        results = Closed._make(array[block] for array in closed)
+        results = take(closed, block)
         pose = objective.pose._replace(targets=objective.pose.targets[block])
         part = objective._replace(pose=pose, anchors=objective.anchors[block])
         nearest_configuration(closure.machine.address, scratch.address, part, results, multipliers[block])
@@ -119,11 +121,11 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
     return closed, multipliers
 
 
-@lru_cache(maxsize=64)
-def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[DescentScratch]:
+@derived
+def _scratch(closure: Closure) -> Scratch[DescentScratch]:
     from ..kernels.closure.linearise_loops import new_descent_scratch
 
-    return Scratch(new_descent_scratch, closure_of(mechanism, whole).loops)
+    return Scratch(new_descent_scratch, closure.loops)
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .close import Closure
+from ..motion.closure import Closure
 
 CLOSING = 5e9
 """Operations of all random starts together: a closing step takes the sum over groups of the cubed number of

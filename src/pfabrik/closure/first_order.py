@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism
+from ..batch import take
+from ..derived import derived
 from ..kernels.closure.loops import FirstOrder, FirstOrderPlan
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
+from ..model import Model
 from ..motion.displacements import rate_units
 from ..motion.joint_rates import actuated_columns, graph_of
 from ..motion.mobility import generic_of
 from ..motion.singularities import KINDS, Singularity, measures, singularity_of
 from ..tolerances import TOLERANCES
-from .close import closure_of
 
 if TYPE_CHECKING:
     from ..kernels.closure.first_order import Tables
@@ -25,43 +25,43 @@ if TYPE_CHECKING:
 ROWS_A_BLOCK = 64
 
 
-def forward_map(mechanism: Mechanism, q: Floats) -> Floats:
+def forward_map(model: Model, q: Floats) -> Floats:
     """Twists per actuator rate at coordinates q, (n, c): (n, 6, n_a) or (n, 3, n_a); NaN where q is."""
-    twists, actuators = units_of(mechanism)
-    return np.asarray(twists[:, None] * _first_order(mechanism, q, whole=False).forward / actuators)
+    twists, actuators = units_of(model)
+    return np.asarray(twists[:, None] * _first_order(model, q, whole=False).forward / actuators)
 
 
-def inverse_map(mechanism: Mechanism, q: Floats) -> Floats:
+def inverse_map(model: Model, q: Floats) -> Floats:
     """Actuator rates per twist at coordinates q, (n, c): (n, n_a, 6) or (n, n_a, 3); NaN where q is."""
-    twists, actuators = units_of(mechanism)
-    return np.asarray(actuators[:, None] * _first_order(mechanism, q, whole=False).inverse / twists)
+    twists, actuators = units_of(model)
+    return np.asarray(actuators[:, None] * _first_order(model, q, whole=False).inverse / twists)
 
 
-def singularities(mechanism: Mechanism, q: Floats) -> Singularity:
+def singularities(model: Model, q: Floats) -> Singularity:
     """How near coordinates q, (n, c), are to singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples.
 
     In a singularity, or next to one, what is lost and gained takes all singular vectors: NumPy finds them there.
     """
-    found = _first_order(mechanism, q, whole=True)
+    found = _first_order(model, q, whole=True)
     near = np.flatnonzero(found.measures.min(axis=1) < TOLERANCES.singular)
     if len(near):
-        exactly = measures(mechanism, q[near])
+        exactly = measures(model.mechanism, q[near])
         found.measures[near] = np.stack([getattr(exactly, kind) for kind in KINDS], axis=1)
         found.lost[near], found.gained[near] = exactly.lost, exactly.gained
     return singularity_of(found.measures, found.lost, found.gained)
 
 
-def are_stretched(mechanism: Mechanism, q: Floats) -> Mask:
+def are_stretched(model: Model, q: Floats) -> Mask:
     """Whether links are stretched out or folded at coordinates q (n, c), so that they may bend either way, (n,)."""
-    found = singularities(mechanism, q)
+    found = singularities(model, q)
     return np.asarray(np.minimum(found.serial, found.passive) < TOLERANCES.stretched)
 
 
-def _first_order(mechanism: Mechanism, q: Floats, *, whole: bool) -> FirstOrder:
+def _first_order(model: Model, q: Floats, *, whole: bool) -> FirstOrder:
     """What the kernel tells of coordinates q, (n, c), lengths in L; `whole`: the constraint measure too."""
     from ..kernels.closure.first_order import first_order
 
-    closure, plan = closure_of(mechanism), _plan(mechanism, whole)
+    closure, plan = model.closure, _plan(model, whole)
     n, coordinates = len(q), q * closure.scale
     twists, actuators = plan.twists, len(plan.actuated)
     found = FirstOrder(
@@ -71,25 +71,26 @@ def _first_order(mechanism: Mechanism, q: Floats, *, whole: bool) -> FirstOrder:
         np.empty((n, twists)),
         np.empty((n, twists)),
     )
-    scratch = _scratch(mechanism, whole)
+    scratch = _scratch(model, whole)
 
     def run(block: slice) -> None:
-        own = FirstOrder._make(each[block] for each in found)
+        own = take(found, block)
         first_order(closure.machine.address, scratch.address, plan, coordinates[block], own)
 
     in_blocks(run, n, ROWS_A_BLOCK)
     return found
 
 
-@lru_cache(maxsize=128)
-def _scratch(mechanism: Mechanism, whole: bool) -> Scratch[Tables]:
+@derived
+def _scratch(model: Model, whole: bool) -> Scratch[Tables]:
     from ..kernels.closure.first_order import new_tables
 
-    return Scratch(new_tables, closure_of(mechanism).loops, _plan(mechanism, whole))
+    return Scratch(new_tables, model.closure.loops, _plan(model, whole))
 
 
-@lru_cache(maxsize=128)
-def _plan(mechanism: Mechanism, whole: bool) -> FirstOrderPlan:
+@derived
+def _plan(model: Model, whole: bool) -> FirstOrderPlan:
+    mechanism = model.mechanism
     graph, generic = graph_of(mechanism), generic_of(mechanism)
     counts = generic.mobility
     return FirstOrderPlan(
@@ -106,9 +107,10 @@ def _plan(mechanism: Mechanism, whole: bool) -> FirstOrderPlan:
     )
 
 
-@lru_cache(maxsize=64)
-def units_of(mechanism: Mechanism) -> tuple[Floats, Floats]:
+@derived
+def units_of(model: Model) -> tuple[Floats, Floats]:
     """What one stands for in a twist, (r,), and in actuator rates, (n_a,): L for a length, 1 for an angle."""
+    mechanism = model.mechanism
     twists = np.ones(3 if mechanism.end_effector_is_joint else 6)
     twists[:3] = mechanism.characteristic_length
     return twists, rate_units(mechanism)[actuated_columns(mechanism)]

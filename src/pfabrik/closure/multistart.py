@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from ..arrays import Floats
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES
+from ..motion.closure import Closure
 from ..poses import pose
 from ..tolerances import TOLERANCES
-from .close import EVERYTHING_FREE, close, closure_of
+from .close import EVERYTHING_FREE, close
 from .descend import MOST_STEPS, nearest_configurations
 from .effort import descents_within, starts_within
 from .parasitic import differences, follows_task, has_parasitic_motion
@@ -25,14 +23,14 @@ SEEDS, RANDOM_STARTS, RANDOM_STEPS = 8, 128, 20
 """Most seeds; random configurations that are closed to find them; about as many steps are spent on each."""
 
 
-@lru_cache(maxsize=64)
-def seeds_of(mechanism: Mechanism) -> tuple[Floats, ...]:
+@derived
+def seeds_of(closure: Closure) -> tuple[Floats, ...]:
     """Feasible configurations far from home and from each other, as joint coordinates (columns,).
 
     They are chosen from the configurations nearest to poses in four directions from home, and from random ones, which
     may lie in components of the workspace that are not connected with home.
     """
-    closure = closure_of(mechanism, whole=False)
+    mechanism = closure.mechanism
     directions = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)]) / np.sqrt(3.0)
     offsets = SEED_DISTANCE * mechanism.characteristic_length * directions
     poses = [
@@ -44,7 +42,7 @@ def seeds_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     _, steps = descents_within(closure, SEEDS, MOST_STEPS)
     platform = (1.0, 1.0, 1.0, turning, turning, turning)
     nearest = nearest_configurations(closure, home, np.array(poses), platform=platform, steps=max(steps, 1))
-    coordinates, candidate_poses = random_feasible(mechanism)
+    coordinates, candidate_poses = random_feasible(closure)
     is_feasible = nearest.feasible
     coordinates = np.concatenate([home[:1], nearest.coordinates[is_feasible], coordinates])
     candidate_poses = np.concatenate([mechanism.home_pose[None], nearest.poses[is_feasible], candidate_poses])
@@ -57,17 +55,17 @@ def seeds_of(mechanism: Mechanism) -> tuple[Floats, ...]:
     return tuple(coordinates[chosen[1:]])
 
 
-@lru_cache(maxsize=64)
-def random_feasible(mechanism: Mechanism) -> tuple[Floats, Floats]:
+@derived
+def random_feasible(closure: Closure) -> tuple[Floats, Floats]:
     """Random feasible configurations: joint coordinates (k, columns), and poses (k, 4, 4).
 
     If what the task leaves out of a pose never changes, it is that of home.
     """
-    closure, task = closure_of(mechanism, whole=False), task_of(mechanism)
+    mechanism, task = closure.mechanism, closure.task
     n = starts_within(closure, RANDOM_STARTS, RANDOM_STEPS)
     coordinates, poses = random_starts(closure, n, np.random.default_rng(0))
     left_out = task.left_out
-    is_fixed = follows_task(mechanism) and not has_parasitic_motion(mechanism)
+    is_fixed = follows_task(closure) and not has_parasitic_motion(closure)
     if is_fixed:
         poses = task.completed(poses, np.repeat(mechanism.home_pose[None], n, axis=0))
     platform, frame = (left_out.held, left_out.frame) if is_fixed else (EVERYTHING_FREE, BASE_AXES)

@@ -2,74 +2,72 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..derived import derived
+from ..motion.closure import Closure
 from ..motion.mobility import generic_of
 from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
-from .close import Closure, closure_of, platform_poses
+from .close import platform_poses
 
 
-@lru_cache(maxsize=64)
-def follows_task(mechanism: Mechanism) -> bool:
+@derived
+def follows_task(closure: Closure) -> bool:
     """True if the mechanism determines every component of a pose that the task leaves out.
 
     It then has no freedom beside the task, and a target has one pose per assembly mode. Freedoms are counted at generic
     configurations, as home may be singular. False for a whole-pose task or a joint end effector, which has no rotation.
     """
-    if mechanism.end_effector_is_joint or task_of(mechanism).is_whole_pose:
+    if closure.mechanism.end_effector_is_joint or closure.task.is_whole_pose:
         return False
-    return generic_of(mechanism).mobility.platform <= _asked(mechanism)
+    return generic_of(closure.mechanism).mobility.platform <= _n_set(closure)
 
 
-def asks_too_much(mechanism: Mechanism) -> bool:
+def asks_too_much(closure: Closure) -> bool:
     """True if the task sets more components than the end effector has freedoms: hardly any target is reachable."""
-    return generic_of(mechanism).mobility.platform < _asked(mechanism)
+    return generic_of(closure.mechanism).mobility.platform < _n_set(closure)
 
 
-def has_other_assemblies(mechanism: Mechanism) -> bool:
+def has_other_assemblies(closure: Closure) -> bool:
     """True if assembly modes reach different targets, so that a target missed in one must be tried in the others.
 
     False if the components left out never change: a position, such as the height of a planar machine, or the rest of
     the rotation of a platform that does not rotate.
     """
-    if not (follows_task(mechanism) and asks_too_much(mechanism)):
+    if not (follows_task(closure) and asks_too_much(closure)):
         return False
-    turns = bool((np.abs(generic_of(mechanism).directions[3:]) > TOLERANCES.alignment).any())
-    return (turns and task_of(mechanism).rotations in (1, 2)) or has_parasitic_motion(mechanism)
+    turns = bool((np.abs(generic_of(closure.mechanism).directions[3:]) > TOLERANCES.alignment).any())
+    return (turns and closure.task.rotations in (1, 2)) or has_parasitic_motion(closure)
 
 
-def _asked(mechanism: Mechanism) -> int:
+def _n_set(closure: Closure) -> int:
     """Number of components of a pose that the task sets."""
-    task = task_of(mechanism)
-    return sum(task.axes) + task.rotations
+    return sum(closure.task.axes) + closure.task.rotations
 
 
-@lru_cache(maxsize=64)
-def has_parasitic_motion(mechanism: Mechanism) -> bool:
+@derived
+def has_parasitic_motion(closure: Closure) -> bool:
     """True if the components of a pose that the task leaves out vary as the mechanism moves about home.
 
     False if, for instance, parallelograms keep the orientation. A platform that has flipped over on its rods is then no
     answer, although its loops close.
     """
+    mechanism = closure.mechanism
     poses = platform_poses(mechanism, around_home(mechanism))
     home = np.repeat(mechanism.home_pose[None], len(poses), axis=0)
-    kept = task_of(mechanism).completed(poses, home)
-    return bool((differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode).any())
+    kept = closure.task.completed(poses, home)
+    return bool((differences(closure, poses, kept) > TOLERANCES.same_mode).any())
 
 
-def is_flipped(mechanism: Mechanism, poses: Floats) -> Mask:
+def is_flipped(closure: Closure, poses: Floats) -> Mask:
     """Mask of poses (n, 4, 4) with a flipped platform, for legs that keep its orientation about home, (n,)."""
-    if not follows_task(mechanism) or has_parasitic_motion(mechanism):
+    if not follows_task(closure) or has_parasitic_motion(closure):
         return np.zeros(len(poses), bool)
-    home = np.repeat(mechanism.home_pose[None], len(poses), axis=0)
-    kept = task_of(mechanism).completed(poses, home)
-    return np.asarray(differences(closure_of(mechanism), poses, kept) > TOLERANCES.same_mode)
+    home = np.repeat(closure.mechanism.home_pose[None], len(poses), axis=0)
+    kept = closure.task.completed(poses, home)
+    return np.asarray(differences(closure, poses, kept) > TOLERANCES.same_mode)
 
 
 def differences(closure: Closure, poses: Floats, other_poses: Floats) -> Floats:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
-from ..description.mechanism import Mechanism
-from ..description.task import Weights, task_of
+from ..batch import put
+from ..derived import derived
+from ..description.task import Weights
 from ..kernels.closure.loops import LOCKED
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
+from ..motion.closure import Closure
 from ..motion.displacements import displacements
 from ..tolerances import TOLERANCES
-from .close import Closing, Closure, close, closure_of, platform_poses
+from .close import Closing, close, platform_poses
 from .descend import MOST_STEPS, limit_multipliers, nearest_configurations
 from .effort import descents_within
 from .multistart import SEEDS, seeds_of
@@ -55,7 +56,7 @@ class ProjectionMode(NamedTuple):
 
     def distances(self, closure: Closure, poses: Floats, targets: Floats) -> Floats:
         """Weighted distances of poses (n, 4, 4) from targets, (n,) [L]; held components do not count."""
-        position, rotation = task_of(closure.mechanism).errors(poses, targets)
+        position, rotation = closure.task.errors(poses, targets)
         turning = np.sqrt(max((weight for weight in self.weights[3:] if weight != LOCKED), default=0.0))
         return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
 
@@ -65,7 +66,7 @@ class ProjectionMode(NamedTuple):
         That is d > d0 + e0, where d and d0 are the distances of the answer and of the start (n, 4, 4) in components
         that are not held, and e0 is the error of the start in those that are.
         """
-        position, rotation = task_of(closure.mechanism).errors(starts, targets)
+        position, rotation = closure.task.errors(starts, targets)
         position = position / closure.mechanism.characteristic_length
         held_error = rotation if self.hold == HOLD_ORIENTATION else position
         allowed = self.distances(closure, starts, targets) + HOLD_COST * held_error
@@ -80,12 +81,10 @@ class Projected(NamedTuple):
     holds: Ints
 
 
-@lru_cache(maxsize=256)
-def projection_modes(
-    mechanism: Mechanism, hold: str | None, rotation_length: float | None
-) -> tuple[ProjectionMode, ...]:
+@derived
+def projection_modes(closure: Closure, hold: str | None, rotation_length: float | None) -> tuple[ProjectionMode, ...]:
     """The projection modes in the order in which they are tried: first with the held part, then with nothing held."""
-    task = task_of(mechanism)
+    task, mechanism = closure.task, closure.mechanism
     turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
     free = ProjectionMode(task.weights(1.0, turning), HOLD_NOTHING)
     if hold is None or not any(task.axes) or task.rotations == 0:
@@ -96,20 +95,19 @@ def projection_modes(
 
 
 def projection_multipliers(
-    mechanism: Mechanism, coordinates: Floats, targets: Floats, projection: ProjectionMode
+    closure: Closure, coordinates: Floats, targets: Floats, projection: ProjectionMode
 ) -> Floats:
     """Multipliers of all limits, as of `limit_multipliers`, at projected configurations (n, columns) of targets."""
-    closure, frame = closure_of(mechanism), task_of(mechanism).frame
-    return limit_multipliers(closure, coordinates, targets, platform=projection.weights, frame=frame)
+    return limit_multipliers(closure, coordinates, targets, platform=projection.weights, frame=closure.task.frame)
 
 
-def held_parts(mechanism: Mechanism, holds: Ints, position: Floats, rotation: Floats) -> Ints:
+def held_parts(closure: Closure, holds: Ints, position: Floats, rotation: Floats) -> Ints:
     """The parts of targets that poses really hold, (n,), from their errors [length], [rad]; else HOLD_NOTHING.
 
     An answer to a clipped target may miss the part that it was to hold.
     """
     is_turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
-    is_moved = (holds == HOLD_POSITION) & (position > TOLERANCES.held * mechanism.characteristic_length)
+    is_moved = (holds == HOLD_POSITION) & (position > TOLERANCES.held * closure.mechanism.characteristic_length)
     return np.where(is_turned | is_moved, HOLD_NOTHING, holds)
 
 
@@ -133,11 +131,11 @@ def project(
         stays near its starts.
     has_start : the first start was given: nothing held leads farther away than it is.
     """
-    n, frame = len(targets), task_of(closure.mechanism).frame
+    n, frame = len(targets), closure.task.frame
     best = Projected(close(closure, starts[0], targets, max_iterations=0), np.full(n, np.inf), np.full(n, HOLD_NOTHING))
     count, steps = descents_within(closure, len(starts) + (SEEDS if seeds else 0), MOST_STEPS)
     is_long = count < len(starts) or steps == 0
-    seed_coordinates = seeds_of(closure.mechanism) if seeds and count == len(starts) + SEEDS else ()
+    seed_coordinates = seeds_of(closure) if seeds and count == len(starts) + SEEDS else ()
     if is_long:
         starts = [_nearest_start(closure, targets, starts, projections[-1])]
     all_starts = [*starts, *(np.where(closure.idle, starts[0], seed) for seed in seed_coordinates)]
@@ -204,7 +202,7 @@ def _release_holds(
         closure, targets[far], [start[far] for start in starts], projections[-1:], seeds=False, has_start=True
     )
     is_nearer = released.distances <= (1.0 + SAME) * free.distances(closure, poses[far], targets[far])
-    best.closing.put(far[is_nearer], released.closing, is_nearer)
+    put(best.closing, far[is_nearer], released.closing, is_nearer)
     best.distances[far[is_nearer]] = released.distances[is_nearer]
     best.holds[far[is_nearer]] = released.holds[is_nearer]
 
@@ -219,13 +217,13 @@ def _put_nearer(
     agreements: Ints,
 ) -> Ints:
     """Put the rows of a trial that are feasible and nearer than the best so far; the new agreement counts, (n,)."""
-    is_valid = trial.feasible & ~is_flipped(closure.mechanism, trial.poses)
+    is_valid = trial.feasible & ~is_flipped(closure, trial.poses)
     distances = np.where(is_valid, projection.distances(closure, trial.poses, targets[rows]), np.inf)
     least = best.distances[rows]
     is_better = distances < (1.0 - SAME) * least
     agrees = np.isfinite(distances) & (distances <= (1.0 + SAME) * least)
     best.distances[rows[is_better]], best.holds[rows[is_better]] = distances[is_better], projection.hold
-    best.closing.put(rows[is_better], trial, is_better)
+    put(best.closing, rows[is_better], trial, is_better)
     return np.where(is_better, 1, agreements + agrees)
 
 
@@ -236,7 +234,7 @@ def _move_to_held(closure: Closure, start: Floats, targets: Floats, projection: 
     """
     if LOCKED not in projection.weights:
         return start
-    task = task_of(closure.mechanism)
+    task = closure.task
     begin = displacements(closure.mechanism, start)[closure.mechanism.end_effector_body] @ closure.mechanism.home_pose
     is_held = np.zeros((4, 4), bool)
     is_held[:3, 3], is_held[:3, :3] = np.array(projection.weights[:3]) == LOCKED, LOCKED in projection.weights[3:]

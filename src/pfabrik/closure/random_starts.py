@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays import Floats
+from ..motion.closure import Closure
 from ..motion.displacements import columns
 from ..rotations import from_quaternion, random_quaternions, rotvec_from_quaternion
-from .close import Closure
 
 
 def random_starts(closure: Closure, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from ..arrays import Floats
-from ..description.mechanism import Mechanism
 from ..kernels.rows import PROJECTED, REACHED, Rows
+from ..model import Model
 from ..options import Options
-from .close import closure_of
 from .first_order import are_stretched
 from .parasitic import differences
 from .projection import SAME, projection_modes
@@ -26,16 +25,16 @@ class BentConfiguration:
     coordinates : joint coordinates (1, columns) of the last answer with bent links; None if that is the last answer.
     """
 
-    def __init__(self, mechanism: Mechanism, options: Options) -> None:
-        self._mechanism = mechanism
-        self._projections = projection_modes(mechanism, options.hold, options.rotation_length)
+    def __init__(self, model: Model, options: Options) -> None:
+        self._model = model
+        self._projections = projection_modes(model.path_closure, options.hold, options.rotation_length)
         self.coordinates: Floats | None = None
 
     def update(self, status: int, start: Floats, end: Floats) -> None:
         """Update after a step of the path, from joint coordinates (1, columns) before and after it."""
         if status == REACHED and self.coordinates is None:
             return  # inside the workspace links are hardly ever stretched out, and the check takes time
-        is_stretched = bool(are_stretched(self._mechanism, end)[0])
+        is_stretched = bool(are_stretched(self._model, end)[0])
         self.coordinates = (start if self.coordinates is None else self.coordinates) if is_stretched else None
 
     def is_preferred(self, target: Floats, rows: Rows, bent_rows: Rows) -> bool:
@@ -46,7 +45,7 @@ class BentConfiguration:
         return self._is_same(rows, bent_rows) or self._is_better(target, rows, bent_rows)
 
     def _is_same(self, rows: Rows, bent_rows: Rows) -> bool:
-        apart = differences(closure_of(self._mechanism), bent_rows.poses, rows.poses)[0]
+        apart = differences(self._model.closure, bent_rows.poses, rows.poses)[0]
         return bool(bent_rows.status[0] == rows.status[0] and apart <= SAME_POSE)
 
     def _is_better(self, target: Floats, rows: Rows, bent_rows: Rows) -> bool:
@@ -59,7 +58,7 @@ class BentConfiguration:
         place, bent_place = (holds.index(answer.holds[0]) for answer in (rows, bent_rows))
         if place != bent_place:
             return bent_place < place
-        closure, projection = closure_of(self._mechanism), self._projections[place]
+        closure, projection = self._model.closure, self._projections[place]
         distance, bent_distance = (
             projection.distances(closure, answer.poses, target)[0] for answer in (rows, bent_rows)
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TypeAlias
 
+from ..derived import derived
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
 from .graph_blocks import TIP, Block, blocks_between, graph_of, is_connected, is_tree
@@ -191,7 +191,7 @@ def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
     return reasons or tuple(missing)
 
 
-@lru_cache(maxsize=64)
+@derived
 def positions_express(mechanism: Mechanism) -> bool:
     """True if positions alone express all chains of a mechanism, and its task sets the whole pose."""
     return mechanism.task == mechanism.whole_task and not beyond_positions(mechanism)

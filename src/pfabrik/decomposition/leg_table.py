@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -126,29 +126,13 @@ class LegTable:
         return task
 
 
-@lru_cache(maxsize=64)
-def leg_table(mechanism: Mechanism) -> LegTable | str:
-    """A mechanism's table of legs, or the reason why it has none."""
-    try:
-        return _table(mechanism)
-    except NoLeg as reason:
-        return str(reason)
+def leg_table(mechanism: Mechanism) -> LegTable:
+    """A mechanism's table of legs.
 
-
-def table_of_poses(mechanism: Mechanism) -> LegTable | str:
-    """A mechanism's table of legs, if a pose determines all their coordinates, or the reason why it has none."""
-    table = leg_table(mechanism)
-    if isinstance(table, str) or not table.has_free_redundant:
-        return table
-    return f"poses leave joints {', '.join(table.redundant_joints)} open"
-
-
-def legs_answer(mechanism: Mechanism) -> bool:
-    """True if the mechanism has a table of legs, so that closed forms answer first."""
-    return isinstance(leg_table(mechanism), LegTable)
-
-
-def _table(mechanism: Mechanism) -> LegTable:
+    Raises
+    ------
+    NoLeg : some chain is no leg in closed form; the text says why.
+    """
     forms = _forms(mechanism)
     legs = leg_records(mechanism, forms)
     coordinates = [

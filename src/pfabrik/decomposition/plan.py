@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Floats, Ints, Records
+from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
@@ -47,7 +47,7 @@ class CompiledPlan:
     home_seed: P.Seeds
 
 
-@lru_cache(maxsize=64)
+@derived
 def compile_plan(mechanism: Mechanism) -> CompiledPlan:
     """Compile a mechanism; `UnsupportedMechanism` names each sub-chain that positions cannot express."""
     reasons = beyond_positions(mechanism)

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from heapq import heappop, heappush
 from itertools import chain
 
 import numpy as np
 
 from ..arrays import Floats
+from ..derived import derived
 from ..errors import InvalidArgument
 from .joint_types import KINDS
 from .joints import Joint
@@ -163,7 +163,7 @@ def welded(joints: Sequence[Joint], *kept: str) -> dict[str, str]:
     return stands_for
 
 
-@lru_cache(maxsize=256)
+@derived
 def steps_from_base(mechanism: Structure) -> Mapping[str, int]:
     """Body -> how many joints the shortest way from the base to it has; bodies that cannot be reached are missing."""
     steps = {mechanism.base: 0}

@@ -7,13 +7,13 @@ the twists of its two bodies differ by its own screws only. The null space of th
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats
+from ..derived import derived
 from ..rotations import square_to
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
@@ -194,7 +194,7 @@ def column_joints(mechanism: Structure) -> NDArray[np.intp]:
     return np.repeat(np.arange(len(counts)), counts)
 
 
-@lru_cache(maxsize=64)
+@derived
 def column_moves(mechanism: Structure) -> Floats:
     """1 for every coordinate of the mechanism, 0 for those of locked joints, shape (c,)."""
     moves = np.array([float(not mechanism.joints[owner].is_rigid) for owner in column_joints(mechanism)])

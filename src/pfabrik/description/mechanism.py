@@ -6,12 +6,13 @@ import dataclasses
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
 from ..checks import require_mapping
-from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, counted
+from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
+from ..frozen import FrozenMapping
 from .coercion import items
 from .faults import find_faults, in_order, joint_index, merged
 from .form_faults import joint_faults, shown
@@ -38,6 +39,15 @@ __all__ = [
 
 MOST_JOINTS_FOR_FREEDOM = 200
 """Most joints for which construction counts freedoms: the cost grows with the cube, and reaches a second here."""
+
+
+class _Source(Protocol):
+    """The file that a mechanism was read from."""
+
+    @property
+    def dimensions(self) -> Mapping[str, float]: ...
+
+    def read_with(self, values: Mapping[str, float]) -> Mechanism: ...
 
 
 Limit: TypeAlias = Range | tuple[Range, Range] | Cone | None
@@ -179,6 +189,34 @@ class Mechanism(Structure):
             )
         elif left == 0 and is_held(self):
             yield "the loops hold the end effector at home: it cannot move"
+
+    @property
+    def dimensions(self) -> Mapping[str, float]:
+        """Values of the named dimensions of the file that it was read from, in their order; empty without any.
+
+        A machine made from another one in Python has none: its numbers may no longer follow from them.
+        """
+        source: _Source | None = self.__dict__.get("_source")
+        return FrozenMapping(source.dimensions if source is not None else {})
+
+    def with_dimensions(self, values: Mapping[str, float] | None = None, /, **by_name: float) -> Mechanism:
+        """The machine with other values of some of its dimensions; what the file computes from them follows.
+
+        Parameters
+        ----------
+        values, by_name : dimension name -> value, in the units of the file.
+
+        Raises
+        ------
+        UnknownName : it has no dimension of that name.
+        InvalidMechanism : these values make no mechanism; with every fault, at its place in the file.
+        """
+        source: _Source | None = self.__dict__.get("_source")
+        changed = {**(values or {}), **by_name}
+        for name in changed:
+            if source is None or name not in source.dimensions:
+                raise UnknownName("dimension", name, self.dimensions)
+        return self if source is None else source.read_with(changed)
 
     def with_limits(self, limits: Mapping[str, Limit] | None = None, /, **by_name: Limit) -> Mechanism:
         """A copy with other limits.

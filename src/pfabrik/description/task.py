@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Floats
+from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES
 from ..rotations import angles_between, from_rotvec, shortest_turns, yaws
 from .joint_types import TASK_TURNS
@@ -97,7 +97,7 @@ class Task:
         return np.asarray(angles - 2.0 * np.pi * np.round(angles / (2.0 * np.pi)))
 
 
-@lru_cache(maxsize=256)
+@derived
 def task_of(mechanism: Mechanism) -> Task:
     """A mechanism's task. Of a joint end effector only the position ever counts."""
     asked = mechanism.task

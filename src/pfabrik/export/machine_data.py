@@ -9,10 +9,11 @@ import numpy as np
 from ..arrays import Floats, Record
 from ..decomposition.leg_forms import RedundantJoint, Rod
 from ..decomposition.leg_records import row_counts
-from ..decomposition.leg_table import LegTable, table_of_poses
+from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
+from ..model import model_of
 from ..motion.mobility import generic_of
 from ..rotations import square_to
 
@@ -81,9 +82,12 @@ class Machine:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        table = table_of_poses(mechanism)
-        if not isinstance(table, LegTable):
-            raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {table}"], "exported")
+        model = model_of(mechanism)
+        if model.why_poses_do_not_suffice:
+            raise UnsupportedMechanism(
+                mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"], "exported"
+            )
+        table = model.legs
         self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
         task = table.task[0]
         self.axes, self.rotations, self.unset = task["axes"].tolist(), int(task["rotations"]), int(task["unset"])

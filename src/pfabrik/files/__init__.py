@@ -71,7 +71,8 @@ def loads(text: str, source: str | None = None) -> Mechanism:
 def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism to a file that `load` turns into an equal one.
 
-    The file is replaced as a whole or not at all. Copies and shorthands of a file it came from are not kept.
+    The file is replaced as a whole or not at all. Copies, shorthands and expressions of the file that the mechanism
+    came from are kept if that has dimensions.
     """
     checked_mechanism(mechanism)
     with whole_path(path) as part:

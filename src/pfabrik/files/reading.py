@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast
 
 from ..description.chains import ChainJoint, read_chain
@@ -17,14 +17,15 @@ from ..description.coercion import numbers
 from ..description.copies import Copy, Pattern, Patterns, count_of, read_copies
 from ..description.faults import in_order, joint_index, merged
 from ..description.form_faults import is_name, joint_faults, key_faults, name_faults, number_faults, shown
-from ..description.joints import Cone, Joint
+from ..description.joints import Cone, Joint, set_fields
 from ..description.leg_joints import LegJoint, count_joints, faults_of_legs, placed_joints
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
 from ..description.mechanism import Mechanism
 from ..errors import Fault, InvalidMechanism, near_miss
+from .dimensions import dimension_values, with_numbers
 from .units import angle_in_radians, in_radians
 
-HEAD_KEYS = ("schema", "name", "units", "base", "end_effector", "reference_point", "task", "joint", "leg")
+HEAD_KEYS = ("schema", "name", "units", "base", "end_effector", "reference_point", "task", "dimensions", "joint", "leg")
 UNIT_KEYS = ("length", "angle")
 _JOINT_FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
 
@@ -35,7 +36,37 @@ Table = dict[str, Any]
 
 
 def read_mechanism(table: Table) -> Mechanism:
-    """The mechanism of a parsed file; `InvalidMechanism` with every fault. Faults of tables come before the whole's."""
+    """The mechanism of a parsed file; `InvalidMechanism` with every fault.
+
+    Faults of dimensions and expressions come first, then those of tables, then those of the whole.
+    """
+    if "dimensions" not in table:
+        return _read(table)
+    faults: list[Fault] = []
+    unit = str(_units(table).get("angle", "deg"))
+    numbers_by_name = dimension_values(table["dimensions"], unit, faults)
+    rest = {key: value for key, value in table.items() if key != "dimensions"}
+    numbers_in = with_numbers(rest, numbers_by_name, unit, "", faults)
+    if faults:
+        raise InvalidMechanism(faults)
+    mechanism = _read(numbers_in)
+    set_fields(mechanism, _source=Source(table, numbers_by_name))
+    return mechanism
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """The parsed file that a mechanism was read from, if it has dimensions, and the values of these."""
+
+    table: Table
+    dimensions: dict[str, float]
+
+    def read_with(self, values: Mapping[str, float]) -> Mechanism:
+        """The mechanism with other values of some dimensions; those that follow from them change with them."""
+        return read_mechanism(self.table | {"dimensions": self.table["dimensions"] | dict(values)})
+
+
+def _read(table: Table) -> Mechanism:
     faults = list(_head_faults(table))
     tables = {kind: _tables(table, kind, faults) for kind in ("joint", "leg")}
     unit = _units(table).get("angle", "deg")

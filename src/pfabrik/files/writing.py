@@ -13,13 +13,32 @@ from .units import MEASURED, converted, exact_degrees, measured
 def dumps(mechanism: Mechanism) -> str:
     """The text of a mechanism file that describes this mechanism, joint by joint, exactly.
 
-    Angles are written in degrees if that is the mechanism's unit and every angle has exact degrees, else in radians.
+    A machine that was read from a file with dimensions is written as that file has it, with its dimensions,
+    expressions, copies and legs. Angles of others are written in degrees if that is the mechanism's unit and every
+    angle has exact degrees, else in radians.
     """
+    source = mechanism.__dict__.get("_source")
+    if source is not None:
+        return _as_read(source.table)
     degrees = mechanism.angle_unit == "deg" and all(exact_degrees(angle) is not None for angle in _angles(mechanism))
     convert = _degrees if degrees else float
     tables = ["\n".join(_head(mechanism, "deg" if degrees else "rad"))]
     tables += ["\n".join(["[[joint]]", *_joint(joint, convert)]) for joint in mechanism.joints]
     return "\n\n".join(tables) + "\n"
+
+
+def _as_read(table: dict[str, Any]) -> str:
+    """The text of a parsed file."""
+    head = [f"{key} = {_value(item)}" for key, item in table.items() if key not in ("dimensions", "joint", "leg")]
+    parts = ["\n".join(head)]
+    parts.append("\n".join(["[dimensions]", *_lines(table["dimensions"])]))
+    parts += ["\n".join([f"[[{kind}]]", *_lines(each)]) for kind in ("joint", "leg") for each in table.get(kind, [])]
+    return "\n\n".join(parts) + "\n"
+
+
+def _lines(table: dict[str, Any]) -> Iterator[str]:
+    for key, item in table.items():
+        yield f"{key} = {_value(item)}"
 
 
 def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
@@ -74,9 +93,9 @@ def _value(value: Any) -> str:
     """A value in TOML."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, float):
+    if isinstance(value, float | int):
         return repr(value)
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, dict):
         return f"{{ {', '.join(f'{key} = {_value(item)}' for key, item in value.items())} }}"

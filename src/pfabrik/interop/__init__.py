@@ -8,7 +8,8 @@ pf.interop.verify(m)                         # with MuJoCo as the referee
 from .assembling import Imported, assemble
 from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
-from .opened import Loop, Note, OpenMechanism
+from .notes import Note
+from .opened import Loop, OpenMechanism
 from .urdf_reading import from_urdf
 from .verifying import AgainstOriginal, Verification, verify
 from .xml_reading import kind_of

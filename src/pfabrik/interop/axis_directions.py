@@ -27,19 +27,43 @@ class Axis:
 
     Attributes
     ----------
-    joint, place : its joint, and which axis of it.
-    along : unit vector; None of a ball.
+    joint : index of its joint.
+    given : unit vector as it was read; None of a ball.
     at : a point on it [length]; None of a slide.
     rounding : how far it is from what was meant at most.
     bodies : the two bodies of its joint.
+    along : unit vector as it has been turned since.
     """
 
     joint: int
-    place: int
-    along: Floats | None
+    given: Floats | None
     at: Floats | None
     rounding: Rounding
     bodies: frozenset[str]
+
+    def __post_init__(self) -> None:
+        self.along = self.given
+
+    @property
+    def point(self) -> Floats:
+        """The point on it [length], of a hinge or ball."""
+        return np.asarray(self.at)
+
+    def error_at(self, point: Floats) -> float:
+        """How far rounding puts it off at a point, at most [length]."""
+        arm = 0.0 if self.along is None else abs(float((point - self.point) @ self.along))
+        return self.rounding.length + self.rounding.angle * arm
+
+    def is_through(self, point: Floats, bound: float) -> bool:
+        """True if it is at a point up to its rounding and a bound [length]."""
+        offset = point - self.point
+        distance = np.linalg.norm(offset if self.along is None else np.cross(self.along, offset))
+        return bool(distance <= self.error_at(point) + bound)
+
+    def turn_to(self, direction: Floats) -> None:
+        """Turn it to a direction, or to the opposite one if that is nearer."""
+        if self.along is not None:
+            self.along = np.sign(self.along @ direction) * direction
 
 
 @dataclass
@@ -51,14 +75,14 @@ class Bundle:
     members : indices of axes.
     along : the direction of all.
     bound, stiff : how far it may be from what was meant [rad]: by the worst and by the best of its members.
-    slides : whether one of them is of a slide.
+    has_slide : one of them is the axis of a slide.
     """
 
     members: list[int]
     along: Floats
     bound: float
     stiff: float
-    slides: bool
+    has_slide: bool
 
 
 def bundles_of(axes: Sequence[Axis], slack: float) -> list[Bundle]:
@@ -68,43 +92,45 @@ def bundles_of(axes: Sequence[Axis], slack: float) -> list[Bundle]:
     ----------
     slack : what two directions may differ by besides their roundings [rad].
     """
-    gathered = _gathered(axes, slack)
-    bundles = [_bundle(axes, members) for members in gathered]
+    bundles = [_bundle(axes, members) for members in _parallel(axes, slack)]
     _make_square(bundles, slack)
     return bundles
 
 
-def _gathered(axes: Sequence[Axis], slack: float) -> list[list[int]]:
-    """Indices of axes, in lists of those that are parallel to the one in each that is known best."""
-    found: list[list[int]] = []
+def _parallel(axes: Sequence[Axis], slack: float) -> list[list[int]]:
+    """Indices of axes, in lists of those that are parallel to the one in each that is known best, the first."""
+    lists: list[list[int]] = []
     for index in sorted(range(len(axes)), key=lambda index: axes[index].rounding.angle):
-        along = axes[index].along
-        if along is None:
+        if axes[index].along is None:
             continue
-        for members in found:
-            best = axes[members[0]]
-            near = best.rounding.angle + axes[index].rounding.angle + slack
-            if best.along is not None and np.linalg.norm(np.cross(best.along, along)) <= near:
-                members.append(index)
-                break
+        members = next((each for each in lists if _is_parallel(axes[each[0]], axes[index], slack)), None)
+        if members is None:
+            lists.append([index])
         else:
-            found.append([index])
-    return found
+            members.append(index)
+    return lists
+
+
+def _is_parallel(one: Axis, other: Axis, slack: float) -> bool:
+    if one.along is None or other.along is None:
+        return False
+    bound = one.rounding.angle + other.rounding.angle + slack
+    return bool(np.linalg.norm(np.cross(one.along, other.along)) <= bound)
 
 
 def _bundle(axes: Sequence[Axis], members: list[int]) -> Bundle:
-    """Their mean, in which each counts by how well it is known."""
+    """The bundle of some axes along their mean, in which each counts by how well it is known."""
     along = np.array([axes[index].along for index in members])
     angles = np.array([axes[index].rounding.angle for index in members])
     weights = 1.0 / np.maximum(angles, 1e-6 * angles.max() + ROUNDED) ** 2
     signs = np.sign(along @ along[0])
     mean = along[0] if len(members) == 1 else (signs * weights) @ along
-    slides = any(axes[index].at is None for index in members)
-    return Bundle(members, mean / np.linalg.norm(mean), float(angles.max()), float(angles.min()), slides)
+    has_slide = any(axes[index].at is None for index in members)
+    return Bundle(members, mean / np.linalg.norm(mean), float(angles.max()), float(angles.min()), has_slide)
 
 
 def _make_square(bundles: Sequence[Bundle], slack: float) -> None:
-    """Least turns, each by how well a direction is known, after which all that are nearly square are square."""
+    """Turn bundles as little as need be, by how well each is known, until all that are nearly square are square."""
     relations = list(_relations(bundles, slack))
     if not relations:
         return
@@ -131,12 +157,12 @@ def _make_square(bundles: Sequence[Bundle], slack: float) -> None:
 
 
 def _relations(bundles: Sequence[Bundle], slack: float) -> Iterator[tuple[int, ...]]:
-    """Two that are square to each other, and three in one plane, if slides are along all of them."""
+    """Pairs of bundles that are square to each other, and threes in one plane, if slides are along all of them."""
     for pair in combinations(range(len(bundles)), 2):
         one, other = (bundles[index] for index in pair)
         if abs(one.along @ other.along) <= one.bound + other.bound + slack:
             yield pair
-    sliding = [index for index, bundle in enumerate(bundles) if bundle.slides]
+    sliding = [index for index, bundle in enumerate(bundles) if bundle.has_slide]
     for three in combinations(sliding, 3):
         along = np.array([bundles[index].along for index in three])
         skew = min(np.linalg.norm(np.cross(*along[list(pair)])) for pair in combinations(range(3), 2))

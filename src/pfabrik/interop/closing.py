@@ -1,4 +1,8 @@
-"""Closing an open machine: its joints moved as little as need be until all loops meet, within their ranges."""
+"""The closed home of an open machine: its joints moved until all loops meet, within their ranges.
+
+Here the bodies that close a loop may be far apart, and joints on either side may be anywhere within their ranges; the
+solver of `closure` begins with a `Mechanism`, whose loops are closed at home.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +34,8 @@ out, or lie on one another, have no direction to begin with."""
 
 
 @dataclass(frozen=True)
-class Placed:
-    """Where the joints have been moved to.
+class ClosedHome:
+    """Coordinates at which the loops meet, or are least open.
 
     Attributes
     ----------
@@ -43,63 +47,63 @@ class Placed:
     gap: float
 
 
-class Closer:
-    """An open machine, and how far its loops are open at given coordinates."""
+class OpenLoops:
+    """The loops of an open machine, and how far they are open at given coordinates.
+
+    Attributes
+    ----------
+    tree : the joints alone.
+    low, high : bounds of the tree's coordinates as deviations from home, (c,) [rad or length]; infinite without any.
+    length : the radius around all joints and loops [length], the L of gaps here.
+    """
 
     def __init__(self, opened: OpenMechanism) -> None:
         self.loops = opened.loops
         self.tree: Structure = opened.tree()
-        self.length = _size(opened)
+        limits = np.reshape([each.limits for each in self.tree.coordinates], (-1, 2)).T
+        self.low, self.high = limits - home_coordinates(self.tree)
+        self.length = _radius(opened)
         self._paths = {body: path[column_joints(self.tree)] for body, path in tree_of(self.tree).paths.items()}
-        self._own = self.length / self.tree.characteristic_length
-
-    @property
-    def count(self) -> int:
-        """How many coordinates the tree's joints have."""
-        return len(column_joints(self.tree))
+        self._relative_length = self.length / self.tree.characteristic_length
 
     def openings(self, q: Floats) -> list[tuple[Floats, Floats]]:
         """For every loop, at coordinates (c,): distance (3,) [L], and angle (3,) [rad] between its two sides."""
         bodies = displacements(self.tree, q[None])
-        return [self._opening(loop, bodies) for loop in self.loops]
+        sides = [(loop, *_sides(loop, bodies)) for loop in self.loops]
+        return [((points[0] - points[1]) / self.length, _turn(loop, frames)) for loop, points, frames in sides]
 
     def gap(self, q: Floats) -> float:
         """The largest distance [L] or angle [rad]."""
-        found = [np.linalg.norm(part) for opening in self.openings(q) for part in opening]
-        return float(max(found, default=0.0))
+        sizes = [np.linalg.norm(part) for opening in self.openings(q) for part in opening]
+        return float(max(sizes, default=0.0))
 
-    def meeting(self, q: Floats) -> list[tuple[Floats, Floats]]:
-        """For every loop, at coordinates (c,): its point (3,) [length] and frame (3, 3), amid those of its sides."""
+    def meetings(self, q: Floats) -> list[tuple[Floats, Floats]]:
+        """For every loop, at coordinates (c,): the point (3,) [length] midway between its sides, a frame (3, 3)."""
         bodies = displacements(self.tree, q[None])
         return [(point.mean(axis=0), frames[0]) for point, frames in (_sides(loop, bodies) for loop in self.loops)]
 
     def linearised(self, q: Floats) -> tuple[Floats, Floats]:
-        """What is open (rows,), and how it changes with the rates of `screws` (rows, c)."""
-        bodies, each = displacements(self.tree, q[None]), screws(self.tree, q[None])[0]
-        each = np.concatenate([each[:, :3], each[:, 3:] / self._own], axis=1)
-        rows, slopes = [np.zeros(0)], [np.zeros((0, self.count))]
+        """Loop errors (rows,) [L and rad], and their slopes by the rates of `screws` (rows, c)."""
+        bodies, twists = displacements(self.tree, q[None]), screws(self.tree, q[None])[0]
+        twists = np.concatenate([twists[:, :3], twists[:, 3:] / self._relative_length], axis=1)
+        errors, slopes = [np.zeros(0)], [np.zeros((0, len(self.low)))]
         for loop in self.loops:
             points, frames = _sides(loop, bodies)
-            twists = [body_twist(self._paths[body], each) for body in loop.connects]
-            moved = [
-                twist[3:] + np.cross(twist[:3], point / self.length, axis=0)
-                for twist, point in zip(twists, points, strict=True)
-            ]
-            rows.append((points[0] - points[1]) / self.length)
-            slopes.append(moved[0] - moved[1])
+            turning, moving = [], []
+            for body, point in zip(loop.connects, points, strict=True):
+                twist = body_twist(self._paths[body], twists)
+                turning.append(twist[:3])
+                moving.append(twist[3:] + np.cross(twist[:3], point / self.length, axis=0))
+            errors.append((points[0] - points[1]) / self.length)
+            slopes.append(moving[0] - moving[1])
             if loop.type != "spherical":
-                turned = twists[0][:3] - twists[1][:3]
                 across = np.eye(3) if loop.type == "fixed" else square_to(frames[0][:, 2])
-                rows.append(across @ _turn(loop, frames))
-                slopes.append(across @ turned)
-        return np.concatenate(rows), np.concatenate(slopes)
-
-    def _opening(self, loop: Loop, bodies: dict[str, Floats]) -> tuple[Floats, Floats]:
-        points, frames = _sides(loop, bodies)
-        return (points[0] - points[1]) / self.length, _turn(loop, frames)
+                errors.append(across @ _turn(loop, frames))
+                slopes.append(across @ (turning[0] - turning[1]))
+        return np.concatenate(errors), np.concatenate(slopes)
 
 
-def _size(opened: OpenMechanism) -> float:
+def _radius(opened: OpenMechanism) -> float:
     """The radius around all joints and loops [length]."""
     points = [joint.at for joint in opened.joints if joint.at is not None]
     every = np.concatenate([np.reshape(points, (-1, 3)), *(loop.at for loop in opened.loops)])
@@ -128,56 +132,48 @@ def _turn(loop: Loop, frames: Floats) -> Floats:
     return np.asarray(sines / np.sinc(angle / np.pi))
 
 
-def closed(closer: Closer, free: Mask, low: Floats, high: Floats) -> Placed:
+def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> ClosedHome:
     """The coordinates nearest to home, of those found, in which the loops meet; or are least open.
 
     Parameters
     ----------
-    free : which coordinates may move, (c,); the others stay at home.
+    free : the coordinates that may move, (c,); the others stay at home.
     low, high : bounds of the coordinates as deviations from home, (c,) [rad or length].
     """
-    units = rate_units(closer.tree)
+    units = rate_units(loops.tree)
     rng = np.random.default_rng(0)
     home = np.where(free, np.clip(0.0, low, high), 0.0)
-    best = _descended(closer, home, free, low, high)
+    best = _descend(loops, home, free, low, high)
     for _ in range(STARTS):
         if best.gap <= TOLERANCES.file_gap:
             break
-        astray = np.where(free, np.clip(home + rng.uniform(-STRAY, STRAY, len(home)) * units, low, high), home)
-        tried = _descended(closer, astray, free, low, high)
-        best = tried if tried.gap < 0.5 * best.gap else best
+        start = np.where(free, np.clip(home + rng.uniform(-STRAY, STRAY, len(home)) * units, low, high), home)
+        trial = _descend(loops, start, free, low, high)
+        best = trial if trial.gap < 0.5 * best.gap else best
     return best
 
 
-def _descended(closer: Closer, q: Floats, free: Mask, low: Floats, high: Floats) -> Placed:
+def _descend(loops: OpenLoops, q: Floats, free: Mask, low: Floats, high: Floats) -> ClosedHome:
     """Levenberg and Marquardt's method, its steps cut at the bounds."""
     damping = 1e-3
-    rows, slopes = closer.linearised(q)
+    errors, slopes = loops.linearised(q)
     for _ in range(STEPS):
-        if np.abs(rows).max(initial=0.0) <= CLOSED or damping > 1e12:
+        if np.abs(errors).max(initial=0.0) <= CLOSED or damping > 1e12:
             break
-        gradient = slopes.T @ rows
-        stuck = ((q <= low) & (gradient > 0.0)) | ((q >= high) & (gradient < 0.0))
-        moving = np.flatnonzero(free & ~stuck)
-        part = slopes[:, moving]
+        gradient = slopes.T @ errors
+        is_stuck = ((q <= low) & (gradient > 0.0)) | ((q >= high) & (gradient < 0.0))
+        moving = np.flatnonzero(free & ~is_stuck)
+        damped = np.sqrt(damping * (errors @ errors)) * np.eye(len(moving))
+        matrix = np.concatenate([slopes[:, moving], damped])
         step = np.zeros(len(q))
-        damped = np.sqrt(damping * (rows @ rows)) * np.eye(len(moving))
-        asked = np.concatenate([rows, np.zeros(len(moving))])
-        step[moving] = -np.linalg.lstsq(np.concatenate([part, damped]), asked, rcond=None)[0]
-        tried = np.clip(stepped(closer.tree, q[None], step[None])[0], low, high)
-        new_rows, new_slopes = closer.linearised(tried)
-        left = (new_rows @ new_rows) / (rows @ rows)
-        if left < 1.0:
-            q, rows, slopes, damping = tried, new_rows, new_slopes, max(0.1 * damping, 1e-9)
+        step[moving] = -np.linalg.lstsq(matrix, np.concatenate([errors, np.zeros(len(moving))]), rcond=None)[0]
+        trial = np.clip(stepped(loops.tree, q[None], step[None])[0], low, high)
+        trial_errors, trial_slopes = loops.linearised(trial)
+        remaining = (trial_errors @ trial_errors) / (errors @ errors)
+        if remaining < 1.0:
+            q, errors, slopes, damping = trial, trial_errors, trial_slopes, max(0.1 * damping, 1e-9)
         else:
             damping *= 10.0
-        if STALLED < left < 1.0:
+        if STALLED < remaining < 1.0:
             break
-    return Placed(q, closer.gap(q))
-
-
-def bounds(opened: OpenMechanism) -> tuple[Floats, Floats]:
-    """Bounds of all coordinates as deviations from home, (c,) each; infinite where there are none."""
-    tree = opened.tree()
-    low, high = np.reshape([each.limits for each in tree.coordinates], (-1, 2)).T - home_coordinates(tree)
-    return low, high
+    return ClosedHome(q, loops.gap(q))

@@ -10,7 +10,8 @@ from typing import NamedTuple
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
-from .opened import Note, OpenMechanism
+from .notes import Note
+from .opened import OpenMechanism
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,16 @@ class Coupling:
         return f"{self.follower} = {' + '.join(terms) or '0'}"
 
 
-def coupled(
+def with_coupled_drives(
     opened: OpenMechanism,
     joints: Sequence[Joint],
     couplings: Sequence[Coupling],
     chosen: Collection[str],
-    told: list[Note],
+    notes: list[Note],
 ) -> OpenMechanism:
     """A machine whose joints are driven by what drives the joints that they are coupled with.
 
-    Of joints that are coupled one may be there: it is driven if any of them is. Where more are there, and move, a
+    Of joints that are coupled one may be in the machine: it is driven if any of them is. Where more are, and move, a
     mechanism has no word for their ratio.
 
     Parameters
@@ -71,26 +72,27 @@ def coupled(
     ------
     InvalidMechanism : joints that follow one another, with their ratio.
     """
-    kept = {joint.name: joint for joint in opened.joints}
-    every = {joint.name: joint for joint in joints if joint.type != "fixed"}
-    left, faults = [], []
-    for group in _groups(couplings, every):
-        there = [name for name in group.slopes if name in kept]
-        if not there:
-            left += group.couplings
-        elif len(there) == 1:
-            kept[there[0]] = _led(kept[there[0]], [every[name] for name in group.slopes], group, told)
-        elif set(there) <= set(chosen):
-            told.append(Note(f"a coupling is left to who drives these, {_text(group.couplings)}", tuple(there)))
+    machine = {joint.name: joint for joint in opened.joints}
+    moving = {joint.name: joint for joint in joints if joint.type != "fixed"}
+    omitted, faults = [], []
+    for group in _groups(couplings, moving):
+        names = [name for name in group.slopes if name in machine]
+        if not names:
+            omitted += group.couplings
+        elif len(names) == 1:
+            is_driven = any(moving[name].driven for name in group.slopes)
+            machine[names[0]] = _coupled_joint(machine[names[0]], is_driven, group, notes)
+        elif set(names) <= set(chosen):
+            notes.append(Note(f"a coupling is left to who drives these, {_text(group.couplings)}", tuple(names)))
         else:
-            faults += [_fault(there[0], other, group) for other in there[1:]]
+            faults += [_fault(names[0], follower, group) for follower in names[1:]]
     if faults:
         raise InvalidMechanism(faults)
-    left += [each for each in couplings if not all(name in every for name in each.names)]
-    if left:
+    omitted += [each for each in couplings if not all(name in moving for name in each.names)]
+    if omitted:
         what = "couplings of joints that are held, or that do not matter to the end effector, are left out"
-        told.append(Note(what, tuple(map(str, left))))
-    return dataclasses.replace(opened, joints=tuple(kept.values()))
+        notes.append(Note(what, tuple(map(str, omitted))))
+    return dataclasses.replace(opened, joints=tuple(machine.values()))
 
 
 class _Group(NamedTuple):
@@ -105,21 +107,22 @@ class _Group(NamedTuple):
     couplings: list[Coupling]
 
 
-def _groups(couplings: Sequence[Coupling], every: Collection[str]) -> list[_Group]:
+def _groups(couplings: Sequence[Coupling], moving: Collection[str]) -> list[_Group]:
     """Joints that are coupled with each other, among those that move."""
     groups: list[_Group] = []
-    waiting = [each for each in couplings if all(name in every for name in each.names)]
-    while waiting:
-        group = _Group({waiting[0].leader: 1.0}, [])
-        while own := [each for each in waiting if set(each.names) & set(group.slopes)]:
-            each = own[0]
-            waiting.remove(each)
-            group.couplings.append(each)
-            leads, follows = group.slopes.get(each.leader), group.slopes.get(each.follower)
-            if each.follower not in group.slopes:
-                group.slopes[each.follower] = None if each.ratio is None or leads is None else leads * each.ratio
-            elif each.leader not in group.slopes:
-                group.slopes[each.leader] = None if each.ratio is None or follows is None else follows / each.ratio
+    pending = [each for each in couplings if all(name in moving for name in each.names)]
+    while pending:
+        group = _Group({pending[0].leader: 1.0}, [])
+        while coupling := next((each for each in pending if set(each.names) & set(group.slopes)), None):
+            pending.remove(coupling)
+            group.couplings.append(coupling)
+            ratio, leader, follower = coupling.ratio, coupling.leader, coupling.follower
+            if follower not in group.slopes:
+                slope = group.slopes[leader]
+                group.slopes[follower] = None if ratio is None or slope is None else slope * ratio
+            elif leader not in group.slopes:
+                slope = group.slopes[follower]
+                group.slopes[leader] = None if ratio is None or slope is None else slope / ratio
         groups.append(group)
     return groups
 
@@ -139,11 +142,10 @@ def _fault(leader: str, follower: str, group: _Group) -> Fault:
     )
 
 
-def _led(own: Joint, group: list[Joint], coupled: _Group, told: list[Note]) -> Joint:
-    """The one joint of a group that is there, driven if any of them is."""
-    is_driven = any(joint.driven for joint in group)
-    if own.driven or not (is_driven and KINDS[own.type].actuatable):
-        told.append(Note(f"coupled with joints that are left out, {_text(coupled.couplings)}", (own.name,)))
-        return own
-    told.append(Note(f"driven through a coupling, {_text(coupled.couplings)}", (own.name,)))
-    return dataclasses.replace(own, actuated=True)
+def _coupled_joint(joint: Joint, is_driven: bool, group: _Group, notes: list[Note]) -> Joint:
+    """The one joint of a group that is in the machine, driven if any of them is."""
+    if joint.driven or not (is_driven and KINDS[joint.type].actuatable):
+        notes.append(Note(f"coupled with joints that are left out, {_text(group.couplings)}", (joint.name,)))
+        return joint
+    notes.append(Note(f"driven through a coupling, {_text(group.couplings)}", (joint.name,)))
+    return dataclasses.replace(joint, actuated=True)

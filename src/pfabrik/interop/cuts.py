@@ -1,4 +1,4 @@
-"""Bodies as a tree: which joints lead to a body each, and which are cut, because they close loops."""
+"""Bodies as a tree: the joints that lead to a body each, and those that are cut because they close loops."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..description.graph import edges_of, spanning_tree
 from ..description.joints import Joint
 from ..description.structure import Structure
+from .names import unique
 
 CUT_AS_THEY_ARE = ("spherical", "fixed")
 """Joint types that an equality of a simulation model stands for: two points, or two frames, that stay together."""
@@ -18,15 +19,15 @@ class Branch:
 
     Attributes
     ----------
-    forward : whether the joint leads from its first body to its second.
-    twin_of : the body that this one doubles, where the joint closes a loop and no equality stands for it; else None.
+    forward : True if the joint leads from its first body to its second.
+    double_of : the body that this one doubles, where the joint closes a loop and no equality stands for it; else None.
     """
 
     joint: Joint
     parent: str
     body: str
     forward: bool = True
-    twin_of: str | None = None
+    double_of: str | None = None
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class CutTree:
 
     Attributes
     ----------
-    cuts : the joints that an equality stands for. Other joints that close loops lead to a twin of their second body.
+    cuts : the joints that an equality stands for. Other joints that close loops lead to a double of their second body.
     """
 
     branches: tuple[Branch, ...]
@@ -46,29 +47,19 @@ def cut_tree(mechanism: Structure) -> CutTree:
     """The tree of a mechanism's bodies; balls are cut first, and motors last."""
     worst_first = edges_of(sorted(mechanism.joints, key=_ease_of_cutting))
     closing = {worst_first[index].joint for index in spanning_tree(worst_first, mechanism.base).closing}
-    kept = [joint for joint in mechanism.joints if joint not in closing]
+    uncut = [joint for joint in mechanism.joints if joint not in closing]
     branches: list[Branch] = []
-    for index, forward in spanning_tree(edges_of(kept), mechanism.base).steps:
-        parent, body = kept[index].connects if forward else kept[index].connects[::-1]
-        branches.append(Branch(kept[index], parent, body, forward))
+    for index, forward in spanning_tree(edges_of(uncut), mechanism.base).steps:
+        parent, body = uncut[index].connects if forward else uncut[index].connects[::-1]
+        branches.append(Branch(uncut[index], parent, body, forward))
     cuts, taken = [], {*mechanism.bodies}
     for joint in mechanism.joints:
         if joint in closing and joint.type in CUT_AS_THEY_ARE:
             cuts.append(joint)
         elif joint in closing:
             parent, body = joint.connects
-            branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), twin_of=body))
+            branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), double_of=body))
     return CutTree(tuple(branches), tuple(cuts))
-
-
-def unique(name: str, taken: set[str]) -> str:
-    """The name, or the name with a number if it is taken; it counts as taken from now on."""
-    free, number = name, 1
-    while free in taken:
-        number += 1
-        free = f"{name}_{number}"
-    taken.add(free)
-    return free
 
 
 def _ease_of_cutting(joint: Joint) -> int:

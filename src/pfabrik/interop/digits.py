@@ -1,13 +1,14 @@
-"""The digits of a file, and how exactly they place the axes of its joints."""
+"""The digits of a file, and how exactly they place the bodies and joints of a model."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,20 +16,23 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 
 FEWEST = 4
-"""Significant digits from which a number was rounded: what people type in full (`0.25`) rarely has more than three."""
+"""Significant digits from which a number was rounded: one typed in full (`0.25`) rarely has more than three."""
 
 HALF = 0.5
-"""By how many units of its last digit rounding changes a number at most."""
+"""Units of its last digit by which rounding changes a number at most."""
+
+STRAIGHT = 1e-12
+"""Distance from a coordinate axis, or from no rotation, up to which a file gives it in whole numbers."""
 
 
 class Rounding(NamedTuple):
-    """How far from what was meant the digits of a file put a joint at most: its point [length], its axis [rad]."""
+    """The largest error that the digits of a file put on a joint: on its point [length] and its axis [rad]."""
 
     length: float
     angle: float
 
     def on(self, offset: ArrayLike, length: float, angle: float) -> Rounding:
-        """Of what is placed on a body so rounded, at an offset (3,) from its origin, with its own digits."""
+        """The rounding of something on a body of this rounding, at an offset (3,), with a length and an angle more."""
         arm = float(np.linalg.norm(offset))
         return Rounding(self.length + self.angle * arm + length, self.angle + angle)
 
@@ -44,13 +48,13 @@ def worst(roundings: Iterable[Rounding]) -> Rounding:
 
 @dataclass(frozen=True)
 class Digits:
-    """How numbers of one kind were rounded: to significant digits, or to decimals (`decimals` is then not None)."""
+    """The rounding of numbers of one kind: to significant digits, or to decimals (`decimals` is then not None)."""
 
     significant: int = 17
     decimals: int | None = None
 
     def errors(self, values: ArrayLike, fewest: int | None = None) -> Floats:
-        """By how much rounding changed numbers at most, in their shape.
+        """The largest error of numbers from their rounding, in their shape.
 
         Parameters
         ----------
@@ -68,14 +72,14 @@ class Digits:
         else:
             places = self.significant - 1 - math.floor(math.log10(abs(value)))
         if fewest is not None:
-            own = _shape(repr(value))
-            if own is not None and own[0] >= fewest:
-                places = own[1]
+            shape = _shape(repr(value))
+            if shape is not None and shape[0] >= fewest:
+                places = shape[1]
         return HALF * 10.0 ** -min(places, 300)
 
 
 def digits_of(texts: Iterable[str], fewest: int = FEWEST - 1) -> Digits:
-    """How the numbers in some texts, with blanks between them, were rounded.
+    """The rounding of the numbers in some texts, with blanks between them.
 
     The number of digits that most long numbers have: significant ones, or, if more of them agree in these, decimals.
     Numbers that are all short are taken as rounded if some have `fewest` significant digits, else as exact.
@@ -104,3 +108,74 @@ def _shape(word: str) -> tuple[int, int] | None:
     if not isinstance(parts.exponent, int) or not any(parts.digits):
         return None
     return len(parts.digits), -parts.exponent
+
+
+class ModelDigits:
+    """The roundings of a compiled model, from the numbers in its text [m, rad]; `bodies` has those of all bodies."""
+
+    def __init__(self, plain: ET.Element, model: Any) -> None:
+        self.model = model
+        self._length = digits_of(_texts(plain, "pos", "anchor"))
+        self._quat = digits_of(_texts(plain, "quat"))
+        self._turn = max(_turns(plain), default=0.0)
+        self._axis = max(_of_vectors(list(_texts(plain, "axis"))), default=0.0)
+        self.bodies: list[Rounding] = [NOTHING]
+        for index in range(1, model.nbody):
+            parent = self.bodies[model.body_parentid[index]]
+            self.bodies.append(self._placed(parent, model.body_pos[index], self._turned(model.body_quat[index])))
+
+    def joint(self, index: int) -> Rounding:
+        """The rounding of a joint."""
+        is_skew = np.abs(self.model.jnt_axis[index]).max() < 1.0 - STRAIGHT
+        body = self.bodies[self.model.jnt_bodyid[index]]
+        return self._placed(body, self.model.jnt_pos[index], self._axis if is_skew else 0.0)
+
+    def site(self, index: int) -> Rounding:
+        """The rounding of a site."""
+        body = self.bodies[self.model.site_bodyid[index]]
+        return self._placed(body, self.model.site_pos[index], self._turned(self.model.site_quat[index]))
+
+    def anchor(self, body: int, offset: ArrayLike, is_computed: bool) -> Rounding:
+        """The rounding of a point on a body, at an offset (3,); MuJoCo computes that on an equality's second body."""
+        return self.bodies[body].on(offset, 0.0, 0.0) if is_computed else self._placed(self.bodies[body], offset, 0.0)
+
+    def _placed(self, body: Rounding, offset: ArrayLike, angle: float) -> Rounding:
+        return body.on(offset, float(np.linalg.norm(self._length.errors(offset))), angle)
+
+    def _turned(self, quat: Floats) -> float:
+        """The error of the rotation of a body or site in its parent [rad]."""
+        if abs(quat[0]) >= 1.0 - STRAIGHT:
+            return 0.0
+        return max(self._turn, 2.0 * float(np.linalg.norm(self._quat.errors(quat))))
+
+
+def _texts(plain: ET.Element, *keys: str) -> Iterator[str]:
+    for element in plain.iter():
+        yield from (element.attrib[key] for key in keys if key in element.attrib)
+
+
+def _turns(plain: ET.Element) -> Iterator[float]:
+    """Yield the errors of rotations that are given otherwise than by a quaternion [rad]."""
+    compiler = plain.find("compiler")
+    radian = compiler is not None and compiler.get("angle") == "radian"
+    unit, fewest = (1.0, FEWEST - 1) if radian else (np.pi / 180.0, FEWEST)
+    euler, about = list(_texts(plain, "euler")), list(_texts(plain, "axisangle"))
+    for texts in (euler, [" ".join(text.split()[3:]) for text in about]):
+        digits = digits_of(texts, fewest)
+        yield from (unit * float(np.linalg.norm(digits.errors(_numbers(text), fewest))) for text in texts)
+    yield from _of_vectors([" ".join(text.split()[:3]) for text in about])
+    yield from _of_vectors(list(_texts(plain, "zaxis")))
+    both = list(_texts(plain, "xyaxes"))
+    yield from _of_vectors([part for text in both for part in (" ".join(text.split()[:3]), " ".join(text.split()[3:]))])
+
+
+def _of_vectors(texts: list[str]) -> Iterator[float]:
+    """Yield the errors of directions that are given in texts [rad]."""
+    digits = digits_of(texts)
+    for vector in map(_numbers, texts):
+        if np.count_nonzero(vector) > 1:
+            yield float(np.linalg.norm(digits.errors(vector)) / np.linalg.norm(vector))
+
+
+def _numbers(text: str) -> Floats:
+    return np.array([float(word) for word in text.split()])

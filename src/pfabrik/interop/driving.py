@@ -1,4 +1,4 @@
-"""What is driven of a robot: the order of its drives, how fast they are, and what is said where there are none."""
+"""The drives of a robot: their order, how fast they are, and the refusal of a machine that has none."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Rates(NamedTuple):
 
 
 def require_drives(opened: OpenMechanism, joints: Sequence[Joint], undriven: str) -> None:
-    """A fault where nothing is driven of what there is between base and end effector: why, and what could be.
+    """Refuse a machine with no driven joint between base and end effector, with the reason and the candidates.
 
     Parameters
     ----------
@@ -31,16 +31,16 @@ def require_drives(opened: OpenMechanism, joints: Sequence[Joint], undriven: str
         return
     elsewhere = [joint.name for joint in joints if joint.driven]
     why = f"drives elsewhere only: {', '.join(elsewhere)}" if elsewhere else undriven
-    able = [joint for joint in opened.joints if KINDS[joint.type].actuatable]
-    able.sort(key=lambda joint: opened.base not in joint.connects)
-    names = ", ".join(joint.name for joint in able) or "none, for nothing here can be driven"
+    candidates = [joint for joint in opened.joints if KINDS[joint.type].actuatable]
+    candidates.sort(key=lambda joint: opened.base not in joint.connects)
+    names = ", ".join(joint.name for joint in candidates) or "none, for nothing here can be driven"
     expected = f"the driven joints by name, `actuated` (--actuated A,B,...), from the base outward: {names}"
     raise InvalidMechanism(
         [Fault("actuated joints", f"none between '{opened.base}' and '{opened.end_effector}': {why}", expected)]
     )
 
 
-def as_driven(mechanism: Mechanism, order: Sequence[str], rates: Mapping[str, Rates], metres: float) -> Mechanism:
+def with_actuators(mechanism: Mechanism, order: Sequence[str], rates: Mapping[str, Rates], metres: float) -> Mechanism:
     """With its actuators in the order of the file, and as fast as it says."""
     place = {name: index for index, name in enumerate(order)}
     drives = {joint.name: [each for each in mechanism.drives if each.joint is joint] for joint in mechanism.joints}
@@ -48,18 +48,18 @@ def as_driven(mechanism: Mechanism, order: Sequence[str], rates: Mapping[str, Ra
     def rank(joint: Joint) -> int:
         return min(place.get(drive.name, len(place)) for drive in drives[joint.name])
 
-    def most(joint: Joint, what: int) -> tuple[float, ...] | float | None:
-        found = []
+    def highest(joint: Joint, kind: int) -> tuple[float, ...] | float | None:
+        values = []
         for drive in drives[joint.name]:
-            value = rates.get(drive.name, Rates())[what]
+            value = rates.get(drive.name, Rates())[kind]
             if value is None:
                 return None
-            found.append(value if drive.kind == "angle" else value / metres)
-        return tuple(found) if len(found) > 1 else found[0]
+            values.append(value if drive.kind == "angle" else value / metres)
+        return tuple(values) if len(values) > 1 else values[0]
 
     def rated(joint: Joint) -> Joint:
-        highest: dict[str, Any] = {"max_speed": most(joint, 0), "max_acceleration": most(joint, 1)}
-        return dataclasses.replace(joint, **highest)
+        changes: dict[str, Any] = {"max_speed": highest(joint, 0), "max_acceleration": highest(joint, 1)}
+        return dataclasses.replace(joint, **changes)
 
     driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
     return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,7 @@ KINDS: dict[str, LoopType] = {
     "fixed": "fixed",
     "6d": "fixed",
 }
-"""What a loop may be called -> what it is."""
+"""Names of loop types in a file -> the type."""
 
 PLAIN = ("loops", "actuated")
 GEPETTO = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
@@ -53,53 +53,85 @@ RETYPED = r"SPHERICAL|FIXED|UJOINT_(XY|XZ|YX|YZ|ZX|ZY)"
 
 
 @dataclass(frozen=True)
-class LoopsFile:
-    """What such a file says.
+class LinkLoop:
+    """Two links that are to meet, described in the frame of each.
 
     Attributes
     ----------
-    entries : the loops, each as a table of our plain form.
+    links : the two.
+    points : the point on each, (2, 3) [m].
+    axes : the axis of a hinge on each, of any length, (2, 3).
+    """
+
+    name: str
+    type: LoopType
+    links: tuple[str, str]
+    points: Floats
+    axes: Floats
+
+
+@dataclass(frozen=True)
+class LoopsFile:
+    """The content of such a file.
+
+    Attributes
+    ----------
+    entries : the loops, each as a table of our plain form, not checked yet.
     actuated : names of joints.
-    retyped : joint -> what it is instead of what the description says.
+    retyped : joint -> its type, in place of that of the description.
     """
 
     entries: Sequence[Mapping[str, Any]] = ()
     actuated: Sequence[str] = ()
     retyped: Mapping[str, str] = field(default_factory=dict)
 
-    def loops(self, frames: Mapping[str, Floats], link_of: Mapping[str, str]) -> list[Loop]:
-        """The loops of a robot.
+    def loops(self, links: Iterable[str], link_of: Mapping[str, str]) -> list[LinkLoop]:
+        """The loops of a robot; InvalidMechanism with every fault of the entries.
 
         Parameters
         ----------
-        frames : link -> where it is, (4, 4) [m].
+        links : names of all links.
         link_of : joint -> the link whose frame it is.
         """
-        faults: list[Fault] = []
-        found = [
-            _loop(f"loops[{place}]", entry, place, frames, link_of, faults) for place, entry in enumerate(self.entries)
-        ]
+        places = {link: link for link in links}
+        faults = [each for number, entry in enumerate(self.entries) for each in _faults(number, entry, places, link_of)]
         if faults:
             raise InvalidMechanism(faults)
-        return [loop for loop in found if loop is not None]
+        return [_loop(number, entry, {**link_of, **places}) for number, entry in enumerate(self.entries)]
 
-    def roundings(
-        self, of_links: Mapping[str, Rounding], frames: Mapping[str, Floats], link_of: Mapping[str, str]
-    ) -> dict[str, Rounding]:
-        """Loop -> how exactly the worse of its sides is placed [m, rad], of links that are so exactly."""
-        points = [each.get("at", np.zeros((2, 3))) for each in self.entries]
-        digits = digits_of(repr(float(value)) for value in np.ravel(points))
-        found = {}
-        for loop, own in zip(self.loops(frames, link_of), points, strict=True):
-            sides = zip(loop.connects, np.asarray(own, dtype=float), strict=True)
-            found[loop.name] = worst(
-                of_links[link].on(point, float(np.linalg.norm(digits.errors(point))), 0.0) for link, point in sides
-            )
-        return found
+
+def placed_loops(loops: Iterable[LinkLoop], frames: Mapping[str, Floats]) -> list[Loop]:
+    """Loops where their sides are.
+
+    Parameters
+    ----------
+    frames : link -> where it is, (4, 4) [m].
+    """
+    placed = []
+    for loop in loops:
+        sides = [frames[link] for link in loop.links]
+        points = [side[:3, :3] @ point + side[:3, 3] for side, point in zip(sides, loop.points, strict=True)]
+        turned = np.array([side[:3, :3] for side in sides])
+        if loop.type == "revolute":
+            turned = turned @ np.array([frame_along(axis) for axis in loop.axes])
+        placed.append(Loop(loop.name, loop.type, loop.links, points, None if loop.type == "spherical" else turned))
+    return placed
+
+
+def roundings_of_loops(loops: Sequence[LinkLoop], of_links: Mapping[str, Rounding]) -> dict[str, Rounding]:
+    """Loop -> how exactly the worse of its sides is placed [m, rad], on links that are placed so exactly."""
+    digits = digits_of(repr(float(value)) for loop in loops for value in loop.points.ravel())
+    return {
+        loop.name: worst(
+            of_links[link].on(point, float(np.linalg.norm(digits.errors(point))), 0.0)
+            for link, point in zip(loop.links, loop.points, strict=True)
+        )
+        for loop in loops
+    }
 
 
 def read_loops(source: str | os.PathLike[str] | Mapping[str, Any] | None) -> LoopsFile:
-    """What a file or table says of loops; InvalidMechanism with every fault of its form."""
+    """The content of a file or table of loops; InvalidMechanism with every fault of its form."""
     if source is None:
         return LoopsFile()
     table = source if isinstance(source, Mapping) else _parsed(source)
@@ -138,8 +170,8 @@ def _parsed(path: str | os.PathLike[str]) -> Any:
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         if isinstance(error, InvalidMechanism):
             raise
-        said = " ".join(str(error).split()) or "nested too deeply"
-        raise fault(place, f"no YAML: {said}", "YAML") from None
+        reason = " ".join(str(error).split()) or "nested too deeply"
+        raise fault(place, f"no YAML: {reason}", "YAML") from None
 
 
 def _plain(table: Mapping[str, Any]) -> LoopsFile:
@@ -175,38 +207,20 @@ def _gepetto(table: Mapping[str, Any]) -> LoopsFile:
     return LoopsFile(entries, [str(name) for name in table.get("name_mot", [])], retyped)
 
 
-def _loop(
-    place: str,
-    entry: Mapping[str, Any],
-    number: int,
-    frames: Mapping[str, Floats],
-    link_of: Mapping[str, str],
-    faults: list[Fault],
-) -> Loop | None:
-    """One loop, where its two sides are at zero; None with faults."""
-    found = list(_entry_faults(place, entry, frames, link_of))
-    faults += found
-    if found:
-        return None
-    name, kind = str(entry.get("name", f"closure_{number + 1}")), KINDS[entry.get("type", "ball")]
-    ends = entry.get("links") or entry["frames"]
-    links = tuple(end if end in frames else link_of[end] for end in ends)
-    own = np.array(entry.get("at", np.zeros((2, 3))), dtype=float)
-    points = [frames[link][:3, :3] @ point + frames[link][:3, 3] for link, point in zip(links, own, strict=True)]
-    turned = np.array([frames[link][:3, :3] for link in links])
-    if kind == "revolute":
-        axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
-        turned = turned @ np.array([frame_along(axis) for axis in axes])
-    return Loop(name, kind, (links[0], links[1]), points, None if kind == "spherical" else turned)
+def _loop(number: int, entry: Mapping[str, Any], link_at: Mapping[str, str]) -> LinkLoop:
+    """One entry without faults; `link_at` has the link of every name that an end may have."""
+    one, other = (link_at[end] for end in entry.get("links") or entry["frames"])
+    points = np.array(entry.get("at", np.zeros((2, 3))), dtype=float)
+    axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
+    name = str(entry.get("name", f"closure_{number + 1}"))
+    return LinkLoop(name, KINDS[entry.get("type", "ball")], (one, other), points, axes)
 
 
-def _entry_faults(
-    place: str, entry: Mapping[str, Any], frames: Mapping[str, Floats], link_of: Mapping[str, str]
-) -> Iterator[Fault]:
-    kind = entry.get("type", "ball")
+def _faults(number: int, entry: Mapping[str, Any], links: Iterable[str], link_of: Mapping[str, str]) -> Iterator[Fault]:
+    place, kind = f"loops[{number}]", entry.get("type", "ball")
     if not isinstance(kind, str) or kind not in KINDS:
         yield Fault(f"{place}.type", shown(kind), f"one of {', '.join(KINDS)}")
-    key, known = ("links", [*frames]) if "links" in entry else ("frames", [*frames, *link_of])
+    key, known = ("links", [*links]) if "links" in entry else ("frames", [*links, *link_of])
     ends = entry.get(key)
     if not (isinstance(ends, Sequence) and len(ends) == 2 and all(isinstance(end, str) for end in ends)):
         yield Fault(f"{place}.{key}", shown(ends), "two names")

@@ -1,4 +1,4 @@
-"""The bodies of a MuJoCo model: where they are, what joints they hang on, what they weigh, and what is seen of them."""
+"""The bodies of a MuJoCo model, with their joints, masses, sites and what is drawn of them."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.home_mobility import universal_axes
+from ..description.joint_coordinates import JointCoordinate
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..motion.displacements import columns
-from .cuts import Branch, CutTree, unique
+from .cuts import Branch, CutTree
+from .names import unique
 from .physics import Physics
 
 REFERENCE_POINT = "reference_point"
 """Name of the site that targets place."""
 
 WORLD = "world"
-"""What MuJoCo calls the body that rests."""
+"""MuJoCo's name of the body that rests."""
 
 THICKNESS = 0.015
 """Radius of what is drawn of a link [L]."""
@@ -30,7 +32,7 @@ THICKNESS = 0.015
 
 @dataclass(frozen=True)
 class Names:
-    """Names of the sites of a model, but for those at the centres of joints on their first bodies: the joints' own.
+    """Names of the sites of a model, but for those at joint centres on first bodies, which have the joints' names.
 
     Attributes
     ----------
@@ -52,6 +54,11 @@ def names_of(mechanism: Mechanism, tree: CutTree) -> Names:
 def vector(values: Floats) -> str:
     """Numbers as an attribute, each the shortest that reads back as it is."""
     return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def si_unit(coordinate: JointCoordinate, metres: float) -> float:
+    """The unit of a coordinate [rad or m]."""
+    return 1.0 if coordinate.kind == "angle" else metres
 
 
 def as_attributes(values: Mapping[str, float]) -> dict[str, str]:
@@ -110,10 +117,9 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
     if joint.type == "spherical":
         yield {"name": joint.name, "type": "ball"} | as_attributes(physics.joint(True, False))
         return
-    own = mechanism.coordinates[columns(mechanism)[joint.name]]
-    for each in own if branch.forward else reversed(own):
-        turning = each.kind == "angle"
-        unit = 1.0 if turning else metres
+    coordinates = mechanism.coordinates[columns(mechanism)[joint.name]]
+    for each in coordinates if branch.forward else reversed(coordinates):
+        turning, unit = each.kind == "angle", si_unit(each, metres)
         attributes = {
             "name": each.name,
             "type": "hinge" if turning else "slide",

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
-from .opened import Note
+from .notes import Note
 from .xml_reading import fault
 
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
@@ -24,7 +24,7 @@ KEPT: dict[str, tuple[str, ...]] = {
     "joint of equality": ("name", "joint1", "joint2", "polycoef", "active"),
     "key": ("name", "qpos"),
 }
-"""Elements that say something of the kinematics, and those of their attributes that do."""
+"""Elements of the kinematics -> their attributes that are."""
 
 IN_DEFAULTS = ("default", "joint", "site")
 REFUSED = {
@@ -32,61 +32,49 @@ REFUSED = {
     "composite": "a composite body",
     "flexcomp": "a flexible body",
 }
-"""Elements that make bodies in a way that is not followed."""
+"""Elements that make bodies in ways that are not read -> their description."""
 
 TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
-"""What an actuator may drive in place of a joint."""
+"""Attributes that say what an actuator drives in place of a joint."""
 
 MOST_COPIES = 1000
 """Most copies that `replicate` may make, of copies too."""
 
-UNTOLD = ("inertial", "light", "camera", "plugin")
+UNNOTED = ("inertial", "light", "camera", "plugin")
 """Elements inside bodies that nobody would look for in a mechanism."""
 
 
-def plain_model(root: ET.Element, told: list[Note]) -> ET.Element:
-    """The kinematics of a model, and the notes of what is left out, by name."""
+def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
+    """The kinematics of a model; notes name what is left out."""
     plain = ET.Element("mujoco")
     compiler = ET.SubElement(plain, "compiler")
-    left: Counter[str] = Counter()
+    omitted: Counter[str] = Counter()
     for section in root:
         if section.tag == "compiler":
             compiler.attrib.update(_attributes(section))
         elif section.tag == "default":
-            plain.append(_kept(section, left, IN_DEFAULTS))
+            plain.append(_kept(section, omitted, IN_DEFAULTS))
         elif section.tag in ("worldbody", "keyframe"):
-            plain.append(_kept(section, left))
+            plain.append(_kept(section, omitted))
         elif section.tag == "equality":
-            plain.append(_equalities(section, told))
+            plain.append(_equalities(section, notes))
         elif section.tag == "actuator":
-            plain.append(_actuators(section, told))
+            plain.append(_actuators(section, notes))
         elif section.tag in ("tendon", "contact", "deformable", "sensor"):
             nameless = Counter(child.tag for child in section if not child.get("name"))
             names = (*filter(None, (child.get("name") for child in section)), *_counted(nameless))
             if names:
-                told.append(Note(f"{section.tag}s are left out", names))
+                notes.append(Note(f"{section.tag}s are left out", names))
         elif section.tag == "asset":
-            left.update(child.tag for child in section)
+            omitted.update(child.tag for child in section)
     compiler.attrib |= {"boundmass": "1", "boundinertia": "1"}  # what moves has a mass; which one does not matter
-    shown = _counted(Counter({tag: count for tag, count in left.items() if tag not in UNTOLD}))
-    if shown:
-        told.append(Note("left out, for they do not move anything", tuple(shown)))
+    counted = _counted(Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED}))
+    if counted:
+        notes.append(Note("left out, for they do not move anything", tuple(counted)))
     springs = tuple(joint.get("name", "a joint") for joint in root.iter("joint") if _number(joint, "stiffness"))
     if springs:
-        told.append(Note("springs are left out, of", springs))
+        notes.append(Note("springs are left out, of", springs))
     return plain
-
-
-def compiled(text: str) -> Any:
-    """The MuJoCo model of a text, whose sites are where it puts them.
-
-    MuJoCo takes frames that are less than 1e-6 apart, in whatever unit, for one; asked not to, it computes both.
-    """
-    import mujoco
-
-    model: Any = mujoco.MjModel.from_xml_string(text)
-    model.site_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
-    return model
 
 
 def _counted(tags: Counter[str]) -> list[str]:
@@ -94,8 +82,8 @@ def _counted(tags: Counter[str]) -> list[str]:
     return [f"{tag} ({count})" for tag, count in sorted(tags.items())]
 
 
-def _kept(element: ET.Element, left: Counter[str], tags: tuple[str, ...] = tuple(KEPT), copies: int = 1) -> ET.Element:
-    """An element with what counts of it and inside it."""
+def _kept(element: ET.Element, omitted: Counter[str], tags: Sequence[str] = tuple(KEPT), copies: int = 1) -> ET.Element:
+    """An element, with its attributes and descendants that belong to the kinematics."""
     if element.tag == "replicate":
         copies *= max(1, int(_number(element, "count")))
         if copies > MOST_COPIES:
@@ -105,9 +93,9 @@ def _kept(element: ET.Element, left: Counter[str], tags: tuple[str, ...] = tuple
         if child.tag in REFUSED:
             raise fault(str(child.tag), REFUSED[child.tag], "bodies one by one, as MuJoCo saves a compiled model")
         if child.tag in tags:
-            kept.append(_kept(child, left, tags, copies))
+            kept.append(_kept(child, omitted, tags, copies))
         elif tags != IN_DEFAULTS:
-            left[child.tag] += 1
+            omitted[child.tag] += 1
     return kept
 
 
@@ -117,34 +105,34 @@ def _attributes(element: ET.Element, kind: str | None = None) -> dict[str, str]:
     return {key: value for key, value in element.attrib.items() if key in known}
 
 
-def _equalities(section: ET.Element, told: list[Note]) -> ET.Element:
-    """Those that close loops, and those that couple joints; the rest is told."""
+def _equalities(section: ET.Element, notes: list[Note]) -> ET.Element:
+    """The equalities that close loops or couple joints; notes name the rest."""
     kept = ET.Element("equality")
     for child in section:
         if child.tag in ("connect", "weld", "joint"):
             kept.append(ET.Element(child.tag, _attributes(child, f"{child.tag} of equality")))
         else:
-            told.append(Note(f"an equality of a {child.tag} is left out", (child.get("name", "without a name"),)))
+            notes.append(Note(f"an equality of a {child.tag} is left out", (child.get("name", "without a name"),)))
     return kept
 
 
-def _actuators(section: ET.Element, told: list[Note]) -> ET.Element:
-    """Every actuator of a joint, whatever its gains; the others are told."""
+def _actuators(section: ET.Element, notes: list[Note]) -> ET.Element:
+    """The actuators of joints, without their gains; notes name the others."""
     kept = ET.Element("actuator")
     for child in section:
         joint = child.get("joint") or child.get("jointinparent")
         if joint:
             ET.SubElement(kept, "general", joint=joint)
         else:
-            told.append(Note("an actuator that drives no joint itself is left out", (through_what(child),)))
+            notes.append(Note("an actuator that drives no joint itself is left out", (transmission_text(child),)))
     return kept
 
 
-def through_what(actuator: ET.Element) -> str:
+def transmission_text(actuator: ET.Element) -> str:
     """Name of an actuator, and what it drives: ``winch (through tendon cable)``."""
     name = actuator.get("name", f"a {actuator.tag}")
-    ways = [f"{what} {actuator.get(what)}" for what in TRANSMISSIONS if actuator.get(what)]
-    return f"{name} (through {' and '.join(ways)})" if ways else name
+    driven = [f"{key} {actuator.get(key)}" for key in TRANSMISSIONS if actuator.get(key)]
+    return f"{name} (through {' and '.join(driven)})" if driven else name
 
 
 def _number(element: ET.Element, key: str) -> float:

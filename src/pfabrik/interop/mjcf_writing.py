@@ -16,11 +16,11 @@ from ..files.units import metres_of
 from ..poses import as_floats
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import Names, as_attributes, bodies, names_of, vector
+from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit, vector
 from .physics import STEP, Physics, physics
 
 NOTE = "pfabrik."
-"""How the names of custom elements begin that hold what MuJoCo has no word for."""
+"""Prefix of the names of custom elements, which hold what MuJoCo has no word for."""
 
 CLOSING_TIME = 2.5 * STEP
 """Time constant by which equalities close what opens [s]: MuJoCo asks for two steps at least."""
@@ -36,9 +36,9 @@ def to_mjcf(
     """A mechanism as a MuJoCo model, which starts closed, at home, and stays closed.
 
     Lengths become metres, and every joint counts as it does in the mechanism: `qpos` of a hinge or slide is the
-    coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a twin of a
+    coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a double of a
     body, of hardly any mass, welded to it. Sites are at all joints and at the reference point; actuated joints have
-    position servos; there is a keyframe `home`. Cones, which MuJoCo does not know, are told in comments and kept in
+    position servos; there is a keyframe `home`. Cones, which MuJoCo does not know, are in comments and in
     custom elements, as are base, end effector and task, and highest speeds and accelerations.
 
     Parameters
@@ -86,14 +86,14 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
     root.append(bodies(mechanism, tree, names, metres, physics))
     root.append(_equalities(tree, names, physics))
     root.append(_servos(mechanism, metres, physics))
-    home = " ".join(repr(value) for value in _home(mechanism, metres))
+    home = " ".join(repr(float(drive.home) * si_unit(drive, metres)) for drive in mechanism.drives)
     ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home", ctrl=home)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
-    """What a reader of the file should know."""
+    """Yield the comments for who reads the file."""
     yield f"'{mechanism.name}', written by pfabrik: lengths in m, where its own file has {mechanism.length_unit}"
     made_up = [body for body in mechanism.bodies if body not in physics.given and body != mechanism.base]
     if made_up:
@@ -105,17 +105,17 @@ def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
 
 
 def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[str, str]]:
-    """What MuJoCo has no word for, for who reads the model back."""
+    """Yield names and texts of the custom elements, which `from_mjcf` reads back."""
     yield "base", mechanism.base
     yield "end_effector", mechanism.end_effector
     yield "reference_point", names.reference
     yield "task", " ".join(mechanism.task)
-    for what in ("max_speed", "max_acceleration"):
+    for key in ("max_speed", "max_acceleration"):
         for drive in mechanism.drives:
-            most = getattr(drive.joint, what)
-            own = most[drive.place] if isinstance(most, tuple) else most
-            if own is not None:
-                yield f"{what}.{drive.name}", repr(own * (1.0 if drive.kind == "angle" else metres))
+            rates = getattr(drive.joint, key)
+            rate = rates[drive.place] if isinstance(rates, tuple) else rates
+            if rate is not None:
+                yield f"{key}.{drive.name}", repr(rate * si_unit(drive, metres))
     for joint in mechanism.joints:
         if joint.cone is not None:
             cone = joint.cone
@@ -123,7 +123,7 @@ def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[
 
 
 def _equalities(tree: CutTree, names: Names, physics: Physics) -> ET.Element:
-    """What keeps the loops closed; stiff, for the kinematics are what counts."""
+    """The equalities that keep the loops closed; stiff, for the kinematics are what counts."""
     stiff = {"solref": f"{CLOSING_TIME!r} 1", "solimp": f"0.999 0.9999 {1e-3 * physics.length!r}"}
     equality = ET.Element("equality")
     for joint in tree.cuts:
@@ -131,8 +131,8 @@ def _equalities(tree: CutTree, names: Names, physics: Physics) -> ET.Element:
         site1, site2 = joint.name, names.ends[joint.name]
         ET.SubElement(equality, kind, {"name": joint.name, "site1": site1, "site2": site2, **stiff})
     for branch in tree.branches:
-        if branch.twin_of is not None:
-            ET.SubElement(equality, "weld", {"body1": branch.twin_of, "body2": branch.body, **stiff})
+        if branch.double_of is not None:
+            ET.SubElement(equality, "weld", {"body1": branch.double_of, "body2": branch.body, **stiff})
     return equality
 
 
@@ -140,15 +140,8 @@ def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element
     """A position servo for every actuated coordinate."""
     actuator = ET.Element("actuator")
     for drive in mechanism.drives:
-        turning = drive.kind == "angle"
-        gains = as_attributes(physics.servo(turning))
+        gains = as_attributes(physics.servo(drive.kind == "angle"))
         servo = ET.SubElement(actuator, "position", {"name": drive.name, "joint": drive.name, **gains})
         if np.isfinite(drive.limits).all():
-            servo.set("ctrlrange", vector(np.array(drive.limits) * (1.0 if turning else metres)))
+            servo.set("ctrlrange", vector(np.array(drive.limits) * si_unit(drive, metres)))
     return actuator
-
-
-def _home(mechanism: Mechanism, metres: float) -> Iterator[float]:
-    """The actuated coordinates at home [rad or m]."""
-    for drive in mechanism.drives:
-        yield float(drive.home) * (1.0 if drive.kind == "angle" else metres)

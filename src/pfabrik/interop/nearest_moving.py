@@ -42,7 +42,7 @@ OPEN = 3e-13
 """Largest loop error with which the machine found counts as one that moves [L and rad]."""
 
 MARGIN = 3.0
-"""How many times what rounding can do to first order a singular value may be, and a joint may be moved."""
+"""Factor on what rounding can do to first order: for singular values that it explains, and moves of joints."""
 
 WEAKEST = 1e-7
 """Singular value, relative to the largest, below which a condition on the joints is not solved for."""
@@ -67,16 +67,14 @@ def nearest_moving(structure: Structure, roundings: Sequence[Rounding]) -> tuple
         return None
     rank = _rank(structure, np.zeros((1, _count(structure))), threshold)
     q = _walked(structure, rank, np.random.default_rng(0))
-    displaced = _solved(structure, q, units, rank)
-    if displaced is None:
+    displacements = _displacements(structure, q, units, rank)
+    if displacements is None:
         return None
-    found = _structure(structure, displaced)
-    others = _walked(found, rank, np.random.default_rng(1))
-    if np.abs(_errors(found, others)).max() > OPEN or len(unclear_conditions(found)) >= len(
-        unclear_conditions(structure)
-    ):
+    moving = _displaced(structure, displacements)
+    is_open = np.abs(_errors(moving, _walked(moving, rank, np.random.default_rng(1)))).max() > OPEN
+    if is_open or len(unclear_conditions(moving)) >= len(unclear_conditions(structure)):
         return None
-    return found.joints
+    return moving.joints
 
 
 def _count(structure: Structure) -> int:
@@ -108,8 +106,8 @@ def _displacement_slopes(structure: Structure, q: Floats) -> Floats:
     bodies, loops, twists = displacements(structure, q), tree_of(structure).loops, []
     length = structure.characteristic_length
     for joint in structure.joints:
-        point, own = _point(structure, joint), columns(structure)[joint.name]
-        motion = joint_displacements(structure, joint.name, q[:, own])
+        point, span = _point(structure, joint), columns(structure)[joint.name]
+        motion = joint_displacements(structure, joint.name, q[:, span])
         carried = bodies[joint.connects[0]]
         twists.append(_adjoint(carried, point, length) - _adjoint(carried @ motion, point, length))
     every = np.concatenate([np.swapaxes(each, -1, -2) for each in twists], axis=1)
@@ -121,7 +119,7 @@ def _point(structure: Structure, joint: Joint) -> Floats:
 
 
 def _adjoint(motions: Floats, point: Floats, length: float) -> Floats:
-    """What a motion (n, 4, 4) makes of a twist that is at a point: one at the base origin, (n, 6, 6) [rad, L]."""
+    """The matrices (n, 6, 6) [rad, L] that carry a twist at a point, by motions (n, 4, 4), to the base origin."""
     turns, place = motions[:, :3, :3], (motions[:, :3, :3] @ point + motions[:, :3, 3]) / length
     matrix = np.zeros((len(motions), 6, 6))
     matrix[:, :3, :3] = matrix[:, 3:, 3:] = turns
@@ -145,35 +143,35 @@ def _walked(structure: Structure, rank: int, rng: np.random.Generator) -> Floats
 
 
 def _joint_steps(slopes: Floats, errors: Floats, rank: int) -> tuple[Floats, Floats]:
-    """Left vectors N that are left over, (n, 6 loops, k), and steps (n, c) that close what the others tell."""
+    """Left vectors N beyond the rank, (n, 6 loops, k), and steps (n, c) that close the errors along the others."""
     left, values, right = np.linalg.svd(slopes)
-    told = np.einsum("nik,ni->nk", left[:, :, :rank], errors) / values[:, :rank]
-    return left[:, :, rank:], -np.einsum("nk,nkj->nj", told, right[:, :rank])
+    solved = np.einsum("nik,ni->nk", left[:, :, :rank], errors) / values[:, :rank]
+    return left[:, :, rank:], -np.einsum("nk,nkj->nj", solved, right[:, :rank])
 
 
-def _solved(structure: Structure, q: Floats, units: Floats, rank: int) -> Floats | None:
-    """Displacements of the joints (j, 6) with which the loops close in configurations near to some (n, c)."""
-    displaced, found = np.zeros_like(units), structure
+def _displacements(structure: Structure, q: Floats, units: Floats, rank: int) -> Floats | None:
+    """Displacements of the joints (j, 6) with which the loops close in configurations near to given ones (n, c)."""
+    displaced, trial = np.zeros_like(units), structure
     for _ in range(NEWTON_STEPS):
-        errors, slopes = _errors(found, q), _slopes(found, q)
+        errors, slopes = _errors(trial, q), _slopes(trial, q)
         if np.abs(errors).max() <= CLOSED:
             break
-        by_joints = _displacement_slopes(found, q) * units.ravel()
-        left, _ = _joint_steps(slopes, errors, rank)
-        rows = np.einsum("nik,nij->nkj", left, by_joints).reshape(-1, units.size)
-        wanted = -np.einsum("nik,ni->nk", left, errors).ravel()
-        step = np.linalg.lstsq(rows, wanted, rcond=WEAKEST)[0]
+        by_joints = _displacement_slopes(trial, q) * units.ravel()
+        excess, _ = _joint_steps(slopes, errors, rank)
+        rows = np.einsum("nik,nij->nkj", excess, by_joints).reshape(-1, units.size)
+        residuals = -np.einsum("nik,ni->nk", excess, errors).ravel()
+        step = np.linalg.lstsq(rows, residuals, rcond=WEAKEST)[0]
         displaced = displaced + (step * units.ravel()).reshape(units.shape)
-        q = moved(found, q, _joint_steps(slopes, errors + by_joints @ step, rank)[1])
-        found = _structure(structure, displaced)
+        q = moved(trial, q, _joint_steps(slopes, errors + by_joints @ step, rank)[1])
+        trial = _displaced(structure, displaced)
         if (np.abs(displaced) > MARGIN * np.sqrt(3.0) * units + CLOSED).any():
             return None
     return displaced if np.abs(errors).max() <= OPEN else None
 
 
-def _structure(structure: Structure, displaced: Floats) -> Structure:
+def _displaced(structure: Structure, displaced: Floats) -> Structure:
     """With every joint moved by a small displacement (j, 6), a twist at its own point [rad, L]."""
-    made = []
+    joints = []
     for joint, xi in zip(structure.joints, displaced, strict=True):
         turn = from_rotvec(xi[None, :3])[0]
         changes: dict[str, Any] = {}
@@ -183,12 +181,5 @@ def _structure(structure: Structure, displaced: Floats) -> Structure:
             changes["axis"] = turn @ np.array(joint.axis)
         if joint.axes is not None:
             changes["axes"] = np.array(joint.axes) @ turn.T
-        made.append(dataclasses.replace(joint, **changes))
-    return Structure(
-        structure.name,
-        tuple(made),
-        structure.end_effector,
-        structure.reference_point,
-        structure.base,
-        structure.length_unit,
-    )
+        joints.append(dataclasses.replace(joint, **changes))
+    return dataclasses.replace(structure, joints=tuple(joints))

@@ -1,9 +1,9 @@
-"""A machine whose loops need not be closed yet: a tree of joints, and the places at which bodies are to meet."""
+"""A machine whose loops need not be closed yet: a tree of joints, and the loops that are to close."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,13 +13,19 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..description.joints import Cone, Joint, Vector
 from ..description.structure import Structure
-from ..errors import InvalidArgument, PfabrikError
+from ..errors import InvalidArgument
 from ..rotations import square_to
+from ..tolerances import TOLERANCES
 from .digits import Rounding
+from .names import unique
+from .notes import Note
 
 LoopType = Literal["spherical", "revolute", "fixed"]
 ROWS: dict[LoopType, int] = {"spherical": 3, "revolute": 5, "fixed": 6}
-"""What may close a loop, and how many conditions that is."""
+"""Joint types that may close a loop, and the number of conditions of each."""
+
+CLOSING = re.compile(r"(closing_.+)_([12])")
+"""The name of a frame that meets another: the loop's name, and which of its two sides it is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +76,21 @@ def _set(loop: Loop, name: str, value: object, shape: tuple[int, ...], place: st
     object.__setattr__(loop, name, array)
 
 
+def frame_along(axis: Floats) -> Floats:
+    """A frame (3, 3) whose third column is along an axis (3,) of any length but zero."""
+    across = square_to(axis)[0]
+    third = axis / np.linalg.norm(axis)
+    return np.column_stack([across, np.cross(third, across), third])
+
+
 @dataclass(frozen=True, eq=False)
 class OpenMechanism:
-    """A machine before its loops are closed; see `assemble`.
+    """A machine before its loops are closed by `assemble`.
 
     Attributes
     ----------
     joints : a tree from the base, with the joints at their home values, in base coordinates.
-    loops : what closes it.
+    loops : the joints that close it.
     base, end_effector, reference_point, length_unit, task : as of a `Mechanism`; the end effector may be a loop.
     cones : joint or loop -> the cone that limits it.
     roundings : joint or loop -> how far its digits put it from what was meant, at most [length, rad]; those that are
@@ -97,38 +110,60 @@ class OpenMechanism:
 
     def tree(self) -> Structure:
         """The joints alone, as a structure that can be moved."""
-        known = {body for joint in self.joints for body in joint.connects}
+        bodies = {body for joint in self.joints for body in joint.connects}
         reference = (0.0, 0.0, 0.0) if self.reference_point is None else self.reference_point
-        body = self.end_effector if self.end_effector in known else self.base
+        body = self.end_effector if self.end_effector in bodies else self.base
         return Structure(self.name, self.joints, body, reference, self.base, self.length_unit)
 
 
-def frame_along(axis: Floats) -> Floats:
-    """A frame (3, 3) whose third column is along an axis (3,) of any length but zero."""
-    across = square_to(axis)[0]
-    third = axis / np.linalg.norm(axis)
-    return np.column_stack([across, np.cross(third, across), third])
+def loops_by_name(
+    places: Mapping[str, tuple[str, Floats]], known: Sequence[Loop], taken: Iterable[str], notes: list[Note]
+) -> list[Loop]:
+    """The loops of frames called `closing_<name>_1` and `closing_<name>_2`, as drawings are exported; new ones only.
+
+    They are balls, or hinges where there are frames of the same names with `_z` behind them, off along the axis.
+
+    Parameters
+    ----------
+    places : frame -> its body, and where it is.
+    known : loops that the file describes otherwise, active or not.
+    taken : names that loops must not have.
+    """
+    sides: dict[str, dict[str, str]] = {}
+    for frame in places:
+        match = CLOSING.fullmatch(frame)
+        if match:
+            sides.setdefault(match[1], {})[match[2]] = frame
+    single = tuple(frame for pair in sides.values() if len(pair) == 1 for frame in pair.values())
+    if single:
+        notes.append(Note("a closing frame without the other one closes no loop", single))
+    names, loops = set(taken), []
+    for name, pair in sides.items():
+        if len(pair) == 2:
+            loop = _loop_between(unique(name, names), (pair["1"], pair["2"]), places)
+            loops += [] if any(_is_same(loop, other) for other in known) else [loop]
+    for kind, plural in (("spherical", "balls"), ("revolute", "hinges")):
+        of_kind = tuple(loop.name for loop in loops if loop.type == kind)
+        if of_kind:
+            notes.append(Note(f"loops that closing frames tell of, as {plural}", of_kind))
+    return loops
 
 
-@dataclass(frozen=True)
-class Note:
-    """Something that an import left out, changed, or found, with the names of what it is about."""
+def _loop_between(name: str, frames: tuple[str, str], places: Mapping[str, tuple[str, Floats]]) -> Loop:
+    """The loop of two frames: a hinge where both have another one along its axis, else a ball."""
+    bodies = (places[frames[0]][0], places[frames[1]][0])
+    points = np.array([places[frame][1] for frame in frames])
+    ends = [places.get(f"{frame}_z", places[frame])[1] for frame in frames]
+    axes = np.array(ends) - points
+    if not np.linalg.norm(axes, axis=1).all():
+        return Loop(name, "spherical", bodies, points)
+    return Loop(name, "revolute", bodies, points, np.array([frame_along(axis) for axis in axes]))
 
-    what: str
-    names: tuple[str, ...] = ()
 
-    def __str__(self) -> str:
-        return f"{self.what}: {', '.join(self.names)}" if self.names else self.what
-
-
-@contextmanager
-def noting(told: list[Note]) -> Iterator[None]:
-    """Have an error carry what was noted before it, as `__notes__`."""
-    try:
-        yield
-    except PfabrikError as error:
-        there = getattr(error, "__notes__", [])
-        for note in told:
-            if f"note: {note}" not in there:
-                error.add_note(f"note: {note}")
-        raise
+def _is_same(loop: Loop, other: Loop) -> bool:
+    """True if two loops join the same two bodies at the same place on each."""
+    points = dict(zip(other.connects, other.at, strict=True))
+    return set(points) == set(loop.connects) and all(
+        np.linalg.norm(points[body] - point) <= TOLERANCES.file_gap
+        for body, point in zip(loop.connects, loop.at, strict=True)
+    )

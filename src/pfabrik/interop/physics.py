@@ -31,12 +31,12 @@ STEP = 0.001
 
 @dataclass(frozen=True)
 class Physics:
-    """What a simulation model needs beside its geometry, in SI units.
+    """The masses of a simulation model, and what follows from them, in SI units.
 
     Attributes
     ----------
     masses : body -> its mass [kg].
-    given : the bodies whose masses were given.
+    given : bodies whose masses the caller gave.
     length : the characteristic length [m].
     heaviest : the largest of the masses, which any servo can carry [kg].
     """
@@ -53,11 +53,11 @@ class Physics:
         """
         centre = points.mean(axis=0)
         spread = float(np.sqrt(points.var(axis=0).sum()))
-        mass = self.masses.get(body, LINK**2 * self.heaviest)  # of a twin, hardly any
+        mass = self.masses.get(body, LINK**2 * self.heaviest)  # of a doubled body, hardly any
         return mass, centre, mass * max(spread, THINNEST * self.length) ** 2
 
     def carried(self, turning: bool) -> float:
-        """What a servo has to carry: a moment of inertia [kg m²] if it turns, else a mass [kg]."""
+        """The load of a servo: a moment of inertia [kg m²] if it turns, else a mass [kg]."""
         return self.heaviest * self.length**2 if turning else self.heaviest
 
     def servo(self, turning: bool) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Reached configurations of a mechanism for a referee to look at, and how far from home they go."""
+"""Reached configurations of a mechanism for a referee, and how far from home they go."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from ..poses import pose
 from ..rotations import angles_between
 
 SPREAD = (0.2, 0.35)
-"""How far from home random targets are at most, in each coordinate [L, rad]."""
+"""Largest distance of random targets from home, in each coordinate [L, rad]."""
 
 MOST_DRAWS = 8
-"""How often random targets, then actuator values, are drawn: each time as many as are asked for, until enough are
-reached."""
+"""Most draws of random targets, then of actuator values: each of as many as are wanted, until enough are reached."""
 
 
 class Travelled(NamedTuple):
-    """How far configurations went.
+    """The distances of configurations from home.
 
     Attributes
     ----------
@@ -42,29 +41,29 @@ class Travelled(NamedTuple):
 
 
 def reached_at_random(mechanism: Mechanism, count: int, rng: np.random.Generator) -> list[Solution]:
-    """Reached configurations around home, as many as are asked for if so many are found.
+    """Reached configurations around home, at most `count`.
 
     Answers to random targets, nearer to home while most are out of reach; where targets are hardly ever reached, as
     where they set more than the end effector can do, answers to random actuator values.
     """
-    found: list[Solution] = []
-    for ask, drawn in ((solve_ik, _targets), (solve_fk, _actuators)):
+    solutions: list[Solution] = []
+    for solve, draw in ((solve_ik, _targets), (solve_fk, _actuators)):
         near = 1.0
         for _ in range(MOST_DRAWS):
-            if len(found) == count:
-                return found
-            answers = ask(mechanism, drawn(mechanism, count, near, rng))
-            reached = np.flatnonzero(np.asarray(answers.status) == Status.REACHED)
-            found += [answers[int(row)] for row in reached[: count - len(found)]]
+            if len(solutions) == count:
+                return solutions
+            block = solve(mechanism, draw(mechanism, count, near, rng))
+            reached = np.flatnonzero(np.asarray(block.status) == Status.REACHED)
+            solutions += [block[int(row)] for row in reached[: count - len(solutions)]]
             near *= 0.6 if 2 * len(reached) < count else 1.0
-    return found
+    return solutions
 
 
-def travelled(mechanism: Mechanism, found: Sequence[Solution]) -> Travelled:
-    """How far some configurations went, at least one."""
-    values = np.array([solution.actuators for solution in found])
+def travelled(mechanism: Mechanism, solutions: Sequence[Solution]) -> Travelled:
+    """The distances of some configurations, at least one, from home."""
+    values = np.array([solution.actuators for solution in solutions])
     spans = np.ptp(np.concatenate([[[drive.home for drive in mechanism.drives]], values]), axis=0)
-    poses = np.array([solution.pose for solution in found])
+    poses = np.array([solution.pose for solution in solutions])
     shifts = np.linalg.norm(poses[:, :3, 3] - mechanism.home_pose[:3, 3], axis=1)
     turns = angles_between(poses[:, :3, :3], mechanism.home_pose[:3, :3])
     names = mechanism.actuator_names
@@ -75,7 +74,7 @@ def travelled(mechanism: Mechanism, found: Sequence[Solution]) -> Travelled:
 
 
 def _most(mechanism: Mechanism) -> Floats:
-    """How far actuators are taken from home at most, (n_a,) [rad or length]."""
+    """Largest distance of actuators from home, (n_a,) [rad or length]."""
     shift, turn = SPREAD
     turns = np.array([drive.kind == "angle" for drive in mechanism.drives])
     return np.where(turns, turn, shift * mechanism.characteristic_length)

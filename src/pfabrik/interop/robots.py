@@ -12,22 +12,19 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_names
-from ..description.graph import welded
 from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
 from ..errors import InvalidArgument, UnknownName
 from ..files.units import metres_of
 from .assembling import Imported, assemble
-from .couplings import Coupling, coupled
-from .cuts import unique
-from .digits import Rounding
-from .driving import Rates, as_driven, require_drives
-from .opened import Loop, Note, OpenMechanism
-from .pruning import prune
+from .couplings import Coupling, with_coupled_drives
+from .digits import Rounding, worst
+from .driving import Rates, require_drives, with_actuators
+from .names import unique
+from .notes import Note
+from .opened import Loop, OpenMechanism
+from .simplify import merged_bodies, merged_pair, prune
 from .tasks import with_task
-
-MOST_NAMES = 24
-"""Most candidates that a refusal lists."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +36,10 @@ class Robot:
     joints : from the root outward, each from its parent to its child; bodies welded to each other have a fixed one.
     root : the body that the others hang on.
     places : what an end effector may be called besides a joint -> its body, and the point of it that targets place [m].
-    base, end_effector, task, cones : what the file says of a mechanism in it, if anything.
+    base, end_effector, task, cones : those of a mechanism that the file describes, if any.
     order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
     rates : coordinate -> its highest speed and acceleration [rad or m, per s and per s^2], None where not known.
-    roundings : joint or loop -> how exactly the digits of the file place it [m, rad].
+    roundings : joint or loop -> how exactly the digits of the file place it [m, rad]; other loops are as the worst.
     couplings : joints that follow others.
     undriven : what the file has in place of driven joints, for the refusal of a machine without any.
     """
@@ -65,7 +62,7 @@ class Robot:
 
 def mechanism_of(
     robot: Robot,
-    told: list[Note],
+    notes: list[Note],
     base: str | None,
     end_effector: str | None,
     actuated: Iterable[str] | None,
@@ -73,63 +70,54 @@ def mechanism_of(
     length_unit: str,
     task: Sequence[str] | None,
 ) -> Imported:
-    """The mechanism between the base and the end effector of a robot, its loops closed; asked for as of `from_mjcf`."""
+    """The mechanism between the base and the end effector of a robot, its loops closed; arguments as of `from_mjcf`."""
     metres = metres_of(length_unit)
-    chosen = () if actuated is None else require_names("actuated", actuated)
-    robot = _driven(_locked(robot, fixed), None if actuated is None else chosen)
+    chosen = None if actuated is None else require_names("actuated", actuated)
+    robot = _with_drives(_with_held(robot, fixed), chosen)
     base = _base(robot, base)
-    end_effector = _end_effector(robot, end_effector, base, told)
+    end_effector = _end_effector(robot, end_effector, base, notes)
     tip, point = _place(robot, end_effector)
-    as_told = (base, end_effector) == (robot.base, robot.end_effector)
-    joints, loops, cones = _merged(robot, base, tip)
-    couplings = robot.couplings
+    rigid = _with_merged_bodies(robot, base, tip)
     if point is not None:
-        joints, loops, couplings = _not_called(tip, joints, loops, couplings, told)
-    opened = OpenMechanism(
-        robot.name,
-        tuple(_in_unit(joint, metres) for joint in joints),
-        tuple(dataclasses.replace(loop, points=loop.at / metres) for loop in loops),
-        tip,
-        None if point is None else tuple((point / metres).tolist()),
-        base,
-        length_unit,
-        require_names("task", task) if task is not None else robot.task if as_told else None,
-        cones,
-        {name: Rounding(each.length / metres, each.angle) for name, each in robot.roundings.items()},
-    )
-    opened = coupled(prune(opened, told), joints, couplings, chosen, told)
+        rigid = _without_joint_named(tip, rigid, notes)
+    if task is not None:
+        task = require_names("task", task)
+    elif (base, end_effector) == (robot.base, robot.end_effector):
+        task = robot.task
+    opened = prune(_opened(rigid, base, tip, point, length_unit, task), notes)
+    opened = with_coupled_drives(opened, rigid.joints, rigid.couplings, chosen or (), notes)
     require_drives(opened, robot.joints, robot.undriven)
-    found = assemble(opened, told)
-    notes = list(found.notes)
-    mechanism = with_task(as_driven(found.mechanism, robot.order, robot.rates, metres), opened.task is not None, notes)
-    return dataclasses.replace(found, mechanism=mechanism, notes=tuple(notes))
+    imported = assemble(opened, notes)
+    notes = list(imported.notes)
+    mechanism = with_actuators(imported.mechanism, robot.order, robot.rates, metres)
+    mechanism = with_task(mechanism, task is not None, notes)
+    return dataclasses.replace(imported, mechanism=mechanism, notes=tuple(notes))
 
 
-def _names(what: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
-    """Names that are all known; UnknownName for the first that is not."""
-    listed, every = require_names(what, names), list(known)
-    for name in listed:
-        if name not in every:
-            raise UnknownName(f"joint to be {what}", name, every)
-    return set(listed)
+def _require_known(argument: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
+    """The names, if all are known; UnknownName for the first that is not."""
+    names, known = require_names(argument, names), list(known)
+    for name in names:
+        if name not in known:
+            raise UnknownName(f"joint to be {argument}", name, known)
+    return set(names)
 
 
-def _locked(robot: Robot, fixed: Iterable[str]) -> Robot:
+def _with_held(robot: Robot, fixed: Iterable[str]) -> Robot:
     """With some joints held where they are."""
-    held = _names("fixed", fixed, (joint.name for joint in robot.joints))
+    held = _require_known("fixed", fixed, (joint.name for joint in robot.joints))
     joints = [Joint(each.name, "fixed", each.connects) if each.name in held else each for each in robot.joints]
     return dataclasses.replace(robot, joints=joints)
 
 
-def _driven(robot: Robot, actuated: Iterable[str] | None) -> Robot:
-    """With other joints actuated than the file says, in the order in which they are named."""
+def _with_drives(robot: Robot, actuated: Sequence[str] | None) -> Robot:
+    """With other joints actuated than in the file, in the order in which they are named."""
     if actuated is None:
         return robot
-    order = require_names("actuated", actuated)
-    able = [joint.name for joint in robot.joints if KINDS[joint.type].actuatable]
-    driven = _names("actuated", order, able)
+    actuatable = [joint.name for joint in robot.joints if KINDS[joint.type].actuatable]
+    driven = _require_known("actuated", actuated, actuatable)
     joints = [dataclasses.replace(joint, actuated=joint.name in driven) for joint in robot.joints]
-    return dataclasses.replace(robot, joints=joints, order=order)
+    return dataclasses.replace(robot, joints=joints, order=actuated)
 
 
 def _bodies(robot: Robot) -> dict[str, None]:
@@ -137,8 +125,13 @@ def _bodies(robot: Robot) -> dict[str, None]:
     return dict.fromkeys([robot.root, *(body for joint in robot.joints for body in joint.connects)])
 
 
+def _joint_names(robot: Robot) -> list[str]:
+    """Names of joints, then of loops."""
+    return [joint.name for joint in robot.joints] + [loop.name for loop in robot.loops]
+
+
 def _base(robot: Robot, base: str | None) -> str:
-    """The body asked for, else the file's own, else the root."""
+    """The given base, else that of the file, else the root."""
     if base is None:
         return robot.base or robot.root
     if not isinstance(base, str) or base not in _bodies(robot):
@@ -146,24 +139,24 @@ def _base(robot: Robot, base: str | None) -> str:
     return base
 
 
-def _end_effector(robot: Robot, end_effector: str | None, base: str, told: list[Note]) -> str:
-    """What was asked for, else the file's own, else the one body at which most joints and loops meet."""
-    joints = [each.name for each in robot.joints] + [each.name for each in robot.loops]
+def _end_effector(robot: Robot, end_effector: str | None, base: str, notes: list[Note]) -> str:
+    """The given end effector, else that of the file, else the one body at which most joints and loops meet."""
     if end_effector is not None:
-        if not isinstance(end_effector, str) or end_effector not in [*robot.places, *joints]:
-            raise UnknownName("body, site or joint", end_effector, [*robot.places, *joints])
+        known = [*robot.places, *_joint_names(robot)]
+        if not isinstance(end_effector, str) or end_effector not in known:
+            raise UnknownName("body, site or joint", end_effector, known)
         return end_effector
     if robot.end_effector is not None:
         return robot.end_effector
-    merged, loops, _ = _merged(robot, base, base)
-    pairs = [each.connects for each in merged] + [each.connects for each in loops]
-    touching = Counter(body for pair in pairs for body in pair if body != base)
-    counts = touching.most_common()
-    if not loops or len(counts) < 2 or counts[0][1] == counts[1][1]:
+    rigid = _with_merged_bodies(robot, base, base)
+    pairs = [joint.connects for joint in rigid.joints] + [loop.connects for loop in rigid.loops]
+    joints_at = Counter(body for pair in pairs for body in pair if body != base)
+    counts = joints_at.most_common()
+    if not rigid.loops or len(counts) < 2 or counts[0][1] == counts[1][1]:
         raise InvalidArgument(
-            "end_effector", "none, and no body where most legs meet", f"one of {', '.join(touching)} (--end-effector)"
+            "end_effector", "none, and no body where most legs meet", f"one of {', '.join(joints_at)} (--end-effector)"
         )
-    told.append(Note("taken for the end effector, for most joints meet there", (counts[0][0],)))
+    notes.append(Note("taken for the end effector, for most joints meet there", (counts[0][0],)))
     return counts[0][0]
 
 
@@ -172,49 +165,68 @@ def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
     for joint in robot.joints:
         if joint.name == end_effector and joint.type == "fixed":
             return robot.places[joint.connects[1]]
-    is_joint = end_effector in [each.name for each in robot.joints] + [each.name for each in robot.loops]
-    if end_effector in _bodies(robot) or not is_joint:
+    if end_effector in _bodies(robot) or end_effector not in _joint_names(robot):
         return robot.places[end_effector]
     return end_effector, None
 
 
-def _merged(robot: Robot, base: str, tip: str) -> tuple[list[Joint], list[Loop], dict[str, Cone]]:
-    """Joints, loops and cones with the bodies that are welded to each other as one, called as asked for."""
-    weld = welded([joint for joint in robot.joints if joint.type == "fixed"], base, tip)
-
-    def named(pair: tuple[str, str]) -> tuple[str, str]:
-        return weld.get(pair[0], pair[0]), weld.get(pair[1], pair[1])
-
-    joints = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.joints if each.type != "fixed"]
-    loops = [dataclasses.replace(each, connects=named(each.connects)) for each in robot.loops]
+def _with_merged_bodies(robot: Robot, base: str, tip: str) -> Robot:
+    """With bodies that are welded to each other as one, called as the base or the tip where it is one of them."""
+    joints, stands_for = merged_bodies(robot.joints, base, tip)
+    loops = [dataclasses.replace(loop, connects=merged_pair(loop.connects, stands_for)) for loop in robot.loops]
     cones = {
-        name: dataclasses.replace(cone, fixed_to=weld.get(cone.fixed_to, cone.fixed_to))
+        name: dataclasses.replace(cone, fixed_to=stands_for.get(cone.fixed_to, cone.fixed_to))
         for name, cone in robot.cones.items()
     }
-    return joints, [loop for loop in loops if loop.connects[0] != loop.connects[1]], cones
+    return dataclasses.replace(
+        robot,
+        joints=[joint for joint in joints if joint.type != "fixed"],
+        loops=[loop for loop in loops if loop.connects[0] != loop.connects[1]],
+        cones=cones,
+    )
 
 
-def _not_called(
-    tip: str, joints: list[Joint], loops: list[Loop], couplings: Sequence[Coupling], told: list[Note]
-) -> tuple[list[Joint], list[Loop], Sequence[Coupling]]:
+def _without_joint_named(tip: str, robot: Robot, notes: list[Note]) -> Robot:
     """With another name for a joint that is called as the end effector, a body."""
-    taken = {tip, *(joint.name for joint in joints), *(loop.name for loop in loops)}
-    name = unique(f"{tip}_joint", taken)
-    if tip not in [*(each.name for each in joints), *(each.name for each in loops)]:
-        return joints, loops, couplings
-    told.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
-    renamed = [dataclasses.replace(each, name=name) if each.name == tip else each for each in joints]
-    loops = [dataclasses.replace(each, name=name) if each.name == tip else each for each in loops]
-    return renamed, loops, [each.renamed(tip, name) for each in couplings]
+    name = unique(f"{tip}_joint", {tip, *_joint_names(robot)})
+    if tip not in _joint_names(robot):
+        return robot
+    notes.append(Note(f"a joint is called as the end effector, '{tip}', and here", (name,)))
+    return dataclasses.replace(
+        robot,
+        joints=[dataclasses.replace(each, name=name) if each.name == tip else each for each in robot.joints],
+        loops=[dataclasses.replace(each, name=name) if each.name == tip else each for each in robot.loops],
+        couplings=[each.renamed(tip, name) for each in robot.couplings],
+    )
+
+
+def _opened(
+    robot: Robot, base: str, tip: str, point: Floats | None, length_unit: str, task: Sequence[str] | None
+) -> OpenMechanism:
+    """The robot in the unit of the mechanism."""
+    metres = metres_of(length_unit)
+    roundings = dict(robot.roundings)
+    if roundings:
+        coarsest = worst(roundings.values())
+        roundings = {loop.name: coarsest for loop in robot.loops} | roundings
+    return OpenMechanism(
+        robot.name,
+        tuple(_in_unit(joint, metres) for joint in robot.joints),
+        tuple(dataclasses.replace(loop, points=loop.at / metres) for loop in robot.loops),
+        tip,
+        None if point is None else tuple((point / metres).tolist()),
+        base,
+        length_unit,
+        None if task is None else tuple(task),
+        robot.cones,
+        {name: Rounding(each.length / metres, each.angle) for name, each in roundings.items()},
+    )
 
 
 def _in_unit(joint: Joint, metres: float) -> Joint:
     """A joint in the unit of the mechanism."""
     changes: dict[str, Any] = {"at": None if joint.at is None else np.array(joint.at) / metres}
-    if joint.type != "prismatic":
-        return dataclasses.replace(joint, **changes)
-    changes |= {"home": np.divide(joint.home, metres)}
-    for name in ("range", "max_speed"):
-        value = getattr(joint, name)
-        changes[name] = None if value is None else np.divide(value, metres)
+    if joint.type == "prismatic":
+        changes["home"] = np.divide(joint.home, metres)
+        changes["range"] = None if joint.range is None else np.divide(joint.range, metres)
     return dataclasses.replace(joint, **changes)

@@ -1,4 +1,7 @@
-"""Joints said more plainly: what is welded is one body, two balls are a hinge, two hinges a universal joint."""
+"""The same machine in fewer joints: without what the end effector does not depend on, and with joints merged.
+
+Bodies that are welded are one body, two balls between two bodies a hinge, two hinges that cross a universal joint.
+"""
 
 from __future__ import annotations
 
@@ -9,47 +12,69 @@ from typing import Any
 
 import numpy as np
 
-from ..description.graph import welded
+from ..description.graph import Edge, spanning_tree, welded
 from ..description.joint_types import JointType
 from ..description.joints import Cone, Joint
 from ..tolerances import TOLERANCES
-from .opened import Note
+from .notes import Note
+from .opened import OpenMechanism
 
 SKEW = 0.1
-"""Least sine between the axes of what is called a universal joint."""
+"""Least sine between the axes of a universal joint."""
 
 
-def without_twins(joints: Sequence[Joint], base: str, end_effector: str) -> list[Joint]:
-    """Balls that two bodies share as the one joint that they are together, and welded bodies as one.
+def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
+    """The machine with only those joints and loops on which the end effector's motion against the base depends."""
+    edges = [Edge(joint, joint.connects) for joint in opened.joints]
+    edges += [Edge(Joint(loop.name, loop.type, loop.connects), loop.connects) for loop in opened.loops]
+    tips = [edge for edge in edges if edge.joint.name == opened.end_effector]
+    body = tips[0].bodies[0] if tips else opened.end_effector
+    kept = _sharing_loops([*edges, Edge(Joint("", "fixed", (opened.base, body)), (opened.base, body))], opened.base)
+    names = {edges[index].joint.name for index in kept if index < len(edges)} | {edge.joint.name for edge in tips}
+    omitted = tuple(edge.joint.name for edge in edges if edge.joint.name not in names)
+    if omitted:
+        notes.append(Note("left out, for the end effector does not depend on them", omitted))
+    joints = tuple(joint for joint in opened.joints if joint.name in names)
+    loops = tuple(loop for loop in opened.loops if loop.name in names)
+    return dataclasses.replace(opened, joints=joints, loops=loops)
+
+
+def _sharing_loops(edges: list[Edge], base: str) -> set[int]:
+    """The edges that share a loop with the last one, or with one that does, and so on."""
+    loops = spanning_tree(edges, base).loops != 0.0
+    kept = np.zeros(len(edges), bool)
+    kept[-1] = True
+    while True:
+        touched = loops[(loops & kept).any(axis=1)].any(axis=0) | kept
+        if (touched == kept).all():
+            return set(np.flatnonzero(kept).tolist())
+        kept = touched
+
+
+def merged_bodies(joints: Sequence[Joint], *kept: str) -> tuple[list[Joint], dict[str, str]]:
+    """The joints between bodies of which those fixed to each other are one; and body -> the one it is part of.
 
     Parameters
     ----------
-    base, end_effector : names that stay.
+    kept : bodies that keep their names, and the fixed joints between them.
     """
-    return _without_welds(_hinged(joints), base, end_effector)
+    stands_for = welded([joint for joint in joints if joint.type == "fixed"], *kept)
+    merged = [dataclasses.replace(joint, connects=merged_pair(joint.connects, stands_for)) for joint in joints]
+    return [joint for joint in merged if joint.connects[0] != joint.connects[1]], stands_for
 
 
-def simplified(
-    joints: Sequence[Joint], base: str, end_effector: str, cones: Mapping[str, Cone], told: list[Note]
-) -> list[Joint]:
-    """The same machine in fewer joints.
-
-    Parameters
-    ----------
-    base, end_effector : names that stay.
-    cones : joint -> the cone that limits it.
-    """
-    single = _grouped(joints, {base, end_effector}, told)
-    return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in single]
+def merged_pair(pair: tuple[str, str], stands_for: Mapping[str, str]) -> tuple[str, str]:
+    """The bodies that stand for two bodies."""
+    return stands_for.get(pair[0], pair[0]), stands_for.get(pair[1], pair[1])
 
 
-def _hinged(joints: Sequence[Joint]) -> list[Joint]:
-    """Balls that share their two bodies: two make a hinge, three that are not in line hold all."""
+def merged_balls(joints: Sequence[Joint]) -> list[Joint]:
+    """Balls that share their two bodies as one joint: two are a hinge, three that are not in line hold all."""
     between: dict[frozenset[str], list[Joint]] = defaultdict(list)
     for joint in joints:
         if joint.type == "spherical":
             between[frozenset(joint.connects)].append(joint)
-    replaced: dict[str, Joint | None] = {}
+    merged: dict[str, Joint | None] = {}
     for balls in between.values():
         points = np.array([ball.at for ball in balls])
         spread, axes = np.linalg.svd(points - points[0])[1:] if len(balls) > 1 else (np.zeros(3), np.eye(3))
@@ -58,22 +83,19 @@ def _hinged(joints: Sequence[Joint]) -> list[Joint]:
             continue
         kind: JointType = "revolute" if directions == 1 else "fixed"
         axis = axes[0] if directions == 1 else None
-        replaced |= {ball.name: None for ball in balls}
-        replaced[balls[0].name] = dataclasses.replace(balls[0], type=kind, axis=axis)
-    left = [replaced.get(joint.name, joint) for joint in joints]
-    return [joint for joint in left if joint is not None]
+        merged |= {ball.name: None for ball in balls}
+        merged[balls[0].name] = dataclasses.replace(balls[0], type=kind, axis=axis)
+    replaced = [merged.get(joint.name, joint) for joint in joints]
+    return [joint for joint in replaced if joint is not None]
 
 
-def _without_welds(joints: Sequence[Joint], *kept: str) -> list[Joint]:
-    """Bodies that are fixed to each other as one, but for those that are kept."""
-    weld = welded([joint for joint in joints if joint.type == "fixed"], *kept)
-    ends = [(weld.get(a, a), weld.get(b, b)) for a, b in (joint.connects for joint in joints)]
-    moved = [dataclasses.replace(joint, connects=pair) for joint, pair in zip(joints, ends, strict=True)]
-    return [joint for joint in moved if joint.connects[0] != joint.connects[1]]
+def with_cones(joints: Sequence[Joint], cones: Mapping[str, Cone]) -> list[Joint]:
+    """The joints with their cones, by name."""
+    return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in joints]
 
 
-def _grouped(joints: Sequence[Joint], kept: set[str], told: list[Note]) -> list[Joint]:
-    """Two joints with nothing else on the body between them, as the one that they are together.
+def combined(joints: Sequence[Joint], kept: set[str], notes: list[Note]) -> list[Joint]:
+    """Two joints with nothing else on the body between them as one joint, unless that body is to be kept.
 
     Two passive hinges whose axes cross are a universal joint. J[0] and J[1], a hinge and a slide along it, are a
     cylindrical joint J: as this library writes it.
@@ -88,47 +110,47 @@ def _grouped(joints: Sequence[Joint], kept: set[str], told: list[Note]) -> list[
         if len(pair) != 2 or between in kept or not all(made.get(joint.name) is joint for joint in pair):
             continue
         first, second = sorted(pair, key=lambda joint: joint.name.endswith("[1]"))
-        one = _one(first, second, between)
+        one = _combination(first, second, between)
         if one is not None:
-            made = {name: one if joint is first else joint for name, joint in made.items() if joint is not second}
-            if one.name not in (stem_of(first), stem_of(second)):
+            made = {name: one if each is first else each for name, each in made.items() if each is not second}
+            if one.name not in (_stem(first), _stem(second)):
                 crossing.append(one.name)
     if crossing:
-        told.append(Note("hinges whose axes cross are a universal joint", tuple(crossing)))
+        notes.append(Note("hinges whose axes cross are a universal joint", tuple(crossing)))
     return list(made.values())
 
 
-def _one(first: Joint, second: Joint, between: str) -> Joint | None:
-    """The joint that two are together, or None where they are not."""
+def _combination(first: Joint, second: Joint, between: str) -> Joint | None:
+    """The joint that two are together, or None where they are not one."""
     kinds = (first.type, second.type)
     if kinds not in (("revolute", "revolute"), ("revolute", "prismatic")):
         return None
-    ranges = (first.range, second.range)
     if (first.range is None) != (second.range is None):
         return None
     signs = (1.0 if first.connects[1] == between else -1.0), (1.0 if second.connects[0] == between else -1.0)
     axes = np.array([first.axis, second.axis]) * np.reshape(signs, (2, 1))
     ends = [next(body for body in joint.connects if body != between) for joint in (first, second)]
-    ours = stem_of(first) if stem_of(first) == stem_of(second) else None
-    both: dict[str, Any] = {"home": (first.home, second.home), "range": None if first.range is None else ranges}
+    stem = _stem(first) if _stem(first) == _stem(second) else None
+    range_ = None if first.range is None else (first.range, second.range)
+    coordinates: dict[str, Any] = {"home": (first.home, second.home), "range": range_}
     driven = (first.actuated is True, second.actuated is True)
     if kinds[1] == "prismatic":
-        along = np.linalg.norm(np.cross(*axes)) < TOLERANCES.alignment and axes[0] @ axes[1] > 0.0
-        if ours is None or not along:
+        is_along = np.linalg.norm(np.cross(*axes)) < TOLERANCES.alignment and axes[0] @ axes[1] > 0.0
+        if stem is None or not is_along:
             return None
-        return Joint(ours, "cylindrical", ends, first.at, axes[0], actuated=driven, **both)
-    if any(driven) or (ours is None and (stem_of(first) or stem_of(second) or not _cross(first, second))):
+        return Joint(stem, "cylindrical", ends, first.at, axes[0], actuated=driven, **coordinates)
+    if any(driven) or (stem is None and (_stem(first) or _stem(second) or not _is_crossing(first, second))):
         return None
-    return Joint(ours or f"{first.name}+{second.name}", "universal", ends, first.at, axes=axes, **both)
+    return Joint(stem or f"{first.name}+{second.name}", "universal", ends, first.at, axes=axes, **coordinates)
 
 
-def stem_of(joint: Joint) -> str | None:
+def _stem(joint: Joint) -> str | None:
     """The name of the joint of which this one is a coordinate, as `coordinate_names` writes it: J of J[0]."""
     return joint.name[:-3] if joint.name.endswith(("[0]", "[1]")) else None
 
 
-def _cross(first: Joint, second: Joint) -> bool:
-    """Whether two hinges are at one place and not nearly parallel."""
+def _is_crossing(first: Joint, second: Joint) -> bool:
+    """True if two hinges are at one place and not nearly parallel."""
     points, axes = np.array([first.at, second.at]), np.array([first.axis, second.axis])
     apart, sine = np.linalg.norm(points[1] - points[0]), np.linalg.norm(np.cross(*axes))
     return bool(apart <= TOLERANCES.alignment * np.abs(points[0]).max() and sine >= SKEW)

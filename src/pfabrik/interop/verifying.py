@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
+from ..answers.solution import Solution
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
@@ -25,7 +26,7 @@ hold for machines that do not move at all."""
 
 @dataclass(frozen=True)
 class AgainstOriginal:
-    """What the file says that a mechanism was imported from: the largest differences over all poses.
+    """The comparison with the file that a mechanism was imported from: the largest differences over all poses.
 
     Attributes
     ----------
@@ -42,14 +43,14 @@ class AgainstOriginal:
     rotation_tolerance: float
 
     def __bool__(self) -> bool:
-        """Whether its loops close, and poses differ, by no more than the digits of the file explain."""
+        """True if its loops close, and poses agree, as exactly as the digits of the file let them."""
         apart = max(self.loop_gap, self.position_difference)
         return apart <= self.position_tolerance and self.rotation_difference <= self.rotation_tolerance
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What the referee found: the largest differences over all poses, lengths in the mechanism's unit.
+    """The comparison with MuJoCo: the largest differences over all poses, lengths in the mechanism's unit.
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class Verification:
         with the actuated joints where we have them [length], [rad].
     tolerance : what counts as agreement [length].
     travelled : how far the poses went from home.
-    original : what the original file says; None where none was given, or there were no poses.
+    original : the comparison with the original file; None where none was given, or there were no poses.
     """
 
     poses: int
@@ -72,18 +73,18 @@ class Verification:
 
     @property
     def agrees(self) -> bool:
-        """Whether MuJoCo agrees on every pose with us, on our export and on the original."""
+        """True if MuJoCo agrees with us on every pose, on our export and on the original."""
         apart = max(self.loop_gap, self.position_difference)
-        own = apart <= self.tolerance and self.rotation_difference <= TOLERANCES.rotation
-        return self.poses > 0 and own and (self.original is None or bool(self.original))
+        is_close = apart <= self.tolerance and self.rotation_difference <= TOLERANCES.rotation
+        return self.poses > 0 and is_close and (self.original is None or bool(self.original))
 
     @property
     def goes_far(self) -> bool:
-        """Whether the poses are far enough from home to say something of the machine."""
+        """True if the poses are far enough from home to say something of the machine."""
         return max(self.travelled.shares.values(), default=0.0) >= FAR
 
     def __bool__(self) -> bool:
-        """Whether there were poses that go far, and the two agree on all."""
+        """True if there were poses that go far, and the two agree on all."""
         return self.agrees and self.goes_far
 
 
@@ -116,21 +117,25 @@ def verify(
     UnknownName : an actuator or end effector that the original does not have.
     """
     checked_mechanism(mechanism)
-    given: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))
-    for name, value, least in given:
+    counts: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))
+    for name, value, least in counts:
         if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
             raise InvalidArgument(name, reprlib.repr(value), f"an integer from {least} on")
     rng = np.random.default_rng(seed)
     referee = Referee(mechanism)
-    model = None if original is None else Original(mechanism, original, loops, configuration)
-    found = reached_at_random(mechanism, poses, rng)
+    file = None if original is None else Original(mechanism, original, loops, configuration)
+    solutions = reached_at_random(mechanism, poses, rng)
     tolerance = TOLERANCES.position * mechanism.characteristic_length
-    if not found:
+    if not solutions:
         return Verification(0, np.nan, np.nan, np.nan, tolerance, Travelled({}, {}, 0.0, 0.0))
-    gap, position, rotation = np.max([referee.compare(solution, rng) for solution in found], axis=0).tolist()
-    against = None
-    if model is not None:
-        far, off, turned = np.max([model.compare(solution) for solution in found], axis=0).tolist()
-        unit, most = referee.metres, (model.position_tolerance, model.rotation_tolerance)
-        against = AgainstOriginal(far / unit, off / unit, turned, most[0] / unit, most[1])
-    return Verification(len(found), gap, position, rotation, tolerance, travelled(mechanism, found), against)
+    gap, position, rotation = np.max([referee.compare(each, rng) for each in solutions], axis=0).tolist()
+    against = None if file is None else _against(file, solutions)
+    return Verification(len(solutions), gap, position, rotation, tolerance, travelled(mechanism, solutions), against)
+
+
+def _against(original: Original, solutions: Sequence[Solution]) -> AgainstOriginal:
+    """The comparison of solutions with the original file, in the mechanism's unit."""
+    metres = original.metres
+    gap, position, rotation = np.max([original.compare(each) for each in solutions], axis=0).tolist()
+    tolerances = original.position_tolerance / metres, original.rotation_tolerance
+    return AgainstOriginal(gap / metres, position / metres, rotation, *tolerances)

@@ -19,7 +19,7 @@ DEEPEST = 100
 """Deepest nesting of elements."""
 
 KINDS: dict[str, Literal["mjcf", "urdf"]] = {"mujoco": "mjcf", "robot": "urdf"}
-"""First element of a file -> what kind of file it is."""
+"""First element of a file -> its kind."""
 
 MOST_ELEMENTS, MOST_INCLUDED = 200_000, 20
 
@@ -53,7 +53,7 @@ def read_xml(source: str | os.PathLike[str], root: str) -> ET.Element:
 
 
 def kind_of(path: str | os.PathLike[str]) -> Literal["mjcf", "urdf"]:
-    """What kind of file this is, by its first element; InvalidMechanism where it is neither."""
+    """The kind of a file, by its first element; InvalidMechanism where it is neither."""
     tree = _parsed(_Budget().read(require_path("path", path)), os.fspath(path))
     if tree.tag not in KINDS:
         expected = " or ".join(f"<{tag}> ({kind.upper()})" for tag, kind in KINDS.items())
@@ -73,14 +73,14 @@ def require_file(path: Path, expected: str) -> None:
 
 
 class _Budget:
-    """How much may still be read."""
+    """The bytes that may still be read."""
 
     def __init__(self) -> None:
-        self.left = LARGEST
+        self.remaining = LARGEST
 
     def spent(self, content: bytes, place: str) -> bytes:
-        self.left -= len(content)
-        if self.left < 0:
+        self.remaining -= len(content)
+        if self.remaining < 0:
             raise fault(place, f"more than {LARGEST} bytes", f"at most {LARGEST}, with all that is included")
         return content
 
@@ -88,13 +88,13 @@ class _Budget:
         require_file(path, "a model in XML")
         try:
             with path.open("rb") as file:
-                return self.spent(file.read(self.left + 1), str(path))
+                return self.spent(file.read(self.remaining + 1), str(path))
         except OSError as error:
             raise fault(str(path), f"a file that cannot be read ({error.strerror})", "a readable file") from None
 
 
 def _parsed(content: bytes, place: str) -> ET.Element:
-    """The tree of a text, after a look at its size and at what it declares: nothing is expanded before."""
+    """The tree of a text whose size and declarations are checked first: nothing is expanded before."""
     parser = expat.ParserCreate()
     depth = count = 0
 

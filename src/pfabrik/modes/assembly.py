@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..closure.close import Closing, Closure, close, closure_of, platform_poses
+from ..closure.close import Closing, close, platform_poses
 from ..closure.random_starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, solution_at
+from ..model import model_of
+from ..motion.closure import Closure
 from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES
 from .fingerprints import pose_marks
@@ -48,7 +50,7 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
         found = f"batch shape {shape}" if shape else "a value that is not finite"
         raise InvalidArgument("actuators", found, f"one set of {len(mechanism.actuator_names)} finite values")
     most_starts = as_count("most_starts", most_starts, 1)
-    search = _Search(closure_of(mechanism), values)
+    search = _Search(model_of(mechanism).closure, values)
     while search.starts < most_starts and not search.is_done:
         search.add_starts(BATCH)
     order = np.argsort(search.distances_from_home, kind="stable")

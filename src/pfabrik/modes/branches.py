@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..closure.close import HELD, Closing, Closure, close, platform_poses
+from ..closure.close import HELD, Closing, close, platform_poses
 from ..closure.random_starts import random_starts
 from ..description.joint_types import TASK_TURNS
-from ..description.task import task_of
 from ..errors import ContinuumOfWorkingModes
+from ..motion.closure import Closure
 from ..motion.displacements import columns
 from ..tolerances import TOLERANCES
 from .fingerprints import Fingerprints, close_on_target, count_from_home, shifts
@@ -58,7 +58,7 @@ class BranchSearch:
     def __init__(self, closure: Closure, target: Floats) -> None:
         self.closure = closure
         self.target = target
-        self.task = task_of(closure.mechanism)
+        self.task = closure.task
         self.rng = np.random.default_rng(0)
         self.starts = 0
         self.poses = Clusters()

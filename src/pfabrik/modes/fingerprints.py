@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..closure.close import Closing, Closure, close
+from ..closure.close import Closing, close
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..motion.closure import Closure
 from ..motion.displacements import centres, columns
 from ..motion.limited_coordinates import within_turns
 from ..tolerances import TOLERANCES
@@ -138,7 +138,7 @@ def shifts(
     moves = []
     for size in (0.0, 0.5 * lengths, lengths):
         begin = _moved(pose, size * twists, closure.mechanism.characteristic_length)
-        completed = task_of(closure.mechanism).completed(np.repeat(pose[None], SHAKES, axis=0), begin)
+        completed = closure.task.completed(np.repeat(pose[None], SHAKES, axis=0), begin)
         closed = close_on_target(closure, coordinates + size * shakes / closure.scale, completed, locked=locked)
         moves.append(np.where((closed.gap <= TOLERANCES.position)[:, None, None], read(closed), np.nan))
     half, whole = moves[1] - moves[0], moves[2] - moves[0]
@@ -158,7 +158,7 @@ def _moved(pose: Floats, twists: Floats, length: float) -> Floats:
 
 def close_on_target(closure: Closure, coordinates: Floats, poses: Floats, **options: Any) -> Closing:
     """Close legs below platforms (n, 4, 4) that are held in the components of the task; options as of `close`."""
-    task = task_of(closure.mechanism)
+    task = closure.task
     return close(closure, coordinates, poses, platform=task.held, frame=task.frame, **options)
 
 

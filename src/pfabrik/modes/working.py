@@ -10,12 +10,12 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
-from ..closure.close import close, closure_of
+from ..closure.close import close
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.rows import POSITION_ERROR, ROTATION_ERROR
+from ..model import model_of
 from ..poses import are_poses, made_exact, what_is_wrong
 from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed
@@ -74,7 +74,7 @@ def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40
     """
     pose = _as_pose(mechanism, target)
     most_starts, most = as_count("most_starts", most_starts, 1), as_count("most", most, 0)
-    search = BranchSearch(closure_of(mechanism), pose)
+    search = BranchSearch(model_of(mechanism).closure, pose)
     while search.starts < most_starts and not search.is_done:
         search.add_starts(BATCH)
     listed = search.listed(most)
@@ -95,12 +95,12 @@ def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
 
 def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
     """A solution of listed configurations for one target: measured, not changed."""
-    closing = close(closure_of(mechanism), listed.coordinates, listed.poses, max_iterations=0)
+    closing = close(model_of(mechanism).closure, listed.coordinates, listed.poses, max_iterations=0)
     configurations = engine_of(mechanism).as_configurations(closing)
     rows, n = configurations.rows, len(configurations)
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = target[:3, :3]
     rows.status[:] = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
-    position, rotation = task_of(mechanism).errors(rows.poses, np.repeat(target[None], n, axis=0))
+    position, rotation = model_of(mechanism).task.errors(rows.poses, np.repeat(target[None], n, axis=0))
     rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
     return Solution(mechanism, configurations, (n,))

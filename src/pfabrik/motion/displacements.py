@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..derived import derived
 from ..description.graph import Tree, tree_of
 from ..description.home_mobility import (
     column_joints,
@@ -66,7 +66,7 @@ class _Geometry:
     spherical: Mask
 
 
-@lru_cache(maxsize=64)
+@derived
 def columns(mechanism: Structure) -> Mapping[str, slice]:
     """Joint name -> its coordinates, as a slice of the columns of q."""
     bounds = np.searchsorted(column_joints(mechanism), np.arange(len(mechanism.joints) + 1)).tolist()
@@ -75,7 +75,7 @@ def columns(mechanism: Structure) -> Mapping[str, slice]:
     )
 
 
-@lru_cache(maxsize=64)
+@derived
 def home_coordinates(mechanism: Structure) -> Floats:
     """All joint coordinates at home as the description counts them, (c,) [rad or length]."""
     home = np.array([each.home for each in mechanism.coordinates], float)
@@ -198,7 +198,7 @@ def stepped(mechanism: Structure, q: Floats, step: Floats) -> Floats:
     return moved
 
 
-@lru_cache(maxsize=64)
+@derived
 def rate_units(mechanism: Structure) -> Floats:
     """What the rates of `screws` are counted in, (c,): 1 for an angle [1/s], L for a displacement [L/s]."""
     turning = _geometry(mechanism).screws[:, :3].any(axis=1)
@@ -212,7 +212,7 @@ def actuator_units(mechanism: Structure) -> Floats:
     return rate_units(mechanism)[[drive.column for drive in mechanism.drives]]
 
 
-@lru_cache(maxsize=64)
+@derived
 def _geometry(mechanism: Structure) -> _Geometry:
     joints, owners = mechanism.joints, column_joints(mechanism)
     places = {body: place for place, body in enumerate(mechanism.bodies)}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Floats, Mask
+from ..derived import derived
 from ..description.joint_types import TASK_TURNS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM, Mechanism
 from ..tolerances import TOLERANCES
@@ -56,7 +56,7 @@ class FittingTask:
         return ",".join(self.words)
 
 
-@lru_cache(maxsize=64)
+@derived
 def fitting_tasks(mechanism: Mechanism) -> tuple[FittingTask, ...]:
     """Tasks with independent coordinates, the best first; empty if nothing moves.
 

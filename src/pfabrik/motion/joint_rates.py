@@ -7,11 +7,11 @@ nothing depends on the mechanism's unit, on where it stands, or on the order of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from ..arrays import Floats
+from ..derived import derived
 from ..description.graph import tree_of
 from ..description.home_mobility import body_twist, column_joints, column_moves, loop_conditions, orthonormal_rates
 from ..description.mechanism import Mechanism
@@ -41,7 +41,7 @@ class CycleBasis:
     rates: Floats
 
 
-@lru_cache(maxsize=64)
+@derived
 def graph_of(mechanism: Structure) -> CycleBasis:
     tree, owners = tree_of(mechanism), column_joints(mechanism)
     path = tree.paths[mechanism.end_effector_body][owners]

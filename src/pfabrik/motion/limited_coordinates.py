@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..derived import derived
 from ..description.graph import cone_line
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
@@ -40,7 +40,7 @@ class Ranges(NamedTuple):
         return np.asarray(coordinates[:, self.columns] + self.home)
 
 
-@lru_cache(maxsize=64)
+@derived
 def ranges_of(mechanism: Mechanism) -> Ranges:
     """The ranges of a mechanism."""
     ranged = [coordinate for coordinate in mechanism.coordinates if coordinate.joint.range is not None]
@@ -67,7 +67,7 @@ def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
         coordinates[:, places] = np.where(outside & (least <= high), least, values)
 
 
-@lru_cache(maxsize=64)
+@derived
 def _ranged_angles(mechanism: Mechanism) -> tuple[NDArray[np.intp], Floats, Floats]:
     """Columns of ranged angles about one axis, and the bounds of their deviations, widened by the limit tolerance."""
     ranges = ranges_of(mechanism)
@@ -90,7 +90,7 @@ class _Cones(NamedTuple):
     axes: Floats
 
 
-@lru_cache(maxsize=64)
+@derived
 def _cones(mechanism: Mechanism) -> _Cones:
     joints = tuple(joint for joint in mechanism.joints if joint.cone is not None)
     lines = [cone_line(mechanism, joint) for joint in joints]

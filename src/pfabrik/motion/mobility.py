@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..derived import derived
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..description.mechanism_html import card
@@ -107,7 +107,7 @@ class Generic:
     home_is_singular: bool
 
 
-@lru_cache(maxsize=64)
+@derived
 def generic_of(mechanism: Mechanism) -> Generic:
     q = around_home(mechanism)
     closure, twist = first_order(mechanism, q[: max(FEWEST, int(COUNTING / max(1, q.shape[1]) ** 3))])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats
+from ..derived import derived
 from ..description.joints import Joint
 from ..description.structure import Structure
 from .displacements import columns, home_coordinates, joint_displacements
@@ -58,7 +58,7 @@ class _Outward(NamedTuple):
     centre_bodies: tuple[tuple[Joint, str | None], ...]
 
 
-@lru_cache(maxsize=64)
+@derived
 def _outward(mechanism: Structure) -> _Outward | None:
     """The order of placing bodies; None if some joint's centre is on no placed body."""
     fixed = {drive.column for drive in mechanism.drives}

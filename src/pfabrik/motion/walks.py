@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from ..arrays import Floats
+from ..derived import derived
 from ..description.home_mobility import column_joints, loop_conditions
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
@@ -19,7 +18,7 @@ NEWTON_STEPS = 20
 """Most steps to close the loops after a step of a walk; a walk that needs more is left out."""
 
 
-@lru_cache(maxsize=64)
+@derived
 def around_home(mechanism: Mechanism) -> Floats:
     """Home, and closed configurations some steps from it, (n, c): the same in every call."""
     random = np.random.default_rng(0)

@@ -11,8 +11,8 @@ from ..answers.solution import Solution
 from ..arrays import Floats
 from ..decomposition.elementary_joints import ElementaryJoint
 from ..decomposition.leg_forms import Rod
-from ..decomposition.leg_table import LegTable, leg_table
 from ..description.mechanism import Mechanism
+from ..model import model_of
 from ..motion.displacements import displacements, home_coordinates
 
 
@@ -53,10 +53,10 @@ def largest_tilts(solution: Solution) -> Extremes | None:
 
 def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
     """Of every rod on a proximal joint: its body and line at home, the joint's body, the motion of the base end."""
-    table = leg_table(mechanism)
+    model = model_of(mechanism)
     found: list[tuple[str, Floats, str, Floats]] = []
     proximal: ElementaryJoint | None = None
-    for form in table.forms if isinstance(table, LegTable) else ():
+    for form in model.legs.forms if model.has_legs else ():
         if not isinstance(form, Rod):
             continue
         proximal = proximal if form.is_shared else form.proximal

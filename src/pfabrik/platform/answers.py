@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import closure_of
-from ..closure.configurations import Configurations, Places, put_rows, rows_at
-from ..decomposition.leg_table import LegTable
-from ..description.mechanism import Mechanism
+from ..batch import put, take
+from ..closure.configurations import Configurations, Places
 from ..kernels.legs import records as K
 from ..kernels.rows import Rows
+from ..model import Model
 from .coordinates import joint_coordinates, read_coordinates
 
 
@@ -57,8 +56,8 @@ class LegAnswers(Configurations):
         """A copy with the rows at some places replaced by others; coordinates are still computed on access."""
         if not isinstance(others, LegAnswers):
             return super().with_rows(places, others)
-        rows, sides = rows_at(self.rows, np.arange(len(self))), self.sides.copy()
-        put_rows(rows, places, others.rows)
+        rows, sides = take(self.rows, np.arange(len(self))), self.sides.copy()
+        put(rows, places, others.rows)
         sides[places] = others.sides
         q_proximal = np.full(sides.shape, np.nan) if self.q_proximal is None else self.q_proximal.copy()
         q_proximal[places] = np.nan if others.q_proximal is None else others.q_proximal
@@ -74,13 +73,14 @@ class LegAnswers(Configurations):
         return LegAnswers(rows, coordinates, sides, q_proximal)
 
 
-def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Floats:
+def sides_at(model: Model, start: Configurations) -> Floats:
     """The side of each leg in configurations, (n, legs): 0 if it has one solution; a redundant joint's coordinate.
 
     Of a leg with two solutions it is the side whose coordinate is nearer to that of the configuration.
     """
     if isinstance(start, LegAnswers):
         return start.sides
+    table = model.legs
     sides = np.repeat(table.home_sides, len(start), axis=0)
     if len(table.implicit_joints):
         redundant = table.implicit_joints
@@ -89,7 +89,7 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
     two_sided = np.flatnonzero(table.home_sides[0])
     if not len(two_sided):
         return sides
-    closure = closure_of(mechanism, whole=False)
+    closure = model.path_closure
     places = np.where(table.legs["kind"] == K.PIVOT, K.BASE_END, K.Q_PROXIMAL)
     columns = [
         table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in two_sided
@@ -116,7 +116,7 @@ def sides_at(mechanism: Mechanism, table: LegTable, start: Configurations) -> Fl
 
 
 def start_coordinates_of(
-    mechanism: Mechanism, table: LegTable, start: Configurations | None, sides: Floats
+    model: Model, start: Configurations | None, sides: Floats
 ) -> Callable[[Places], Floats | None]:
     """A function that gives the joint coordinates of the starts at some places, or of the single start; None for home.
 
@@ -132,16 +132,13 @@ def start_coordinates_of(
 
     def coordinates_at(places: Places) -> Floats:
         rows = slice(None) if n == 1 else places
-        return joint_coordinates(
-            mechanism, table, poses[rows], actuators[rows], sides if len(sides) == 1 else sides[rows], None
-        )
+        return joint_coordinates(model, poses[rows], actuators[rows], sides if len(sides) == 1 else sides[rows], None)
 
     return coordinates_at
 
 
 def answer_coordinates(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     rows: Rows,
     sides: Floats,
     q_proximal: Floats | None,
@@ -162,8 +159,7 @@ def answer_coordinates(
     by_legs = fallback_index[indices] < 0
     leg_rows = indices[by_legs]
     coordinates = joint_coordinates(
-        mechanism,
-        table,
+        model,
         rows.poses[leg_rows],
         rows.actuators[leg_rows],
         sides if len(sides) == 1 else sides[leg_rows],

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from ..arrays import Floats, Records
 from ..decomposition.leg_table import LegTable
+from ..derived import derived
 from ..kernels.legs import records as K
 from ..kernels.platform.search_records import Along
 from ..tolerances import TOLERANCES
@@ -25,7 +24,7 @@ def stays_there(table: LegTable) -> Along:
     return Along(np.zeros((3, 3)), np.zeros((n, 3)), np.zeros((n, 2)))
 
 
-@lru_cache(maxsize=64)
+@derived
 def carriages_along(table: LegTable) -> Along:
     """The displacements d of the whole machine, and what carriages go: on the way from the base to whatever else moves,
     they add up to d."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from ..closure.close import HELD, close, closure_of
+from ..batch import put
+from ..closure.close import HELD, close
 from ..decomposition.leg_table import LegTable
-from ..description.mechanism import Mechanism
+from ..model import Model
+from ..motion.closure import Closure
 from ..motion.limited_coordinates import within_turns
 from ..tolerances import TOLERANCES
 from .table import reading_scratch, reading_table
@@ -19,8 +21,7 @@ RESTARTS = 24
 
 
 def joint_coordinates(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     poses: Floats,
     actuators: Floats,
     sides: Floats,
@@ -38,7 +39,7 @@ def joint_coordinates(
     q_proximal : coordinates of proximal joints (n, legs) [L or rad] that a search found; NaN, or None, where closed
         forms give them. Near dead points these have half their digits.
     """
-    closure = closure_of(mechanism, whole=False)
+    table, closure = model.legs, model.path_closure
     coordinates = np.zeros((len(poses), len(closure.scale)))
     if start is not None:
         coordinates[:] = start
@@ -46,19 +47,18 @@ def joint_coordinates(
         return coordinates
     read_coordinates(table, poses, sides, coordinates, q_proximal)
     closure.put_actuators(coordinates, actuators)
-    coordinates = _closed(mechanism, poses, actuators, coordinates)
+    coordinates = _closed(closure, poses, actuators, coordinates)
     if start is not None:
         angles = np.setdiff1d(table.known["column"][table.known["turns"] == 1], closure.actuated)
         coordinates[:, angles] += 2.0 * np.pi * np.round((start - coordinates)[:, angles] / (2.0 * np.pi))
-    within_turns(mechanism, coordinates)
+    within_turns(model.mechanism, coordinates)
     return coordinates
 
 
-def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, start: Floats) -> Floats:
+def _closed(closure: Closure, poses: Floats, actuators: Floats, start: Floats) -> Floats:
     """Close the loops at fixed poses and actuators, from joint coordinates (n, columns)."""
-    closure = closure_of(mechanism, whole=False)
     locked = closure.driven
-    platform = (*HELD[:3], *((0.0,) * 3)) if mechanism.end_effector_is_joint else HELD
+    platform = (*HELD[:3], *((0.0,) * 3)) if closure.mechanism.end_effector_is_joint else HELD
     closing = close(closure, start, poses, locked=locked, platform=platform)
     rng = np.random.default_rng(0)
     for _ in range(RESTARTS):
@@ -69,7 +69,7 @@ def _closed(mechanism: Mechanism, poses: Floats, actuators: Floats, start: Float
         closure.put_actuators(restarts, actuators[unsolved])
         candidate = close(closure, restarts, poses[unsolved], locked=locked, platform=platform)
         is_better = candidate.gap < closing.gap[unsolved]
-        closing.put(unsolved[is_better], candidate, is_better)
+        put(closing, unsolved[is_better], candidate, is_better)
     return closing.coordinates
 
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..batch import take, take_each
 from ..closure.assemble import NOISE, is_over_determined
-from ..closure.configurations import Configurations, new_rows, rows_at
-from ..decomposition.leg_table import LegTable, leg_table
-from ..description.mechanism import Mechanism
+from ..closure.configurations import Configurations, new_rows
+from ..derived import derived
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from ..kernels.threads import in_blocks
+from ..model import Model
 from .nearest import nearest_actuators
 from .nearest_pose import home_start, no_starts, starts_at
 from .seeds import seeds_of
@@ -28,8 +29,7 @@ ROWS_A_BLOCK = 256
 
 
 def forward_kinematics(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     values: Floats,
     start: Configurations | None,
     sides: Floats,
@@ -52,50 +52,47 @@ def forward_kinematics(
     The rows, the coordinates of proximal joints (n, legs) [L or rad], and the sides of the answers (n, legs).
     """
     is_cold = start is None
-    starts = home_start(mechanism, table) if start is None else starts_at(mechanism, table, start.rows.poses, sides)
-    rows, (wanted_values, *outputs) = given or _assembled_from(mechanism, table, values, starts)
+    starts = home_start(model) if start is None else starts_at(model, start.rows.poses, sides)
+    rows, (wanted_values, *outputs) = given or _assembled_from(model, values, starts)
     solution, is_missed = Starts(rows.poses, *outputs), rows.status == PENDING
-    assemble_missed = partial(_assemble_missed, mechanism, table, values, rows, wanted_values, solution)
+    assemble_missed = partial(_assemble_missed, model, values, rows, wanted_values, solution)
     if is_cold:
         assemble_missed(starts, seeds_of, np.flatnonzero(rows.status != REACHED))
     unsolved = np.flatnonzero(rows.status != REACHED)
     if not len(unsolved):
         return rows, solution.q, solution.sides
     rows.status[unsolved] = PENDING
-    _project(mechanism, table, wanted_values, starts, unsolved, rows, solution, anywhere=is_cold)
+    _project(model, wanted_values, starts, unsolved, rows, solution, anywhere=is_cold)
     nearby = unsolved[rows.measures[unsolved, ACTUATOR_ERROR] <= tolerance]
     rows.status[nearby[rows.status[nearby] == PROJECTED]] = REACHED
     is_missed &= rows.status != REACHED
     if is_cold or not np.count_nonzero(is_missed):
         return rows, solution.q, solution.sides
-    if is_over_determined(mechanism):
+    if is_over_determined(model.closure):
         is_missed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
     assemble_missed(starts, _starts_elsewhere, np.flatnonzero(is_missed))
-    assemble_missed(home_start(mechanism, table), seeds_of, np.flatnonzero(is_missed & (rows.status != REACHED)))
+    assemble_missed(home_start(model), seeds_of, np.flatnonzero(is_missed & (rows.status != REACHED)))
     missed = np.flatnonzero(is_missed & (rows.status != REACHED))
     if len(missed):
-        _project_elsewhere(mechanism, table, wanted_values, starts, missed, rows, values, solution, tolerance)
+        _project_elsewhere(model, wanted_values, starts, missed, rows, values, solution, tolerance)
     return rows, solution.q, solution.sides
 
 
-@lru_cache(maxsize=64)
-def _starts_elsewhere(mechanism: Mechanism) -> Starts:
+@derived
+def _starts_elsewhere(model: Model) -> Starts:
     """Home, then the seeds."""
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
-    home = home_start(mechanism, table)
-    return Starts(*(np.concatenate(both) for both in zip(home, seeds_of(mechanism), strict=True)))
+    home = home_start(model)
+    return Starts(*(np.concatenate(both) for both in zip(home, seeds_of(model), strict=True)))
 
 
 def _assemble_missed(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     values: Floats,
     rows: Rows,
     nearest_values: Floats,
     solution: Starts,
     starts: Starts,
-    other_starts: Callable[[Mechanism], Starts],
+    other_starts: Callable[[Model], Starts],
     places: NDArray[np.intp],
 ) -> None:
     """Assemble missed rows from other starts, the nearest to their own first; rows reached replace their outputs.
@@ -106,7 +103,7 @@ def _assemble_missed(
         return
     outputs, values_here = [rows.status, nearest_values, *solution, rows.measures], values[places]
     block = [array[places] for array in outputs]
-    _assemble(mechanism, table, starts.of(places), other_starts(mechanism), [values_here, *block])
+    _assemble(model, take_each(starts, places), other_starts(model), [values_here, *block])
     is_reached = block[0] == REACHED
     for array, block_array in zip(outputs, block, strict=True):
         array[places[is_reached]] = block_array[is_reached]
@@ -115,8 +112,7 @@ def _assemble_missed(
 
 
 def _project_elsewhere(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     wanted_values: Floats,
     starts: Starts,
     places: NDArray[np.intp],
@@ -126,14 +122,13 @@ def _project_elsewhere(
     tolerance: float,
 ) -> None:
     """Project rows from seeds too; rows that have their values then replace their outputs."""
-    block = rows_at(rows, places)
+    block = take(rows, places)
     block_solution = Starts(block.poses, solution.q[places], solution.sides[places])
     block.actuators[:] = values[places]
     _project(
-        mechanism,
-        table,
+        model,
         wanted_values[places],
-        starts.of(places),
+        take_each(starts, places),
         np.arange(len(places)),
         block,
         block_solution,
@@ -147,21 +142,18 @@ def _project_elsewhere(
         array[places[is_reached]] = block_array[is_reached]
 
 
-def _assembled_from(
-    mechanism: Mechanism, table: LegTable, values: Floats, starts: Starts
-) -> tuple[Rows, AssemblyOutputs]:
+def _assembled_from(model: Model, values: Floats, starts: Starts) -> tuple[Rows, AssemblyOutputs]:
     """Rows assembled at actuated values (n, n_a) from one start each, or one for all; PENDING where that fails."""
-    rows, shape = new_rows(mechanism, len(values)), (len(values), len(table.legs))
+    rows, shape = new_rows(model, len(values)), (len(values), len(model.legs.legs))
     outputs = AssemblyOutputs(np.zeros_like(values), np.zeros(shape), np.zeros(shape))
     rows.actuators[:] = values
     arrays = rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
-    _assemble(mechanism, table, starts, no_starts(table), (rows.actuators, *arrays))
+    _assemble(model, starts, no_starts(model.legs), (rows.actuators, *arrays))
     return rows, outputs
 
 
 def _project(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     values: Floats,
     starts: Starts,
     places: NDArray[np.intp],
@@ -174,14 +166,14 @@ def _project(
 
     The search takes angles modulo whole turns. Rows whose nearest turn is out of range stay PENDING.
     """
-    block_starts = starts.of(places)
-    nearest = nearest_actuators(mechanism, values[places], block_starts, seeds=anywhere)
+    block_starts = take_each(starts, places)
+    nearest = nearest_actuators(model, values[places], block_starts, seeds=anywhere)
     solved = np.flatnonzero(np.isfinite(nearest.distances))
-    nearest, places = nearest.at(solved), places[solved]
+    nearest, places = take(nearest, solved), places[solved]
     block_values, actuators, measures = rows.actuators[places], nearest.actuators, nearest.measures
     measures[:, [POSITION_ERROR, ROTATION_ERROR]] = 0.0
     is_turned = np.zeros(len(places), bool)
-    for driven in table.driven:
+    for driven in model.legs.driven:
         column = driven["column"]
         column_values = actuators[:, column]  # a view
         if driven["turns"] == 1 and driven["hi"] - driven["lo"] > 2.0 * np.pi:
@@ -201,16 +193,14 @@ def _project(
     rows.poses[places], solution.q[places], solution.sides[places] = nearest.poses, nearest.q, nearest.sides
 
 
-def _assemble(
-    mechanism: Mechanism, table: LegTable, starts: Starts, other_starts: Starts, arrays: Sequence[NDArray[Any]]
-) -> None:
+def _assemble(model: Model, starts: Starts, other_starts: Starts, arrays: Sequence[NDArray[Any]]) -> None:
     """Assemble rows on all cores; the arrays are the actuators, then the outputs of the kernel."""
     from ..kernels.platform.forward import assemble
 
-    legs, scratch, others_handle = search_table(table), scratch_of(mechanism, table), Handle(other_starts)
+    legs, scratch, others_handle = search_table(model.legs), scratch_of(model), Handle(other_starts)
 
     def run(block: slice) -> None:
-        block_starts, (values, *outputs) = Handle(starts.of(block)), (array[block] for array in arrays)
+        block_starts, (values, *outputs) = Handle(take_each(starts, block)), (array[block] for array in arrays)
         assemble(legs.address, scratch.address, values, block_starts.address, others_handle.address, *outputs)
 
     in_blocks(run, len(arrays[0]), ROWS_A_BLOCK)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,10 +12,10 @@ from ..closure.configurations import Configurations
 from ..closure.first_order import forward_map as forward_by_joints
 from ..closure.first_order import inverse_map as inverse_by_joints
 from ..closure.first_order import units_of
-from ..decomposition.leg_table import LegTable, leg_table
-from ..description.mechanism import Mechanism
+from ..derived import derived
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
+from ..model import Model
 from ..motion.mobility import generic_of
 from .answers import LegAnswers
 from .coordinates import NO_ROWS
@@ -40,27 +39,27 @@ class ByLegs(NamedTuple):
     units: tuple[Floats, Floats]  # of the inverse Jacobian (n_a, r), and of the forward one (r, n_a)
 
 
-def forward_map(mechanism: Mechanism, found: Configurations) -> Floats:
+def forward_map(model: Model, found: Configurations) -> Floats:
     """Twists per actuator rate at configurations: (n, 6, n_a) or (n, 3, n_a) [length, rad]; NaN where these are."""
-    return _map(mechanism, found, forward_by_joints, is_forward=1)
+    return _map(model, found, forward_by_joints, is_forward=1)
 
 
-def inverse_map(mechanism: Mechanism, found: Configurations) -> Floats:
+def inverse_map(model: Model, found: Configurations) -> Floats:
     """Actuator rates per twist at configurations: (n, n_a, 6) or (n, n_a, 3) [length, rad]; NaN where these are."""
-    return _map(mechanism, found, inverse_by_joints, is_forward=0)
+    return _map(model, found, inverse_by_joints, is_forward=0)
 
 
 def _map(
-    mechanism: Mechanism,
+    model: Model,
     found: Configurations,
-    by_joints: Callable[[Mechanism, Floats], Floats],
+    by_joints: Callable[[Model, Floats], Floats],
     *,
     is_forward: int,
 ) -> Floats:
     """Jacobians from the legs' slopes where they exist, from all joint coordinates elsewhere."""
-    by_legs = _by_legs(mechanism) if isinstance(found, LegAnswers) else None
+    by_legs = _by_legs(model) if isinstance(found, LegAnswers) else None
     if by_legs is None:
-        return by_joints(mechanism, found.coordinates)
+        return by_joints(model, found.coordinates)
     assert isinstance(found, LegAnswers)
     units = by_legs.units[is_forward]
     maps = np.zeros((len(found), *units.shape))
@@ -73,7 +72,7 @@ def _map(
     maps *= units
     if any(left):
         rest = np.flatnonzero(np.isnan(maps[:, 0, 0]))
-        maps[rest] = by_joints(mechanism, found.coordinates_at(rest))
+        maps[rest] = by_joints(model, found.coordinates_at(rest))
     return maps
 
 
@@ -94,18 +93,18 @@ def _put_maps(own: ByLegs, poses: Floats, sides: Floats, q_proximal: Floats, is_
     return jacobians(own.scratch.address, slopes, is_forward, maps)
 
 
-@lru_cache(maxsize=64)
-def _by_legs(mechanism: Mechanism) -> ByLegs | None:
+@derived
+def _by_legs(model: Model) -> ByLegs | None:
     """A machine as the kernels take it; None if its Jacobians do not follow from its legs.
 
     They do if the pose determines all coordinates of the legs, and all motions of actuators move the end effector.
     """
     from ..kernels.platform.jacobians import new_jacobian_tables
 
-    table, counts = leg_table(mechanism), generic_of(mechanism).mobility
-    if not isinstance(table, LegTable) or len(table.redundant) or counts.internal or counts.uncontrolled:
+    counts = generic_of(model.mechanism).mobility
+    if not model.has_legs or len(model.legs.redundant) or counts.internal or counts.uncontrolled:
         return None
-    twists, actuators = units_of(mechanism)
+    table, (twists, actuators) = model.legs, units_of(model)
     rows, rank = int(table.task["rows"][0]), len(twists) - counts.platform
     if not counts.platform > 0 or rank > rows:
         return None

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..batch import put, take
+from ..closure.attempts import Attempt
 from ..closure.close import Closing, in_lengths
 from ..closure.closure_engine import ClosureEngine
-from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
+from ..closure.configurations import Configurations, new_rows, steps_of
+from ..closure.engine_contract import Engine, Prepared
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
-from ..decomposition.leg_table import LegTable
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.rows import OPEN, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
-from ..kernels.threads import in_blocks
+from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
+from ..model import Model
 from ..motion.outward import centres_at
 from ..options import Options
 from ..poses import are_poses
@@ -28,17 +28,15 @@ from ..tolerances import TOLERANCES
 from .answers import LegAnswers, answer_coordinates, sides_at, start_coordinates_of
 from .coordinates import joint_coordinates
 from .forward import forward_kinematics
-from .nearest import limit_multipliers, move_redundant_joints
+from .leg_attempts import attempts
+from .nearest import limit_multipliers
 from .nearest_pose import starts_at
+from .reach import count_turns, reach, turns_repeatedly
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
-from .table import TableHandle, legs_at_rest, local_table, table_handle
 from .unreached import Request, Unreached, answer_unreached
 
-ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
-"""Rows of one call of the kernels that solve targets one by one, and in blocks."""
 
-
-class LegsEngine:
+class LegsEngine(Engine):
     """Inverse and forward kinematics by the legs' closed forms, with a solver in joint coordinates as fallback.
 
     Targets are solved in closed form in the working mode of the start; what the task leaves open of a pose follows from
@@ -47,17 +45,15 @@ class LegsEngine:
     coordinates.
     """
 
-    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
-        self.mechanism, self._table = mechanism, table
-        self._joint_space, self._single = ClosureEngine(mechanism), SingleTarget(mechanism, table)
-        self._single_forward = SingleAssembly(self.mechanism, table)
-        driven = table.driven
-        self._turning = driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)]
+    def __init__(self, model: Model) -> None:
+        self._model, self._table = model, model.legs
+        self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
+        self._single_forward = SingleAssembly(model)
 
     @cached_property
     def _searches(self) -> bool:
         """True if unreached targets are searched for in the platform's pose, before joint coordinates."""
-        return not has_other_assemblies(self.mechanism)
+        return not has_other_assemblies(self._model.path_closure)
 
     def answer(
         self,
@@ -75,32 +71,32 @@ class LegsEngine:
         """
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         start_sides = self._sides_of(start)
-        rows = self._single.new_rows() if is_one else new_rows(self.mechanism, len(targets))
+        rows = self._single.new_rows() if is_one else new_rows(self._model, len(targets))
         end_sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
         if is_one and self._reach_one(targets, start, end_sides, keep_mode, rows):
-            mechanism, table = self.mechanism, self._table
-            start_coordinates = start_coordinates_of(mechanism, table, start, start_sides)
+            model = self._model
+            start_coordinates = start_coordinates_of(model, start, start_sides)
             platform = rows.poses, rows.actuators, end_sides
             return LegAnswers(
                 rows,
-                lambda places: joint_coordinates(mechanism, table, *platform, start_coordinates(slice(None)))[places],
+                lambda places: joint_coordinates(model, *platform, start_coordinates(slice(None)))[places],
                 end_sides,
             )
-        n_unsolved, sides = self._reach(targets, start, start_sides, keep_mode, rows, is_tried=is_one)
+        n_unsolved, sides = reach(self._model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
         q_proximal, fallback = None, None
         if n_unsolved and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
             q_proximal = np.empty_like(sides)
             q_proximal[:] = np.nan
             start_poses = self._single.home if start is None else start.rows.poses
-            request = Request(self.mechanism, self._table, options, keep_mode, nearby, start is not None)
+            request = Request(self._model, options, keep_mode, nearby, start is not None)
             unreached = Unreached(targets, start_poses, sides, q_proximal, rows)
             is_unsolved = rows.status != REACHED
             if start is not None and self._table.has_sides:
                 is_unsolved &= ~self._starts_on_target(targets, start.rows.poses)
             unreached.answer(is_unsolved, partial(answer_unreached, request))
             if start is not None:
-                self._count_turns(start.rows.actuators, rows)
+                count_turns(self._model, start.rows.actuators, rows)
         is_pending = rows.status != REACHED
         if q_proximal is not None:
             is_pending = rows.status >= PENDING  # or UNSURE
@@ -110,45 +106,49 @@ class LegsEngine:
             if start is not None and len(start) not in (1, len(unsolved)):
                 fallback_start = start.at(unsolved)
             fallback = self._joint_space.answer(targets[unsolved], fallback_start, options, keep_mode=keep_mode)
-            is_kept = self._kept_projections(rows_at(rows, unsolved), fallback.rows, options)
+            is_kept = self._kept_projections(take(rows, unsolved), fallback.rows, options)
             rows.status[unsolved[is_kept]] = PROJECTED
             unsolved = unsolved[~is_kept]
             if is_kept.any():
                 fallback = fallback.at(np.flatnonzero(~is_kept))
             if len(unsolved) == len(targets):
                 return fallback
-            put_rows(rows, unsolved, fallback.rows)
+            put(rows, unsolved, fallback.rows)
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
-            sides[unsolved] = sides_at(self.mechanism, self._table, fallback)
+            sides[unsolved] = sides_at(self._model, fallback)
             if q_proximal is not None:
                 q_proximal[unsolved] = np.nan
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 
+    def attempts(
+        self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Iterator[Attempt]:
+        """As `InverseEngine.attempts`: of the legs, then of the joint coordinates, which answer what legs leave."""
+        last = None
+        if self._searches:
+            for last in attempts(self._model, target, start, self._sides_of(start), options, keep_mode=keep_mode):
+                yield last
+        if last is None or last.ending != "reached":
+            yield from self._joint_space.attempts(target, start, options, keep_mode=keep_mode)
+
     def _kept_projections(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
         """The UNSURE projections to keep: the fallback neither reaches their targets nor comes nearer."""
-        length = options.rotation_length or self.mechanism.rotation_length
+        length = options.rotation_length or self._model.mechanism.rotation_length
         projected, other = (
             np.hypot(batch.measures[:, POSITION_ERROR], length * batch.measures[:, ROTATION_ERROR])
             for batch in (rows, fallback)
         )
-        nearer = (fallback.status == PROJECTED) & (
-            other < projected - TOLERANCES.position * self.mechanism.characteristic_length
-        )
+        nearer = (fallback.status == PROJECTED) & (other < projected - TOLERANCES.position * self._model.length)
         better = (fallback.status == REACHED) | (nearer & (fallback.holds >= rows.holds))
         return np.asarray((rows.status == UNSURE) & ~better)
 
-    def prepared(
-        self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool
-    ) -> Callable[[], int] | None:
-        """A call that solves the pose in `target`, (1, 4, 4), into `rows` and returns 0 if legs reach it.
-
-        None if actuators may turn more than once, and are counted from a start.
-        """
-        if start is not None and len(self._turning):
+    def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
+        """As `Engine.prepared`; None if actuators may turn more than once, and are counted from a start."""
+        if start is not None and turns_repeatedly(self._table):
             return None
         single, start_pose = self._single, self._single.home if start is None else start.rows.poses
-        sides = single.home_sides if start is None else sides_at(self.mechanism, self._table, start)
-        return single.prepared(target, start_pose, sides, rows, nearby=keep_mode)
+        sides = single.home_sides if start is None else sides_at(self._model, start)
+        return single.prepared(target, start_pose, sides, rows, nearby=keep_mode), single
 
     def follow(
         self,
@@ -169,7 +169,7 @@ class LegsEngine:
 
     def _joined(self, answers: Sequence[Configurations], start: Configurations | None) -> Configurations:
         """Single answers as one batch; the first of them began at `start`."""
-        rows, n_legs = new_rows(self.mechanism, len(answers)), len(self._table.legs)
+        rows, n_legs = new_rows(self._model, len(answers)), len(self._table.legs)
         sides, q_proximal = (
             np.repeat(self._table.home_sides, len(answers), axis=0),
             np.full((len(answers), n_legs), np.nan),
@@ -179,16 +179,14 @@ class LegsEngine:
         )
         for i, answer in enumerate(answers):
             row = slice(i, i + 1)
-            put_rows(rows, row, answer.rows)
+            put(rows, row, answer.rows)
             if isinstance(answer, LegAnswers):
                 sides[i] = answer.sides
                 if answer.q_proximal is not None:
                     q_proximal[i] = answer.q_proximal
         fallback = None
         if len(unsolved):
-            fallback = Configurations(
-                rows_at(rows, unsolved), np.concatenate([answers[i].coordinates for i in unsolved])
-            )
+            fallback = Configurations(take(rows, unsolved), np.concatenate([answers[i].coordinates for i in unsolved]))
         return self._answers(rows, sides, q_proximal, start, self._sides_of(start), unsolved, fallback)
 
     def _answers(
@@ -202,11 +200,10 @@ class LegsEngine:
         fallback: Configurations | None,
     ) -> LegAnswers:
         """Rows as answers, from a start with the sides `start_sides`; the rows `unsolved` are those of the fallback."""
-        start_coordinates = start_coordinates_of(self.mechanism, self._table, start, start_sides)
+        start_coordinates = start_coordinates_of(self._model, start, start_sides)
         coordinates = partial(
             answer_coordinates,
-            self.mechanism,
-            self._table,
+            self._model,
             rows,
             sides,
             q_proximal,
@@ -222,13 +219,13 @@ class LegsEngine:
         Use the legs' closed forms where the start is non-singular and the pose fixes every coordinate; otherwise solve
         in joint space.
         """
-        mechanism, table, start_sides = self.mechanism, self._table, sides_at(self.mechanism, self._table, start)
-        rows, at_start = (new_rows(mechanism, len(targets)) for _ in range(2))
+        model, table, start_sides = self._model, self._table, sides_at(self._model, start)
+        rows, at_start = (new_rows(model, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
-        _, sides = self._reach(targets, start, start_sides, True, rows)
+        _, sides = reach(self._model, targets, start, start_sides, True, rows)
         reached = np.flatnonzero(rows.status == REACHED)
         coordinates_reached = joint_coordinates(
-            mechanism, table, rows.poses[reached], rows.actuators[reached], sides[reached], coordinates[reached]
+            model, rows.poses[reached], rows.actuators[reached], sides[reached], coordinates[reached]
         )
         angles = table.limited["column"][table.limited["turns"] == 1]
         is_turned = (np.abs(coordinates_reached - coordinates[reached])[:, angles] > np.pi).any(axis=1)
@@ -236,11 +233,11 @@ class LegsEngine:
         reached, coordinates_reached = reached[~is_turned], coordinates_reached[~is_turned]
         coordinates[reached] = coordinates_reached
         if len(reached) < len(targets):
-            self._reach(start.rows.poses, start, start_sides, True, at_start)
+            reach(self._model, start.rows.poses, start, start_sides, True, at_start)
             is_decided = (at_start.status == REACHED) & ~np.bool_(table.leaves_open)
             unsolved = np.flatnonzero((rows.status != REACHED) & ~is_decided)
             fallback = self._joint_space.advance(targets[unsolved], start.at(unsolved))
-            put_rows(rows, unsolved, fallback.rows)
+            put(rows, unsolved, fallback.rows)
             coordinates[unsolved] = fallback.coordinates
         return Configurations(rows, coordinates)
 
@@ -252,7 +249,7 @@ class LegsEngine:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         if not isinstance(answers, LegAnswers):
             return self._joint_space.points(answers)
-        centres = centres_at(self.mechanism, answers.rows.poses, answers.rows.actuators)
+        centres = centres_at(self._model.mechanism, answers.rows.poses, answers.rows.actuators)
         return centres if centres is not None else self._joint_space.points(answers)
 
     def limit_multipliers(self, answers: Configurations, targets: Floats, way: ProjectionMode) -> Floats:
@@ -261,11 +258,11 @@ class LegsEngine:
             return self._joint_space.limit_multipliers(answers, targets, way)
         has_proximal = np.isfinite(answers.q_proximal).all(axis=1)
         by_legs, by_joints = np.flatnonzero(has_proximal), np.flatnonzero(~has_proximal)
-        scale = 1.0 / self.mechanism.characteristic_length
+        scale = 1.0 / self._model.length
         solutions = Starts(
             in_lengths(answers.rows.poses[by_legs], scale), answers.q_proximal[by_legs], answers.sides[by_legs]
         )
-        weights = limit_multipliers(self.mechanism, self._table, targets[by_legs], solutions, way)
+        weights = limit_multipliers(self._model, targets[by_legs], solutions, way)
         all_weights = np.empty((len(targets), weights.shape[1]))
         all_weights[by_legs] = weights
         if len(by_joints):
@@ -280,25 +277,20 @@ class LegsEngine:
             rows.actuators[:] = values
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
                 return self._single_answer(rows, solution, start, start_sides)
-        rows, q_proximal, sides = forward_kinematics(
-            self.mechanism, self._table, values, start, start_sides, tolerance, outputs
-        )
+        rows, q_proximal, sides = forward_kinematics(self._model, values, start, start_sides, tolerance, outputs)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved) == len(values):
             return self._joint_space.forward(values, start, tolerance)
         if len(unsolved):
             block_start = start if start is None or len(start) == 1 else start.at(unsolved)
             fallback = self._joint_space.forward(values[unsolved], block_start, tolerance)
-            put_rows(rows, unsolved, fallback.rows)
+            put(rows, unsolved, fallback.rows)
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 
-    def prepared_forward(self, start: Configurations | None, rows: Rows) -> tuple[Callable[[], int], object]:
-        """A call that assembles one row at `rows.actuators` and returns 0 where that succeeds.
-
-        With it what must be kept alive for the call: its start and its scratch memory.
-        """
+    def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared:
+        """As `Engine.prepared_forward`; with the call, its start and its scratch memory."""
         start_handle = self._forward_start(start, self._sides_of(start))
-        scratch = Handle(new_scratch(self.mechanism, self._table))
+        scratch = Handle(new_scratch(self._model))
         return self._single_forward.prepared(start_handle, scratch, rows, self._single_forward.new_outputs()), (
             start_handle,
             scratch,
@@ -307,18 +299,16 @@ class LegsEngine:
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
         if start is None:
             return self._single_forward.home
-        return Handle(starts_at(self.mechanism, self._table, start.rows.poses, sides))
+        return Handle(starts_at(self._model, start.rows.poses, sides))
 
     def _starts_on_target(self, targets: Floats, poses: Floats) -> Mask:
         """True for rows whose start, one of as many poses or the only one, is on the target already, (n,).
 
         At a dead point closed forms may miss these targets; joint coordinates do not.
         """
-        task, poses = task_of(self.mechanism), np.broadcast_to(poses, targets.shape)
+        task, poses = self._model.task, np.broadcast_to(poses, targets.shape)
         position = np.where(task.axes, (targets - poses)[:, :3, 3], 0.0)
-        is_there = np.asarray(
-            np.abs(position).max(axis=1) <= TOLERANCES.position * self.mechanism.characteristic_length
-        )
+        is_there = np.asarray(np.abs(position).max(axis=1) <= TOLERANCES.position * self._model.length)
         if np.count_nonzero(is_there):
             _, rotation = task.errors(poses[is_there], targets[is_there])
             is_there[is_there] = rotation <= TOLERANCES.rotation
@@ -326,18 +316,18 @@ class LegsEngine:
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""
-        return self._table.home_sides if start is None else sides_at(self.mechanism, self._table, start)
+        return self._table.home_sides if start is None else sides_at(self._model, start)
 
     def _single_answer(
         self, rows: Rows, solution: AssemblyOutputs, start: Configurations | None, start_sides: Floats
     ) -> LegAnswers:
         """One assembled row as an answer, from a start with the sides `start_sides`."""
-        mechanism, table, q = self.mechanism, self._table, solution.q
-        start_coordinates = start_coordinates_of(mechanism, table, start, start_sides)
+        model, q = self._model, solution.q
+        start_coordinates = start_coordinates_of(model, start, start_sides)
         platform = rows.poses, rows.actuators, solution.sides
         return LegAnswers(
             rows,
-            lambda places: joint_coordinates(mechanism, table, *platform, start_coordinates(slice(None)), q)[places],
+            lambda places: joint_coordinates(model, *platform, start_coordinates(slice(None)), q)[places],
             solution.sides,
             q,
         )
@@ -350,128 +340,5 @@ class LegsEngine:
         if self._single.reach(target, start_pose, sides, rows, nearby=keep_mode):
             return False
         if start is not None:
-            self._count_turns(start.rows.actuators, rows)
+            count_turns(self._model, start.rows.actuators, rows)
         return True
-
-    def _reach(
-        self,
-        targets: Floats,
-        start: Configurations | None,
-        sides: Floats,
-        keep_mode: bool,
-        rows: Rows,
-        *,
-        is_tried: bool = False,
-    ) -> tuple[int, Floats]:
-        """Solve the rows that legs reach.
-
-        Parameters
-        ----------
-        is_tried : the only row was tried already, without success; its status is set.
-
-        Returns
-        -------
-        The number of unsolved rows, and the sides of the answers with the coordinates of redundant joints.
-        """
-        start_poses = self.mechanism.home_pose[None] if start is None else start.rows.poses
-        legs = local_table(self._table) if keep_mode else table_handle(self._table)
-        if self._table.has_implicit_joints:
-            sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-        n_unsolved = 1 if is_tried else self._reach_at_start(start is None, legs, targets, start_poses, sides, rows)
-        if n_unsolved and self._table.is_for_blocks and self._table.task["unset"][0]:
-            n_unsolved -= self._complete(legs, targets, start_poses, sides, rows)
-        if n_unsolved and self._table.has_free_redundant:
-            sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-            n_unsolved -= self._reach_by_redundant(legs, targets, start_poses, sides, rows)
-            if n_unsolved and start is not None and not keep_mode:
-                n_unsolved -= self._reach_from_home(legs, targets, sides, rows)
-        if start is not None:
-            self._count_turns(start.rows.actuators, rows)
-        return n_unsolved, sides
-
-    def _reach_at_start(
-        self, from_home: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
-    ) -> int:
-        """Solve the rows that legs reach while free redundant joints stay; return the number of unsolved rows."""
-        resting = legs_at_rest(self._table) if from_home else None
-        if resting is None:
-            return self._run(self._table.is_for_blocks, legs, targets, start_poses, sides, rows)
-        rows.actuators[:] = resting.actuators
-        return self._run(True, table_handle(resting.table), targets, start_poses, resting.table.home_sides, rows)
-
-    def _reach_by_redundant(
-        self, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
-    ) -> int:
-        """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved."""
-        sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
-        moved, poses = move_redundant_joints(self.mechanism, self._table, targets, start_poses, sides, unsolved)
-        if not len(moved):
-            return 0
-        block, start_poses = rows_at(rows, moved), poses
-        n_unsolved = self._run(False, legs, targets[moved], start_poses, sides[moved], block)
-        put_rows(rows, moved, block)
-        missed = moved[block.status != REACHED]
-        sides[missed] = sides_before[missed]
-        return len(moved) - n_unsolved
-
-    def _reach_from_home(self, legs: TableHandle, targets: Floats, sides: Floats, rows: Rows) -> int:
-        """Solve rows by moving the redundant joints from home, where limits bar the way from the start.
-
-        Return the number of rows solved.
-        """
-        is_unsolved, home_sides, redundant = rows.status != REACHED, sides.copy(), self._table.implicit_joints["leg"]
-        home_sides[:, redundant] = self._table.home_sides[:, redundant]
-        n_reached = self._reach_by_redundant(legs, targets, self._single.home, home_sides, rows)
-        is_reached = is_unsolved & (rows.status == REACHED)
-        sides[is_reached] = home_sides[is_reached]
-        return n_reached
-
-    def _run(
-        self, by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
-    ) -> int:
-        """Solve targets on all cores, in blocks of poses or one by one; return the number not reached."""
-        if by_blocks:
-            from ..kernels.legs.blocks import answer_blocks as answer
-        else:
-            from ..kernels.legs.answer import answer
-
-        def run(block: slice) -> int:
-            return answer(
-                legs.address,
-                targets[block],
-                _part(start_poses, block),
-                _part(sides, block),
-                rows.status[block],
-                rows.poses[block],
-                rows.actuators[block],
-                rows.measures[block],
-            )
-
-        return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
-
-    def _complete(self, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
-        """Solve the rows that blocks left OPEN, whose poses are to be completed; return the number reached."""
-        is_open = (rows.status == OPEN).nonzero()[0]
-        if not len(is_open):
-            return 0
-        block = rows_at(rows, is_open)
-        start_poses, sides = (array if len(array) == 1 else array[is_open] for array in (start_poses, sides))
-        n_unsolved = self._run(False, legs, targets[is_open], start_poses, sides, block)
-        put_rows(rows, is_open, block)
-        return len(is_open) - n_unsolved
-
-    def _count_turns(self, start_values: Floats, rows: Rows) -> None:
-        """Add whole turns to actuators that may turn more than once: nearest to the start's values (n or 1, n_a)."""
-        for driven in self._turning:
-            is_solved = rows.status != PENDING
-            values, previous = rows.actuators[is_solved, driven["column"]], start_values[:, driven["column"]]
-            previous = previous if len(start_values) == 1 else previous[is_solved]
-            nearest = values - 2.0 * np.pi * np.round((values - previous) / (2.0 * np.pi))
-            is_inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
-            rows.actuators[is_solved, driven["column"]] = np.where(is_inside, nearest, values)
-
-
-def _part(array: Floats, block: slice) -> Floats:
-    """The rows of a block, or the single row for all; writable, as kernels are compiled for."""
-    part = array if len(array) == 1 else array[block]
-    return np.require(part, requirements=["C", "W"])

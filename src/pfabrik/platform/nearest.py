@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from math import hypot
 from typing import NamedTuple
 
@@ -12,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Records
-from ..closure.close import closure_of, in_lengths
+from ..batch import put, take, take_each
+from ..closure.close import in_lengths
 from ..closure.projection import SAME, ProjectionMode, projection_modes
-from ..decomposition.leg_table import LegTable, leg_table
+from ..decomposition.leg_table import LegTable
+from ..derived import derived
 from ..description.home_mobility import column_joints
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
+from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .nearest_pose import NearestPose, new_solution, no_starts, starts_at
@@ -32,7 +32,7 @@ MOST_STEPS = 200
 
 
 def nearest_poses(
-    mechanism: Mechanism,
+    model: Model,
     options: Options,
     targets: Floats,
     starts: Starts,
@@ -55,7 +55,7 @@ def nearest_poses(
     has_start : the first start was given: nothing held leads farther away than it is.
     """
     tolerances = options.tolerance, options.rotation_tolerance
-    plan = _search_plan(mechanism, options.hold, options.rotation_length, *tolerances, seeds, keep_mode)
+    plan = _search_plan(model, options.hold, options.rotation_length, *tolerances, seeds, keep_mode)
     preferred, *later = plan.searches
     n_unsolved = preferred.fill(targets, starts, solution)
     for search in later:
@@ -65,9 +65,9 @@ def nearest_poses(
             n_unsolved = search.fill(targets, starts, solution)
             continue
         is_unsolved = solution.distances == np.inf
-        block = solution.at(is_unsolved)
-        n_unsolved = search.fill(targets[is_unsolved], starts.of(is_unsolved), block)
-        solution.put(is_unsolved, block)
+        block = take(solution, is_unsolved)
+        n_unsolved = search.fill(targets[is_unsolved], take_each(starts, is_unsolved), block)
+        put(solution, is_unsolved, block)
     if has_start and len(later) and _may_be_too_far(plan, targets, starts, solution):
         _release(plan, targets, starts, solution)
     if plan.fallback is not None:
@@ -78,16 +78,15 @@ def nearest_poses(
 class SearchPlan(NamedTuple):
     """The projections tried in turn, and a search for each."""
 
-    mechanism: Mechanism
-    length: float
+    model: Model
     projections: tuple[ProjectionMode, ...]
     searches: tuple[NearestPose, ...]
     fallback: NearestPose | None  # another projection, if redundant joints follow step by step
 
 
-@lru_cache(maxsize=256)
+@derived
 def _search_plan(
-    mechanism: Mechanism,
+    model: Model,
     hold: str | None,
     rotation_length: float | None,
     tolerance: float | None,
@@ -96,39 +95,47 @@ def _search_plan(
     keep_mode: bool,
 ) -> SearchPlan:
     """The projections that options ask for, in the order in which they are tried, and their searches."""
-    table, length = leg_table(mechanism), mechanism.characteristic_length
-    assert isinstance(table, LegTable)
+    table = model.legs
     settings = {"steps": MOST_STEPS, "stays": int(keep_mode), "rotation": rotation_tolerance}
-    settings["position"] = tolerance or TOLERANCES.position * length
-    seed_starts = seeds_of(mechanism) if seeds else no_starts(table)
-    projections = projection_modes(mechanism, hold, rotation_length)
-    searches = tuple(_new_search(mechanism, table, projection, settings, seed_starts) for projection in projections)
-    with_orientation = projection_modes(mechanism, "orientation", rotation_length)
+    settings["position"] = tolerance or TOLERANCES.position * model.length
+    seed_starts = seeds_of(model) if seeds else no_starts(table)
+    projections = projection_modes(model.path_closure, hold, rotation_length)
+    searches = tuple(_new_search(model, projection, settings, seed_starts) for projection in projections)
+    with_orientation = projection_modes(model.path_closure, "orientation", rotation_length)
     fallback = None
     if table.has_implicit_joints and len(with_orientation) > 1:
         fallback = (
-            searches[-1]
-            if len(projections) > 1
-            else _new_search(mechanism, table, with_orientation[0], settings, seed_starts)
+            searches[-1] if len(projections) > 1 else _new_search(model, with_orientation[0], settings, seed_starts)
         )
-    return SearchPlan(mechanism, length, projections, searches, fallback)
+    return SearchPlan(model, projections, searches, fallback)
+
+
+def endings(
+    model: Model, options: Options, target: Floats, starts: Starts, *, keep_mode: bool
+) -> list[tuple[ProjectionMode, PoseSolutions]]:
+    """Where the search of each projection ends from each start alone, for one target (1, 4, 4) [length]."""
+    tolerances = options.tolerance, options.rotation_tolerance
+    plan = _search_plan(model, options.hold, options.rotation_length, *tolerances, False, keep_mode)
+    targets = np.repeat(target, len(starts.poses), axis=0)
+    return [
+        (projection, search.find(targets, starts))
+        for projection, search in zip(plan.projections, plan.searches, strict=True)
+    ]
 
 
 def _new_search(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     projection: ProjectionMode,
     settings: Mapping[str, float],
     seed_starts: Starts,
 ) -> NearestPose:
     """The search of one projection: from each row's start, then from seeds."""
-    length = mechanism.characteristic_length
     held = {
         "hold": projection.hold,
-        "held_position": TOLERANCES.held * length if projection.hold == HOLD_POSITION else np.inf,
+        "held_position": TOLERANCES.held * model.length if projection.hold == HOLD_POSITION else np.inf,
         "held_rotation": TOLERANCES.held if projection.hold == HOLD_ORIENTATION else np.inf,
     }
-    return NearestPose(mechanism, table, projection.weights, {**settings, **held}, seed_starts)
+    return NearestPose(model, model.legs, projection.weights, {**settings, **held}, seed_starts)
 
 
 def _reach_by_fallback(search: NearestPose, targets: Floats, starts: Starts, solution: PoseSolutions) -> None:
@@ -137,11 +144,11 @@ def _reach_by_fallback(search: NearestPose, targets: Floats, starts: Starts, sol
     rows_to_try = (is_uncertain & (solution.distances < np.inf)).nonzero()[0]
     if not len(rows_to_try):
         return
-    block = solution.at(rows_to_try)
-    search.fill(targets[rows_to_try], starts.of(rows_to_try), block)
+    block = take(solution, rows_to_try)
+    search.fill(targets[rows_to_try], take_each(starts, rows_to_try), block)
     is_reached = (block.status == REACHED) & (block.distances < np.inf)
     block.counters[:, HOLD] = HOLD_NOTHING
-    solution.put(rows_to_try[is_reached], block.at(is_reached))
+    put(solution, rows_to_try[is_reached], take(block, is_reached))
 
 
 def _may_be_too_far(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSolutions) -> bool:
@@ -149,9 +156,9 @@ def _may_be_too_far(plan: SearchPlan, targets: Floats, starts: Starts, solution:
 
     A quick test that spares most single targets `_release`.
     """
-    if len(targets) > 1 or plan.projections[0].hold != HOLD_ORIENTATION or not all(task_of(plan.mechanism).axes):
+    if len(targets) > 1 or plan.projections[0].hold != HOLD_ORIENTATION or not all(plan.model.task.axes):
         return True
-    target, start, scale = targets[0, :3, 3].tolist(), starts.poses[0, :3, 3].tolist(), plan.length
+    target, start, scale = targets[0, :3, 3].tolist(), starts.poses[0, :3, 3].tolist(), plan.model.length
     (x, y, z), (a, b, c) = target, start
     return bool(solution.distances[0] * scale > hypot(x - a * scale, y - b * scale, z - c * scale))
 
@@ -162,32 +169,31 @@ def _release(plan: SearchPlan, targets: Floats, starts: Starts, solution: PoseSo
     Too far is defined by `ProjectionMode.is_too_far`.
     """
     holding, free = plan.projections
-    closure = closure_of(plan.mechanism)
+    closure = plan.model.path_closure
     is_held = (solution.counters[:, HOLD] % CERTAIN == holding.hold) & (solution.distances < np.inf)
     if holding.hold == HOLD_ORIENTATION:  # most are nearer in position alone
-        offset = (targets[:, :3, 3] / plan.length - starts.poses[:, :3, 3]) * task_of(plan.mechanism).axes
+        offset = (targets[:, :3, 3] / plan.model.length - starts.poses[:, :3, 3]) * plan.model.task.axes
         is_held &= solution.distances > np.sqrt(np.einsum("ij,ij->i", offset, offset))
     far = is_held.nonzero()[0]
     if not len(far):
         return
-    start_poses = np.broadcast_to(in_lengths(starts.poses, plan.length), targets.shape)
+    start_poses = np.broadcast_to(in_lengths(starts.poses, plan.model.length), targets.shape)
     far = far[holding.is_too_far(closure, solution.distances[far], start_poses[far], targets[far])]
     if not len(far):
         return
-    block = solution.at(far)
-    plan.searches[-1].fill(targets[far], starts.of(far), block)
+    block = take(solution, far)
+    plan.searches[-1].fill(targets[far], take_each(starts, far), block)
     is_nearer = block.distances <= (1.0 + SAME) * free.distances(closure, start_poses[far], targets[far])
-    solution.put(far[is_nearer], block.at(is_nearer))
+    put(solution, far[is_nearer], take(block, is_nearer))
 
 
-def limit_multipliers(
-    mechanism: Mechanism, table: LegTable, targets: Floats, configurations: Starts, projection: ProjectionMode
-) -> Floats:
+def limit_multipliers(model: Model, targets: Floats, configurations: Starts, projection: ProjectionMode) -> Floats:
     """The multipliers of all limits at configurations, for targets (n, 4, 4) [length].
 
     In the order of `closure.descend.limit_multipliers`.
     """
-    multipliers = _multipliers(mechanism, table, projection).weigh(targets, configurations)
+    table, mechanism = model.legs, model.mechanism
+    multipliers = _multipliers(model, projection).weigh(targets, configurations)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     cone_joints = [joint.name for joint in mechanism.joints if joint.cone is not None]
     weights = np.zeros((len(targets), 2 * columns + len(cone_joints)))
@@ -198,32 +204,30 @@ def limit_multipliers(
     return weights
 
 
-@lru_cache(maxsize=256)
-def _multipliers(mechanism: Mechanism, table: LegTable, projection: ProjectionMode) -> NearestPose:
+@derived
+def _multipliers(model: Model, projection: ProjectionMode) -> NearestPose:
     """The kernel call that takes no steps and gives the multipliers of limits."""
-    return NearestPose(mechanism, table, projection.weights, {"steps": 0}, no_starts(table))
+    return NearestPose(model, model.legs, projection.weights, {"steps": 0}, no_starts(model.legs))
 
 
-def nearest_actuators(mechanism: Mechanism, values: Floats, starts: Starts, *, seeds: bool) -> PoseSolutions:
+def nearest_actuators(model: Model, values: Floats, starts: Starts, *, seeds: bool) -> PoseSolutions:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
-    poses = in_lengths(starts.poses, mechanism.characteristic_length)
+    poses = in_lengths(starts.poses, model.length)
     poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
-    return _actuator_search(mechanism, seeds).find(poses, starts, values)
+    return _actuator_search(model, seeds).find(poses, starts, values)
 
 
-@lru_cache(maxsize=64)
-def _actuator_search(mechanism: Mechanism, seeds: bool) -> NearestPose:
+@derived
+def _actuator_search(model: Model, seeds: bool) -> NearestPose:
     """The search for actuators nearest to values; the pose does not count."""
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
-    seed_starts = seeds_of(mechanism) if seeds else no_starts(table)
+    table = model.legs
+    seed_starts = seeds_of(model) if seeds else no_starts(table)
     settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
-    return NearestPose(mechanism, table, (0.0,) * 6, settings, seed_starts, table.driven)
+    return NearestPose(model, table, (0.0,) * 6, settings, seed_starts, table.driven)
 
 
 def move_redundant_joints(
-    mechanism: Mechanism,
-    table: LegTable,
+    model: Model,
     targets: Floats,
     start_poses: Floats,
     sides: Floats,
@@ -241,14 +245,14 @@ def move_redundant_joints(
     -------
     The rows solved, and the poses at which their searches ended, (rows, 4, 4) [length].
     """
-    starts = starts_at(mechanism, table, start_poses if len(start_poses) == 1 else start_poses[places], sides[places])
-    solution = _nearest_redundant(mechanism, table, targets[places], starts)
+    starts = starts_at(model, start_poses if len(start_poses) == 1 else start_poses[places], sides[places])
+    solution = _nearest_redundant(model, targets[places], starts)
     is_solved = np.isfinite(solution.distances)
     sides[places[is_solved]] = solution.sides[is_solved]
     return places[is_solved], solution.poses[is_solved]
 
 
-def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, starts: Starts) -> PoseSolutions:
+def _nearest_redundant(model: Model, targets: Floats, starts: Starts) -> PoseSolutions:
     """Feasible configurations at targets (n, 4, 4) [length] whose redundant joints are nearest to those of starts (n,).
 
     Searches start there alone; what they miss, projections from seeds find. A row without a solution for one set of
@@ -258,10 +262,10 @@ def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, s
     ----------
     starts : poses (n or 1, 4, 4), sides (n, legs), and no coordinates.
     """
-    best = new_solution(len(targets), table)
+    best = new_solution(len(targets), model.legs)
     best.distances[:], best.sides[:] = 0.0, starts.sides
     unsolved = np.arange(len(targets))
-    for redundant, legs, nearest_pose in _redundant_searches(mechanism, table):
+    for redundant, legs, nearest_pose in _redundant_searches(model):
         poses = starts.poses if len(starts.poses) == 1 else starts.poses[unsolved]
         block_starts = Starts(
             poses, np.ascontiguousarray(starts.q[:, legs]), np.ascontiguousarray(starts.sides[unsolved][:, legs])
@@ -274,19 +278,17 @@ def _nearest_redundant(mechanism: Mechanism, table: LegTable, targets: Floats, s
     return best
 
 
-@lru_cache(maxsize=64)
-def _redundant_searches(mechanism: Mechanism, table: LegTable) -> tuple[tuple[Records, slice, NearestPose], ...]:
+@derived
+def _redundant_searches(model: Model) -> tuple[tuple[Records, slice, NearestPose], ...]:
     """A search for each independent set of redundant joints, at a held pose: their coordinates, and their legs."""
-    held = task_of(mechanism).held
+    held = model.task.held
     return tuple(
         (
             part_table.redundant,
             legs,
-            NearestPose(
-                mechanism, part_table, held, {"steps": MOST_STEPS}, no_starts(part_table), part_table.redundant
-            ),
+            NearestPose(model, part_table, held, {"steps": MOST_STEPS}, no_starts(part_table), part_table.redundant),
         )
-        for part_table, legs in _split_by_redundant(table)
+        for part_table, legs in _split_by_redundant(model.legs)
     )
 
 

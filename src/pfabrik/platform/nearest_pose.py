@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Floats, Records
+from ..batch import put, take, take_each
 from ..closure.close import in_lengths
 from ..decomposition.leg_table import LegTable
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..kernels.platform.search_records import SETTINGS, MultistartPlan, PoseSolutions, Starts
 from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
 from ..kernels.threads import in_blocks
+from ..model import Model
 from ..tolerances import TOLERANCES
 from .carriages import carriages_along, proximal_coordinates, stays_there
 from .rotation import keeps_rotation, n_implied_rows, without_idle_legs
@@ -61,7 +62,7 @@ class NearestPose:
 
     def __init__(
         self,
-        mechanism: Mechanism,
+        model: Model,
         table: LegTable,
         weights: Sequence[float],
         settings: Mapping[str, float],
@@ -71,7 +72,7 @@ class NearestPose:
         keep_pointing: bool = False,
     ) -> None:
         self._table, searches = table, settings["steps"] > 0
-        pose_weights, is_fixed = np.array(weights, dtype=float), keeps_rotation(mechanism)
+        pose_weights, is_fixed = np.array(weights, dtype=float), keeps_rotation(model)
         pose_weights[3:] = LOCKED if is_fixed else pose_weights[3:]
         is_at_home = table.task[0]["rotations"] == 0 and pose_weights[3] == LOCKED and searches
         legs = without_idle_legs(table) if is_at_home and not len(table.redundant) else search_table(table)
@@ -80,9 +81,9 @@ class NearestPose:
         n_cones = len(cones) if keep_pointing or not searches else int((cones["leader"] != OF_POINTING).sum())
         setting = np.zeros(1, SETTINGS)
         setting["margin"], setting["near"], setting["cones"] = TOLERANCES.inside, TOLERANCES.active, n_cones
-        setting["implied"] = 0 if len(table.redundant) else n_implied_rows(mechanism)
+        setting["implied"] = 0 if len(table.redundant) else n_implied_rows(model)
         setting["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
-        for name, value in {"frame": task_of(mechanism).frame, **settings}.items():
+        for name, value in {"frame": model.task.frame, **settings}.items():
             setting[name] = value
         setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
         along = stays_there(table) if driven is not None else carriages_along(table)
@@ -90,7 +91,7 @@ class NearestPose:
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._pointing_search: NearestPose | None = None
         if n_cones < len(cones):
-            self._pointing_search = NearestPose(mechanism, table, weights, settings, seeds, driven, keep_pointing=True)
+            self._pointing_search = NearestPose(model, table, weights, settings, seeds, driven, keep_pointing=True)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -123,9 +124,10 @@ class NearestPose:
             is_missed = (solution.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (solution.distances < np.inf)
             if np.count_nonzero(is_missed):
                 solution.status[is_missed] = PENDING
-                block_values, block = None if values is None else values[is_missed], solution.at(is_missed)
-                n_unsolved += self._pointing_search.fill(targets[is_missed], starts.of(is_missed), block, block_values)
-                solution.put(is_missed, block)
+                block_values, block = None if values is None else values[is_missed], take(solution, is_missed)
+                starts_here = take_each(starts, is_missed)
+                n_unsolved += self._pointing_search.fill(targets[is_missed], starts_here, block, block_values)
+                put(solution, is_missed, block)
         return n_unsolved
 
     def weigh(self, targets: Floats, configurations: Starts) -> Floats:
@@ -145,13 +147,13 @@ class NearestPose:
 
         def run(block: slice) -> int:
             block_values = values[block] if len(values) else values
-            outputs = *starts.of(block), *solution.at(block), weights[block]
+            outputs = *take_each(starts, block), *take(solution, block), weights[block]
             return kernel(legs, plan, scratch.address, targets[block], block_values, *outputs)
 
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
 
 
-@lru_cache(maxsize=64)
+@derived
 def _agreements(table: LegTable) -> int:
     task = table.task[0]
     if table.leaves_open:
@@ -188,12 +190,13 @@ def no_starts(table: LegTable) -> Starts:
     return Starts(np.zeros((0, 4, 4)), np.zeros((0, len(table.legs))), np.zeros((0, len(table.legs))))
 
 
-def starts_at(mechanism: Mechanism, table: LegTable, poses: Floats, sides: Floats) -> Starts:
+def starts_at(model: Model, poses: Floats, sides: Floats) -> Starts:
     """Starts at poses (n, 4, 4) [length] with legs on given sides, (n, legs)."""
-    return Starts(in_lengths(poses, 1.0 / mechanism.characteristic_length), np.zeros((0, len(table.legs))), sides)
+    return Starts(in_lengths(poses, 1.0 / model.length), np.zeros((0, len(model.legs.legs))), sides)
 
 
-def home_start(mechanism: Mechanism, table: LegTable) -> Starts:
+def home_start(model: Model) -> Starts:
     """A single start: home."""
-    poses = in_lengths(mechanism.home_pose[None], 1.0 / mechanism.characteristic_length)
-    return Starts(poses, np.zeros((1, len(table.legs))), table.home_sides)
+    return starts_at(model, model.mechanism.home_pose[None], model.legs.home_sides)._replace(
+        q=np.zeros((1, len(model.legs.legs)))
+    )

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.close import platform_poses
-from ..decomposition.leg_table import LegTable, leg_table
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..decomposition.leg_table import LegTable
+from ..derived import derived
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
+from ..model import Model
 from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
 from .table import TableHandle, kernel_table, reading_scratch, search_table, table_handle, with_pointing_cones
@@ -22,35 +20,31 @@ N_SAMPLES, RADIUS = 8, 0.05
 """Poses sampled around home, and how far off they are [L]."""
 
 
-@lru_cache(maxsize=64)
-def keeps_rotation(mechanism: Mechanism) -> bool:
+@derived
+def keeps_rotation(model: Model) -> bool:
     """True if the platform cannot turn: a joint end effector has no orientation; or legs such as parallelograms fix it.
 
     Only of tasks that leave the whole rotation open. A platform that has turned over on its rods closes its loops, but
     is useless, and no answer.
     """
-    if mechanism.end_effector_is_joint:
+    if model.mechanism.end_effector_is_joint:
         return True
-    table = leg_table(mechanism)
-    if not isinstance(table, LegTable) or task_of(mechanism).rotations > 0:
+    if model.task.rotations > 0 or model.legs.task[0]["rows"] < 3:
         return False
-    if table.task[0]["rows"] < 3:
-        return False
-    rows, slopes = constraints_at(table, _shifted_about_home(table))
+    rows, slopes = constraints_at(model.legs, _shifted_about_home(model.legs))
     if not len(rows):
         return False
     is_kept = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
     return bool(is_kept and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
 
 
-@lru_cache(maxsize=64)
-def n_implied_rows(mechanism: Mechanism) -> int:
+@derived
+def n_implied_rows(model: Model) -> int:
     """The number of leg constraints that follow from the others in general, such as planes that coincide.
 
     For machines without redundant joints. 0 at dead points, where it cannot be determined.
     """
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
+    mechanism, table = model.mechanism, model.legs
     at_home = _n_implied(table, mechanism.home_pose[None])
     if 0 in at_home:  # walks around home take long, and would give 0 too
         return 0
@@ -64,7 +58,7 @@ def _n_implied(table: LegTable, poses: Floats) -> list[int]:
     return implied
 
 
-@lru_cache(maxsize=64)
+@derived
 def without_idle_legs(table: LegTable) -> TableHandle:
     """Kernel table for searches in which the platform keeps its orientation at home.
 

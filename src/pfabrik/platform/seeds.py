@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..batch import take
 from ..closure.close import in_lengths
 from ..closure.configurations import new_rows
 from ..closure.parasitic import is_flipped
-from ..decomposition.leg_table import LegTable, leg_table
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..decomposition.leg_table import LegTable
+from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import REACHED
+from ..model import Model
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 from .carriages import proximal_coordinates
@@ -53,39 +52,35 @@ DECIMALS = 6
 """Decimals of the places of legs [L]: aligned ones differ by rounding."""
 
 
-@lru_cache(maxsize=64)
-def seeds_of(mechanism: Mechanism) -> Starts:
+@derived
+def seeds_of(model: Model) -> Starts:
     """Feasible configurations far from home and from each other; every third may be in a component beyond the base."""
-    table = leg_table(mechanism)
-    assert isinstance(table, LegTable)
+    table = model.legs
     rng = np.random.default_rng(0)
     is_many = table.has_implicit_joints or len(_sided_pivots(table)) > 0
     n_near, n_beyond = (MANY_SEEDS, MANY_BEYOND) if is_many else (SEEDS, BEYOND)
-    near_seeds = _far_apart(
-        home_start(mechanism, table), _random_feasible(mechanism, table, rng, DRAWS, RADIUS), n_near
-    )
-    far_seeds = _far_apart(near_seeds, _random_feasible(mechanism, table, rng, DRAWS, RADIUS_BEYOND), n_beyond)
+    near_seeds = _far_apart(home_start(model), _random_feasible(model, rng, DRAWS, RADIUS), n_near)
+    far_seeds = _far_apart(near_seeds, _random_feasible(model, rng, DRAWS, RADIUS_BEYOND), n_beyond)
     ranks = np.concatenate([np.arange(len(near_seeds.poses)), 2.0 * np.arange(len(far_seeds.poses)) + 0.5])
     order = np.argsort(ranks)
     return Starts(*(np.concatenate(both)[order] for both in zip(near_seeds, far_seeds, strict=True)))
 
 
-@lru_cache(maxsize=64)
-def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
+@derived
+def seeds_of_other_assemblies(model: Model) -> Starts:
     """The seeds in other assemblies than home's: completing from home what the task sets gives another pose."""
     from ..kernels.legs.answer import answer
 
-    table, seeds = leg_table(mechanism), seeds_of(mechanism)
-    assert isinstance(table, LegTable)
-    if keeps_rotation(mechanism) and all(task_of(mechanism).axes) and not table.has_implicit_joints:
+    table, seeds, length = model.legs, seeds_of(model), model.length
+    if keeps_rotation(model) and all(model.task.axes) and not table.has_implicit_joints:
         return no_starts(table)  # a position that is set is the pose
-    poses, length = in_lengths(seeds.poses, mechanism.characteristic_length), mechanism.characteristic_length
-    rows, sides, redundant = new_rows(mechanism, len(poses)), seeds.sides.copy(), table.implicit_joints["leg"]
+    poses = in_lengths(seeds.poses, length)
+    rows, sides, redundant = new_rows(model, len(poses)), seeds.sides.copy(), table.implicit_joints["leg"]
     sides[:, redundant] = table.home_sides[:, redundant]
     answer(
         table_handle(table).address,
         poses,
-        mechanism.home_pose[None].copy(),
+        model.mechanism.home_pose[None].copy(),
         sides,
         rows.status,
         rows.poses,
@@ -93,20 +88,20 @@ def seeds_of_other_assemblies(mechanism: Mechanism) -> Starts:
         rows.measures,
     )
     error = np.abs(in_lengths(rows.poses, 1.0 / length) - seeds.poses).max(axis=(1, 2))
-    return seeds.at(np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
+    return take(seeds, np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
 
 
-def _random_feasible(mechanism: Mechanism, table: LegTable, rng: np.random.Generator, n: int, radius: float) -> Starts:
+def _random_feasible(model: Model, rng: np.random.Generator, n: int, radius: float) -> Starts:
     """Random feasible configurations: the nearest to n random poses within a radius of home [L]."""
-    home = home_start(mechanism, table)
+    table, home = model.legs, home_start(model)
     poses = np.repeat(home.poses, n, axis=0)
     twists = rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([radius, FARTHEST_ROTATION], 3)
-    for slopes in constraints_at(table, mechanism.home_pose[None])[1]:
+    for slopes in constraints_at(table, model.mechanism.home_pose[None])[1]:
         _, sizes, directions = np.linalg.svd(slopes)
         bound = directions[: (sizes > TOLERANCES.alignment).sum()]
         twists -= twists @ bound.T @ bound  # motions that the legs bar at home they mostly bar elsewhere
     poses[:, :3, 3] += twists[:, :3]
-    if not keeps_rotation(mechanism):
+    if not keeps_rotation(model):
         poses[:, :3, :3] = from_rotvec(twists[:, 3:]) @ poses[:, :3, :3]
     q = np.zeros((n, len(table.legs)))
     coordinates = np.concatenate([proximal_coordinates(table), table.redundant])
@@ -117,13 +112,13 @@ def _random_feasible(mechanism: Mechanism, table: LegTable, rng: np.random.Gener
     sides = np.repeat(home.sides, n, axis=0)
     pivots = _sided_pivots(table)
     sides[:, pivots] *= rng.choice([-1.0, 1.0], (n, len(pivots)))  # no search leads from one side to the other
-    targets = in_lengths(poses, mechanism.characteristic_length)
+    targets = in_lengths(poses, model.length)
     weights = (1.0, 1.0, 1.0, ROTATION_WEIGHT, ROTATION_WEIGHT, ROTATION_WEIGHT)
-    nearest_pose = NearestPose(mechanism, table, weights, {"frame": BASE_AXES, "steps": DRAW_STEPS}, no_starts(table))
+    nearest_pose = NearestPose(model, table, weights, {"frame": BASE_AXES, "steps": DRAW_STEPS}, no_starts(table))
     solution = nearest_pose.find(targets, Starts(poses, q, sides))
-    is_usable = np.isfinite(solution.distances) & ~is_flipped(mechanism, solution.poses)
-    solution.poses[:] = in_lengths(solution.poses, 1.0 / mechanism.characteristic_length)
-    return Starts(*solution[1:4]).at(np.flatnonzero(is_usable))
+    is_usable = np.isfinite(solution.distances) & ~is_flipped(model.path_closure, solution.poses)
+    solution.poses[:] = in_lengths(solution.poses, 1.0 / model.length)
+    return take(Starts(*solution[1:4]), np.flatnonzero(is_usable))
 
 
 def _far_apart(given: Starts, drawn: Starts, most: int) -> Starts:
@@ -138,7 +133,7 @@ def _far_apart(given: Starts, drawn: Starts, most: int) -> Starts:
         is_rare = np.bincount(modes[chosen], minlength=modes.max() + 1)[modes] < SEEDS_PER_MODE
         chosen.append(int(np.where(is_rare & (distances > 0.0), distances + RARE_BONUS, distances).argmax()))
         distances = np.minimum(distances, _distances_from(candidates, chosen[-1]))
-    return Starts._make(array[chosen] for array in candidates)
+    return take(candidates, chosen)
 
 
 def _distances_from(starts: Starts, k: int) -> Floats:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting
-from ..description.mechanism import Mechanism
+from ..derived import derived
 from ..kernels.handle import Handle, Scratch
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import N_COUNTERS, Rows
+from ..model import Model
 from .nearest_pose import home_start, no_starts
 from .table import legs_at_rest, local_table, search_table, table_handle
 
@@ -29,7 +29,8 @@ class SingleTarget:
     A target takes microseconds, so everything that does not depend on it is prepared once.
     """
 
-    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
+    def __init__(self, model: Model) -> None:
+        mechanism, table = model.mechanism, model.legs
         self._n_actuators = len(mechanism.actuator_names)
         self._is_for_blocks, self._has_implicit_joints = table.is_for_blocks, table.has_implicit_joints
         self._full_table, self._local_table = table_handle(table), local_table(table)
@@ -113,10 +114,11 @@ class AssemblyOutputs(NamedTuple):
 class SingleAssembly:
     """Forward kinematics of a machine, one row at a time, prepared likewise."""
 
-    def __init__(self, mechanism: Mechanism, table: LegTable) -> None:
-        self._n_actuators, self._n_legs = len(mechanism.actuator_names), len(table.legs)
-        self.home, self._no_starts = Handle(home_start(mechanism, table)), Handle(no_starts(table))
-        self._legs, self._scratch_key = search_table(table), (mechanism, table)
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self.home, self._no_starts = Handle(home_start(model)), Handle(no_starts(model.legs))
+        self._legs = search_table(model.legs)
+        self._n_actuators, self._n_legs = len(model.mechanism.actuator_names), len(model.legs.legs)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -126,13 +128,12 @@ class SingleAssembly:
 
     @cached_property
     def _scratch(self) -> Scratch[NewtonScratch]:
-        return scratch_of(*self._scratch_key)
+        return scratch_of(self._model)
 
     def new_outputs(self) -> AssemblyOutputs:
         """Allocate the outputs of one row."""
-        return AssemblyOutputs(
-            np.empty((1, self._n_actuators)), np.empty((1, self._n_legs)), np.empty((1, self._n_legs))
-        )
+        n_legs = self._n_legs
+        return AssemblyOutputs(np.empty((1, self._n_actuators)), np.empty((1, n_legs)), np.empty((1, n_legs)))
 
     def prepared(
         self,
@@ -155,17 +156,17 @@ class SingleAssembly:
         return self.prepared(start, self._scratch, rows, outputs)() == 0
 
 
-def new_scratch(mechanism: Mechanism, table: LegTable) -> NewtonScratch:
+def new_scratch(model: Model) -> NewtonScratch:
     """Scratch memory of assembly."""
     from ..kernels.platform.forward import new_newton_scratch
 
-    return new_newton_scratch(search_table(table).record, not mechanism.end_effector_is_joint)
+    return new_newton_scratch(search_table(model.legs).record, not model.mechanism.end_effector_is_joint)
 
 
-@lru_cache(maxsize=64)
-def scratch_of(mechanism: Mechanism, table: LegTable) -> Scratch[NewtonScratch]:
+@derived
+def scratch_of(model: Model) -> Scratch[NewtonScratch]:
     """Scratch memory of assembly, for each thread its own."""
-    return Scratch(new_scratch, mechanism, table)
+    return Scratch(new_scratch, model)
 
 
 def _outputs(rows: Rows) -> tuple[NDArray[Any], ...]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from ..arrays import Records
-from ..closure.closure_engine import STRANGE
+from ..closure.target_closing import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
+from ..derived import derived
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
@@ -24,7 +24,7 @@ OF_POINTING = -1
 """The leader of cones that belong to no joint, but limit where crossed hinges can point a rod."""
 
 
-@lru_cache(maxsize=64)
+@derived
 def kernel_table(table: LegTable) -> K.Table:
     """The records of a leg table, with the index of each proximal, then redundant, coordinate among the unknowns."""
     columns = np.full(len(table.legs), -1)
@@ -39,19 +39,19 @@ def kernel_table(table: LegTable) -> K.Table:
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
 
 
-@lru_cache(maxsize=64)
+@derived
 def table_handle(table: LegTable) -> TableHandle:
     """The kernel table."""
     return Handle(kernel_table(table))
 
 
-@lru_cache(maxsize=64)
+@derived
 def local_table(table: LegTable) -> TableHandle:
     """Kernel table that completes a partial pose only near its start."""
     return Handle(kernel_table(table)._replace(task=table.task_within(STRANGE)))
 
 
-@lru_cache(maxsize=64)
+@derived
 def search_table(table: LegTable) -> TableHandle:
     """Kernel table for searches and assembly, with cones that limit where crossed hinges can point their rods."""
     return Handle(kernel_table(table)._replace(cones=with_pointing_cones(table.legs, table.cones)))
@@ -82,13 +82,13 @@ def with_pointing_cones(legs: Records, cones: Records) -> Records:
     return np.concatenate([cones, np.array(pointing, K.CONE)]) if pointing else cones
 
 
-@lru_cache(maxsize=64)
+@derived
 def reading_table(table: LegTable) -> TableHandle:
     """Kernel table that computes the angles of all endings."""
     return Handle(kernel_table(table)._replace(legs=table.aimed))
 
 
-@lru_cache(maxsize=64)
+@derived
 def reading_scratch(table: LegTable) -> Scratch[EvaluationScratch]:
     """Scratch memory to read joint coordinates and constraints at poses."""
     from ..kernels.platform.evaluate import new_evaluation_scratch
@@ -96,7 +96,7 @@ def reading_scratch(table: LegTable) -> Scratch[EvaluationScratch]:
     return Scratch(new_evaluation_scratch, kernel_table(table))
 
 
-@lru_cache(maxsize=64)
+@derived
 def legs_at_rest(table: LegTable) -> Resting | None:
     """The legs while free redundant joints stay at home; None if there are none, or if such legs are not equivalent."""
     return at_rest(table, table.home_sides[0]) if table.has_free_redundant else None

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..batch import put, take
 from ..closure.close import in_lengths
-from ..closure.configurations import new_rows, put_rows, rows_at
+from ..closure.configurations import new_rows
 from ..closure.parasitic import is_flipped
 from ..decomposition.leg_table import LegTable
-from ..description.mechanism import Mechanism
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..kernels.threads import in_blocks
+from ..model import Model
 from ..options import Options
 from .nearest import nearest_poses
 from .nearest_pose import starts_at
@@ -37,8 +38,7 @@ class Request(NamedTuple):
     the start. With `has_start` it was given, and is not home.
     """
 
-    mechanism: Mechanism
-    table: LegTable
+    model: Model
     options: Options
     keep_mode: bool
     nearby: bool
@@ -58,12 +58,12 @@ class Unreached(NamedTuple):
         """A part of the batch: copied, or views where `places` is a slice."""
         start_poses = self.start_poses if len(self.start_poses) == 1 else self.start_poses[places]
         arrays = self.targets[places], start_poses, self.sides[places], self.q_proximal[places]
-        return Unreached(*arrays, rows_at(self.rows, places))
+        return Unreached(*arrays, take(self.rows, places))
 
     def put(self, places: Mask | NDArray[np.intp], block: Unreached) -> None:
         """Write the outputs of a part of the batch."""
         self.sides[places], self.q_proximal[places] = block.sides, block.q_proximal
-        put_rows(self.rows, places, block.rows)
+        put(self.rows, places, block.rows)
 
     def answer(self, mask: Mask, answer: Callable[[Unreached], None]) -> None:
         """Call `answer` on the masked rows and store its outputs; no copy is made where these are all rows."""
@@ -92,26 +92,26 @@ def _answer_otherwise_kernel() -> Callable[..., int]:
 
 def answer_unreached(request: Request, unreached: Unreached) -> None:
     """Answer targets in other working modes, or by the nearest feasible poses. Rows may stay PENDING or UNSURE."""
-    table = request.table
+    table = request.model.legs
     if request.keep_mode or not table.has_sides:
         _answer_completed(request, unreached)
     else:
-        unreached.answer(_reach_otherwise(table, unreached), partial(_answer_completed, request))
+        unreached.answer(reach_in_other_modes(table, unreached), partial(_answer_completed, request))
 
 
 def _answer_completed(request: Request, unreached: Unreached) -> None:
     """Answer targets in other assemblies, where poses are completed, or by the nearest feasible poses."""
-    if request.keep_mode or not request.table.is_completed:
+    if request.keep_mode or not request.model.legs.is_completed:
         _project(request, unreached)
         return
-    seeds = seeds_of_other_assemblies(request.mechanism)
+    seeds = seeds_of_other_assemblies(request.model)
     if len(seeds.poses):
-        unreached.answer(_reach_from_seeds(seeds, request, unreached), partial(_project, request))
+        unreached.answer(reach_from_seeds(seeds, request, unreached), partial(_project, request))
     else:
         _project(request, unreached)
 
 
-def _reach_otherwise(table: LegTable, unreached: Unreached) -> Mask:
+def reach_in_other_modes(table: LegTable, unreached: Unreached) -> Mask:
     """Answer rows in other working modes; return the mask of rows still to be projected.
 
     Rows with a leg at a dead point are not among these: closed forms are too inexact there, and another engine answers.
@@ -134,20 +134,20 @@ def _reach_otherwise(table: LegTable, unreached: Unreached) -> Mask:
     return np.asarray(status == PENDING)
 
 
-def _reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> Mask:
+def reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> Mask:
     """Answer rows in other assemblies, completed from the nearest seed that leads to one; return the unsolved mask."""
-    length, legs, k = request.mechanism.characteristic_length, table_handle(request.table), len(seeds.poses)
+    length, legs, k = request.model.length, table_handle(request.model.legs), len(seeds.poses)
     poses = in_lengths(seeds.poses, length)
 
     def reach(part: slice) -> Mask:
         block = unreached.at(part)
         n = len(block.targets)
         start_poses, end_sides = np.concatenate([poses] * n), np.concatenate([seeds.sides] * n)
-        targets, rows = np.repeat(block.targets, k, axis=0), new_rows(request.mechanism, n * k)
+        targets, rows = np.repeat(block.targets, k, axis=0), new_rows(request.model, n * k)
         candidates = Unreached(targets, start_poses, end_sides, np.empty_like(end_sides), rows)
         _reach_from_poses(legs, start_poses, end_sides, candidates)
         is_reached = rows.status == REACHED
-        is_reached[is_reached] = ~is_flipped(request.mechanism, rows.poses[is_reached])
+        is_reached[is_reached] = ~is_flipped(request.model.path_closure, rows.poses[is_reached])
         is_reached = is_reached.reshape(n, k)
         is_solved = is_reached.any(axis=1)
         if np.count_nonzero(is_solved):
@@ -170,13 +170,13 @@ def _project(request: Request, unreached: Unreached) -> None:
     From a pose within `NEARLY` of its target, and from every pose where the task leaves some of it open, legs then try
     to reach the target exactly. A row within `NEARLY` that stays unreached, and has no certificate, is UNSURE.
     """
-    mechanism, table, options, keep_mode, nearby, has_start = request
+    model, options, keep_mode, nearby, has_start = request
     targets, start_poses, sides, q_proximal, rows = unreached
-    n, starts = len(targets), starts_at(mechanism, table, start_poses, sides[: len(start_poses)])
+    n, starts = len(targets), starts_at(model, start_poses, sides[: len(start_poses)])
     end_state = rows.poses, np.empty_like(q_proximal), np.empty_like(sides)
     solution = PoseSolutions(np.empty(n), *end_state, rows.counters, rows.actuators, rows.measures, rows.status)
     n_unsolved = nearest_poses(
-        mechanism, options, targets, starts, solution, seeds=not nearby, keep_mode=keep_mode, has_start=has_start
+        model, options, targets, starts, solution, seeds=not nearby, keep_mode=keep_mode, has_start=has_start
     )
     if n_unsolved == n:
         return
@@ -186,8 +186,8 @@ def _project(request: Request, unreached: Unreached) -> None:
     if np.count_nonzero(is_near):
         is_near &= ~(rows.certain & (rows.status == PROJECTED))
         rows.status[is_near] = UNSURE
-    legs = (local_table if nearby else table_handle)(table)
-    unreached.answer(solution.distances < np.inf if table.is_partial else is_near, partial(_reach_exactly, legs))
+    legs = (local_table if nearby else table_handle)(model.legs)
+    unreached.answer(solution.distances < np.inf if model.legs.is_partial else is_near, partial(_reach_exactly, legs))
 
 
 def _reach_exactly(legs: TableHandle, unreached: Unreached) -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
 
 from ..arrays import Floats
-from ..closure.close import HELD, Closing, close, closure_of, platform_poses
+from ..batch import put
+from ..closure.close import HELD, Closing, close, platform_poses
 from ..decomposition.plan import CompiledPlan, compile_plan
+from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..description.task import Weights
 from ..kernels.reaching import plan as P
+from ..motion.closure import Closure
 from ..motion.displacements import columns, displacements
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
@@ -54,13 +56,13 @@ def new_pass_results(compiled: CompiledPlan, n: int) -> P.PassResults:
     )
 
 
-def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, results: P.PassResults) -> Closing:
+def place(closure: Closure, compiled: CompiledPlan, begin: Floats, results: P.PassResults) -> Closing:
     """Joint coordinates that fit joint centres and platform poses, by least squares from a start (n, columns).
 
     What the centres leave open (a rod's spin) stays near the start. Loops are open by about the gap of the chains; rows
     that fit worse are repeated from random starts.
     """
-    closure, poses = closure_of(mechanism, whole=False), results.poses
+    mechanism, poses = closure.mechanism, results.poses
     platform, centres = holding(mechanism), _centres(mechanism, compiled, results)
     placed = close(closure, begin, poses, platform=platform, centres=centres)
     near = 2.0 * results.gaps / mechanism.characteristic_length + TOLERANCES.position
@@ -72,7 +74,7 @@ def place(mechanism: Mechanism, compiled: CompiledPlan, begin: Floats, results: 
         turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
         trial = close(closure, begin[unsolved] + turns, poses[unsolved], platform=platform, centres=centres[unsolved])
         is_better = _misfit(trial) < _misfit(placed)[unsolved]
-        placed.put(unsolved[is_better], trial, is_better)
+        put(placed, unsolved[is_better], trial, is_better)
     return placed
 
 
@@ -92,7 +94,7 @@ def _centres(mechanism: Mechanism, compiled: CompiledPlan, results: P.PassResult
     return centres
 
 
-@lru_cache(maxsize=64)
+@derived
 def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
     """Names of joints whose centres follow from node positions: not those merged with others into one joint."""
     compiled = compile_plan(mechanism)

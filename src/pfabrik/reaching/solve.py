@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..closure.close import Closing, close, closure_of
-from ..closure.closure_engine import ClosureEngine, start_coordinates, to_answers
-from ..closure.configurations import Configurations, new_rows, put_rows, rows_at, steps_of
+from ..batch import put, take
+from ..closure.close import Closing, close
+from ..closure.closure_engine import start_coordinates, to_answers
+from ..closure.configurations import Configurations, new_rows, steps_of
 from ..closure.descend import clip_targets
+from ..closure.engine_contract import Engine, InverseEngine
 from ..closure.projection import ProjectionMode, held_parts, projection_modes
-from ..decomposition.leg_table import LegTable, leg_table
 from ..decomposition.plan import compile_plan
-from ..description.mechanism import Mechanism
-from ..description.task import task_of
+from ..derived import derived
 from ..kernels.closure.loops import LOCKED
 from ..kernels.legs.records import REDUNDANT
 from ..kernels.reaching import plan as P
 from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
+from ..model import Model
 from ..options import Options
 from ..platform.answers import sides_at
-from ..platform.legs_engine import LegsEngine
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of
@@ -39,7 +39,7 @@ STEPS = 8
 ROWS_A_BLOCK = 64
 
 
-class ReachingEngine:
+class ReachingEngine(InverseEngine):
     """The paper's method, for mechanisms whose chains can be expressed by joint positions.
 
     Passes bring the ends of chains to the target, or else move the target; from there the loops are closed exactly.
@@ -47,10 +47,9 @@ class ReachingEngine:
     which the passes end in no feasible configuration.
     """
 
-    def __init__(self, mechanism: Mechanism, exact: LegsEngine | ClosureEngine) -> None:
-        self.mechanism, self._exact = mechanism, exact
-        self._compiled, self._table = compile_plan(mechanism), leg_table(mechanism)
-        self._held = holding(mechanism)
+    def __init__(self, model: Model, exact: Engine) -> None:
+        self._model, self.mechanism, self._exact = model, model.mechanism, exact
+        self._compiled, self._held = compile_plan(model.mechanism), holding(model.mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -84,22 +83,22 @@ class ReachingEngine:
     ) -> Configurations:
         """Solve a path (n, 4, 4), each target from the answer before it, in its working mode."""
         is_valid, previous = are_poses(targets), start
-        rows = new_rows(self.mechanism, len(targets))
-        coordinates = np.zeros((len(targets), start_coordinates(self.mechanism, start).shape[1]))
+        rows = new_rows(self._model, len(targets))
+        coordinates = np.zeros((len(targets), start_coordinates(self._model, start).shape[1]))
         for i in steps_of(is_valid, on_progress):
             answer = self.answer(targets[i : i + 1], previous, options, keep_mode=True)
             previous = Configurations(answer.rows, answer.coordinates)
-            put_rows(rows, slice(i, i + 1), previous.rows)
+            put(rows, slice(i, i + 1), previous.rows)
             coordinates[i] = previous.coordinates[0]
-        return Configurations(rows_at(rows, is_valid), coordinates[is_valid]).scatter(is_valid)
+        return Configurations(take(rows, is_valid), coordinates[is_valid]).scatter(is_valid)
 
     def _by_passes(
         self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool
     ) -> Configurations:
         """Solve for poses by passes; FAILED where infeasible, or where the working mode is to be kept and is not."""
-        begin = start_coordinates(self.mechanism, start)
+        begin = start_coordinates(self._model, start)
         begin = np.repeat(begin, len(targets), axis=0) if len(begin) == 1 else begin
-        projection = projection_modes(self.mechanism, options.hold, options.rotation_length)[0]
+        projection = projection_modes(self._model.path_closure, options.hold, options.rotation_length)[0]
         solutions = self._solve_from(targets, begin, options, projection)
         if keep_mode:
             has_left_mode = (self._sides(solutions) * self._sides(start) < 0.0).any(axis=1)
@@ -108,35 +107,35 @@ class ReachingEngine:
 
     def _sides(self, configurations: Configurations | None) -> Floats:
         """The working mode of configurations, or of home: the side of each leg, (n, legs); 0 for legs without one."""
-        if not isinstance(self._table, LegTable):
+        if not self._model.has_legs:
             return np.zeros((1, 0))
-        legs, home = self._table.legs, self._table.home_sides
+        legs, home = self._model.legs.legs, self._model.legs.home_sides
         has_side = (legs["kind"] != REDUNDANT) | (legs["orients"] == 1)
-        sides = home if configurations is None else sides_at(self.mechanism, self._table, configurations)
+        sides = home if configurations is None else sides_at(self._model, configurations)
         return np.where(has_side, sides, 0.0)
 
     def _solve_from(
         self, targets: Floats, begin: Floats, options: Options, projection: ProjectionMode
     ) -> Configurations:
         """Solve for poses by passes from joint coordinates (n, columns); FAILED where the loops do not close."""
-        closure = closure_of(self.mechanism, whole=False)
-        settings, clipped = settings_of(self.mechanism, options, projection), clip_targets(self.mechanism, targets)
+        closure = self._model.path_closure
+        settings, clipped = settings_of(self._model, options, projection), clip_targets(self.mechanism, targets)
         if options.exact and not self._is_struts:
             placed, results = self._move_to_fit(clipped, begin, settings)
         else:
             pass_settings = settings._replace(max_iterations=1) if options.exact else settings
             results = self._run(clipped, begin, pass_settings)
-            placed = place(self.mechanism, self._compiled, begin, results)
+            placed = place(closure, self._compiled, begin, results)
         margin = TOLERANCES.inside
         closed = close(closure, placed.coordinates, placed.poses, platform=projection.held, limits=True, margin=margin)
-        errors = task_of(self.mechanism).errors(closed.poses, targets)
+        errors = self._model.task.errors(closed.poses, targets)
         shifted = np.flatnonzero((results.rounds == 0) & (errors[0] > settings.enough))
         if len(shifted):  # the chains came near this target, but closing the loops moved the platform: hold it
             start = placed.coordinates[shifted], placed.poses[shifted]
             closed.put_better(shifted, close(closure, *start, platform=self._held, limits=True, margin=margin))
-            errors = task_of(self.mechanism).errors(closed.poses, targets)
-        holds = held_parts(self.mechanism, np.full(len(targets), projection.hold), *errors)
-        solutions = to_answers(closure, closed, targets, holds, options)
+            errors = self._model.task.errors(closed.poses, targets)
+        holds = held_parts(closure, np.full(len(targets), projection.hold), *errors)
+        solutions = to_answers(self._model, closed, targets, holds, options)
         solutions.rows.counters[:, ITERATIONS] = results.iterations
         solutions.rows.counters[:, ROUNDS] = results.rounds
         return solutions
@@ -146,7 +145,7 @@ class ReachingEngine:
 
         This replaces passes, which can get stuck at the ranges of joints. The remaining gap of a chain is at its end.
         """
-        closure = closure_of(self.mechanism, whole=False)
+        closure = self._model.path_closure
         results, unsolved = new_pass_results(self._compiled, len(targets)), np.arange(len(targets))
         results.rounds[:] = 0
         placed = close(closure, begin, targets, platform=self._held, limits=True, max_iterations=0)
@@ -158,7 +157,7 @@ class ReachingEngine:
             if not self.mechanism.end_effector_is_joint:
                 fitted.poses[:] = revised.poses
             fitted.poses[:, :3, 3] = revised.poses[:, :3, 3]
-            placed.put(unsolved, fitted)
+            put(placed, unsolved, fitted)
             rounds = results.rounds[unsolved] + revised.rounds
             for array, revised_array in zip(results, revised, strict=True):
                 array[unsolved] = revised_array
@@ -185,8 +184,8 @@ class ReachingEngine:
         results = new_pass_results(self._compiled, len(targets))
 
         def run(block: slice) -> None:
-            block_seeds = P.Seeds._make(array[block] for array in seeds)
-            block_results = P.PassResults._make(array[block] for array in results)
+            block_seeds = take(seeds, block)
+            block_results = take(results, block)
             solve_by_passes(self._compiled.plan, targets[block], block_seeds, settings, block_results)
 
         in_blocks(run, len(targets), ROWS_A_BLOCK)
@@ -198,10 +197,10 @@ def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configuration
     return start if start is None or len(start) == 1 else start.at(places)
 
 
-@lru_cache(maxsize=256)
-def settings_of(mechanism: Mechanism, options: Options, projection: ProjectionMode) -> P.Settings:
+@derived
+def settings_of(model: Model, options: Options, projection: ProjectionMode) -> P.Settings:
     """Options as the kernel reads them; passes end sooner if exact steps follow."""
-    length, free = mechanism.characteristic_length, [weight != LOCKED and weight > 0.0 for weight in projection.weights]
+    length, free = model.length, [weight != LOCKED and weight > 0.0 for weight in projection.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)
     return P.Settings(
         enough=max(tolerance, NEAR * length) if options.exact else tolerance,

@@ -79,7 +79,7 @@ class Explorer:
                 tell(int(first.sum()))
 
     def _as_answers(self, coordinates: Floats) -> Configurations:
-        return Configurations(new_rows(self._engine.mechanism, len(coordinates)), coordinates)
+        return Configurations(new_rows(self._engine.model, len(coordinates)), coordinates)
 
     def _take(self, look: _Look, rows: NDArray[np.intp], found: Configurations) -> None:
         """Note what was tried, and go on from what was reached."""

@@ -13,11 +13,11 @@ from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
 from ..closure.closure_engine import ClosureEngine
 from ..configuration import configuration
-from ..decomposition.leg_table import LegTable, table_of_poses
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
 from ..feasibility import feasibility
 from ..ik import solve_ik
+from ..model import model_of
 from ..motion.displacements import home_coordinates
 from ..options import Options
 from ..tolerances import TOLERANCES
@@ -61,7 +61,7 @@ class MapQuestion:
     @property
     def has_margins(self) -> bool:
         """Whether closed forms tell margins; else points are asked for one by one, and only told whether reached."""
-        return self.hold == "orientation" and isinstance(table_of_poses(self.mechanism), LegTable)
+        return self.hold == "orientation" and not model_of(self.mechanism).why_poses_do_not_suffice
 
     @property
     def limits(self) -> Limits:

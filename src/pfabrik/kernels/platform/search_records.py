@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints, Mask, Records
+from ...arrays import Floats, Ints, Records
 from ..closure.loops import PoseObjective
 
 STRETCHED = 1e-4
@@ -29,14 +28,6 @@ class Starts(NamedTuple):
     poses: Floats  # (s, 4, 4)
     q: Floats  # (s, legs); no rows if they follow from poses and sides
     sides: Floats  # (s, legs)
-
-    def at(self, places: NDArray[np.intp] | Mask | slice) -> Starts:
-        """The starts at some indices."""
-        return Starts(self.poses[places], self.q[places] if len(self.q) else self.q, self.sides[places])
-
-    def of(self, rows: NDArray[np.intp] | Mask | slice) -> Starts:
-        """The starts of some rows; the common start if there is only one."""
-        return self if len(self.poses) == 1 else self.at(rows)
 
 
 SETTINGS = np.dtype(
@@ -88,12 +79,3 @@ class PoseSolutions(NamedTuple):
     actuators: Floats  # (n, n_a)
     measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess
     status: Ints  # (n,): REACHED or PROJECTED
-
-    def at(self, places: NDArray[np.intp] | Mask | slice) -> PoseSolutions:
-        """The solutions of some rows."""
-        return PoseSolutions._make(array[places] for array in self)
-
-    def put(self, places: NDArray[np.intp] | Mask, solutions: PoseSolutions) -> None:
-        """Write other solutions into some rows."""
-        for array, block in zip(self, solutions, strict=True):
-            array[places] = block

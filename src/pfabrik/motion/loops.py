@@ -14,8 +14,8 @@ from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
 from ..kernels.closure import loops as K
-from ..motion.displacements import columns, rate_units
 from ..tolerances import TOLERANCES
+from .displacements import columns, rate_units
 
 
 def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:

@@ -1,0 +1,31 @@
+"""A batch: a NamedTuple of arrays, with a row in each of them for every target or configuration."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar, cast
+
+Batch = TypeVar("Batch", bound=tuple[Any, ...])
+"""A NamedTuple of arrays, or of such NamedTuples. Arrays without rows say nothing, whichever rows are taken."""
+
+
+def take(batch: Batch, places: Any) -> Batch:
+    """The rows at some places: an integer array or a mask (copied), or a slice (shared)."""
+    make = cast(Any, batch)._make
+    taken = make(
+        take(item, places) if isinstance(item, tuple) else item[places] if len(item) else item for item in batch
+    )
+    return cast(Batch, taken)
+
+
+def take_each(batch: Batch, places: Any) -> Batch:
+    """The rows at some places; the whole batch if it has a single row, which is common to all."""
+    return batch if len(batch[0]) == 1 else take(batch, places)
+
+
+def put(batch: Batch, places: Any, source: Batch, source_places: Any = slice(None)) -> None:
+    """Write rows of a source at some places."""
+    for item, source_item in zip(batch, source, strict=True):
+        if isinstance(item, tuple):
+            put(item, places, source_item, source_places)
+        elif len(item):
+            item[places] = source_item[source_places]

@@ -1,0 +1,184 @@
+"""A compiled MuJoCo model as joints between bodies, and the loops that its equalities close."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.joints import Joint
+from .compiled_model import CompiledModel
+from .couplings import Coupling
+from .digits import ModelDigits, Rounding, worst
+from .names import unique
+from .notes import Note
+from .opened import Loop
+from .xml_reading import fault
+
+
+class MjcfModel(CompiledModel):
+    """A model in one configuration, as joints and loops.
+
+    Attributes
+    ----------
+    roundings : joint or loop -> how exactly the digits of the file place it [m, rad], of those that were read.
+    """
+
+    def __init__(self, plain: ET.Element, configuration: str) -> None:
+        try:
+            super().__init__(ET.tostring(plain, encoding="unicode"))
+        except ValueError as error:
+            reason = str(error).replace("\n", " ").strip()
+            raise fault("model", f"what MuJoCo does not compile ({reason})", "a model that it does") from None
+        self.put_configuration(configuration)
+        self.mujoco.mj_normalizeQuat(self.model, self.data.qpos)
+        self.mujoco.mj_kinematics(self.model, self.data)
+        self._digits = ModelDigits(plain, self.model)
+        self.roundings: dict[str, Rounding] = {}
+        self._bodies = {self.body(index) for index in range(self.model.nbody)}
+
+    def body(self, index: int) -> str:
+        """Name of a body; a number where it has none."""
+        return str(self.model.body(index).name) or f"body_{index}"
+
+    def joint(self, index: int) -> str:
+        """Name of a joint; a number where it has none."""
+        return self.joint_names[index] or f"joint_{index}"
+
+    @property
+    def driven(self) -> list[str]:
+        """Names of the joints that are driven, in the order of the actuators."""
+        return [self.joint(int(index)) for index in self.model.actuator_trnid[:, 0]]
+
+    def places(self) -> dict[str, tuple[str, Floats]]:
+        """Body or site -> its body, and where it is (3,) [m]."""
+        model, data = self.model, self.data
+        sites = {
+            str(model.site(i).name): (self.body(model.site_bodyid[i]), data.site_xpos[i].copy())
+            for i in range(model.nsite)
+        }
+        return sites | {self.body(i): (self.body(i), data.xpos[i].copy()) for i in range(model.nbody)}
+
+    def joints(self, notes: list[Note]) -> Iterator[Joint]:
+        """Yield every joint, between its body and the parent's; several on one body have bodies between them."""
+        model = self.model
+        limited_balls = []
+        for index in range(1, model.nbody):
+            parent, body = self.body(model.body_parentid[index]), self.body(index)
+            begin, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
+            parts: list[dict[str, Any]] = []
+            for joint in range(begin, begin + count):
+                parts += self._parts(joint)
+                self.roundings[self.joint(joint)] = self._digits.joint(joint)
+                if bool(model.jnt_type[joint] == self.mujoco.mjtJoint.mjJNT_BALL) and model.jnt_limited[joint]:
+                    limited_balls.append(self.joint(joint))
+            parts = parts or [{"name": unique(f"{body}:weld", self._bodies), "type": "fixed"}]
+            between = [unique(f"{body}:{part['name']}", self._bodies) for part in parts[:-1]]
+            for part, connects in zip(parts, pairwise([parent, *between, body]), strict=True):
+                yield Joint(connects=connects, **part)
+        if limited_balls:
+            notes.append(Note("a ball's range is no limit here: it is left out", tuple(limited_balls)))
+
+    def _parts(self, index: int) -> Iterator[dict[str, Any]]:
+        """Yield the fields of the joints that one of the model is in series: a free joint, three slides and a ball."""
+        model, data, kinds = self.model, self.data, self.mujoco.mjtJoint
+        name, kind = self.joint(index), kinds(int(model.jnt_type[index]))
+        at, axis = data.xanchor[index].copy(), data.xaxis[index].copy()
+        address = int(model.jnt_qposadr[index])
+        if kind == kinds.mjJNT_FREE:
+            for letter, direction, home in zip("xyz", np.eye(3), data.qpos[address:], strict=False):
+                yield {"name": f"{name}_{letter}", "type": "prismatic", "axis": direction, "home": home}
+        if kind in (kinds.mjJNT_FREE, kinds.mjJNT_BALL):
+            yield {"name": name, "type": "spherical", "at": at}
+            return
+        is_hinge = kind == kinds.mjJNT_HINGE
+        yield {
+            "name": name,
+            "type": "revolute" if is_hinge else "prismatic",
+            "at": at if is_hinge else None,
+            "axis": axis,
+            "actuated": index in model.actuator_trnid[:, 0],
+            "home": float(data.qpos[address]),
+            "range": model.jnt_range[index].tolist() if model.jnt_limited[index] else None,
+        }
+
+    def loops(self, notes: list[Note]) -> list[Loop]:
+        """Every active equality of two points, or two frames, that are to meet."""
+        inactive = tuple(loop.name for loop in self.inactive_loops())
+        if inactive:
+            notes.append(Note("an equality that is not active is left out", inactive))
+        return list(self._loops(active=True))
+
+    def inactive_loops(self) -> list[Loop]:
+        """Every equality that would close a loop, but is not active."""
+        return list(self._loops(active=False))
+
+    def _loops(self, active: bool) -> Iterator[Loop]:
+        model, kinds = self.model, self.mujoco.mjtEq
+        taken = {self.joint(index) for index in range(model.njnt)}
+        for index in range(model.neq):
+            kind = kinds(int(model.eq_type[index]))
+            if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+                continue
+            name = unique(str(model.eq(index).name) or f"closure_{index + 1}", taken)
+            if bool(model.eq_active0[index]) == active:
+                is_weld = kind == kinds.mjEQ_WELD
+                holds_frames = is_weld and model.eq_data[index, 10] != 0.0
+                bodies, points, frames, self.roundings[name] = self._sides(index, is_weld)
+                yield Loop(
+                    name,
+                    "fixed" if holds_frames else "spherical",
+                    bodies,
+                    points,
+                    frames if holds_frames else None,
+                )
+
+    def _sides(self, index: int, is_weld: bool) -> tuple[tuple[str, str], Floats, Floats, Rounding]:
+        """The two bodies of an equality, point (2, 3) and frame (2, 3, 3) on each, the rounding of the worse side."""
+        model, data = self.model, self.data
+        ends = [int(model.eq_obj1id[index]), int(model.eq_obj2id[index])]
+        if model.eq_objtype[index] == self.mujoco.mjtObj.mjOBJ_SITE:
+            first, second = (self.body(model.site_bodyid[site]) for site in ends)
+            frames = data.site_xmat[ends].reshape(2, 3, 3).copy()
+            return (first, second), data.site_xpos[ends].copy(), frames, worst(map(self._digits.site, ends))
+        values = model.eq_data[index]
+        anchors = np.array([values[3:6], values[:3]] if is_weld else [values[:3], values[3:6]])
+        frames = data.xmat[ends].reshape(2, 3, 3).copy()
+        points = data.xpos[ends] + np.einsum("bij,bj->bi", frames, anchors)
+        if is_weld:
+            relative = np.empty(9)
+            self.mujoco.mju_quat2Mat(relative, values[6:10])
+            frames[0] = frames[0] @ relative.reshape(3, 3)
+        rounding = worst(self._digits.anchor(end, anchors[side], bool(side)) for side, end in enumerate(ends))
+        return (self.body(ends[0]), self.body(ends[1])), points, frames, rounding
+
+    def couplings(self, notes: list[Note]) -> Iterator[Coupling]:
+        """Yield every active equality of two joints, as coordinates count."""
+        inactive = []
+        for follower, leader, factors, is_active in self._joint_equalities():
+            if leader >= 0 and is_active:
+                y, x = (float(self.model.qpos0[self.model.jnt_qposadr[joint]]) for joint in (follower, leader))
+                begin = y + factors[0] - factors[1] * x  # factors count from the reference; higher ones stay with it
+                yield Coupling(self.joint(follower), self.joint(leader), (begin, *factors[1:]))
+            elif not is_active:
+                inactive += [self.joint(joint) for joint in (follower, leader) if joint >= 0]
+        if inactive:
+            notes.append(Note("an equality that is not active is left out, of", tuple(inactive)))
+
+    def held(self, notes: list[Note]) -> list[str]:
+        """Joints that an equality keeps where they are."""
+        names = [self.joint(joint) for joint, leader, _, active in self._joint_equalities() if leader < 0 and active]
+        if names:
+            notes.append(Note("an equality holds these where they are", tuple(names)))
+        return names
+
+    def _joint_equalities(self) -> Iterator[tuple[int, int, tuple[float, ...], bool]]:
+        """Yield follower and leader of each equality of joints, -1 for no leader, its factors, and if it is active."""
+        model = self.model
+        for index in np.flatnonzero(model.eq_type == self.mujoco.mjtEq.mjEQ_JOINT):
+            factors = tuple(model.eq_data[index, :5].tolist())
+            yield int(model.eq_obj1id[index]), int(model.eq_obj2id[index]), factors, bool(model.eq_active0[index])

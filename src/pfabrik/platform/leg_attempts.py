@@ -1,0 +1,57 @@
+"""The attempts of the engine of legs, repeated one by one to look into an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..arrays import Floats
+from ..closure.attempts import HELD, Attempt, with_verdicts
+from ..closure.configurations import Configurations, new_rows
+from ..kernels.rows import ITERATIONS, REACHED
+from ..model import Model
+from ..options import Options
+from .nearest import endings
+from .nearest_pose import starts_at
+from .reach import reach
+from .seeds import seeds_of, seeds_of_other_assemblies
+from .unreached import Request, Unreached, reach_from_seeds, reach_in_other_modes
+
+
+def attempts(
+    model: Model, target: Floats, start: Configurations | None, sides: Floats, options: Options, *, keep_mode: bool
+) -> Iterator[Attempt]:
+    """Every attempt to answer one target (1, 4, 4), from a start with legs on given sides (1, legs)."""
+    table, rows, sides = model.legs, new_rows(model, 1), sides.copy()
+    reach(model, target, start, sides, keep_mode, rows)
+    yield _of_closed_forms("closed forms", "working mode of the start", rows.status[0] == REACHED)
+    if rows.status[0] == REACHED:
+        return
+    start_poses = model.mechanism.home_pose[None].copy() if start is None else start.rows.poses
+    unreached = Unreached(target, start_poses, sides.copy(), np.full_like(sides, np.nan), rows)
+    if not keep_mode and table.has_sides:
+        reach_in_other_modes(table, unreached)
+        yield _of_closed_forms("closed forms", "other working modes", rows.status[0] == REACHED)
+        if rows.status[0] == REACHED:
+            return
+    if not keep_mode and table.is_completed:
+        seeds = seeds_of_other_assemblies(model)
+        request = Request(model, options, keep_mode, False, start is not None)
+        is_reached = len(seeds.poses) > 0 and not reach_from_seeds(seeds, request, unreached)[0]
+        yield _of_closed_forms("closed forms", "other assemblies", is_reached)
+        if is_reached:
+            return
+    own, seeds = starts_at(model, start_poses, sides), seeds_of(model)
+    own = own._replace(q=np.zeros((1, len(table.legs)))) if len(seeds.q) and start is None else own
+    for projection, ends in endings(model, options, target, own, keep_mode=keep_mode):
+        others = dict(endings(model, options, target, seeds, keep_mode=keep_mode))[projection]
+        distances = model.length * np.concatenate([ends.distances, others.distances])
+        distances[np.isinf(distances)] = np.nan
+        steps = np.concatenate([ends.counters[:, ITERATIONS], others.counters[:, ITERATIONS]]).tolist()
+        names = ["the start", *(f"seed {k + 1}" for k in range(len(seeds.poses)))]
+        yield from with_verdicts(f"platform's pose, {HELD[projection.hold]}", names, steps, distances)
+
+
+def _of_closed_forms(phase: str, start: str, is_reached: bool | np.bool_) -> Attempt:
+    return Attempt(phase, start, 0, 0.0 if is_reached else np.nan, "reached" if is_reached else "not reached")

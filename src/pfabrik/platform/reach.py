@@ -1,0 +1,159 @@
+"""Reaching targets by the legs' closed forms, in the working mode of the start, on all cores."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Records
+from ..batch import put, take
+from ..closure.configurations import Configurations
+from ..decomposition.leg_table import LegTable
+from ..derived import derived
+from ..kernels.rows import OPEN, PENDING, REACHED, Rows
+from ..kernels.threads import in_blocks
+from ..model import Model
+from .nearest import move_redundant_joints
+from .table import TableHandle, legs_at_rest, local_table, table_handle
+
+ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
+"""Rows of one call of the kernels that solve targets one by one, and in blocks."""
+
+
+def reach(
+    model: Model,
+    targets: Floats,
+    start: Configurations | None,
+    sides: Floats,
+    keep_mode: bool,
+    rows: Rows,
+    *,
+    is_tried: bool = False,
+) -> tuple[int, Floats]:
+    """Solve the rows that legs reach.
+
+    Parameters
+    ----------
+    is_tried : the only row was tried already, without success; its status is set.
+
+    Returns
+    -------
+    The number of unsolved rows, and the sides of the answers with the coordinates of redundant joints.
+    """
+    start_poses = model.mechanism.home_pose[None] if start is None else start.rows.poses
+    legs = local_table(model.legs) if keep_mode else table_handle(model.legs)
+    if model.legs.has_implicit_joints:
+        sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
+    n_unsolved = 1 if is_tried else _reach_at_start(model, start is None, legs, targets, start_poses, sides, rows)
+    if n_unsolved and model.legs.is_for_blocks and model.legs.task["unset"][0]:
+        n_unsolved -= _complete(model, legs, targets, start_poses, sides, rows)
+    if n_unsolved and model.legs.has_free_redundant:
+        sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
+        n_unsolved -= _reach_by_redundant(model, legs, targets, start_poses, sides, rows)
+        if n_unsolved and start is not None and not keep_mode:
+            n_unsolved -= _reach_from_home(model, legs, targets, sides, rows)
+    if start is not None:
+        count_turns(model, start.rows.actuators, rows)
+    return n_unsolved, sides
+
+
+def _reach_at_start(
+    model: Model, from_home: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
+) -> int:
+    """Solve the rows that legs reach while free redundant joints stay; return the number of unsolved rows."""
+    resting = legs_at_rest(model.legs) if from_home else None
+    if resting is None:
+        return _run(model.legs.is_for_blocks, legs, targets, start_poses, sides, rows)
+    rows.actuators[:] = resting.actuators
+    return _run(True, table_handle(resting.table), targets, start_poses, resting.table.home_sides, rows)
+
+
+def _reach_by_redundant(
+    model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
+) -> int:
+    """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved."""
+    sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
+    moved, poses = move_redundant_joints(model, targets, start_poses, sides, unsolved)
+    if not len(moved):
+        return 0
+    block, start_poses = take(rows, moved), poses
+    n_unsolved = _run(False, legs, targets[moved], start_poses, sides[moved], block)
+    put(rows, moved, block)
+    missed = moved[block.status != REACHED]
+    sides[missed] = sides_before[missed]
+    return len(moved) - n_unsolved
+
+
+def _reach_from_home(model: Model, legs: TableHandle, targets: Floats, sides: Floats, rows: Rows) -> int:
+    """Solve rows by moving the redundant joints from home, where limits bar the way from the start.
+
+    Return the number of rows solved.
+    """
+    is_unsolved, home_sides, redundant = rows.status != REACHED, sides.copy(), model.legs.implicit_joints["leg"]
+    home_sides[:, redundant] = model.legs.home_sides[:, redundant]
+    n_reached = _reach_by_redundant(model, legs, targets, model.mechanism.home_pose[None], home_sides, rows)
+    is_reached = is_unsolved & (rows.status == REACHED)
+    sides[is_reached] = home_sides[is_reached]
+    return n_reached
+
+
+def _run(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
+    """Solve targets on all cores, in blocks of poses or one by one; return the number not reached."""
+    if by_blocks:
+        from ..kernels.legs.blocks import answer_blocks as answer
+    else:
+        from ..kernels.legs.answer import answer
+
+    def run(block: slice) -> int:
+        return answer(
+            legs.address,
+            targets[block],
+            _part(start_poses, block),
+            _part(sides, block),
+            rows.status[block],
+            rows.poses[block],
+            rows.actuators[block],
+            rows.measures[block],
+        )
+
+    return sum(in_blocks(run, len(targets), ROWS_A_RUN if by_blocks else ROWS_A_BLOCK))
+
+
+def _complete(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
+    """Solve the rows that blocks left OPEN, whose poses are to be completed; return the number reached."""
+    is_open = (rows.status == OPEN).nonzero()[0]
+    if not len(is_open):
+        return 0
+    block = take(rows, is_open)
+    start_poses, sides = (array if len(array) == 1 else array[is_open] for array in (start_poses, sides))
+    n_unsolved = _run(False, legs, targets[is_open], start_poses, sides, block)
+    put(rows, is_open, block)
+    return len(is_open) - n_unsolved
+
+
+def count_turns(model: Model, start_values: Floats, rows: Rows) -> None:
+    """Add whole turns to actuators that may turn more than once: nearest to the start's values (n or 1, n_a)."""
+    for driven in _turning(model.legs):
+        is_solved = rows.status != PENDING
+        values, previous = rows.actuators[is_solved, driven["column"]], start_values[:, driven["column"]]
+        previous = previous if len(start_values) == 1 else previous[is_solved]
+        nearest = values - 2.0 * np.pi * np.round((values - previous) / (2.0 * np.pi))
+        is_inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
+        rows.actuators[is_solved, driven["column"]] = np.where(is_inside, nearest, values)
+
+
+def turns_repeatedly(table: LegTable) -> bool:
+    """True if some actuator may turn more than once."""
+    return len(_turning(table)) > 0
+
+
+@derived
+def _turning(table: LegTable) -> Records:
+    """The actuators that may turn more than once."""
+    driven = table.driven
+    return np.asarray(driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)])
+
+
+def _part(array: Floats, block: slice) -> Floats:
+    """The rows of a block, or the single row for all; writable, as kernels are compiled for."""
+    part = array if len(array) == 1 else array[block]
+    return np.require(part, requirements=["C", "W"])

@@ -1,0 +1,92 @@
+"""A look into an answer: every attempt that was made to reach a target, and where it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .answers.aligned_text import aligned
+from .answers.solution import Solution
+from .answers.start_configuration import Start, start_of
+from .closure.attempts import Attempt
+from .description.mechanism import Mechanism
+from .engine import inverse_engine_of
+from .errors import InvalidArgument
+from .feasibility import feasibility
+from .ik import keeps_mode, solve_ik
+from .model import model_of
+from .options import Options, checked_options
+from .targets import Target, as_targets
+
+
+@dataclass(frozen=True, repr=False)
+class SearchLog:
+    """The attempts to answer one target; printed as a table.
+
+    Attributes
+    ----------
+    solution : the answer, that of `solve_ik`.
+    attempts : in the order in which they are made. The solver stops once enough of them agree: some of the last ones
+        may not have been needed.
+    blocked_by : (joint, bound) of the limit that the target exceeds most in the working mode of the start, and by how
+        much, as of `feasibility`; None where closed forms do not tell.
+    """
+
+    solution: Solution
+    attempts: tuple[Attempt, ...]
+    blocked_by: tuple[str, str, float] | None
+
+    @property
+    def answered_by(self) -> str:
+        """The phase that gave the answer: the first one that ended at a feasible configuration."""
+        return next((each.phase for each in self.attempts if each.ending in ("reached", "nearest")), "none")
+
+    def __str__(self) -> str:
+        unit = self.solution.mechanism.length_unit
+        header = ("phase", "start", "steps", f"distance [{unit}]", "ending")
+        rows = [
+            (each.phase, each.start, str(each.steps), f"{each.distance:.6g}".replace("nan", "-"), each.ending)
+            for each in self.attempts
+        ]
+        lines = [aligned(header, rows)]
+        if self.blocked_by is not None:
+            joint, bound, beyond = self.blocked_by
+            lines.append(f"in the working mode of the start the target is beyond '{bound}' of {joint}, by {beyond:.4g}")
+        return "\n".join([*lines, f"answer: {self.solution}, by {self.answered_by}"])
+
+    __repr__ = __str__
+
+
+def search_log(
+    mechanism: Mechanism, target: Target, *, start: Start | None = None, options: Options | None = None
+) -> SearchLog:
+    """Every attempt to answer a target: phase, start, steps, where it ended.
+
+    The attempts are made again, one by one, so this takes longer than `solve_ik`, whose arguments it takes.
+
+    Parameters
+    ----------
+    target : a single one.
+
+    Raises
+    ------
+    InvalidArgument : as of `solve_ik`, or for several targets.
+    """
+    options = checked_options(options)
+    targets, shape = as_targets(mechanism, target)
+    if shape != ():
+        raise InvalidArgument("target", f"{len(targets)} targets", "a single one")
+    solution = solve_ik(mechanism, targets[0], start=start, options=options)
+    begin = start_of(mechanism, start, ())
+    attempts = tuple(
+        inverse_engine_of(mechanism, options).attempts(targets, begin, options, keep_mode=keeps_mode(options, begin))
+    )
+    return SearchLog(solution, attempts, _blocked_by(mechanism, targets[0], start))
+
+
+def _blocked_by(mechanism: Mechanism, target: Target, start: Start | None) -> tuple[str, str, float] | None:
+    """The limit that a target exceeds most, in the working mode of the start."""
+    if model_of(mechanism).why_poses_do_not_suffice:
+        return None
+    found = feasibility(mechanism, target, start=start)
+    margin, binding = float(found.margin), int(found.binding)
+    return None if binding < 0 or not margin < 0.0 else (*found.limits[binding], -margin)
