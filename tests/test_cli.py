@@ -30,10 +30,9 @@ from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
 from pfabrik.cli import main, outputs
 from pfabrik.cli.group import exit_code
-from pfabrik.cli.outputs import ignores_case
+from pfabrik.cli.outputs import ignores_case, new_folder
 from pfabrik.cli.report import describe_modes
 from pfabrik.cli.stops import AGAIN
-from pfabrik.cli.whole import new_folder
 from pfabrik.description.rod_lengths import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
@@ -736,7 +735,9 @@ def test_every_starting_file_has_room_around_home(name: str) -> None:
 
 
 def test_a_starting_file_is_named_as_its_text_begins(run: Callable[..., Result]) -> None:
-    assert {"6-UPS", "6-RUS", "6-PUS", "3-RPS", "3-PRS", "3-RPR", "3-RRR", "5-bar", "delta"} <= set(templates())
+    assert {"6-UPS", "6-RUS", "6-PUS", "3-RPS", "3-PRS", "3-RRS", "3-RPR", "3-RRR", "5-bar", "ankle"} <= set(
+        templates()
+    )
     rows = run("new", "--list").stdout.splitlines()[1:]
     assert [row.split()[0] for row in rows] == list(templates())
     for name, row in zip(templates(), rows, strict=True):
@@ -768,6 +769,18 @@ def test_names_of_machines_and_kinds_are_completed(line: str, found: list[str]) 
         told = process.communicate()[0]
     assert [each.removeprefix("plain,") for each in told.split()] == found
     assert "_PFABRIK_COMPLETE=bash_source" in (Path(__file__).parents[1] / "docs" / "cli.md").read_text()
+
+
+def test_dimensions_of_a_starting_file_are_options(run: Callable[..., Result], tmp_path: Path) -> None:
+    assert (
+        run("new", "linear-delta", "--rod", "300", "--platform-radius=30", "--lowest", "-5", "-o", "my.toml").exit_code
+        == 0
+    )
+    machine, usual = pf.load("my.toml"), loads(template("linear-delta"))
+    assert machine == usual.with_dimensions(rod=300, platform_radius=30, lowest=-5)
+    upper, lower = (np.array(machine.joint(name).at) for name in ("UpperL1", "LowerL1"))
+    assert np.linalg.norm(upper - lower) == pytest.approx(300)
+    assert run("new", "hexapod").stdout == template("6-UPS")
 
 
 def test_kinds_are_listed_for_programs_too(run: Callable[..., Result]) -> None:
@@ -804,6 +817,12 @@ def test_a_file_that_exists_is_kept_unless_forced(run: Callable[..., Result], tm
         (["dleta", "-o", "my.toml"], "did you mean 'delta'?"),
         (["-o", "my.toml"], "one KIND of 3-PRS, "),
         (["delta", "-o", "no/such/my.toml"], "no/such/my.toml: No such file or directory"),
+        (["delta", "--rods", "3"], "no dimension or option named '--rods'; did you mean '--rod'?"),
+        (["delta", "--fore"], "did you mean '--force'?"),
+        (["delta", "--rod", "long"], "--rod: found 'long'; expected a number"),
+        (["delta", "--rod"], "--rod: found ''; expected a number"),
+        (["delta", "--rod", "100"], "dimensions.height: found 'sqrt(rod**2 - across**2)', which has no finite value"),
+        (["delta", "more"], "unexpected extra argument (more)"),
     ],
 )
 def test_wrong_starting_files_are_told_in_a_line(
@@ -1019,7 +1038,7 @@ def test_what_stood_in_the_output_stays_when_the_work_fails(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pfabrik.cli.track_rows.TrackRows.write", interrupted)
+    monkeypatch.setattr("pfabrik.cli.track_report.TrackRows.write", interrupted)
     assert run("track", "five_bar", "path.csv", "-o", "answers.csv").exit_code == 130
     assert (tmp_path / "answers.csv").read_text() == "precious"
     assert set(os.listdir(tmp_path)) == {"path.csv", "answers.csv"}

@@ -9,17 +9,17 @@ from collections.abc import Iterable
 from typing import Any, TextIO
 
 NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*")
-"""Python reads more as a number: 1_0, digits of other scripts, names of infinities."""
+"""A decimal number; Python would also read 1_0, digits of other scripts and names of infinities."""
 
 FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠].")
-"""How text begins that spreadsheets take for a formula, or that would be one without marks in front."""
+"""The beginning of text that spreadsheets take for a formula, also behind marks."""
 
 MARK = "'"
-"""What spreadsheets take for the beginning of text."""
+"""The character at which spreadsheets recognise text."""
 
 
 def is_finite(text: str) -> bool:
-    """Whether a text is a finite number."""
+    """True if a text is a finite number."""
     return NUMBER.fullmatch(text) is not None and math.isfinite(float(text))
 
 
@@ -29,7 +29,7 @@ def marked(text: str) -> str:
 
 
 def unmarked(cell: str) -> str:
-    """The text that `marked` made a cell of."""
+    """The text of a cell that `marked` made."""
     return cell[1:] if cell.startswith(MARK) and _is_formula(cell) else cell
 
 
@@ -41,7 +41,7 @@ def _is_formula(text: str) -> bool:
 
 
 class CsvWriter:
-    """Writes rows to an open file, their text marked."""
+    """Writes rows to an open file, with text marked."""
 
     def __init__(self, handle: TextIO) -> None:
         self._writer = csv.writer(handle, lineterminator="\n")

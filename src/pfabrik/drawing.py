@@ -1,4 +1,4 @@
-"""What pictures of machines and of workspaces share: figures, letters, and axes in space."""
+"""Figures, sizes of letters and axes in space, for pictures of machines and of workspaces."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def new_figure(width: float, height: float, *, dpi: int = 150, layout: str | Non
 
 
 def is_spatial(ax: Axes) -> bool:
-    """Whether axes are three-dimensional."""
+    """True if axes are three-dimensional."""
     return hasattr(ax, "get_zlim")
 
 

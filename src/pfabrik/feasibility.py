@@ -1,4 +1,4 @@
-"""Margins of targets from the limits of a mechanism, for maps: nothing is projected."""
+"""Margins of targets from the limits of a mechanism, without projection, for maps."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .platform.table import table_handle
 from .targets import Target, as_targets
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
-"""Rows of one call of a kernel that measures one by one, or in blocks."""
+"""Rows of one call of the kernel for single rows, and of the kernel for blocks."""
 
 UNKNOWN = -2
 """Binding of rows that `kernels.legs.margin_blocks` leaves unsolved."""
 
 
 class Feasibility(NamedTuple):
-    """The limits that keep targets from being reached, or would first.
+    """The least margins of targets, and the limits that have them.
 
     Attributes
     ----------
     margin : the least margin of all limits, (...,): as of `margins` a share of the range, 1 in its middle or on the
         axis of a cone, 0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a share of its
         length; where a leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses.
-    binding : which of `limits` it is the margin of, (...,); -1 where there is none.
+    binding : index in `limits` of the limit that has it, (...,); -1 where there is none.
     limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's proximal joint,
         and "closed" of its first joint.
     """
@@ -54,7 +54,7 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     Parameters
     ----------
     targets : as of `solve_ik`; what the task leaves open is completed from the start.
-    start : a single Solution or joint vector q whose working mode is meant; default home's.
+    start : a single Solution or joint vector q that sets the working mode; default that of home.
 
     Raises
     ------
@@ -98,10 +98,10 @@ def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> 
 
     unsolved_poses, margins, bindings = poses[unsolved], np.empty(len(unsolved)), np.empty(len(unsolved), np.int64)
 
-    def run_rest(block: slice) -> None:
+    def run_unsolved(block: slice) -> None:
         measure(legs.address, unsolved_poses[block], start_pose, sides, margins[block], bindings[block])
 
-    in_blocks(run_rest, len(unsolved), ROWS_A_BLOCK)
+    in_blocks(run_unsolved, len(unsolved), ROWS_A_BLOCK)
     margin[unsolved], binding[unsolved] = margins, bindings
     return margin, binding
 

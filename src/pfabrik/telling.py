@@ -1,4 +1,4 @@
-"""How far something long is: a bar on a terminal, once it has taken a while."""
+"""Progress of long computations: a bar on a terminal, once they have taken a while."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import TypeAlias
 from .checks import require_callable
 
 OnProgress: TypeAlias = Callable[[int, int], None]
-"""Called with what is done, and with what there is in all, about."""
+"""Called with the amount done and the approximate total."""
 
 PATIENCE = 2.0
-"""Seconds before anything is said."""
+"""Seconds before a bar appears."""
 
 
 @contextmanager
 def telling(label: str, on_progress: OnProgress | None = None) -> Iterator[OnProgress | None]:
-    """What to call with (done, total): what the caller gave, else a bar on stderr; None where nobody would see it.
+    """The function to call with (done, total): the caller's, else one that draws a bar on a terminal; else None.
 
-    A bar takes a total of 0 for one that is not known.
+    For a bar, a total of 0 means that it is not known.
     """
     require_callable("on_progress", on_progress)
     if on_progress is not None or sys.stderr is None or not sys.stderr.isatty():

@@ -1,4 +1,4 @@
-"""Travel: how far the end effector can move from a configuration in each direction, and which limits stop it."""
+"""Travel: the distances that the end effector can move in each direction, and the limits that stop it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .rotations import from_rotvec
 from .tolerances import TOLERANCES
 
 STEP = 1.0 / 32.0
-"""First step [L or rad]: narrower obstacles may be stepped over."""
+"""First step [L or rad]: narrower obstacles may be missed."""
 
 NEARBY, LONGEST, HORIZON = 4.0, 64.0, 1e3
 """Distance up to which steps keep the length `STEP`, and beyond which they double; the longest step, which an engine
@@ -54,10 +54,10 @@ class Reach:
     ----------
     kind : "along" an axis, or "about" it.
     direction : unit vector in the base frame.
-    distance : how far the end effector can go [length or rad]; inf where nothing stops it.
+    distance : that the end effector can move [length or rad]; inf where nothing stops it.
     stopped_by : the limits that stop it; empty if the links are stretched out or nothing stops it.
     end : the last configuration in this direction; None if nothing stops it.
-    cause : in words, what stops it if no limit does: the links are stretched out, the mechanism has no freedom that
+    cause : of the stop if no limit stops it, in words: the links are stretched out, the mechanism has no freedom that
         way, or its task asks for more than it can do, whatever limits are active; else empty.
     """
 
@@ -70,7 +70,7 @@ class Reach:
 
     @property
     def why(self) -> str:
-        """What stops it, in a few words for a table; empty if nothing does."""
+        """The cause of the stop in a few words, for a table; empty if nothing stops it."""
         return IN_SHORT.get(self.cause, "the task") if self.cause else short_names(self.stopped_by)
 
 
@@ -177,8 +177,8 @@ def travel(
 
     Returns
     -------
-    Travel : how far in each direction and what stops it; first along, then about. Distances are inf where nothing stops
-        it within 1000 L, or a full turn. Where a task leaves coordinates out, these follow from the mechanism.
+    Travel : distance in each direction and the limits that stop it; first along, then about. Distances are inf where
+        nothing stops it within 1000 L, or a full turn. Coordinates that the task leaves out follow from the mechanism.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
 
 
 def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floats:
-    """Directions to go along, unit vectors (n, 3)."""
+    """Checked directions of translation, unit vectors (n, 3)."""
     counts = task_of(mechanism).axes
     if along is None:
         chosen = np.eye(3)[list(counts)] if default else np.zeros((0, 3))
@@ -244,7 +244,7 @@ def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floa
 
 
 def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, default: bool) -> Floats:
-    """Axes to turn about, unit vectors (n, 3)."""
+    """Checked axes of rotation, unit vectors (n, 3)."""
     task = task_of(mechanism)
     rotations = task.rotations
     if about is None:

@@ -1,4 +1,4 @@
-"""The `pfabrik` command. Each subcommand is the module of its name and is loaded when it is asked for."""
+"""The `pfabrik` command. Each subcommand is the module of its name and is loaded on demand."""
 
 from __future__ import annotations
 

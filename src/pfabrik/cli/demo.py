@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -20,12 +19,7 @@ from ..answers.aligned_text import aligned
 from ..arrays import Floats
 from ..extras import require
 from ..telling import telling
-from .outputs import check_outputs, real
-from .pictures import picture
-from .whole import new_folder, whole_folder
-
-if TYPE_CHECKING:
-    from ..answers.tracked import Track
+from .outputs import check_outputs, new_folder, picture, real, whole_folder
 
 QUICK_STEPS = 36
 
@@ -36,7 +30,7 @@ class Run:
 
     key: str
     targets: Floats
-    solution: Track
+    solution: pf.Track
     seconds: float
 
 
@@ -61,13 +55,14 @@ def demo(output: Path, steps: int, quick: bool) -> int:
     count = QUICK_STEPS if quick else steps
     for key, targets in circles(count):
         runs.append(follow(key, targets))
-        with whole_folder(output) as folder:
-            draw(runs[-1], folder)
+        with whole_folder(output) as folder, picture(folder / f"{key}.png"):
+            pf.plot_track(runs[-1].solution)
         click.echo(f"wrote {output / key}.png", err=True)
     with whole_folder(output) as folder:
         for run in runs:
             write(run, folder)
-    click.echo(table(runs))
+    header = ("mechanism", "reached", "projected", "failed", "farthest", "loop gap", "limit excess", "per step")
+    click.echo(aligned(header, map(row, runs)))
     click.echo(f"\nwrote {', '.join(f'{run.key}.png, {run.key}.csv' for run in runs)} to {output}/")
     return 0 if all(holds(run.solution) for run in runs) else 1
 
@@ -95,25 +90,18 @@ def follow(key: str, targets: Floats) -> Run:
     return Run(key, targets, solution, seconds)
 
 
-def draw(run: Run, folder: Path) -> None:
-    """The picture of one run."""
-    with picture(folder / f"{run.key}.png", quiet=True):
-        pf.plot_track(run.solution)
-
-
 def write(run: Run, folder: Path) -> None:
-    """The CSV file of one run, with the limits that hold: these take joint coordinates, and more kernels."""
+    """Write the CSV file of one run, with the active limits: these take joint coordinates, and more kernels."""
+    from ..paths.along import largest_tilts, least_margins
+    from ..paths.follow import TrackPart
     from ..paths.path import Path as Targets
-    from .track_rows import write_track
+    from .track_report import TrackRows
 
+    part = TrackPart(Targets.of(run.targets), run.solution, first=0)
+    margins, tilts = least_margins(run.solution), largest_tilts(run.solution)
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
-        write_track(handle, Targets.of(run.targets), run.solution)
-
-
-def table(runs: list[Run]) -> str:
-    """What the runs came to."""
-    header = ("mechanism", "reached", "projected", "failed", "farthest", "loop gap", "limit excess", "per step")
-    return aligned(header, [row(run) for run in runs])
+        rows = TrackRows(handle, run.solution.mechanism, part.path, has_tilts=tilts is not None)
+        rows.write(part, margins, tilts)
 
 
 def row(run: Run) -> tuple[str, ...]:
@@ -133,8 +121,8 @@ def row(run: Run) -> tuple[str, ...]:
     )
 
 
-def holds(solution: Track) -> bool:
-    """Whether every step has an answer with its loops closed and its limits kept."""
+def holds(solution: pf.Track) -> bool:
+    """True if every step has an answer with its loops closed and its limits kept."""
     from ..tolerances import TOLERANCES
 
     answered = (solution.status < pf.Status.FAILED).all()

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING
-
 import click
 import numpy as np
 
 import pfabrik as pf
 
+from ..arrays import Floats
+from ..cells import is_finite
 from ..description.readouts import readouts
 from ..errors import counted
-from .finite import is_finite
-from .mech import MECH, load
-from .report import describe, pose_header, pose_texts, tell_modes
-
-if TYPE_CHECKING:
-    from ..answers.solution import Solution
-    from ..arrays import Floats
-    from ..description.mechanism import Mechanism
+from .arguments import MECH, load
+from .printing import json_option, print_answer
+from .report import describe, pose_cells, pose_header, print_modes
 
 
 def finite_numbers(context: click.Context, parameter: click.Parameter, words: tuple[str, ...]) -> tuple[float, ...]:
@@ -35,7 +29,7 @@ def finite_numbers(context: click.Context, parameter: click.Parameter, words: tu
 @click.argument("mech", type=MECH)
 @click.argument("values", nargs=-1, metavar="VALUE...", callback=finite_numbers)
 @click.option("--all", "list_all", is_flag=True, help="List every assembly mode, limits kept or not.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
+@json_option()
 def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> int:
     """Find the pose that has given actuator values.
 
@@ -47,28 +41,19 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
     limits.
     """
     mechanism = load(mech)
-    asked = coordinates(mechanism, values)
+    actuators = coordinates(mechanism, values)
     if list_all:
-        return list_modes(mechanism, asked, as_json)
-    solution = pf.solve_fk(mechanism, asked)
-    click.echo(json.dumps(solution.to_dict(), allow_nan=False) if as_json else describe(solution, asked))
+        header = pose_header(mechanism)
+        return print_modes(lambda: pf.assembly_modes(mechanism, actuators), "assembly", header, pose_cells, as_json)
+    solution = pf.solve_fk(mechanism, actuators)
+    print_answer(as_json, solution.to_dict, lambda: describe(solution, actuators))
     return 0 if solution else 1
 
 
-def coordinates(mechanism: Mechanism, values: tuple[float, ...]) -> Floats:
+def coordinates(mechanism: pf.Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
     shown = readouts(mechanism)
     if len(values) != len(shown):
         expected = ", ".join(f"{readout.name} [{readout.unit}]" for readout in shown)
         raise click.UsageError(f"VALUE...: found {counted(len(values), 'value')}; expected {len(shown)}: {expected}")
     return np.array([readout.coordinate(value) for readout, value in zip(shown, values, strict=True)])
-
-
-def list_modes(mechanism: Mechanism, asked: Floats, as_json: bool) -> int:
-    """Print all assembly modes, each with its pose; the exit code."""
-
-    def cells(mode: Solution) -> list[str]:
-        position, angles = pose_texts(mode)
-        return [*position, *angles]
-
-    return tell_modes(lambda: pf.assembly_modes(mechanism, asked), "assembly", pose_header(mechanism), cells, as_json)

@@ -1,4 +1,4 @@
-"""The group of subcommands: loads them on demand, and turns every failure into one readable line and an exit code."""
+"""The group of subcommands: loads them on demand, and turns every failure into a line on stderr and an exit code."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from ..errors import PfabrikError, near_miss
+from .printing import complain
 from .stops import Stops
 
 WRONG_INPUT = 2
@@ -54,7 +55,7 @@ class CommandGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """As click does, but what is wrong with the options of a subcommand is told as that subcommand's."""
+        """As click does, but errors in the options of a subcommand name that subcommand."""
         try:
             return super().invoke(ctx)
         except click.UsageError as error:
@@ -80,9 +81,9 @@ class CommandGroup(click.Group):
 
 
 def take_closed_places() -> None:
-    """Open what stands in for standard streams that are closed, lest a file that is written gets their place.
+    """Open the null device in place of standard streams that are closed, lest an output file takes their numbers.
 
-    Reading standard input and writing standard output then fail as they should; what is said on stderr is dropped.
+    Reading standard input and writing standard output then fail as they should; text on stderr is dropped.
     """
     for name, mode, flags in (("stdin", "r", os.O_WRONLY), ("stdout", "w", os.O_RDONLY), ("stderr", "w", os.O_WRONLY)):
         if getattr(sys, name) is None:
@@ -90,7 +91,7 @@ def take_closed_places() -> None:
 
 
 def exit_code(run: Callable[[], Any]) -> int:
-    """Run, and say how it went: the returned integer, or the code of the failure, which is told on stderr."""
+    """Run a command: the integer it returns, or the code of its failure, which is reported on stderr."""
     with Stops() as stops:
         try:
             code = code_of(run, stops)
@@ -105,7 +106,7 @@ def exit_code(run: Callable[[], Any]) -> int:
 
 
 def code_of(run: Callable[[], Any], stops: Stops) -> int:
-    """Run; what failed is told on stderr, but for a signal that ended it."""
+    """Run a command, and report a failure on stderr, except a signal that ended it."""
     try:
         with plain_warnings(), interruptions_first(stops):
             result = run()
@@ -129,12 +130,6 @@ def code_of(run: Callable[[], Any], stops: Stops) -> int:
     return WRONG_INPUT
 
 
-def complain(message: str) -> None:
-    """Each line of `message` on stderr, marked as ours."""
-    for line in message.splitlines() or ["failed without a message"]:
-        click.echo(f"pfabrik: {line}", err=True)
-
-
 @contextmanager
 def plain_warnings() -> Iterator[None]:
     """Show warnings as one line for people, without the place in the code that raised them."""
@@ -149,7 +144,7 @@ def plain_warnings() -> Iterator[None]:
 
 @contextmanager
 def interruptions_first(stops: Stops) -> Iterator[None]:
-    """Have an interruption told, not what failed on its way out: a clean-up that it met may close a file twice."""
+    """Report an interruption, not a failure that it causes: a clean-up that it meets may close a file twice."""
     try:
         yield
     except Exception as error:
@@ -164,7 +159,7 @@ def interruptions_first(stops: Stops) -> Iterator[None]:
 
 
 def leave(code: int) -> NoReturn:
-    """Exit; what stdout can no longer take (a full disk, say) was already told and is dropped."""
+    """Exit; text that stdout can no longer take (a full disk, say) was reported before and is dropped."""
     try:
         sys.stdout.flush()
     except OSError:

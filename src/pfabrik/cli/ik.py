@@ -1,22 +1,19 @@
-"""``pfabrik ik``: one target, one answer."""
+"""``pfabrik ik``: one target, one answer; or all working modes."""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
 
 import pfabrik as pf
 
-from .mech import MECH, load
-from .projecting import note_left_out, note_unused, options_projecting, projecting
-from .report import describe, in_units, margins_table, pose_header, pose_texts, tell_modes
-from .target import Triple, target_of, targeted
+from .arguments import MECH, TargetOptions, load, note_left_out, note_unused_projection, projecting, targeted
+from .printing import json_option, print_answer
+from .report import describe, in_units, margins_table, pose_cells, pose_header, print_modes
 
 if TYPE_CHECKING:
-    from ..answers.solution import Solution
-    from ..description.mechanism import Mechanism
     from ..targets import Target
 
 
@@ -26,18 +23,8 @@ if TYPE_CHECKING:
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
-def ik(
-    mech: str,
-    position: Triple | None,
-    rpy: Triple | None,
-    joint: str | None,
-    hold: str,
-    projection: str,
-    with_margins: bool,
-    list_all: bool,
-    as_json: bool,
-) -> int:
+@json_option()
+def ik(mech: str, target: TargetOptions, options: pf.Options, with_margins: bool, list_all: bool, as_json: bool) -> int:
     """Solve for one target.
 
     A target out of reach gets the feasible answer nearest to it, with the limits that hold it back, the hardest first.
@@ -48,48 +35,52 @@ def ik(
     """
     if list_all and with_margins:
         raise click.UsageError("--margins is of one answer: it does not go with --all")
-    if position is None and rpy is None and joint is None:
+    if not target.is_given:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
     mechanism = load(mech)
-    target = target_of(mechanism, position, rpy, joint)
-    note_ignored(mechanism, position, rpy)
+    pose = target.of(mechanism)
+    note_left_out(ignored(mechanism, target), mechanism)
     if list_all:
-        note_unused("--all")
-        return list_modes(mechanism, target, as_json)
-    solution = pf.solve_ik(mechanism, target, options=options_projecting(hold, projection))
-    if as_json:
-        answer = solution.to_dict() | ({} if solution else {"reason": solution.reason})
-        if with_margins:
-            from ..answers.margins import nearest_first
+        note_unused_projection("--all")
+        return print_working_modes(mechanism, pose, as_json)
+    solution = pf.solve_ik(mechanism, pose, options=options)
 
-            names = ("joint", "bound", "margin")
-            answer["margins"] = [dict(zip(names, limit, strict=True)) for limit in nearest_first(solution)]
-        click.echo(json.dumps(answer, allow_nan=False))
-    else:
-        click.echo(describe(solution))
-        if with_margins:
-            click.echo(f"\n{margins_table(solution)}")
+    def in_words() -> str:
+        return describe(solution) + (f"\n\n{margins_table(solution)}" if with_margins else "")
+
+    print_answer(as_json, lambda: as_object(solution, with_margins), in_words)
     return 0 if solution else 1
 
 
-def note_ignored(mechanism: Mechanism, position: Triple | None, rpy: Triple | None) -> None:
-    """Say so when the task leaves out what the user gave."""
-    task, left_out = set(mechanism.task), []
+def ignored(mechanism: pf.Mechanism, target: TargetOptions) -> Iterator[str]:
+    """Options, or parts of them, that the task leaves out."""
+    task, position, rpy = set(mechanism.task), target.position, target.rpy
     if position and not task & set("xyz"):
-        left_out.append("--position")
+        yield "--position"
     elif position:
-        off = zip("xyz", position, mechanism.reference_point, strict=True)
-        left_out += [f"{axis} of --position" for axis, asked, home in off if axis not in task and asked != home]
+        for axis, value, home in zip("xyz", position, mechanism.reference_point, strict=True):
+            if axis not in task and value != home:
+                yield f"{axis} of --position"
     if rpy and not task & {"rotation", "tilt", "yaw"}:
-        left_out.append("--rpy")
+        yield "--rpy"
     elif rpy and "yaw" in task and any(rpy[:2]):
-        left_out.append("the tilt in --rpy")
+        yield "the tilt in --rpy"
     elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
-        left_out.append("the yaw of --rpy")
-    note_left_out(left_out, mechanism)
+        yield "the yaw of --rpy"
 
 
-def list_modes(mechanism: Mechanism, target: Target, as_json: bool) -> int:
+def as_object(solution: pf.Solution, with_margins: bool) -> dict[str, object]:
+    """An answer as plain numbers, lists and dicts, with the reason where it is not reached."""
+    plain = solution.to_dict() | ({} if solution else {"reason": solution.reason})
+    if with_margins:
+        from ..answers.margins import nearest_first
+
+        names = ("joint", "bound", "margin")
+        plain["margins"] = [dict(zip(names, limit, strict=True)) for limit in nearest_first(solution)]
+    return plain
+
+
+def print_working_modes(mechanism: pf.Mechanism, target: Target, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
     from ..description.readouts import readouts
 
@@ -97,14 +88,8 @@ def list_modes(mechanism: Mechanism, target: Target, as_json: bool) -> int:
     header = [f"{readout.name} [{readout.unit}]" for readout in shown]
     is_open = mechanism.task != mechanism.whole_task
 
-    def cells(mode: Solution) -> list[str]:
-        position, angles = pose_texts(mode) if is_open else ([], [])
-        return [*in_units(shown, mode.actuators), *position, *angles]
+    def cells(mode: pf.Solution) -> list[str]:
+        return in_units(shown, mode.actuators) + (pose_cells(mode) if is_open else [])
 
-    return tell_modes(
-        lambda: pf.working_modes(mechanism, target),
-        "working",
-        header + (pose_header(mechanism) if is_open else []),
-        cells,
-        as_json,
-    )
+    header += pose_header(mechanism) if is_open else []
+    return print_modes(lambda: pf.working_modes(mechanism, target), "working", header, cells, as_json)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +10,8 @@ import click
 import pfabrik as pf
 
 from ..errors import PfabrikError
-from .group import complain
-from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing
-from .whole import whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
+from .printing import complain, json_option, note, print_json
 
 if TYPE_CHECKING:
     from ..interop import Imported
@@ -42,9 +40,9 @@ def words(context: click.Context, parameter: click.Parameter, value: str | None)
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")
 @click.option("--unit", default="m", show_default=True, help="Unit of length of the mechanism.")
 @click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
-@click.option("--force", is_flag=True, help="Replace the file if it exists.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout: what was found, and the file's text.")
-def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) -> int:
+@force_option
+@json_option("One JSON object on stdout: what was found, and the file's text.")
+def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any) -> int:
     """Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.
 
     FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed.
@@ -53,40 +51,49 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **asked: Any) 
     refuse_existing(output, force)
     check_outputs([("-o", output)], [file])
     try:
-        found = imported(file, **asked)
+        model = imported(file, **choices)
     except PfabrikError as error:
-        for note in getattr(error, "__notes__", []):
-            complain(note)
+        for remark in getattr(error, "__notes__", []):
+            complain(remark)
         raise
     from ..files import dumps
 
     name = "".join(letter for letter in file.name if letter.isprintable())
-    text = f"# imported from {name}; to compare: pfabrik verify THIS --original {name}\n\n{dumps(found.mechanism)}"
+    text = f"# imported from {name}; to compare: pfabrik verify THIS --original {name}\n\n{dumps(model.mechanism)}"
     if as_json:
-        notes = [{"what": note.what, "names": note.names} for note in found.notes]
-        told = {"name": found.mechanism.name, "gap": found.gap, "unit": found.mechanism.length_unit, "notes": notes}
-        click.echo(json.dumps(told | {"file": text}))
+        print_json(as_object(model, text))
         if output == STANDARD:
             return 0
-    with whole_file(output, [file]) as handle:
+    with whole_file(output) as handle:
         handle.write(text)
     if not as_json:
-        for note in found.notes:
-            complain(f"note: {note}")
+        for remark in model.notes:
+            note(str(remark))
         if output != STANDARD:
             click.echo(f"wrote {output}; next: pfabrik info {output}", err=True)
     return 0
 
 
+def as_object(model: Imported, text: str) -> dict[str, object]:
+    """An imported mechanism's name, gap and notes, and the text of its file."""
+    return {
+        "name": model.mechanism.name,
+        "gap": model.gap,
+        "unit": model.mechanism.length_unit,
+        "notes": [{"what": remark.what, "names": remark.names} for remark in model.notes],
+        "file": text,
+    }
+
+
 def imported(
-    file: Path, loops: Path | None, configuration: str, unit: str, fixed: list[str] | None, **asked: Any
+    file: Path, loops: Path | None, configuration: str, unit: str, fixed: list[str] | None, **choices: Any
 ) -> Imported:
-    """What a file holds, by its first element."""
-    asked |= {"fixed": fixed or (), "length_unit": unit}
+    """The mechanism in a file, whose kind follows from its first element."""
+    choices |= {"fixed": fixed or (), "length_unit": unit}
     if pf.interop.kind_of(file) == "urdf":
         if configuration != "qpos0":
             raise click.UsageError("--configuration: a URDF has one configuration; expected none")
-        return pf.interop.from_urdf(file, loops, **asked)
+        return pf.interop.from_urdf(file, loops, **choices)
     if loops is not None:
         raise click.UsageError("--loops: a MuJoCo model tells its loops itself; expected none")
-    return pf.interop.from_mjcf(file, configuration=configuration, **asked)
+    return pf.interop.from_mjcf(file, configuration=configuration, **choices)

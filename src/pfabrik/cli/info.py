@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections import Counter
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import click
 
@@ -19,32 +17,27 @@ from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
 from ..model import model_of
 from ..tolerances import TOLERANCES
-from .mech import MECH, load
+from .arguments import MECH, load
+from .printing import json_option, print_answer
 
-if TYPE_CHECKING:
-    from ..answers.differential import Mobility, NearlyFree
-    from ..description.mechanism import Joint, Mechanism
+NOT_COUNTED = f"not counted with more than {MOST_JOINTS_FOR_FREEDOM} joints"
 
 
 @click.command()
 @click.argument("mech", type=MECH)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
+@json_option()
 def info(mech: str, as_json: bool) -> int:
     """Show what a mechanism is made of.
 
     Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
     """
     mechanism = load(mech)
-    if as_json:
-        click.echo(json.dumps(as_object(mechanism), allow_nan=False))
-        return 0
-    tables = [summary(mechanism), joint_table(mechanism), chain_table(mechanism)]
-    click.echo("\n\n".join([*tables, *parallelogram_tables(mechanism)]))
+    print_answer(as_json, lambda: as_object(mechanism), lambda: describe(mechanism))
     return 0
 
 
-def as_object(mechanism: Mechanism) -> dict[str, object]:
-    """The same as plain numbers, lists and dicts, angles in radians; a limit that is not there is None, and so is the
+def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
+    """A mechanism as plain numbers, lists and dicts, angles in radians; None for limits that are not there, and for the
     mobility of more joints than it is counted for."""
     counted = counted_mobility(mechanism)
     mobility = None if counted is None else dataclasses.asdict(counted) | {"redundancy": counted.redundancy}
@@ -59,7 +52,20 @@ def as_object(mechanism: Mechanism) -> dict[str, object]:
         "actuators": mechanism.actuator_names,
         "coordinates": mechanism.coordinate_names,
         "mobility": mobility,
-        "joints": [joint_as_object(joint, mechanism) for joint in mechanism.joints],
+        "joints": [
+            {
+                "name": joint.name,
+                "type": joint.type,
+                "connects": joint.connects,
+                "actuated": joint.actuated,
+                "home": mechanism.home_coordinate(joint.name),
+                "range": joint.range,
+                "max_speed": joint.max_speed,
+                "max_acceleration": joint.max_acceleration,
+                "cone": None if joint.cone is None else dataclasses.asdict(joint.cone),
+            }
+            for joint in mechanism.joints
+        ],
         "sub_chains": [
             {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(mechanism)}
             for chain in pf.decompose(mechanism)
@@ -67,22 +73,13 @@ def as_object(mechanism: Mechanism) -> dict[str, object]:
     }
 
 
-def joint_as_object(joint: Joint, mechanism: Mechanism) -> dict[str, object]:
-    """One joint: what it connects, its coordinate at home, and its limits."""
-    return {
-        "name": joint.name,
-        "type": joint.type,
-        "connects": joint.connects,
-        "actuated": joint.actuated,
-        "home": mechanism.home_coordinate(joint.name),
-        "range": joint.range,
-        "max_speed": joint.max_speed,
-        "max_acceleration": joint.max_acceleration,
-        "cone": None if joint.cone is None else dataclasses.asdict(joint.cone),
-    }
+def describe(mechanism: pf.Mechanism) -> str:
+    """A mechanism in tables, for people."""
+    tables = [summary(mechanism), joint_table(mechanism), chain_table(mechanism), parallelogram_table(mechanism)]
+    return "\n\n".join(table for table in tables if table)
 
 
-def summary(mechanism: Mechanism) -> str:
+def summary(mechanism: pf.Mechanism) -> str:
     """Name, size, what is moved and by what."""
     kind = "joint" if mechanism.end_effector_is_joint else "body"
     length = mechanism.characteristic_length
@@ -99,16 +96,13 @@ def summary(mechanism: Mechanism) -> str:
     )
 
 
-def counted_mobility(mechanism: Mechanism) -> Mobility | None:
+def counted_mobility(mechanism: pf.Mechanism) -> pf.Mobility | None:
     """Its freedoms; None with so many joints that counting them would take minutes, or hours."""
     return pf.mobility(mechanism) if len(mechanism.joints) <= MOST_JOINTS_FOR_FREEDOM else None
 
 
-NOT_COUNTED = f"not counted with more than {MOST_JOINTS_FOR_FREEDOM} joints"
-
-
-def freedom(counted: Mobility | None) -> list[str]:
-    """What moves, what drives it, and what nothing holds; in general, where home may be special."""
+def freedom(counted: pf.Mobility | None) -> list[str]:
+    """Lines on what moves, what drives it, and what nothing holds; in general, where home may be special."""
     if counted is None:
         return [f"mobility               {NOT_COUNTED}"]
     parts = f"{counted.platform} of the end effector, {counted.internal} internal, {counted.idle} idle"
@@ -118,51 +112,41 @@ def freedom(counted: Mobility | None) -> list[str]:
     ]
     if counted.uncontrolled:
         lines.append(f"uncontrolled           {counted.uncontrolled} of the freedoms, with all actuators locked")
-    lines += [f"nearly free            {nearly_free(each)}" for each in counted.nearly_free]
-    return lines
+    return lines + [f"nearly free            {nearly_free(motion)}" for motion in counted.nearly_free]
 
 
-def nearly_free(motion: NearlyFree) -> str:
-    """A motion that the loops hardly resist, its joints, and whether it was counted."""
+def nearly_free(motion: pf.NearlyFree) -> str:
+    """A motion that the loops hardly resist: its joints, its singular value, and if it was counted."""
     counted = "counted" if motion.singular_value <= TOLERANCES.alignment else "not counted"
     return f"{', '.join(motion.joints)}: singular value {motion.singular_value:.1e}, {counted} as a motion"
 
 
-def joint_table(mechanism: Mechanism) -> str:
+def joint_table(mechanism: pf.Mechanism) -> str:
     """Every joint with what it connects, its coordinate and its limits; ``*`` marks the actuated ones."""
-    rows = [
-        (
-            joint.name + "*" * bool(joint.actuated),
-            joint.type,
-            " - ".join(joint.connects),
-            coordinate(joint),
-            limits(joint, mechanism),
-        )
-        for joint in mechanism.joints
-    ]
+    rows = []
+    for joint in mechanism.joints:
+        name = joint.name + "*" * bool(joint.actuated)
+        rows.append((name, joint.type, " - ".join(joint.connects), coordinate(joint), limits(joint, mechanism)))
     return aligned(("joint", "type", "connects", "coordinate", "limits"), rows)
 
 
-def coordinate(joint: Joint) -> str:
-    """What the joint's coordinate measures."""
+def coordinate(joint: pf.Joint) -> str:
+    """The distance, angle or displacement that the joint's coordinate is."""
     if joint.along:
         return f"distance {joint.along[0]} to {joint.along[1]}"
     if joint.axis is None:
         return ""
     kinds = KINDS[joint.type].coordinates
     driven = joint.driven if len(kinds) > 1 else ()
-    measured = " and ".join(
-        {"angle": "angle", "length": "displacement"}[kind] + "*" * (place in driven) for place, kind in enumerate(kinds)
-    )
-    return (
-        f"{measured} about {vector(joint.axis)}" if joint.type == "revolute" else f"{measured} on {vector(joint.axis)}"
-    )
+    names = ["angle" if kind == "angle" else "displacement" for kind in kinds]
+    measured = " and ".join(name + "*" * (place in driven) for place, name in enumerate(names))
+    return f"{measured} {'about' if joint.type == 'revolute' else 'on'} {vector(joint.axis)}"
 
 
-def limits(joint: Joint, mechanism: Mechanism) -> str:
+def limits(joint: pf.Joint, mechanism: pf.Mechanism) -> str:
     """The joint's range and cone, in degrees and the mechanism's length unit."""
-    ranged = [each for each in mechanism.coordinates if each.joint is joint and joint.range is not None]
-    parts = [interval(readout(each, mechanism.length_unit)) for each in ranged]
+    coordinates = mechanism.coordinates if joint.range is not None else ()
+    parts = [interval(readout(one, mechanism.length_unit)) for one in coordinates if one.joint is joint]
     if joint.cone:
         half_angle = math.degrees(joint.cone.half_angle)
         parts.append(f"cone {half_angle:.6g} deg about {vector(joint.cone.axis)} of {joint.cone.fixed_to}")
@@ -181,11 +165,11 @@ def vector(components: Iterable[float]) -> str:
 
 
 def clean(value: float, scale: float = 1.0) -> float:
-    """A number without what rounding has left of it, twelve digits below the scale; zero has no sign."""
+    """A number rounded to twelve digits below the scale; zero has no sign."""
     return round(value / scale, 12) * scale + 0.0
 
 
-def chain_table(mechanism: Mechanism) -> str:
+def chain_table(mechanism: pf.Mechanism) -> str:
     """The distinct sub-chains in the field's notation, how often each occurs, the engine that answers, and why."""
     counts = Counter((str(chain), why(mechanism)) for chain in pf.decompose(mechanism))
     engine = shown_engine(mechanism)
@@ -193,22 +177,22 @@ def chain_table(mechanism: Mechanism) -> str:
     return aligned(("count", "sub-chain", "engine", "why"), rows)
 
 
-def shown_engine(mechanism: Mechanism) -> str:
+def shown_engine(mechanism: pf.Mechanism) -> str:
     """The engine that answers first."""
     return "legs" if model_of(mechanism).has_legs else "closure"
 
 
-def why(mechanism: Mechanism) -> str:
-    """Why an engine answers for a mechanism."""
+def why(mechanism: pf.Mechanism) -> str:
+    """The reason why an engine answers for a mechanism."""
     reason = model_of(mechanism).why_no_legs
     return f"no closed forms: {reason}" if reason else "closed forms; closure where they do not reach"
 
 
-def parallelogram_tables(mechanism: Mechanism) -> list[str]:
-    """The parallelograms in sub-chains: joints of their rods, lengths of these, how far apart; none where none are."""
+def parallelogram_table(mechanism: pf.Mechanism) -> str:
+    """The parallelograms in sub-chains: joints of their rods, lengths and distances of these; empty without any."""
     unit, counts = mechanism.length_unit, Counter[tuple[str, ...]]()
-    for found in (each for chain in pf.decompose(mechanism) for each in chain.parallelograms):
-        rods = ["-".join(KINDS[mechanism.joint(name).type].letter for name in rod) for rod in found.rods]
-        counts[", ".join(rods), f"{found.length:.6g} {unit}", f"{found.width:.6g} {unit}"] += 1
+    for shape in (shape for chain in pf.decompose(mechanism) for shape in chain.parallelograms):
+        rods = ["-".join(KINDS[mechanism.joint(name).type].letter for name in rod) for rod in shape.rods]
+        counts[", ".join(rods), f"{shape.length:.6g} {unit}", f"{shape.width:.6g} {unit}"] += 1
     rows = [(str(count), *cells) for cells, count in counts.items()]
-    return [aligned(("count", "parallelogram", "rods", "apart"), rows)] if rows else []
+    return aligned(("count", "parallelogram", "rods", "apart"), rows) if rows else ""

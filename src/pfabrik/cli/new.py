@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import re
+import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -10,41 +12,56 @@ from click.shell_completion import CompletionItem
 
 from ..answers.aligned_text import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
-from .mech import MECH
-from .outputs import OUTPUT, STANDARD, check_outputs, refuse_existing
-from .whole import whole_file
+from ..errors import UnknownName
+from ..files import loads
+from .arguments import MECH
+from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
+from .printing import json_option, print_answer
+
+ALIASES = {"hexapod": "6-UPS", "five-bar": "5-bar", "servo-hexapod": "6-RUS", "hexaglide": "6-PUS", "tripod": "3-RPS"}
+"""Other names of kinds."""
 
 
-def kinds_completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def complete_kind(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """The kinds that begin so."""
     return [CompletionItem(name) for name in templates() if name.lower().startswith(incomplete.lower())]
 
 
-@click.command()
-@click.argument("kind", required=False, shell_complete=kinds_completed)
+@click.command(context_settings={"ignore_unknown_options": True, "allow_extra_args": True})
+@click.argument("kind", required=False, shell_complete=complete_kind)
 @click.option("--from", "machine", type=MECH, metavar="NAME", help="A machine of the catalogue, in place of a KIND.")
 @click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
-@click.option("--force", is_flag=True, help="Replace the file if it exists.")
+@force_option
 @click.option("--list", "list_all", is_flag=True, help="List the kinds of machines there are files for.")
-@click.option("--json", "as_json", is_flag=True, help="With --list: one JSON object on stdout.")
-def new(kind: str | None, machine: str | None, output: Path, force: bool, list_all: bool, as_json: bool) -> int:
+@json_option("With --list: one JSON object on stdout.")
+@click.pass_context
+def new(
+    ctx: click.Context,
+    kind: str | None,
+    machine: str | None,
+    output: Path,
+    force: bool,
+    list_all: bool,
+    as_json: bool,
+) -> int:
     """Write a starting file for a machine of your own.
 
-    KIND is one of those that `pfabrik new` alone lists. The file describes a machine of this kind that works as it is;
-    its comments say what to measure and where to put it. With --from it is a machine of `pfabrik catalog`, as it is
-    there.
+    KIND is one of those that `pfabrik new` alone lists. The file describes a machine of this kind that works as it is.
+    Its dimensions are at the top; each may be given as an option: `pfabrik new delta --rod 230 --arm 80`. With --from
+    it is a machine of `pfabrik catalog`, as it is there.
     """
     if as_json and not list_all:
         raise click.UsageError("--json goes with --list: a file is TOML")
     if list_all or not (kind or machine or output != STANDARD or force):
         kinds = {name: title(name) for name in templates()}
-        click.echo(json.dumps(kinds) if as_json else aligned(("kind", "machine"), kinds.items()))
+        print_answer(as_json, lambda: kinds, lambda: aligned(("kind", "machine"), kinds.items()))
         if not list_all:
             click.echo("next: pfabrik new KIND -o FILE", err=True)
         return 0
     if (kind is None) == (machine is None):
         raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")
-    text = text_of(kind) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
+    text = starting_file(str(kind)) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
+    text = with_dimensions(text, ctx.args)
     refuse_existing(output, force)
     check_outputs([("-o", output)])
     with whole_file(output) as handle:
@@ -54,10 +71,35 @@ def new(kind: str | None, machine: str | None, output: Path, force: bool, list_a
     return 0
 
 
-def text_of(kind: str | None) -> str:
-    """The text of a starting file; where there is none of that name, but a machine of the catalogue, it says so."""
-    name = str(kind)
-    spelt = name.lower().replace("-", "_")
-    if name.lower() not in map(str.lower, templates()) and spelt in catalog():
-        raise click.UsageError(f"no KIND '{name}'; a machine of the catalogue is called so: --from {spelt}")
-    return template(name)
+def starting_file(kind: str) -> str:
+    """The text of a starting file; if only a machine of the catalogue has that name, the error says so."""
+    kind = ALIASES.get(kind.lower(), kind)
+    name = kind.lower().replace("-", "_")
+    if kind.lower() not in map(str.lower, templates()) and name in catalog():
+        raise click.UsageError(f"no KIND '{kind}'; a machine of the catalogue is called so: --from {name}")
+    return template(kind)
+
+
+def with_dimensions(text: str, options: Sequence[str]) -> str:
+    """A starting file with other dimensions: options `--rod 250` or `--rod=250`, in order."""
+    words = [word for option in options for word in (option.split("=", 1) if option.startswith("--") else [option])]
+    if not words:
+        return text
+    names, numbers = words[::2], words[1::2]
+    known = tomllib.loads(text).get("dimensions", {})
+    for name, number in zip(names, [*numbers, ""], strict=False):
+        if not name.startswith("--"):
+            raise click.UsageError(f"Got unexpected extra argument ({name})")
+        dimension = name[2:].replace("-", "_")
+        if dimension not in known:
+            options_of_all = ["--from", "--output", "--force", "--list", "--json"]
+            of_kind = [f"--{each.replace('_', '-')}" for each in known]
+            raise UnknownName("dimension or option", name, [*of_kind, *options_of_all])
+        try:
+            value = float(number)
+        except ValueError:
+            raise click.UsageError(f"{name}: found '{number}'; expected a number") from None
+        line = re.compile(rf"^({dimension} *= *)(\"[^\"]*\"|[^ #\n]+)( *)", re.MULTILINE)
+        text = line.sub(rf"\g<1>{value:.15g}\g<3>", text, count=1)
+    loads(text)
+    return text

@@ -1,16 +1,24 @@
-"""Places that commands write to: none is that of a file that was read, nor of another output."""
+"""Outputs: whole or not at all, and never in place of a file that was read, nor of another output."""
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import sys
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from itertools import combinations
 from pathlib import Path
 from typing import Any, TextIO
 
 import click
+
+from ..checks import require_ending
+from ..extras import require
+from ..whole_files import whole_path
+from .printing import note
 
 STANDARD = Path("-")
 """Standard input or output, in place of a file."""
@@ -22,31 +30,42 @@ def standard_if_so_named(context: click.Context, parameter: click.Parameter, pat
 
 
 OUTPUT: dict[str, Any] = {"type": click.Path(path_type=Path, allow_dash=True), "callback": standard_if_so_named}
-"""What an option is that takes a file to write."""
+"""Settings of an option that takes a file to write."""
+
+force_option = click.option("--force", is_flag=True, help="Replace the file if it exists.")
 
 
-def check_outputs(outputs: Sequence[tuple[str, Path | None]], inputs: Iterable[Path] = ()) -> None:
-    """Stop if an output would overwrite a file that was read, or another output; say so where one is a link.
+def check_outputs(
+    outputs: Sequence[tuple[str, Path | None]], inputs: Iterable[Path] = (), *, as_json: bool = False
+) -> None:
+    """Stop if an output would overwrite a file that was read, or another output; note where one is a link.
 
     Parameters
     ----------
     outputs : options, each with its path, or None where it is not given.
+    inputs : files that are read, by any name or link, ``-`` for standard input.
+    as_json : True if JSON goes to standard output.
     """
     given = [(option, path) for option, path in outputs if path is not None]
+    if as_json:
+        given.append(("--json", STANDARD))
     for _, path in given:
-        refuse_input(path, inputs)
-    for (option, path), (other, its) in combinations(given, 2):
-        if is_one_place(path, its):
-            both = " and ".join(dict.fromkeys(f"{name} {place}" for name, place in ((option, path), (other, its))))
+        if path != STANDARD and any(is_same_file(path, read, sys.stdin) for read in inputs):
+            raise click.UsageError(f"{path}: found a file that was read; expected another file")
+    for (option, path), (other_option, other) in combinations(given, 2):
+        if is_one_place(path, other):
+            both = " and ".join(dict.fromkeys((f"{option} {path}", f"{other_option} {other}")))
             raise click.UsageError(f"{both}: found one place for two outputs; expected a place for each")
     for _, path in given:
-        if path.is_symlink() and not real(path).is_symlink() and not _is_device(path):
-            click.echo(f"pfabrik: note: {path} is a link; {real(path)} is written", err=True)
+        is_device = path.exists() and not path.is_file() and not path.is_dir()
+        if path.is_symlink() and not real(path).is_symlink() and not is_device:
+            note(f"{path} is a link; {real(path)} is written")
 
 
-def _is_device(path: Path) -> bool:
-    """Whether it is there, and neither a file nor a folder: a pipe, say."""
-    return path.exists() and not path.is_file() and not path.is_dir()
+def refuse_both_on_stdout(output: Path | None, as_json: bool) -> None:
+    """Stop if ``-o -`` and ``--json`` are both given."""
+    if as_json and output == STANDARD:
+        raise click.UsageError("-o - and --json both print on stdout: give one of them")
 
 
 def refuse_existing(path: Path, force: bool) -> None:
@@ -57,14 +76,8 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise click.ClickException(f"{path}: exists already; --force replaces it")
 
 
-def refuse_input(path: Path, inputs: Iterable[Path]) -> None:
-    """Stop if an output would overwrite a file that was read."""
-    if path != STANDARD and any(is_same_file(path, read, sys.stdin) for read in inputs):
-        raise click.UsageError(f"{path}: found a file that was read; expected another file")
-
-
 def is_same_file(path: Path, other: Path, standard: TextIO) -> bool:
-    """Whether a path leads to another file, or to the one behind a standard stream where that is ``-``."""
+    """True if a path leads to another file, or to the one behind a standard stream where that is ``-``."""
     if other != STANDARD:
         return path.exists() and other.exists() and path.samefile(other)
     try:
@@ -74,7 +87,7 @@ def is_same_file(path: Path, other: Path, standard: TextIO) -> bool:
 
 
 def is_one_place(path: Path, other: Path) -> bool:
-    """Whether what is written to two paths would be one file, by whatever names or links."""
+    """True if two outputs would be one file, by whatever names or links."""
     if STANDARD in (path, other):
         path, other = (other, path) if path == STANDARD else (path, other)
         return path == STANDARD or is_same_file(path, other, sys.stdout)
@@ -95,9 +108,74 @@ def _folded(path: Path) -> str:
 
 
 def ignores_case(folder: Path) -> bool:
-    """Whether names differ by case alone in a folder, as far as the names of the folders that it is in tell."""
-    for each in (folder, *folder.parents):
-        other = each.with_name(each.name.swapcase()) if each.name else each
-        if other != each:
-            return other.exists() and other.samefile(each)
+    """True if a folder takes names that differ by case alone for one, as far as names of it and its parents show."""
+    for parent in (folder, *folder.parents):
+        swapped = parent.with_name(parent.name.swapcase()) if parent.name else parent
+        if swapped != parent:
+            return swapped.exists() and swapped.samefile(parent)
     return False
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[TextIO]:
+    """A text file for writing that takes the name `path` only when the block ends without an error.
+
+    It is opened at once, so an unwritable place is found before the work begins. A device or pipe, and standard output
+    for ``-``, is written directly.
+    """
+    if path == STANDARD:
+        yield sys.stdout
+        sys.stdout.flush()  # so that a failure to write is reported
+        return
+    if path.exists() and not path.is_file():
+        with path.open("w", newline="", encoding="utf-8") as direct:
+            yield direct
+        return
+    with whole_path(path) as part, part.open("x", newline="", encoding="utf-8") as handle:
+        yield handle
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """An empty folder beside `path` that goes when the block ends; a failure speaks of `path`, which the user knows."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with ExitStack() as removals:
+        for _ in range(2):  # an interruption may come while it is removed
+            removals.callback(shutil.rmtree, part, ignore_errors=True)
+        try:
+            part.mkdir(parents=True)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        yield part
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A folder to fill; its files move into `path` only when the block ends without an error."""
+    path = real(path)
+    if path.exists() and not path.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
+    with new_folder(path) as part:
+        yield part
+        path.mkdir(exist_ok=True)
+        for item in sorted(part.iterdir()):
+            item.replace(path / item.name)
+
+
+@contextmanager
+def picture(path: Path) -> Iterator[None]:
+    """Write to a file what a block draws in one new figure; a name that cannot be is refused before it draws."""
+    from ..view.save_picture import PICTURES, save_picture
+
+    require_ending(path, PICTURES)
+    require("pictures", "matplotlib", "plot")
+    import matplotlib
+    from matplotlib import pyplot
+
+    matplotlib.use("Agg")  # no window, whatever the user's settings
+    yield
+    figure = pyplot.gcf()
+    try:
+        save_picture(figure, path)
+    finally:
+        pyplot.close(figure)

@@ -8,10 +8,8 @@ import click
 
 import pfabrik as pf
 
-from .mech import MECH, load
-from .outputs import check_outputs
-from .pictures import picture
-from .target import Triple, target_of, targeted
+from .arguments import MECH, STANDARD_INPUT, TargetOptions, load, targeted
+from .outputs import check_outputs, picture
 
 
 @click.command()
@@ -19,20 +17,17 @@ from .target import Triple, target_of, targeted
 @targeted
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="PNG, SVG or PDF.  [default: NAME.png]")
 @click.option("--names", is_flag=True, help="Write the names of joints beside them.")
-def plot(
-    mech: str, position: Triple | None, rpy: Triple | None, joint: str | None, output: Path | None, names: bool
-) -> int:
+def plot(mech: str, target: TargetOptions, output: Path | None, names: bool) -> int:
     """Draw a machine at home, or where a target takes it.
 
     A planar machine is drawn in its plane. A target out of reach shows the nearest feasible pose, the joints that hold
     it back in orange and named; the exit code is then 1.
     """
-    path = output or Path(f"{Path(mech).stem if mech != '-' else 'mechanism'}.png")
+    path = output or Path(f"{Path(mech).stem if mech != STANDARD_INPUT else 'mechanism'}.png")
     check_outputs([("-o", path)], [Path(mech)])
     mechanism = load(mech)
-    home = position is None and rpy is None and joint is None
-    shown = mechanism if home else pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
-    with picture(path, quiet=True):
+    shown = pf.solve_ik(mechanism, target.of(mechanism)) if target.is_given else mechanism
+    with picture(path):
         pf.plot(shown, names=names)
     click.echo(f"wrote {path}")
-    return 0 if home or shown else 1
+    return 0 if shown else 1

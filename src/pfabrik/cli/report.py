@@ -1,58 +1,68 @@
-"""Answers for people: what became of a question, poses, actuators, all modes; angles in degrees."""
+"""Answers for people: status, poses, actuators, margins, all modes; angles in degrees."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
-import click
+import pfabrik as pf
 
 from ..answers.aligned_text import aligned, plain
 from ..answers.words import as_sentence, by_bound, exceeded, loop_gap
 from ..arrays import Floats
 from ..description.mechanism_html import bound_text
-from ..description.readouts import readouts
+from ..description.readouts import Readout, readouts
 from ..errors import ContinuumOfSolutions, counted
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
-from .group import complain
+from .printing import complain, print_answer
 
 if TYPE_CHECKING:
-    from ..answers.solution import Solution
-    from ..description.mechanism import Mechanism
-    from ..description.readouts import Readout
     from ..modes.lists import Modes
 
+ModeCells: TypeAlias = Callable[[pf.Solution], list[str]]
+"""The cells of a table of modes that show one of them."""
 
-def describe(solution: Solution, asked: Floats | None = None) -> str:
-    """The answer to a target or, with `asked` (n_a,) [length or rad], to actuator values."""
+
+def describe(solution: pf.Solution, values: Floats | None = None) -> str:
+    """The answer to a target or, with `values` (n_a,) [length or rad], to actuator values."""
     position, angles = pose_texts(solution)
     rows = [
         ("x y z", "   ".join(position), solution.mechanism.length_unit),
         ("roll pitch yaw", "   ".join(angles), "deg"),
     ]
-    width = max(len(value) for _, value, _ in rows)
-    lines = [f"{name:<16}{value:<{width}}   [{label}]" for name, value, label in rows]
+    width = max(len(text) for _, text, _ in rows)
+    lines = [f"{name:<16}{text:<{width}}   [{unit}]" for name, text, unit in rows]
     gap = f"{'loops closed to':<16}{loop_gap(solution)}"
-    return "\n".join([as_sentence(solution, asked), "", *lines, gap, "", actuator_table(solution, asked)])
+    return "\n".join([as_sentence(solution, values), "", *lines, gap, "", actuator_table(solution, values)])
 
 
-def pose_texts(solution: Solution) -> tuple[list[str], list[str]]:
+def pose_texts(solution: pf.Solution) -> tuple[list[str], list[str]]:
     """Position [length], and roll, pitch, yaw [deg]."""
     smallest = TOLERANCES.position * solution.mechanism.characteristic_length
     position = [plain(value, smallest) for value in solution.pose[:3, 3]]
     return position, [plain(math.degrees(angle), 1e-7) for angle in to_rpy(solution.pose[:3, :3])]
 
 
-def actuator_table(solution: Solution, asked: Floats | None) -> str:
-    """The actuator values, those asked for where they were not reached, and the limits."""
+def pose_cells(solution: pf.Solution) -> list[str]:
+    """Position and angles of a pose in one row."""
+    position, angles = pose_texts(solution)
+    return position + angles
+
+
+def pose_header(mechanism: pf.Mechanism) -> list[str]:
+    """The columns of `pose_cells`."""
+    return [*(f"{name} [{mechanism.length_unit}]" for name in "xyz"), "roll [deg]", "pitch [deg]", "yaw [deg]"]
+
+
+def actuator_table(solution: pf.Solution, values: Floats | None) -> str:
+    """The actuator values, the target values if they are not reached, and the limits."""
     shown = readouts(solution.mechanism)
     low, high = ([bound_text(readout.limits[side]) for readout in shown] for side in (0, 1))
     columns = {"actuator": [readout.name for readout in shown], "value": in_units(shown, solution.actuators)}
-    if asked is not None and not solution:
-        columns["asked"] = in_units(shown, asked)
+    if values is not None and not solution:
+        columns["asked"] = in_units(shown, values)
     columns |= {"min": low, "max": high, "unit": [readout.unit for readout in shown]}
     return aligned(list(columns), zip(*columns.values(), strict=True))
 
@@ -62,7 +72,7 @@ def in_units(shown: Sequence[Readout], values: Floats) -> list[str]:
     return [plain(float(readout.display(value)), 1e-9) for readout, value in zip(shown, values, strict=True)]
 
 
-def margins_table(solution: Solution) -> str:
+def margins_table(solution: pf.Solution) -> str:
     """Joint, bound and margin of every limit, nearest first."""
     from ..answers.margins import nearest_first
 
@@ -70,55 +80,40 @@ def margins_table(solution: Solution) -> str:
     return aligned(["joint", "bound", "margin"], rows) if rows else "no limits"
 
 
-def tell_modes(
-    find: Callable[[], Modes], kind: str, header: Sequence[str], cells: Callable[[Solution], list[str]], as_json: bool
-) -> int:
-    """Print all modes of a kind that are found; the exit code.
-
-    Parameters
-    ----------
-    header, cells : what a table of them shows of each.
-    """
+def print_modes(search: Callable[[], Modes], kind: str, header: Sequence[str], cells: ModeCells, as_json: bool) -> int:
+    """Print all modes of a kind that a search finds, in a table with `cells` under `header`; the exit code."""
     try:
-        found = find()
+        modes = search()
     except ContinuumOfSolutions as error:
         complain(str(error))
         return 1
-    if as_json:
-        click.echo(json.dumps(modes_as_object(found), allow_nan=False))
-    else:
-        click.echo(describe_modes(found, kind, header, cells))
-    return 0 if any(found) else 1
+    print_answer(as_json, lambda: modes_as_object(modes), lambda: describe_modes(modes, kind, header, cells))
+    return 0 if any(modes) else 1
 
 
-def modes_as_object(found: Modes) -> dict[str, object]:
+def modes_as_object(modes: Modes) -> dict[str, object]:
     """Modes as plain numbers, lists and dicts."""
     return {
-        "modes": [mode.to_dict() for mode in found],
-        "total": found.total,
-        "hits": list(found.hits),
-        "starts": found.starts,
-        "unseen": found.unseen,
+        "modes": [mode.to_dict() for mode in modes],
+        "total": modes.total,
+        "hits": list(modes.hits),
+        "starts": modes.starts,
+        "unseen": modes.unseen,
     }
 
 
-def describe_modes(found: Modes, kind: str, header: Sequence[str], cells: Callable[[Solution], list[str]]) -> str:
-    """How many modes, a table of them, and how sure it is that there are no others."""
-    chance = f"another one would find a new mode with a probability of about {found.unseen:.2%}"
-    searched = f"{counted(found.starts, 'start')}; {chance}"
-    if not found:
+def describe_modes(modes: Modes, kind: str, header: Sequence[str], cells: ModeCells) -> str:
+    """The number of modes, a table of them, and how likely it is that there are others."""
+    chance = f"another one would find a new mode with a probability of about {modes.unseen:.2%}"
+    searched = f"{counted(modes.starts, 'start')}; {chance}"
+    if not modes:
         return f"no {kind} mode found\n\n{searched}"
-    kept = sum(map(bool, found)) or "none"
-    count = f"{counted(found.total, f'{kind} mode')}, "
-    count += f"of the {len(found)} nearest to home " if found.total > len(found) else ""
+    kept = sum(map(bool, modes)) or "none"
+    count = f"{counted(modes.total, f'{kind} mode')}, "
+    count += f"of the {len(modes)} nearest to home " if modes.total > len(modes) else ""
     rows = [
         [str(number), *cells(mode), str(hits), by_bound(exceeded(mode)) or "nothing"]
-        for number, (mode, hits) in enumerate(zip(found, found.hits, strict=True), 1)
+        for number, (mode, hits) in enumerate(zip(modes, modes.hits, strict=True), 1)
     ]
     table = aligned(["mode", *header, "starts", "exceeds"], rows)
     return "\n\n".join([f"{count}{kept} within all limits", table, searched])
-
-
-def pose_header(mechanism: Mechanism) -> list[str]:
-    """The columns of `pose_texts`."""
-    return [*(f"{name} [{mechanism.length_unit}]" for name in "xyz"), "roll [deg]", "pitch [deg]", "yaw [deg]"]

@@ -1,4 +1,4 @@
-"""Signals that end a command: nothing half-written stays behind, and the exit code is the one that shells know."""
+"""Signals that end a command: no half-written file stays behind, and the exit code is the one that shells know."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Stops:
 
     @property
     def word(self) -> str:
-        """What became of the command."""
+        """The end of the command in one word."""
         return "interrupted" if self.number in (None, signal.SIGINT) else "terminated"
 
     def __enter__(self) -> Stops:
@@ -56,7 +56,7 @@ class Stops:
         return self
 
     def end(self) -> None:
-        """Raise no more interruptions: all that is left is to say what became of the command."""
+        """Raise no more interruptions: only the end of the command is still to be reported."""
         self._over.set()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -93,7 +93,7 @@ class Stops:
 
 
 def _is_cleaning_up() -> bool:
-    """Whether what runs was called because of an interruption."""
+    """True if the running code handles an interruption."""
     error = sys.exception()
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -14,14 +12,10 @@ import pfabrik as pf
 from ..answers.aligned_text import aligned
 from ..errors import counted
 from ..telling import telling
-from .finite import FINITE
-from .mech import MECH, load
-from .outputs import OUTPUT, STANDARD, check_outputs
-from .speeds import speed_limits, speed_option
-from .whole import whole_file
-
-if TYPE_CHECKING:
-    from ..timing.timed import Timed
+from .arguments import FINITE, MECH, load
+from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
+from .printing import json_option, print_answer
+from .speed import speed_limits, speed_option
 
 
 @click.command()
@@ -38,7 +32,7 @@ if TYPE_CHECKING:
 )
 @click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s].")
 @click.option("--rate", type=FINITE, default=1000.0, show_default=True, metavar="HZ", help="Samples per second.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout: the time, and what limits it.")
+@json_option("One JSON object on stdout: the time, and what limits it.")
 def time(
     mech: str,
     path: Path,
@@ -55,41 +49,36 @@ def time(
     ends the machine is at rest. A path with steps that are not reached, that leaps or crosses a parallel singularity
     is refused.
     """
-    if as_json and output == STANDARD:
-        raise click.UsageError("-o - and --json both print on stdout: give one of them")
-    inputs = (path, Path(mech))
-    check_outputs([("-o", output), ("--json", STANDARD if as_json else None)], inputs)
+    refuse_both_on_stdout(output, as_json)
+    check_outputs([("-o", output)], [path, Path(mech)], as_json=as_json)
     mechanism = load(mech)
-    limits = speed_limits(mechanism, speeds)
-    pushes = speed_limits(mechanism, accelerations, "--acceleration")
+    highest_speeds = speed_limits(mechanism, speeds) or None
+    highest_accelerations = speed_limits(mechanism, accelerations, "--acceleration") or None
     targets = pf.read_path(path, mechanism).targets
-    with nullcontext() if output is None else whole_file(output, inputs) as handle:
+    with nullcontext() if output is None else whole_file(output) as handle:
         with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
-            followed = pf.track(mechanism, targets, on_progress=on_progress)
+            solution = pf.track(mechanism, targets, on_progress=on_progress)
         timed = pf.time_path(
-            followed,
-            speed=limits or None,
-            acceleration=pushes or None,
+            solution,
+            speed=highest_speeds,
+            acceleration=highest_accelerations,
             platform_speed=platform_speed,
             rate=rate,
         )
         if handle is not None:
             timed.write(handle)
-    if as_json:
-        click.echo(json.dumps(as_object(timed), allow_nan=False))
-    else:
-        click.echo(describe(timed), err=output == STANDARD)
+    print_answer(as_json, lambda: as_object(timed), lambda: describe(timed), to_stderr=output == STANDARD)
     return 0
 
 
-def as_object(timed: Timed) -> dict[str, object]:
+def as_object(timed: pf.Timed) -> dict[str, object]:
     """The time, how many samples, and the limits that hold the path back."""
     held = [{"actuator": name, "what": what, "share": share} for (name, what), share in timed.held_back.items()]
     return {"duration": timed.duration, "samples": len(timed.times), "held_back": held}
 
 
-def describe(timed: Timed) -> str:
-    """The same for people."""
+def describe(timed: pf.Timed) -> str:
+    """The time, how many samples, and the limits that hold the path back, for people."""
     rows = [(name, what, f"{100.0 * share:.1f} %") for (name, what), share in timed.held_back.items()]
-    told = f"{timed.duration:.6g} s, {counted(len(timed.times), 'sample')}"
-    return "\n\n".join([told, aligned(["held back by", "its", "of the time"], rows)]) if rows else told
+    duration = f"{timed.duration:.6g} s, {counted(len(timed.times), 'sample')}"
+    return f"{duration}\n\n{aligned(['held back by', 'its', 'of the time'], rows)}" if rows else duration

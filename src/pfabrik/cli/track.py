@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext
 from functools import partial
@@ -10,29 +9,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import click
+import numpy as np
 
 import pfabrik as pf
 
+from ..arrays import Mask
 from ..checks import require_ending
-from ..errors import counted
+from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
-from .finite import FINITE
-from .mech import MECH, load
-from .outputs import OUTPUT, STANDARD, check_outputs
-from .pictures import picture
-from .projecting import options_projecting, projecting
-from .speeds import own_limits, speed_limits, speed_option
-from .track_checks import checked
-from .whole import whole_file
+from .arguments import FINITE, MECH, load, note_left_out, projecting
+from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, whole_file
+from .printing import json_option, note, print_json
+from .speed import own_limits, speed_limits, speed_option
 
 if TYPE_CHECKING:
-    from ..answers.tracked import Track
-    from ..description.mechanism import Mechanism
-    from ..options import Options
     from ..paths import path as paths
-    from ..paths.along import Extremes
-    from .track_summary import Summary
+    from .track_report import Summary
 
 
 @click.command()
@@ -50,22 +43,17 @@ if TYPE_CHECKING:
     "--plot", "picture_path", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF."
 )
 @click.option("--animate", "film_path", type=click.Path(path_type=Path), metavar="FILE", help="Film: GIF or MP4.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
+@json_option()
 def track(
     mech: str,
     path: Path,
     output: Path | None,
-    hold: str,
-    projection: str,
-    sample_time: float | None,
-    rapid: float | None,
-    rate: float | None,
-    longest: float | None,
-    tolerance: float | None,
+    options: pf.Options,
     speeds: tuple[str, ...],
     picture_path: Path | None,
     film_path: Path | None,
     as_json: bool,
+    **sampling: float | None,
 ) -> int:
     """Follow a path of targets.
 
@@ -81,41 +69,36 @@ def track(
 
     The exit code is 1 also where an actuator would have to be faster than it may.
     """
-    drawn = picture_path is not None or film_path is not None
-    if output is None and not as_json and not drawn:
+    is_drawn = picture_path is not None or film_path is not None
+    if output is None and not as_json and not is_drawn:
         raise click.UsageError("no place for the answers: give -o FILE, -o -, --json, --plot or --animate")
-    if as_json and output == STANDARD:
-        raise click.UsageError("-o - and --json both print on stdout: give one of them")
+    refuse_both_on_stdout(output, as_json)
     if mech == str(path) == str(STANDARD):
         raise click.UsageError("MECH and PATH are both standard input: give a file for one of them")
-    inputs = (path, Path(mech))
-    printed = STANDARD if as_json else None
-    outputs = [("-o", output), ("--plot", picture_path), ("--animate", film_path), ("--json", printed)]
-    check_outputs(outputs, inputs)
-    refuse_early(picture_path, film_path)
+    outputs = [("-o", output), ("--plot", picture_path), ("--animate", film_path)]
+    check_outputs(outputs, [path, Path(mech)], as_json=as_json)
+    check_pictures(picture_path, film_path)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     from ..paths.read_path import path_blocks
-    from .track_summary import Summary
+    from .track_report import Summary
 
-    timing = {"rate": rate, "rapid": rapid, "sample_time": sample_time}
-    read = partial(path_blocks, path, mechanism, tolerance=tolerance, longest=longest, **timing)
+    read = partial(path_blocks, path, mechanism, **sampling)
     check = partial(checked, mechanism=mechanism, is_timed=bool(limits))
-    blocks, total = blocks_of(path, read, check, whole=as_json or drawn)
-    told = Summary(mechanism)
-    options = options_projecting(hold, projection)
-    with nullcontext() if output is None else whole_file(output, inputs) as handle:
-        followed = answered(mechanism, blocks, options, own_limits(mechanism) | limits, handle, told, total)
-    draw(followed, picture_path, film_path)
+    blocks, n_targets = blocks_of(path, read, check, whole=as_json or is_drawn)
+    summary = Summary(mechanism)
+    with nullcontext() if output is None else whole_file(output) as handle:
+        solution = follow(mechanism, blocks, options, own_limits(mechanism) | limits, handle, summary, n_targets)
+    draw(solution, picture_path, film_path)
     if as_json:
-        click.echo(json.dumps(as_object(followed), allow_nan=False))
-    click.echo(told.line(), err=as_json or output == STANDARD)
-    if told.worst():
-        click.echo(told.worst(), err=True)
-    return 0 if told.is_well else 1
+        print_json(as_object(solution))
+    click.echo(summary.line(), err=as_json or output == STANDARD)
+    if summary.worst():
+        click.echo(summary.worst(), err=True)
+    return 0 if summary.is_well else 1
 
 
-def refuse_early(picture_path: Path | None, film_path: Path | None) -> None:
+def check_pictures(picture_path: Path | None, film_path: Path | None) -> None:
     """Stop before the work begins where a picture or film cannot be written."""
     from ..view.save_picture import FILMS, PICTURES
 
@@ -134,7 +117,7 @@ def blocks_of(
 ) -> tuple[Iterable[paths.Path], int | None]:
     """The parts of a path, all in one if it is wanted whole, and how many targets there are, where that is known.
 
-    What can be read twice is checked to its end before anything is answered; the rest part by part.
+    A path that can be read twice is checked to its end before the first answer; others part by part.
     """
     from ..paths.path import joined
 
@@ -146,51 +129,91 @@ def blocks_of(
     return check(read()), None
 
 
-def draw(followed: Track, picture_path: Path | None, film_path: Path | None) -> None:
-    """Write the picture and the film that were asked for."""
-    if picture_path is not None:
-        with picture(picture_path):
-            pf.plot_track(followed)
-    if film_path is not None:
-        pf.animate(followed, film_path)
-        click.echo(f"wrote {film_path}", err=True)
+def checked(blocks: Iterable[paths.Path], mechanism: pf.Mechanism, is_timed: bool) -> Iterator[paths.Path]:
+    """Blocks of a path, with notes of what it sets to no effect, and an error if it sets nothing of the task."""
+    from ..paths.csv_table import NUMERIC
+
+    is_set = np.zeros((4, 4), bool)
+    for number, block in enumerate(blocks):
+        if number == 0:
+            if is_timed and block.times is None:
+                raise click.UsageError("--speed says nothing without --sample-time, or a path with times")
+            for name in block.others:
+                hint = "" if name in NUMERIC else near_miss(name, NUMERIC)
+                if hint:
+                    note(f"column '{name}' goes out as it came in{hint}")
+        is_set |= (block.targets != mechanism.home_pose).any(axis=0)
+        yield block
+    check_columns(is_set, mechanism)
 
 
-def answered(
-    mechanism: Mechanism,
+def check_columns(is_set: Mask, mechanism: pf.Mechanism) -> None:
+    """Note columns that the task leaves out; refuse a path that sets nothing else.
+
+    Parameters
+    ----------
+    is_set : mask (4, 4) of the elements of a pose that are not as at home in some target.
+    """
+    task, axes = set(mechanism.task), dict(zip("xyz", is_set[:3, 3], strict=True))
+    is_turned, is_tilted = is_set[:3, :3].any(), is_set[:3, 2].any()
+    columns = [axis for axis in axes if axes[axis] and axis not in task]
+    if is_turned and not task - set("xyz"):
+        columns += ["roll", "pitch", "yaw"]
+    elif "yaw" in task and is_tilted:
+        columns += ["roll", "pitch"]
+    sets_some = any(axes[axis] for axis in task & set("xyz")) or (is_turned and task - set("xyz"))
+    if columns and not sets_some:
+        raise click.ClickException(
+            f"the path sets {', '.join(columns)} only, none of which the task has: {' '.join(mechanism.task)}"
+        )
+    note_left_out((f"column {name}" for name in columns), mechanism)
+
+
+def follow(
+    mechanism: pf.Mechanism,
     blocks: Iterable[paths.Path],
-    options: Options,
+    options: pf.Options,
     limits: dict[str, float],
     handle: TextIO | None,
-    told: Summary,
-    total: int | None,
-) -> Track:
+    summary: Summary,
+    n_targets: int | None,
+) -> pf.Track:
     """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
     from ..paths.along import largest_tilts, least_margins
     from ..paths.follow import follow_parts
-    from .track_rows import TrackRows
+    from .track_report import TrackRows
 
     rows: TrackRows | None = None
-    with telling(f"tracking {counted(total, 'target') if total else 'targets'}") as tell:
-        on_progress = None if tell is None else lambda done: tell(done, total or 0)
+    with telling(f"tracking {counted(n_targets, 'target') if n_targets else 'targets'}") as tell:
+        on_progress = None if tell is None else lambda done: tell(done, n_targets or 0)
         parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
-        for path, followed, first in parts:
-            room, tilts = least_margins(followed), largest_tilts(followed)
-            told.add(path, followed, room, tilts, first)
+        for part in parts:
+            margins, tilts = least_margins(part.track), largest_tilts(part.track)
+            summary.add(part, margins, tilts)
             if handle is not None:
-                rows = rows or TrackRows(handle, mechanism, path, tilts is not None)
-                rows.write(path, followed, room, tilts, first)
-    return followed
+                rows = rows or TrackRows(handle, mechanism, part.path, has_tilts=tilts is not None)
+                rows.write(part, margins, tilts)
+    return part.track
 
 
-def as_object(followed: Track) -> dict[str, object]:
+def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None) -> None:
+    """Write the picture and the film that are wanted."""
+    if picture_path is not None:
+        with picture(picture_path):
+            pf.plot_track(solution)
+        click.echo(f"wrote {picture_path}", err=True)
+    if film_path is not None:
+        pf.animate(solution, film_path)
+        click.echo(f"wrote {film_path}", err=True)
+
+
+def as_object(solution: pf.Track) -> dict[str, object]:
     """The fields of a track, and in every row the least margin and the largest tilt of a rod [rad]."""
     from ..answers.solution import as_plain
     from ..paths.along import largest_tilts, least_margins
 
-    plain = followed.to_dict()
-    found: dict[str, Extremes | None] = {"margin": least_margins(followed), "tilt": largest_tilts(followed)}
-    for name, each in found.items():
-        plain[name] = None if each is None else as_plain(each.values)
-        plain[f"{name}_of"] = None if each is None else each.names
+    plain = solution.to_dict()
+    for name, extremes in (("margin", least_margins(solution)), ("tilt", largest_tilts(solution))):
+        plain[name] = None if extremes is None else as_plain(extremes.values)
+        plain[f"{name}_of"] = None if extremes is None else extremes.names
     return plain

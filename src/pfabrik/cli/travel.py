@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 import pfabrik as pf
 
-from .finite import FINITE
-from .mech import MECH, load
-from .outputs import STANDARD, check_outputs
-from .pictures import picture
-from .target import Triple, target_of, targeted
+from .arguments import FINITE, MECH, TargetOptions, Triple, load, targeted
+from .outputs import check_outputs, picture
+from .printing import json_option, print_answer
 
 
 @click.command()
@@ -23,12 +20,10 @@ from .target import Triple, target_of, targeted
 @click.option("--about", type=FINITE, nargs=3, multiple=True, metavar="X Y Z", help="An axis to turn about. Likewise.")
 @click.option("--pivot", type=FINITE, nargs=3, metavar="X Y Z", help="What stays where it is. Default: --position.")
 @click.option("--plot", "path", type=click.Path(path_type=Path), metavar="FILE", help="Picture too: PNG, SVG or PDF.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
+@json_option()
 def travel(
     mech: str,
-    position: Triple | None,
-    rpy: Triple | None,
-    joint: str | None,
+    target: TargetOptions,
     along: tuple[Triple, ...],
     about: tuple[Triple, ...],
     pivot: Triple | None,
@@ -40,14 +35,15 @@ def travel(
     It starts at a pose within reach (default: home) and stays in its working mode; a limit, or the length of the links,
     stops it. By default it goes both ways along and about each axis of the task.
     """
-    check_outputs([("--plot", path), ("--json", STANDARD if as_json else None)], [Path(mech)])
+    check_outputs([("--plot", path)], [Path(mech)], as_json=as_json)
     mechanism = load(mech)
-    start = pf.solve_ik(mechanism, target_of(mechanism, position, rpy, joint))
+    start = pf.solve_ik(mechanism, target.of(mechanism))
     if not start:
         raise click.ClickException(f"cannot start there: {str(start.status).lower()}; see `pfabrik ik`")
-    found = pf.travel(start, along=along or None, about=about or None, pivot=pivot)
+    distances = pf.travel(start, along=along or None, about=about or None, pivot=pivot)
     if path is not None:
         with picture(path):
-            pf.plot_travel(found)
-    click.echo(json.dumps(found.to_dict(), allow_nan=False) if as_json else str(found))
+            pf.plot_travel(distances)
+        click.echo(f"wrote {path}", err=True)
+    print_answer(as_json, distances.to_dict, lambda: str(distances))
     return 0

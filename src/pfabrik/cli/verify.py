@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,11 +13,11 @@ import pfabrik as pf
 
 from ..errors import counted
 from ..interop.verifying import FAR
-from .mech import MECH, load
+from .arguments import MECH, load
+from .printing import json_option, print_answer
 
 if TYPE_CHECKING:
     from ..description.joint_coordinates import JointCoordinate
-    from ..description.mechanism import Mechanism
     from ..interop import Verification
 
 
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 )
 @click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of the original, if a URDF.")
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of it: home.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; angles in radians.")
+@json_option()
 def verify(
     mech: str,
     referee: str,
@@ -54,45 +53,47 @@ def verify(
     Exit code 0 if all agree, 1 if some do not, none was found, or all are too near to home to say anything.
     """
     mechanism = load(mech)
-    found = pf.interop.verify(
+    verification = pf.interop.verify(
         mechanism, poses=poses, seed=seed, original=original, loops=loops, configuration=configuration
     )
-    if as_json:
-        plain = {key: value if value == value else None for key, value in dataclasses.asdict(found).items()}
-        plain["travelled"] = found.travelled._asdict()
-        click.echo(json.dumps({"agree": found.agrees, "far": found.goes_far} | plain))
-    else:
-        click.echo(describe(mechanism, found))
-    return 0 if found else 1
+    print_answer(as_json, lambda: as_object(verification), lambda: describe(mechanism, verification))
+    return 0 if verification else 1
 
 
-def describe(mechanism: Mechanism, found: Verification) -> str:
-    """What was found, for people."""
-    unit = mechanism.length_unit
-    if not found.poses:
-        return f"{mechanism.name}: no pose was reached"
-    went, own = found.travelled, found.original
-    spans = ", ".join(span(drive, went.drives[drive.name], unit) for drive in mechanism.drives)
-    shift = f"{went.position / mechanism.characteristic_length:.2g} L ({went.position:.3g} {unit})"
-    agrees = "agrees" if found.agrees else "does not agree"
-    lines = [
-        f"{mechanism.name}: {agrees} with MuJoCo on {counted(found.poses, 'pose')}",
-        f"largest loop gap             {found.loop_gap:.1e} {unit}",
-        f"largest position difference  {found.position_difference:.1e} {unit}",
-        f"largest rotation difference  {found.rotation_difference:.1e} rad",
+def as_object(verification: Verification) -> dict[str, object]:
+    """A verification as plain numbers and dicts, None where a number is not known."""
+    fields = dataclasses.asdict(verification) | {"travelled": verification.travelled._asdict()}
+    plain = {name: value if value == value else None for name, value in fields.items()}
+    return {"agree": verification.agrees, "far": verification.goes_far} | plain
+
+
+def describe(mechanism: pf.Mechanism, verification: Verification) -> str:
+    """A verification for people."""
+    name, unit, original, went = mechanism.name, mechanism.length_unit, verification.original, verification.travelled
+    if not verification.poses:
+        return f"{name}: no pose was reached"
+    rows = [
+        ("largest loop gap", f"{verification.loop_gap:.1e} {unit}"),
+        ("largest position difference", f"{verification.position_difference:.1e} {unit}"),
+        ("largest rotation difference", f"{verification.rotation_difference:.1e} rad"),
     ]
-    if own is not None:
-        lines += [
-            f"original file                {'agrees' if own else 'does not agree'}",
-            f"its own loops, left open by   {own.loop_gap:.1e} {unit}, of {own.position_tolerance:.1e}",
-            f"position difference from it  {own.position_difference:.1e} {unit}, of {own.position_tolerance:.1e}",
-            f"rotation difference from it  {own.rotation_difference:.1e} rad, of {own.rotation_tolerance:.1e}",
+    if original is not None:
+        nearest, least = f"{original.position_tolerance:.1e}", f"{original.rotation_tolerance:.1e}"
+        rows += [
+            ("original file", "agrees" if original else "does not agree"),
+            ("its own loops, left open by", f" {original.loop_gap:.1e} {unit}, of {nearest}"),
+            ("position difference from it", f"{original.position_difference:.1e} {unit}, of {nearest}"),
+            ("rotation difference from it", f"{original.rotation_difference:.1e} rad, of {least}"),
         ]
-    lines += [
-        f"actuators went through       {spans}",
-        f"end effector went up to      {shift}, {math.degrees(went.rotation):.2g} deg",
+    shift = f"{went.position / mechanism.characteristic_length:.2g} L ({went.position:.3g} {unit})"
+    rows += [
+        ("actuators went through", ", ".join(span(drive, went.drives[drive.name], unit) for drive in mechanism.drives)),
+        ("end effector went up to", f"{shift}, {math.degrees(went.rotation):.2g} deg"),
     ]
-    if not found.goes_far:
+    agrees = "agrees" if verification.agrees else "does not agree"
+    lines = [f"{name}: {agrees} with MuJoCo on {counted(verification.poses, 'pose')}"]
+    lines += [f"{label:<29}{text}" for label, text in rows]
+    if not verification.goes_far:
         lines.append(
             "too near to home to say anything: farther targets were not reached, and no actuator went through "
             f"{100.0 * FAR:.0f} % of its range; see `pfabrik check` for what may hold the machine"
@@ -101,7 +102,7 @@ def describe(mechanism: Mechanism, found: Verification) -> str:
 
 
 def span(drive: JointCoordinate, value: float, unit: str) -> str:
-    """How far an actuator went, and which share of its range that is, if it has one."""
+    """The travel of an actuator, with its share of the range if there is one."""
     shown = f"{math.degrees(value):.3g} deg" if drive.kind == "angle" else f"{value:.3g} {unit}"
     width = drive.limits[1] - drive.limits[0]
     return f"{drive.name} {shown}" + (f" ({100.0 * value / width:.0f} %)" if math.isfinite(width) else "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -13,12 +12,8 @@ import pfabrik as pf
 from ..checks import require_ending
 from ..errors import counted
 from ..telling import telling
-from .mech import MECH, STANDARD_INPUT, load
+from .arguments import MECH, STANDARD_INPUT, load
 from .outputs import check_outputs
-
-if TYPE_CHECKING:
-    from ..answers.tracked import Track
-    from ..description.mechanism import Mechanism
 
 
 @click.command()
@@ -39,9 +34,10 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     if html is not None:
         check_outputs([("--html", html)], [Path(mech), *([path] if path else [])])
         require_ending(html, (".html", ".htm"))
-    shown: str | Mechanism | Track = mech if mech != STANDARD_INPUT and path is None else load(mech)
+    shown: str | pf.Mechanism | pf.Track = mech
+    if mech == STANDARD_INPUT or path is not None:
+        shown = mechanism = load(mech)
     if path is not None:
-        mechanism = load(mech)
         targets = pf.read_path(path, mechanism).targets
         with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
             shown = pf.track(mechanism, targets, on_progress=on_progress)

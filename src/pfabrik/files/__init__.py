@@ -95,15 +95,15 @@ def _text(path: Path) -> str:
 
 
 FORMATS = {"<mujoco": "a MuJoCo model (MJCF)", "<robot": "a robot description (URDF)", "<": "XML"}
-"""Beginnings by which files of other programs are known."""
+"""Tags by which files of other programs are recognised."""
 
 
 def _parsed(text: str) -> dict[str, Any]:
     _refuse_large(text)
     if text.lstrip().startswith("<"):
-        told = next(name for tag, name in FORMATS.items() if tag in text)
-        way = ", or `pfabrik import` to make one of it" if told != FORMATS["<"] else ""
-        raise _unusable(told, f"a mechanism file (TOML), as `pfabrik new` writes{way}")
+        form = next(name for tag, name in FORMATS.items() if tag in text)
+        hint = ", or `pfabrik import` to make one of it" if form != FORMATS["<"] else ""
+        raise _unusable(form, f"a mechanism file (TOML), as `pfabrik new` writes{hint}")
     try:
         if max(line.count(".") for line in text.split("\n") if not line.startswith("#")) > MOST_DOTS:
             raise RecursionError

@@ -11,6 +11,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..description.directions import WORDS
 from ..errors import Fault, near_miss
 
 TEXTS = ("name", "type", "connects", "along", "chain", "fixed_to", "base", "end_effector", "units", "task", "schema")
@@ -61,7 +62,10 @@ def dimension_values(dimensions: Any, angle_unit: str, faults: list[Fault]) -> d
 
 
 def with_numbers(table: Any, values: Mapping[str, float], angle_unit: str, place: str, faults: list[Fault]) -> Any:
-    """A table of a file with every expression replaced by its value; faults of expressions are added."""
+    """A table of a file with every expression replaced by its value; faults of expressions are added.
+
+    Words for directions ("vertical", "-x") stay under `axis` and `axes`, whatever dimensions are called.
+    """
     if isinstance(table, dict):
         return {
             key: item
@@ -75,13 +79,17 @@ def with_numbers(table: Any, values: Mapping[str, float], angle_unit: str, place
             with_numbers(item, values, angle_unit, f"{place}[{k}]" if is_tables else place, faults)
             for k, item in enumerate(table)
         ]
-    if not isinstance(table, str):
+    if not isinstance(table, str) or (_is_axis(place) and table.removeprefix("-") in WORDS):
         return table
     try:
         return number_of(table, values, angle_unit, ())
     except NoNumber as reason:
         faults.append(Fault(place, str(reason), EXPECTED))
         return 1.0
+
+
+def _is_axis(place: str) -> bool:
+    return place.rpartition(".")[2] in ("axis", "axes")
 
 
 def number_of(said: Any, values: Mapping[str, float], angle_unit: str, later: tuple[str, ...]) -> float:

@@ -1,7 +1,7 @@
-"""A parsed mechanism file to its mechanism, or to every fault of it at its place in the file.
+"""Turns a parsed mechanism file into its mechanism, or into every fault of it at its place in the file.
 
-What the tables may hold, and how many joints they may ask for, is looked at here. What the values must be is the
-description's to say: it finds the same faults in a file as in a call.
+The keys of tables and the number of joints are checked here, the values by `description`, which finds the same faults
+in a file as in a call.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _head_faults(table: Table) -> Iterator[Fault]:
 
 
 def _unknown_keys(place: str, table: Table, known: Sequence[str]) -> Iterator[Fault]:
-    """Faults of keys; one that is the file's own was probably meant for it: TOML takes it for the last table's."""
+    """Faults of keys; a key of the file's head was probably meant for it, but TOML adds it to the last table."""
 
     def hint(key: str) -> str:
         of_the_file = key in HEAD_KEYS
@@ -151,16 +151,16 @@ def _leg(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
         return Leg("")
     letters = sorted(key for key in table if re.fullmatch("[A-Z]", key))
     steps = {step.letter: step for step in read_chain(table.get("chain"))}
-    own = {key: value for key, value in table.items() if key not in letters}
-    others = ", or the letter of one of its joints: A, B, ..."
-    faults += key_faults(place, own, LEG_KEYS, lambda key: _leg_hint(key, list(steps) or ["A"]), others)
-    by_letter = {letter: _said(table[letter], steps.get(letter), angle_unit) for letter in letters}
-    values = {"chain": None} | {key: own[key] for key in LEG_KEYS if key in own}
+    leg_fields = {key: value for key, value in table.items() if key not in letters}
+    alternative = ", or the letter of one of its joints: A, B, ..."
+    faults += key_faults(place, leg_fields, LEG_KEYS, lambda key: _leg_hint(key, list(steps) or ["A"]), alternative)
+    by_letter = {letter: _joint_fields(table[letter], steps.get(letter), angle_unit) for letter in letters}
+    values = {"chain": None} | {key: leg_fields[key] for key in LEG_KEYS if key in leg_fields}
     return Leg(by_letter=by_letter, **values)
 
 
 def _leg_hint(key: str, letters: Sequence[str]) -> str:
-    """What an unknown key of a leg was probably meant to be: a joint, what is said of one, the file's, or its own."""
+    """A hint for an unknown key of a leg: a joint, a key of a joint, of the file's head, or of a leg."""
     if key.upper() in letters:
         return f"; did you mean '{key.upper()}'?"
     if key in JOINT_KEYS:
@@ -170,31 +170,31 @@ def _leg_hint(key: str, letters: Sequence[str]) -> str:
     return " here: it is one of the file, above its first table" if of_the_file else near_miss(key, LEG_KEYS)
 
 
-def _said(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
-    """What is said of one joint of a leg, angles in radians; anything but a table as it is."""
+def _joint_fields(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
+    """The table of one joint of a leg, with angles in radians; anything but a table as it is."""
     if not isinstance(table, dict):
         return table
     kind, actuated = (step.type, table.get("actuated", step.actuated)) if step is not None else (None, False)
-    said = {key: in_radians(key, value, kind, actuated, angle_unit) for key, value in table.items()}
-    cone = said.get("cone")
+    fields = {key: in_radians(key, value, kind, actuated, angle_unit) for key, value in table.items()}
+    cone = fields.get("cone")
     if isinstance(cone, dict) and "half_angle" in cone:
-        said["cone"] = cone | {"half_angle": angle_in_radians(cone["half_angle"], angle_unit)}
-    return said
+        fields["cone"] = cone | {"half_angle": angle_in_radians(cone["half_angle"], angle_unit)}
+    return fields
 
 
 def _expanded(table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault]) -> Mechanism:
-    """The mechanism of all copies and legs. When it is not clear what is copied, or where legs are, only the joints'
-    own faults are looked for."""
-    unclear = any(map(_hides_joints, faults))
+    """The mechanism of all copies and legs. If it is not clear what is copied, or where legs are, only faults of single
+    joints are searched for."""
+    is_unclear = any(map(_hides_joints, faults))
     base, end_effector = table.get("base", "base"), cast(str, table.get("end_effector"))
-    placed, found = _placed(base, end_effector, patterns, legs)
-    faults = merged(faults, found)
+    placed, leg_faults = _placed(base, end_effector, patterns, legs)
+    faults = merged(faults, leg_faults)
     joints = (*patterns, *(Pattern(each.joint) for each in placed))
     layout = Patterns(joints, base, end_effector)
-    if not unclear and not found:
+    if not is_unclear and not leg_faults:
         misfits = faults_of_legs(list(_misfits(layout)), len(patterns), placed)
-        unclear, faults = bool(misfits), [*faults, *misfits]
-    if unclear or found:
+        is_unclear, faults = bool(misfits), [*faults, *misfits]
+    if is_unclear or leg_faults:
         alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
         raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(patterns), placed)))
     return _built(table, layout, placed, faults)
@@ -222,7 +222,7 @@ def _misfits(layout: Patterns) -> Iterator[Fault]:
 
 
 def _hides_joints(fault: Fault) -> bool:
-    """Whether a fault leaves open which joints and bodies there are, or what their numbers mean."""
+    """True if a fault leaves open which joints and bodies there are, or what their numbers mean."""
     root = fault.place.partition(".")[0]
     return root in ("base", "end_effector", "units", "joint", "leg") or ".copies" in fault.place
 
@@ -238,8 +238,8 @@ def _built(table: Table, layout: Patterns, placed: Sequence[LegJoint], faults: l
                 warnings.simplefilter("ignore")
             mechanism = Mechanism(**head)
     except InvalidMechanism as error:
-        own = len(layout.patterns) - len(placed)
-        faults = merged(faults, faults_of_legs(_as_written(error.faults, layout, copies), own, placed))
+        n_joints = len(layout.patterns) - len(placed)
+        faults = merged(faults, faults_of_legs(_as_written(error.faults, layout, copies), n_joints, placed))
     if faults:
         raise InvalidMechanism(in_order(faults))
     return mechanism

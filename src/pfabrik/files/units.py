@@ -20,13 +20,13 @@ MEASURED = ("home", "range", "max_speed", "max_acceleration")
 
 
 def in_radians(field: str, value: Any, joint_type: Any, actuated: Any, unit: str) -> Any:
-    """What a file says in a field of a joint, its angles in radians and its lengths as they are.
+    """The value of a joint's field in a file, with angles in radians and lengths unchanged.
 
     Parameters
     ----------
     field : one of MEASURED; anything in another field stays as it is.
     value : a number, or a pair of them for a range, or one for each coordinate that it is of; anything else stays too.
-    actuated : what is said of the joint's being driven: speeds are those of what is driven.
+    actuated : the joint's field of that name: speeds are those of the driven coordinates.
     unit : "deg" or "rad", the unit of the angles in `value`.
     """
     if field not in MEASURED or unit != "deg" or joint_type not in list(KINDS):
@@ -41,7 +41,7 @@ def in_radians(field: str, value: Any, joint_type: Any, actuated: Any, unit: str
 
 
 def measured(field: str, joint_type: Any, actuated: Any) -> tuple[Coordinate, ...]:
-    """What the numbers in one of the fields MEASURED of a joint are: all its coordinates, or those that are driven."""
+    """The coordinates that the numbers in one of the fields MEASURED of a joint are for: all, or the driven ones."""
     kind = KINDS[joint_type]
     if field in ("home", "range"):
         return kind.coordinates if kind.ranged else ()

@@ -68,17 +68,17 @@ def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
 
 def _angles(mechanism: Mechanism) -> Iterator[float]:
     """Every angle of the description [rad]."""
-    found: list[float] = []
+    angles: list[float] = []
 
     def note(angle: float) -> float:
-        found.append(angle)
+        angles.append(angle)
         return angle
 
     for joint in mechanism.joints:
         for field in MEASURED:
             converted(getattr(joint, field), measured(field, joint.type, joint.actuated), note)
-        yield from found
-        found.clear()
+        yield from angles
+        angles.clear()
         if joint.cone is not None:
             yield joint.cone.half_angle
 

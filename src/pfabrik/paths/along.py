@@ -1,4 +1,4 @@
-"""What a machine has left along a path that was followed: room before its limits, and how upright its rods stand."""
+"""Least margins and largest tilts of rods along a path that was followed."""
 
 from __future__ import annotations
 
@@ -17,26 +17,27 @@ from ..motion.displacements import displacements, home_coordinates
 
 
 class Extremes(NamedTuple):
-    """The extreme of a kind in every row, (n,), and what it is of, n names; NaN and "" where there is nothing."""
+    """An extreme value in every row, (n,), and the names of what has it, n; NaN and "" where there is none."""
 
     values: Floats
     names: list[str]
 
 
 def least_margins(solution: Solution) -> Extremes:
-    """The smallest margin of all limits, as of `margins`, and the limit: its joint and bound."""
-    found = margins(solution)
-    if not found:
+    """The smallest margin of every row, of those of `margins`, and the limit that has it: its joint and bound."""
+    by_limit = margins(solution)
+    if not by_limit:
         return Extremes(np.full(len(solution), np.nan), [""] * len(solution))
-    names = [f"{joint} {bound}" for joint, bound in found]
-    return _extremes(np.stack([np.asarray(each) for each in found.values()], axis=-1), names)
+    names = [f"{joint} {bound}" for joint, bound in by_limit]
+    return _extremes(np.stack([np.asarray(values) for values in by_limit.values()], axis=-1), names)
 
 
 def largest_tilts(solution: Solution) -> Extremes | None:
-    """The largest tilt of any rod [rad], and which body that rod is; None for machines without rods.
+    """The largest tilt of any rod in every row [rad], and the body of that rod; None for machines without rods.
 
-    The tilt of a rod is the angle between its line and the direction in which its carriage or crank moves its foot: 0
-    where it is pushed along its length, a quarter turn at a dead point. Struts, which change their length, have none.
+    The tilt of a rod is the angle between its line and the direction in which its carriage or crank moves its base
+    end: 0 where it is pushed along its length, a quarter turn at a dead point. Struts, which change their length, have
+    none.
     """
     rods = _rods(solution.mechanism)
     if not rods:
@@ -47,14 +48,14 @@ def largest_tilts(solution: Solution) -> Extremes | None:
         now, pushed = bodies[rod][:, :3, :3] @ line, bodies[proximal][:, :3, :3] @ motion
         across = np.linalg.norm(np.cross(now, pushed), axis=-1)
         tilts.append(np.arctan2(across, np.abs((now * pushed).sum(axis=-1))))
-    found = _extremes(-np.stack(tilts, axis=-1), [rod for rod, *_ in rods])
-    return found._replace(values=-found.values)
+    least = _extremes(-np.stack(tilts, axis=-1), [rod for rod, *_ in rods])
+    return least._replace(values=-least.values)
 
 
 def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
-    """Of every rod on a proximal joint: its body and line at home, the joint's body, the motion of the base end."""
+    """Rods on proximal joints: body and line at home, body of the joint, direction of motion of the base end."""
     model = model_of(mechanism)
-    found: list[tuple[str, Floats, str, Floats]] = []
+    rods: list[tuple[str, Floats, str, Floats]] = []
     proximal: ElementaryJoint | None = None
     for form in model.legs.forms if model.has_legs else ():
         if not isinstance(form, Rod):
@@ -64,13 +65,13 @@ def _rods(mechanism: Mechanism) -> list[tuple[str, Floats, str, Floats]]:
             continue
         turns = proximal.kind == "R"
         motion = np.cross(proximal.axis, form.base_end - proximal.point) if turns else proximal.axis
-        found.append(
+        rods.append(
             (form.base_ending.elements[-1].outward, form.platform_end - form.base_end, proximal.outward, motion)
         )
-    return found
+    return rods
 
 
 def _extremes(values: Floats, names: list[str]) -> Extremes:
-    """The least of each row, (n, k) to (n,)."""
+    """The least value of each row, (n, k) to (n,)."""
     places = np.argmin(np.where(np.isnan(values), np.inf, values), axis=1)
     return Extremes(values[np.arange(len(values)), places], [names[place] for place in places.tolist()])

@@ -36,7 +36,7 @@ OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in 
 NUMERIC = (*OF_POSES, "t", "feed")
 SEPARATORS = (",", ";", "\t")
 SAID = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
-"""A first line by which spreadsheets are told the separator."""
+"""A first line that gives spreadsheets the separator."""
 
 EXPECTED = "expected x, y, z and roll, pitch, yaw or qx, qy, qz, qw"
 
@@ -46,7 +46,7 @@ class CsvTable:
 
     Attributes
     ----------
-    has_times : whether it says when targets are to be there, or how fast.
+    has_times : True if a column gives times or feeds.
 
     Raises
     ------
@@ -85,9 +85,9 @@ class CsvTable:
         for number, cells in rows:
             if len(cells) != len(self._header):
                 raise WrongPath(f"line {number}: found {counted(len(cells), 'cell')}; expected {len(self._header)}")
-        told = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
+        texts_by_name = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
         others: dict[str, Sequence[str]] = {}
-        for name, texts in told.items():
+        for name, texts in texts_by_name.items():
             if name not in NUMERIC:
                 others[name] = [unmarked(cell) for cell in texts]
                 continue
@@ -104,30 +104,30 @@ class CsvTable:
         for line, cell in zip(lines, cells, strict=True):
             if "," in cell and not is_finite(cell.replace(",", ".")):
                 raise WrongPath(f"line {line}: column '{name}': found '{cell[:20]}'; expected a finite number")
-            sign = "," if "," in cell else "." if "." in cell else self._decimal
-            if self._decimal not in (None, sign):
-                said = f"found '{cell[:20]}'; expected decimals with '{self._decimal}', as before"
-                raise WrongPath(f"line {line}: column '{name}': {said}")
-            self._decimal = sign
+            mark = "," if "," in cell else "." if "." in cell else self._decimal
+            if self._decimal not in (None, mark):
+                fault = f"found '{cell[:20]}'; expected decimals with '{self._decimal}', as before"
+                raise WrongPath(f"line {line}: column '{name}': {fault}")
+            self._decimal = mark
         return [cell.replace(",", ".") for cell in cells] if self._decimal == "," else cells
 
 
 def _separated(lines: Iterator[str]) -> tuple[str, Iterator[str]]:
-    """What separates cells, as a first line says, or by the names of columns that it makes of the header; all lines."""
-    begun: list[str] = []
+    """The separator of cells, from a first line that gives it or from the column names in the header; and all lines."""
+    read: list[str] = []
     for line in lines:
-        begun.append(line)
+        read.append(line)
         if line.strip():
             break
-    said = SAID.fullmatch(begun[-1].strip()) if begun else None
-    if said is not None:
-        begun[-1] = "\n"
-        return said[1], chain(begun, lines)
-    return max(SEPARATORS, key=lambda each: _names(begun[-1:], each)), chain(begun, lines)
+    stated = SAID.fullmatch(read[-1].strip()) if read else None
+    if stated is not None:
+        read[-1] = "\n"
+        return stated[1], chain(read, lines)
+    return max(SEPARATORS, key=lambda separator: _names(read[-1:], separator)), chain(read, lines)
 
 
 def _names(header: Sequence[str], separator: str) -> tuple[int, int]:
-    """How many known names, and how many cells, a header has with a separator."""
+    """Numbers of known names and of cells that a header has with a separator."""
     cells = [cell.strip() for row in csv.reader(header, delimiter=separator) for cell in row]
     return sum(name in NUMERIC or name.lower() in OF_POSES for name in cells), len(cells)
 
@@ -142,24 +142,24 @@ def _numbered(lines: Iterable[str], separator: str) -> Iterator[tuple[int, list[
 
 
 def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> None:
-    """Columns that a target needs, each once, each angle in one unit."""
+    """Refuse a header without the columns of a target, or with one of them twice, or an angle in two units."""
     twice = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if twice:
         raise WrongPath(f"line {line}: column '{twice[0]}' appears twice")
     moves = np.abs(generic_of(mechanism).directions[:3]).max(axis=1, initial=0.0) > TOLERANCES.alignment
     missing = [
         name
-        for name, asked, free in zip(POSITION, task_of(mechanism).axes, moves, strict=True)
-        if asked and free and name not in header
+        for name, is_asked, is_free in zip(POSITION, task_of(mechanism).axes, moves, strict=True)
+        if is_asked and is_free and name not in header
     ]
     if missing:
         hint = near_miss(missing[0], [name for name in header if name not in NUMERIC])
         between = ", with commas between" if len(header) == 1 else ""
         raise WrongPath(f"line {line}: no column {', '.join(missing)}{hint}; {EXPECTED}{between}")
     for columns in OF_ANGLES.values():
-        ways = [name for name in columns if name in header]
-        if len(ways) > 1:
-            raise WrongPath(f"line {line}: found columns {' and '.join(ways)}; expected one of them")
+        same = [name for name in columns if name in header]
+        if len(same) > 1:
+            raise WrongPath(f"line {line}: found columns {' and '.join(same)}; expected one of them")
     turning = [name for name in OF_POSES if name in header and name not in POSITION]
     parts = [name for name in turning if name in QUATERNION]
     if parts and turning != [*QUATERNION]:
@@ -185,11 +185,11 @@ def _path(
     positions = [columns.get(name, np.full(count, at)) for name, at in zip(POSITION, home, strict=True)]
     given = [next((name for name in names if name in columns), "") for names in OF_ANGLES.values()]
     units: list[AngleUnit] = ["rad" if name.endswith("_rad") else "deg" for name in given]
-    said = {unit for unit, name in zip(units, given, strict=True) if name} or {"deg"}
-    if len(said) == 1:  # angles that are not given come in the unit of the others
-        units = [*said] * 3
+    units_given = {unit for unit, name in zip(units, given, strict=True) if name} or {"deg"}
+    if len(units_given) == 1:  # angles that are not given come in the unit of the others
+        units = [*units_given] * 3
     angles = [columns.get(name, np.zeros(count)) for name in given]
-    turned = [np.radians(each) if unit == "deg" else each for each, unit in zip(angles, units, strict=True)]
+    turned = [np.radians(values) if unit == "deg" else values for values, unit in zip(angles, units, strict=True)]
     feeds = columns.get("feed", np.full(count, math.nan))
     if (feeds <= 0.0).any():
         place = int(np.flatnonzero(feeds <= 0.0)[0])
@@ -203,15 +203,15 @@ def _path(
 
 def _quaternions(columns: Mapping[str, Floats], lines: Sequence[int]) -> Floats:
     """Quaternions (n, 4), of any length but zero."""
-    found = np.stack([columns[name] for name in QUATERNION], axis=-1)
-    zero = np.flatnonzero(~found.any(axis=-1))
+    quaternions = np.stack([columns[name] for name in QUATERNION], axis=-1)
+    zero = np.flatnonzero(~quaternions.any(axis=-1))
     if len(zero):
         raise WrongPath(f"line {lines[int(zero[0])]}: found a zero quaternion; expected one that is a rotation")
-    return found
+    return quaternions
 
 
 def _check_times(times: Floats, lines: Sequence[int]) -> None:
-    """Times, after the one before them."""
+    """Refuse times that do not grow."""
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
         place = int(back[0])

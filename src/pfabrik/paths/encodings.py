@@ -12,13 +12,13 @@ MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-"""How files begin that tell their encoding."""
+"""Byte order marks at the beginning of files, each with its encoding."""
 
 LATIN = "pfabrik.latin"
 
 
 def _as_latin(error: UnicodeError) -> tuple[str, int]:
-    """Bytes that are no UTF-8, as the letters of western Europe that they are in older files."""
+    """Decode bytes that are not UTF-8 as the western European letters that they are in older files."""
     if not isinstance(error, UnicodeDecodeError):
         raise error
     return error.object[error.start : error.end].decode("cp1252", "replace"), error.end
@@ -28,7 +28,7 @@ codecs.register_error(LATIN, _as_latin)
 
 
 def as_text(raw: BufferedReader) -> TextIOWrapper:
-    """The text of a file: as the mark that it begins with says, else UTF-8, and Latin-1 where it is none."""
+    """The text of a file in the encoding of its byte order mark; without one, UTF-8, and Latin-1 for invalid bytes."""
     begin = raw.peek(4)
     encoding = next((name for mark, name in MARKS if begin.startswith(mark)), "utf-8")
     return TextIOWrapper(raw, encoding, LATIN if encoding.startswith("utf-8") else "strict", newline="")

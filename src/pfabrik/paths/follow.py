@@ -1,4 +1,4 @@
-"""Paths that are followed part by part, so that no more than a part is held at a time."""
+"""Paths followed part by part, so that only one part is in memory at a time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..track import track
 from .path import BLOCK, Path, joined
 
 BACK = BLOCK // 4
-"""How many steps a part is begun before the end of the one before it, at most."""
+"""Largest number of steps by which a part overlaps the one before it."""
 
 
 class TrackPart(NamedTuple):
@@ -38,8 +38,8 @@ def follow_parts(
 ) -> Iterator[TrackPart]:
     """Answers along a path as of `track`, a part at a time.
 
-    Each part begins at an answer of the one before it, and with what follows there: two steps, for accelerations, or
-    back to where a target was last reached, for what a path remembers of links that are stretched out.
+    Each part overlaps the one before it: by two steps, for accelerations, or back to the last target that was reached,
+    because answers with stretched links depend on the steps before them.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def follow_parts(
         )
         yield TrackPart(path, answers, first)
         done += len(block.lines)
-        place = _last_sure(answers.status)
+        place = _last_feasible(answers.status)
         if place is not None:
             start = answers[place]
         kept = path.after(max(len(path.lines) - 2, 0) if place is None else place)
 
 
-def _last_sure(status: Ints) -> int | None:
-    """The last but one answer, or one before it that was reached; None where none of them is feasible."""
+def _last_feasible(status: Ints) -> int | None:
+    """The row of the last answer but one, or of one before it that was reached; None if none of them is feasible."""
     end = max(len(status) - 1, 1)
     begin = max(end - BACK, 0)
     for most in (Status.REACHED, Status.PROJECTED):

@@ -29,7 +29,7 @@ RETRACTS = (10, 92)
 OTHER_AXES = "UVW"
 
 CODE = re.compile(r"(?:N\s*\d+\s*)?M\s*(\d{1,9})(?![\d.])")
-"""How a line begins that has a code of M first."""
+"""The beginning of a line whose first code is an M code."""
 
 MESSAGES = (117, 118)
 """Codes followed by words for people."""
@@ -38,17 +38,17 @@ CALLS = (97, 98, 99, 198)
 """Codes that steer a program, and set nothing."""
 
 FARTHEST = 1e9
-"""Numbers beyond are no places of a machine."""
+"""Numbers beyond this are no positions of a machine."""
 
 ROUNDING = 1e-12
-"""Share by which a length may be longer than so many steps: what dividing it leaves."""
+"""Share by which a length may exceed a whole number of steps, by rounding of the division."""
 
 OFF_ROUND, DIGITS = 1e-3, 1e-6
 """Shares of an arc's radius by which its ends may differ in theirs, as other readers have it, and by which a radius
 may be too short for them: programs are written with some six digits."""
 
 ONE_PLACE = 1e-9
-"""Angle of an arc whose ends are one place, which goes all the way round, up to rounding [rad]."""
+"""Angle of an arc below which its ends coincide, so that it is a full circle [rad]."""
 
 
 class Move(NamedTuple):
@@ -61,14 +61,14 @@ class Move(NamedTuple):
 
 @dataclass
 class ModalState:
-    """What holds until another word changes it.
+    """Modal state: values that hold until another word changes them.
 
     Attributes
     ----------
     place : x, y, z [length of the machine], and a, b, c [deg].
     unit : of the program's lengths, in those of the machine.
-    has_number : whether the program has said its number.
-    feed : as the program says it, per minute; NaN before it does.
+    has_number : True once the program has given its number.
+    feed : as the program gives it, per minute; NaN before it does.
     """
 
     place: Floats
@@ -113,23 +113,23 @@ def _words(text: str, number: int) -> dict[str, list[float]]:
     if plain.startswith(("%", "/")) or _is_setting(plain):
         return {}
     refuse_steering(plain, number)
-    found: dict[str, list[float]] = {}
-    rest = WORD.sub(" ", plain).split()
-    if rest:
-        raise WrongPath(f"line {number}: found '{rest[0][:20]}'; expected words such as X12.5")
+    words: dict[str, list[float]] = {}
+    unread = WORD.sub(" ", plain).split()
+    if unread:
+        raise WrongPath(f"line {number}: found '{unread[0][:20]}'; expected words such as X12.5")
     for letter, value in WORD.findall(plain):
         if abs(float(value)) > FARTHEST:
             raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
         if letter in OTHER_AXES:
             raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected axes {', '.join(AXES)}")
-        if letter in found and letter in AXES:
+        if letter in words and letter in AXES:
             raise WrongPath(f"line {number}: found {letter} twice; expected one place")
-        found.setdefault(letter, []).append(float(value))
-    return found
+        words.setdefault(letter, []).append(float(value))
+    return words
 
 
 def _is_setting(plain: str) -> bool:
-    """Whether all words of a line belong to a code of M, as those of printers do: `M205 X8` sets what a jerk may be."""
+    """True if all words of a line belong to its M code, as those of printers do: `M205 X8` limits the jerk."""
     begin = CODE.match(plain)
     code = int(begin[1]) if begin else 0
     is_printers = code in (17, 18, 73) or code >= 80  # others may stand beside a motion
@@ -137,7 +137,7 @@ def _is_setting(plain: str) -> bool:
 
 
 def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None:
-    """Take in what is no motion."""
+    """Update the modal state from the words of a line that are no motion."""
     if "O" in words:
         if state.has_number or state.motion is not None:
             raise WrongPath(f"line {number}: found O{words['O'][-1]:g}, another program; expected {IN_ONE_PROGRAM}")
@@ -222,8 +222,8 @@ def _arc(
     if tolerance < radius:  # the cosine of half of it would be 1, rounded, where the tolerance is small
         flat = 4.0 * math.asin(math.sqrt(tolerance) / math.sqrt(2.0 * radius))
     if turn / flat > FARTHEST:
-        said = f"an arc of radius {radius:g} in steps that are off by {tolerance:g} at most: too many steps"
-        raise WrongPath(f"line {number}: {said}; expected a larger tolerance")
+        fault = f"an arc of radius {radius:g} in steps that are off by {tolerance:g} at most: too many steps"
+        raise WrongPath(f"line {number}: {fault}; expected a larger tolerance")
     count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
     for part in range(1, count):
         share = part / count

@@ -29,10 +29,9 @@ class Path(NamedTuple):
     Attributes
     ----------
     targets : (n, 4, 4) [length].
-    times : when each is to be there, (n,) [s]: as the path says, or as its feeds come to; None where neither is said of
-        every step.
-    feeds : speed of the reference point toward each, (n,) [length/s], or of turning where it does not move [deg/s];
-        infinite in rapid moves, NaN where not said.
+    times : of the targets, (n,) [s], as given or from the feeds; None unless every step has one.
+    feeds : speed of the reference point toward each target, (n,) [length/s], or of turning where it does not move
+        [deg/s]; infinite in rapid moves, NaN where not given.
     lines : of the file that each comes from, (n,), counted from 1.
     others : further columns by name, the cells as they were, n each.
     angle_units : of roll, pitch and yaw, as the file has them.
@@ -47,13 +46,13 @@ class Path(NamedTuple):
 
     @classmethod
     def of(cls, targets: Floats) -> Path:
-        """Targets of which nothing else is known."""
+        """A path with targets only: no times, feeds or further columns."""
         count = len(targets)
         return cls(targets, None, np.full(count, np.nan), list(range(1, count + 1)), {}, ("deg", "deg", "deg"))
 
     def at(self, ends: Ints, shares: Floats) -> Path:
-        """Places (k,) on the way to each of the steps `ends` from the one before it; feeds and cells are those of the
-        step that it leads to."""
+        """Points (k,) on the way to the steps `ends`, each at a share (k,) of the way from the step before; feeds and
+        cells are those of the step that it leads to."""
         begins = np.maximum(ends - 1, 0)
         chosen = ends.tolist()
         times = self.times
@@ -68,7 +67,7 @@ class Path(NamedTuple):
         )
 
     def after(self, first: int) -> Path:
-        """The steps from one on."""
+        """The steps from row `first` on."""
         return self._replace(
             targets=self.targets[first:],
             times=None if self.times is None else self.times[first:],

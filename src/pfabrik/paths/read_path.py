@@ -28,16 +28,16 @@ from .sampling import at_rate, divided, timed
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
 CHORD, LONGEST = 1e-5, 1e-2
-"""How far chords are off their arcs, and the longest straight part of a move, as shares of L."""
+"""Largest distance of a chord from its arc, and longest straight part of a move, as shares of L."""
 
 LONGEST_LINE = 100_000
-"""Characters of a line: what is longer is no text of a path."""
+"""Characters of a line at most; a file with a longer one is not the text of a path."""
 
 MOST_LINES = 10 * MOST_STEPS
-"""Lines of a file at most, those that say nothing among them."""
+"""Lines of a file at most, blank ones and comments included."""
 
 FIRST_WORD = re.compile(r"\s*([%/]|[A-Z]\s*[-+.\d])", re.IGNORECASE)
-"""How a line of G-code begins."""
+"""The beginning of a line of G-code."""
 
 
 def read_path(
@@ -71,10 +71,10 @@ def read_path(
     InvalidArgument : a file that is no path, with its line; one of more than a million targets; a rate for a path that
         says nothing of time.
     """
-    found = joined(path_blocks(path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid))
-    if found.times is not None and not np.isfinite(found.times).all():
-        return found._replace(times=None)
-    return found
+    path_read = joined(path_blocks(path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid))
+    if path_read.times is not None and not np.isfinite(path_read.times).all():
+        return path_read._replace(times=None)
+    return path_read
 
 
 def path_blocks(
@@ -87,16 +87,16 @@ def path_blocks(
     rapid: float | None = None,
     sample_time: float | None = None,
 ) -> Iterator[Path]:
-    """What `read_path` reads, in parts; their times are NaN from where they are not known.
+    """The path of `read_path` in parts; times are NaN from the first step on whose time is not known.
 
     Parameters
     ----------
-    sample_time : from one target to the next [s], whatever the path says of it.
+    sample_time : from one target to the next [s], in place of the times of the path.
     """
     length = checked_mechanism(mechanism).characteristic_length
-    off = CHORD * length if tolerance is None else require_positive("tolerance", tolerance)
-    asked = {"longest": longest, "rate": rate, "rapid": rapid, "sample_time": sample_time}
-    for option, value in asked.items():
+    chord = CHORD * length if tolerance is None else require_positive("tolerance", tolerance)
+    lengths_and_times = {"longest": longest, "rate": rate, "rapid": rapid, "sample_time": sample_time}
+    for option, value in lengths_and_times.items():
         if value is not None:
             require_positive(option, value)
     file = require_path("path", path)
@@ -111,7 +111,7 @@ def path_blocks(
                     blocks = divided(blocks, longest)
             else:
                 step = LONGEST * length if longest is None else longest
-                program = steps_of(lines, _home(mechanism), mechanism.length_unit, off, step)
+                program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step)
                 blocks, has_times = _program(program), True
             if has_times or sample_time is not None or rate is not None:
                 blocks = timed(blocks, sample_time, rapid)
@@ -156,19 +156,19 @@ def _text(handle: TextIO) -> Iterator[str]:
 
 
 def _begun(lines: Iterator[str], ending: str) -> tuple[bool, Iterator[str]]:
-    """Whether lines are a table, by the file's ending or by the first that says something; and all of them."""
-    blank, first = 0, ""
+    """True if lines are a table, by the file's ending or by the first line that is not blank; and all lines."""
+    n_blank, first = 0, ""
     for line in lines:
         first = line.removeprefix("\ufeff")
         if first.strip():
             break
-        blank += 1
-    every = chain(repeat("\n", blank), [first] if first.strip() else [], lines)
-    return ending == ".csv" or (ending not in GCODE and _is_header(first)), every
+        n_blank += 1
+    all_lines = chain(repeat("\n", n_blank), [first] if first.strip() else [], lines)
+    return ending == ".csv" or (ending not in GCODE and _is_header(first)), all_lines
 
 
 def _is_header(line: str) -> bool:
-    """Whether a line names columns: G-code has numbers after its letters."""
+    """True if a line names columns: G-code has numbers after its letters."""
     plain = COMMENT.sub(" ", line)
     if "," in plain or SAID.fullmatch(line.strip()):
         return True

@@ -12,11 +12,11 @@ from ..rotations import angles_and_sines
 from .path import BLOCK, MOST_STEPS, Path, WrongPath, joined
 
 LEAST_TURN = 1e-6
-"""What is turned less is rounding [deg]."""
+"""Rotations below this angle are rounding [deg]."""
 
 
 def timed(blocks: Iterable[Path], sample_time: float | None, rapid: float | None) -> Iterator[Path]:
-    """Blocks with times: evenly, or as they are, or as feeds come to; NaN from the first step on that has no feed.
+    """Blocks with times: evenly spaced, as given, or from feeds; NaN from the first step on that has no feed.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def timed(blocks: Iterable[Path], sample_time: float | None, rapid: float | None
 
 
 def _durations(targets: Floats, feeds: Floats, rapid: float | None) -> Floats:
-    """Time [s] that each of n steps takes that lead to all but the first of targets (n + 1, 4, 4)."""
+    """Durations (n,) [s] of the steps between consecutive targets (n + 1, 4, 4)."""
     feeds = feeds if rapid is None else np.where(np.isinf(feeds), rapid, feeds)
     moved = np.linalg.norm(np.diff(targets[:, :3, 3], axis=0), axis=1)
     turned = np.degrees(angles_and_sines(np.swapaxes(targets[:-1, :3, :3], 1, 2) @ targets[1:, :3, :3])[0])
@@ -70,19 +70,19 @@ def at_rate(blocks: Iterable[Path], rate: float) -> Iterator[Path]:
         times = block.times
         if times is None or not np.isfinite(times).all():
             place = 0 if times is None else int(np.flatnonzero(~np.isfinite(times))[0])
-            said = "a step without a time; expected a column t or feed, or feeds and a speed of rapid moves"
-            raise WrongPath(f"line {block.lines[place]}: {said}")
+            fault = "a step without a time; expected a column t or feed, or feeds and a speed of rapid moves"
+            raise WrongPath(f"line {block.lines[place]}: {fault}")
         begin = float(times[0]) if is_first else begin
         passed = (float(times[-1]) - begin) * rate * (1.0 + 1e-12)
         if passed >= count + MOST_STEPS:  # it may be infinite
             raise WrongPath(f"line {block.lines[-1]}: more than {MOST_STEPS} samples; expected a lower rate")
         total = math.floor(passed) + 1
         for start in range(count, total, BLOCK):
-            when = np.minimum(begin + np.arange(start, min(start + BLOCK, total)) / rate, times[-1])
-            ends = np.clip(np.searchsorted(times, when, side="left"), 0, len(times) - 1)
+            sampled = np.minimum(begin + np.arange(start, min(start + BLOCK, total)) / rate, times[-1])
+            ends = np.clip(np.searchsorted(times, sampled, side="left"), 0, len(times) - 1)
             before = np.maximum(ends - 1, 0)
             steps = times[ends] - times[before]
-            shares = np.divide(when - times[before], steps, out=np.ones(len(when)), where=steps > 0.0)
+            shares = np.divide(sampled - times[before], steps, out=np.ones(len(sampled)), where=steps > 0.0)
             yield block.at(ends, shares)
         count = max(total, count)
         last = block.after(len(block.lines) - 1)
@@ -91,7 +91,7 @@ def at_rate(blocks: Iterable[Path], rate: float) -> Iterator[Path]:
 
 
 def _with_step_before(blocks: Iterable[Path]) -> Iterator[tuple[Path, bool]]:
-    """Blocks, each with the last step of the one before it in front; whether it is the first."""
+    """Blocks, each with the last step of the block before it in front, and a flag that is True for the first block."""
     last: Path | None = None
     for block in blocks:
         yield (block, True) if last is None else (joined([last, block]), False)

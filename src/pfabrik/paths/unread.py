@@ -1,4 +1,4 @@
-"""What programs in G-code may hold that is not followed here: each is refused as what it is."""
+"""Constructs of G-code that are not followed here; each is refused by its name."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ OF_PROGRAMS: tuple[tuple[re.Pattern[str], str, str], ...] = (
     (re.compile(r"[A-Z]? ?#\S*"), "a variable", IN_NUMBERS),
     (re.compile(r"[A-Z]? ?\[\S*"), "an expression", IN_NUMBERS),
 )
-"""How a line looks that steers a program, what that is, and what is expected in its place."""
+"""Patterns of lines that steer a program, what each is, and what is expected in its place."""
 
 MAY_STEER = re.compile(r"[O#\[M]|[A-Z]{2}|G ?0*6[56]")
-"""What each of these lines has; most lines have none of it."""
+"""Characters that each of these lines has and most others do not."""
 
 OFFSETS = "offsets or tool data that are set"
 CODES: dict[str, tuple[str, str]] = {
@@ -58,7 +58,7 @@ CODES: dict[str, tuple[str, str]] = {
     "M72": ("a return to modes that were saved", IN_ONE_PROGRAM),
     **dict.fromkeys(("M206", "M428"), ("an offset of all positions", WITHOUT_OFFSETS)),
 }
-"""Codes that change what later words mean, or where they lead."""
+"""Codes that change the meaning of later words, or where they lead."""
 
 
 def refuse_steering(plain: str, number: int) -> None:
@@ -67,9 +67,9 @@ def refuse_steering(plain: str, number: int) -> None:
     if MAY_STEER.search(spaced) is None:
         return
     for pattern, what, expected in OF_PROGRAMS:
-        found = pattern.search(spaced)
-        if found:
-            raise WrongPath(f"line {number}: found {found[0].strip()[:20]}, {what}; expected {expected}")
+        match = pattern.search(spaced)
+        if match:
+            raise WrongPath(f"line {number}: found {match[0].strip()[:20]}, {what}; expected {expected}")
 
 
 def refuse_code(code: str, number: int) -> None:
@@ -79,6 +79,6 @@ def refuse_code(code: str, number: int) -> None:
 
 
 def has_offset(code: str, words: Mapping[str, Sequence[float]], axes: str) -> bool:
-    """Whether G10 or G92 does more than a printer means: to retract, or to count filament."""
+    """True if G10 or G92 sets an offset; a printer uses them to retract, or to count filament."""
     places = any(letter in words for letter in axes)
     return places or ("L" in words if code == "G10" else "E" not in words)

@@ -1,1 +1,1 @@
-"""How fast a path may be followed, and how fast a platform may move."""
+"""The fastest timing of a path, and the highest speeds of a platform."""

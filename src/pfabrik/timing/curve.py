@@ -1,4 +1,4 @@
-"""A followed path as a smooth curve: what its steps are, and how its actuators and its platform move along it."""
+"""A followed path as a smooth curve: its steps, and the motion of actuators and platform along it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from ..arrays import Floats
 from ..kernels.timing import second_derivatives
 from ..motion.displacements import actuator_units
 from ..poses import between
-from ..rotations import angles_between
 
 FINEST, FEWEST = 20_000, 2
 """Grid points that a path is given at least, and each of its steps: that speeds are kept between them too costs less
@@ -65,14 +64,9 @@ class Curve:
         """Poses at s (n,): positions on the spline, rotations by the shortest turn from step to step."""
         place, step = self._places(s)
         shares = ((s - self.s[place]) / step)[:, None, None]
-        found = between(self.poses[place], self.poses[place + 1], shares)
-        found[:, :3, 3] = self.at(s)[0][:, self.n_actuators :]
-        return found
-
-    def turning(self) -> Floats:
-        """How fast the platform turns by s after each step, (k,) [rad per s]."""
-        rates = angles_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3]) / np.diff(self.s)
-        return np.append(rates, rates[-1:])
+        poses = between(self.poses[place], self.poses[place + 1], shares)
+        poses[:, :3, 3] = self.at(s)[0][:, self.n_actuators :]
+        return poses
 
     def step_of(self, s: Floats) -> np.ndarray:
         """The row of the track at, or before, s (n,)."""

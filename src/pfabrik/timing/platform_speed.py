@@ -1,4 +1,4 @@
-"""How fast a platform may move at a pose, and which actuator limits it."""
+"""The highest speeds of a platform at a pose, and the actuators that limit them."""
 
 from __future__ import annotations
 
@@ -48,10 +48,9 @@ def platform_speed(
 
     Axes are those of the base; of a tilt, the platform's x and y axes.
 
-    They are those of the present moment: both ways along a direction they are the same. Internal motions of a redundant
-    machine help where they can. The last one is the direction
-    in which the reference point is slowest of all that the machine can move it in without turning; it is left out
-    where there is none.
+    Speeds are instantaneous, so they are equal both ways along a direction. Internal motions of a redundant machine are
+    used where they help. The last direction is the one in which the reference point is slowest, of all in which the
+    machine can move it without turning; it is omitted if there is none.
 
     Parameters
     ----------
@@ -74,19 +73,19 @@ def platform_speed(
     twists = _twists(solution)[:, : len(sizes)]
     kept = twists @ (forward / sizes[:, None])
     following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
-    shares, found = _Shares(_internal_rates(solution) / limits[:, None]), []
+    shares, speeds = _Shares(_internal_rates(solution) / limits[:, None]), []
     for twist in twists:
         rates = inverse @ twist
         if not _is_made(twist, forward @ rates, sizes):
-            wanted = twists @ (twist / sizes)
-            rates = following @ wanted
-            if not _is_made(wanted, kept @ rates, np.ones(len(wanted))):
+            target_rates = twists @ (twist / sizes)
+            rates = following @ target_rates
+            if not _is_made(target_rates, kept @ rates, np.ones(len(target_rates))):
                 rates = np.full(len(limits), np.nan)
-        found.append(_fastest(twist, rates / limits, shares, mechanism.actuator_names))
+        speeds.append(_fastest(twist, rates / limits, shares, mechanism.actuator_names))
     slowest = _slowest(_translations(inverse, forward, sizes), inverse / limits[:, None], shares)
     if slowest is not None:
-        found.append(_fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names))
-    return tuple(found)
+        speeds.append(_fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names))
+    return tuple(speeds)
 
 
 def _twists(solution: Solution) -> Floats:
@@ -108,11 +107,11 @@ def _internal_rates(solution: Solution) -> Floats:
 
 
 class _Shares:
-    """How much of their limits actuators take at least, whatever internal motions go with what they do.
+    """The least share of their limits that actuators need for a motion, over all internal motions.
 
-    It is the most that they take by weights that no internal motion changes and whose sizes sum to one: a linear
-    programme, solved by the simplex method. These weights are the same whatever is asked, so that each search goes on
-    from where the last one ended; the first from an actuator without a limit, which is added to the others.
+    By duality it is the largest weighted share over weights that are orthogonal to all internal motions and whose
+    magnitudes sum to one: a linear programme, solved by the simplex method. Feasible weights do not depend on the
+    motion, so each search starts from the basis of the last one; the first starts from an added actuator without limit.
 
     Attributes
     ----------
@@ -123,29 +122,29 @@ class _Shares:
     def __init__(self, internal: Floats) -> None:
         present = np.pad(internal, ((0, 1), (0, 0)))
         motions, sizes, _ = np.linalg.svd(present, full_matrices=False)
-        self.motions = rest = motions[:, sizes > TOLERANCES.rank * sizes.max(initial=0.0)]
-        self.signs, self.basis = np.ones(rest.shape[1] + 1), np.full(rest.shape[1] + 1, len(internal))
-        for k in range(rest.shape[1]):
-            lengths = np.linalg.norm(rest, axis=1)
+        self.motions = remaining = motions[:, sizes > TOLERANCES.rank * sizes.max(initial=0.0)]
+        self.signs, self.basis = np.ones(remaining.shape[1] + 1), np.full(remaining.shape[1] + 1, len(internal))
+        for k in range(remaining.shape[1]):
+            lengths = np.linalg.norm(remaining, axis=1)
             self.basis[k] = np.argmax(lengths)
-            axis = rest[self.basis[k]] / lengths.max()
-            rest = rest - np.outer(rest @ axis, axis)
+            axis = remaining[self.basis[k]] / lengths.max()
+            remaining = remaining - np.outer(remaining @ axis, axis)
 
     def weights(self, rates: Floats) -> Floats:
-        """The weights of the actuators, (n_a,), by which rates, in shares of the limits, (n_a,), take the most."""
-        asked, is_stuck = np.append(rates, 0.0), False
-        rounded = ROUNDED * np.abs(asked).max()
+        """The weights (n_a,) with the largest weighted sum of actuator rates (n_a,), in shares of the limits."""
+        target, is_stuck = np.append(rates, 0.0), False
+        rounded = ROUNDED * np.abs(target).max()
         while True:
             inverse = np.linalg.inv(np.column_stack([self.motions[self.basis], self.signs]))
-            *moves, share = inverse @ asked[self.basis]
-            left = asked - self.motions @ moves
-            over = np.abs(left) - share
+            *moves, share = inverse @ target[self.basis]
+            residual = target - self.motions @ moves
+            over = np.abs(residual) - share
             over[self.basis] = -2.0 * share
             # the first where nothing is gained, of what leaves too: Bland's rule, by which no basis comes back
             enters = np.argmax(over > rounded if is_stuck else over)
             if over[enters] <= rounded:
                 break
-            sign = np.copysign(1.0, left[enters])
+            sign = np.copysign(1.0, residual[enters])
             falls = sign * self.signs * (np.append(self.motions[enters], sign) @ inverse)
             until = np.full(len(falls), np.inf)
             np.divide(self.signs * inverse[-1], falls, out=until, where=falls > TOLERANCES.rank)
@@ -153,13 +152,13 @@ class _Shares:
             leaves = leaving[np.argmin(self.basis[leaving] if is_stuck else -falls[leaving])]
             is_stuck = until.min() <= ROUNDED
             self.basis[leaves], self.signs[leaves] = enters, sign
-        weights = np.zeros(len(asked))
+        weights = np.zeros(len(target))
         weights[self.basis] = inverse[-1]
         return weights[:-1]
 
 
 def _fastest(twist: Floats, rates: Floats, shares: _Shares, names: tuple[str, ...]) -> PlatformSpeed:
-    """The highest speed along or about an axis, by the rates it asks for, in shares of the limits; NaN for none."""
+    """The highest speed along or about an axis, from actuator rates in shares of the limits; NaN if it cannot move."""
     kind = "along" if twist[:3].any() else "about"
     x, y, z = (twist[:3] if kind == "along" else twist[3:]).tolist()
     if np.isnan(rates).any():
@@ -183,7 +182,7 @@ def _translations(inverse: Floats, forward: Floats, sizes: Floats) -> Floats:
 
 
 def _slowest(free: Floats, inverse: Floats, shares: _Shares) -> Floats | None:
-    """Of the unit vectors that these (m, 3) span, the translation that takes the largest share, as a twist.
+    """The unit translation in the span of `free` (m, 3) that takes the largest share, as a twist; None without any.
 
     Shares are convex: in a cone of m directions a linear function with the same values at these is no less, nor is the
     largest of their values where it is scaled to the plane through these. The cone is halved if that is more than has

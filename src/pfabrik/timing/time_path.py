@@ -1,4 +1,4 @@
-"""The fastest speed along a given path."""
+"""`time_path`: the fastest timing of a path."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from .timed import Timed, What
 MOST_SAMPLES = 10_000_000
 
 ROUNDS = 8
-"""How often the grid's cells in which an acceleration exceeds its limit are slowed down; three do, mostly."""
+"""Largest number of passes that slow down cells of the grid in which an acceleration exceeds its limit; usually three
+suffice."""
 
 
 def time_path(
@@ -34,7 +35,7 @@ def time_path(
     platform_speed: float | None = None,
     rate: float = 1000.0,
 ) -> Timed:
-    """The fastest way along a path that was followed, from rest to rest, within the limits of every actuator.
+    """The fastest timing of a path that was followed, from rest to rest, within the limits of every actuator.
 
     Between its steps the path is the cubic spline of the actuators through them, so that corners of a path are rounded
     off within a step: follow it in steps as short as it is to be exact. On that path no other timing is faster, but for
@@ -78,18 +79,18 @@ def time_path(
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
     """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
-    own = [getattr(drive.joint, f"max_{what}") for drive in mechanism.drives]
-    told = [
-        value[drive.place] if isinstance(value, tuple) else value
-        for value, drive in zip(own, mechanism.drives, strict=True)
-    ]
-    limits = np.array([np.inf if value is None else value for value in told], dtype=float)
+    limits = np.full(len(mechanism.drives), np.inf)
+    for place, drive in enumerate(mechanism.drives):
+        limit = getattr(drive.joint, f"max_{what}")
+        value = limit[drive.place] if isinstance(limit, tuple) else limit
+        if value is not None:
+            limits[place] = value
     put_limits(limits, what, given, mechanism.actuator_names)
     return limits
 
 
 def refuse_leaps(track: Track) -> None:
-    """No machine follows steps that are not reached, or that leap."""
+    """Refuse a track with steps that are not reached, or that jump."""
     for bad, what in ((track.status != Status.REACHED, "not reached"), (track.jumps, "leaping from the one before")):
         steps = np.flatnonzero(bad)
         if len(steps):
@@ -98,7 +99,7 @@ def refuse_leaps(track: Track) -> None:
 
 
 def refuse_swings(track: Track, curve: Curve) -> None:
-    """Where steps bend, the spline between them swings out: no farther than ranges allow."""
+    """Refuse a track whose spline, which swings out where steps bend, leaves the range of an actuator between steps."""
     s, mechanism = curve.grid(), track.mechanism
     low, high = np.array([drive.limits for drive in mechanism.drives]).T
     values = curve.at(s)[0][:, : curve.n_actuators]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 What: TypeAlias = Literal["speed", "acceleration"]
 
 REACHED = 0.99
-"""Share of a limit from which on a sample counts as held back by it: some are felt at the next point of the grid."""
+"""Share of a limit from which on a sample counts as held back by it; some limits bind only at the next grid point."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,7 +54,7 @@ class Timed:
 
     @property
     def duration(self) -> float:
-        """Of the whole path [s]."""
+        """Duration of the whole path [s]."""
         return float(self.times[-1])
 
     @property
@@ -80,7 +80,7 @@ class Timed:
             self.write(handle)
 
     def write(self, handle: TextIO) -> None:
-        """The same, to an open file."""
+        """Write the columns of `to_csv` to an open file."""
         shown = readouts(self.mechanism)
         units = np.array([float(each.display(np.ones(1))[0]) for each in shown])
         names = [f"{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
@@ -129,5 +129,5 @@ class Timed:
             axes.set_ylabel(label)
         axes.set_xlabel("time [s]")
         axes.legend(ncols=3, fontsize="small")
-        found: Figure = figure
-        return found
+        drawn: Figure = figure
+        return drawn

@@ -23,7 +23,7 @@ from .canvas import canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD
 from .machine import draw_key, draw_machine
 from .plane import plane_of
-from .plot_track import checked_track, ways_of
+from .plot_track import checked_track, places_along
 from .save_picture import FILMS
 from .skeleton import Skeleton, skeleton_of
 
@@ -41,7 +41,7 @@ def animate(
     seconds: float | None = None,
     on_progress: OnProgress | None = None,
 ) -> None:
-    """Write a film of a path that was followed: the machine, what was asked for, and what holds it back.
+    """Write a film of a path that was followed: the machine, its targets, and the limits that block them.
 
     Axes and their limits stay the same throughout. The file appears when it is complete, or not at all.
 
@@ -49,7 +49,7 @@ def animate(
     ----------
     track : what `track` answered.
     path : of the film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
-    seconds : how long it runs; default: as long as the path takes where `track` was told a `sample_time`, else a
+    seconds : how long it runs; default: as long as the path takes if the track has a `sample_time`, else a
         twentieth of a second a step. There are 20 frames a second, each the step that is due.
     on_progress : called with (frames done, frames in all); default: a bar on a terminal, if it takes more than two
         seconds.
@@ -88,7 +88,7 @@ def _steps(track: Track, known: NDArray[np.intp], seconds: float | None) -> NDAr
 
 
 def _writer(suffix: str) -> Any:
-    """What writes a film of that ending."""
+    """The writer of films with that ending."""
     from matplotlib import animation, rcParams
 
     if suffix == ".gif":
@@ -126,22 +126,22 @@ class _Film:
         self._caption = above.text(0.02, 0.9, " ", fontsize=SMALL + 1.0, va="top")
         self._canvas = canvas_on(new_axes(below, plane), plane)
         draw_key(self._canvas, next((each for each in skeletons if each.is_held), skeletons[0]))
-        everything = np.vstack([ways_of(track), *(skeleton.points for skeleton in skeletons)])
+        everything = np.vstack([places_along(track), *(skeleton.points for skeleton in skeletons)])
         self._canvas.frame(everything, track.mechanism.length_unit)
         self._artists: list[Any] = []
 
     def show(self, step: int) -> None:
-        """The machine at a step, the whole path asked for, and the path taken so far."""
+        """Draw the machine at a step, the whole target path, and the path achieved so far."""
         for artist in self._artists:
             artist.remove()
         track, canvas = self._track, self._canvas
         self._artists = draw_machine(canvas, self._skeletons[step])
         taken = track.pose[: step + 1, :3, 3]
-        asked = track.targets[:, :3, 3]
+        targets = track.targets[:, :3, 3]
         self._artists += [
-            canvas.line(asked, color=ASKED, linestyle="--", linewidth=1.2, zorder=20),
+            canvas.line(targets, color=ASKED, linestyle="--", linewidth=1.2, zorder=20),
             canvas.line(taken, color=ACHIEVED, linewidth=1.8, zorder=21),
-            canvas.line(asked[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
+            canvas.line(targets[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
         ]
         colour = ACHIEVED if track.status[step] == Status.REACHED else HELD
         self._caption.set(text=_caption(track[step], step, len(track)), color=colour)
@@ -150,5 +150,5 @@ class _Film:
 def _caption(solution: Solution, step: int, steps: int) -> str:
     """Which step it is, what became of it, and what holds it back."""
     held = short_names(solution._limits[0])
-    told = as_sentence(solution).partition(";")[0]
-    return f"step {step + 1} of {steps}: {told}\n{held or ' '}"
+    status = as_sentence(solution).partition(";")[0]
+    return f"step {step + 1} of {steps}: {status}\n{held or ' '}"

@@ -1,4 +1,4 @@
-"""Axes to draw points of space on: three-dimensional ones, or two-dimensional ones for what lies in a plane."""
+"""Axes to draw points of space on: three-dimensional, or two-dimensional for a planar machine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1.1
-"""Room around what is drawn, as a share of it."""
+"""Extent of the axes, as a multiple of the drawing's."""
 
 THINNEST = 0.15
 """The least that the axes of a flat machine in space span across it, as a share of its largest extent."""
@@ -25,32 +25,32 @@ TICKS, ROOM_ACROSS, ROOM_UP = 6, 24.0, 18.0
 """Ticks of an axis at most, and the room each needs on an axis of any direction, and on an upright one [points]."""
 
 OFF_CORNERS = 0.06
-"""How far ticks stay off the corners of a box, as a share of its side: those of two axes would meet there."""
+"""Distance of ticks from the corners of a box, where those of two axes would meet, as a share of its side."""
 
 ZOOMS = (1.1, 1.05, 1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
 """Sizes of a box in space, tried until all that belongs to it is within the figure."""
 
-MOST_LOOKS = 16
-"""How often a picture in space is looked at before it is taken as it is."""
+MOST_ADJUSTMENTS = 16
+"""Largest number of adjustments of a picture in space."""
 
 FREE_EDGE = 2.0
-"""How far from the edge of the figure that is at least [points]."""
+"""Least distance of all that belongs to a box from the edge of the figure [points]."""
 
 ELEVATION, AZIMUTH = 22.0, -58.0
-"""Where a machine in space is seen from [deg]."""
+"""Direction from which a machine in space is viewed [deg]."""
 
 LABEL_OFF = 4.0
-"""How far the names of axes in space stay off their ticks, beyond matplotlib's own distance [points]."""
+"""Distance of the names of axes in space from their ticks, beyond matplotlib's own [points]."""
 
 SPATIAL = (0.0, 0.0, 1.0, 0.9)
-"""Where in a figure axes in space are: left, bottom, width, height."""
+"""Place of axes in space in a figure: left, bottom, width, height."""
 
 PANE, GRID = (1.0, 1.0, 1.0, 0.0), "#d9d9d9"
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """Axes, and what makes points (n, 3) of the base frame theirs.
+    """Axes, with the map of points (n, 3) of the base frame to their coordinates.
 
     Attributes
     ----------
@@ -97,8 +97,8 @@ class Canvas:
         largest = float(np.max(high - low)) or 1.0
         spans = MARGIN * np.maximum(high - low, THINNEST * largest)
         ends = np.stack([(low + high - spans) / 2.0, (low + high + spans) / 2.0])
-        for name, own in zip("xyz", ends.T.tolist(), strict=False):
-            self.axes.set(**{f"{name}lim": own})
+        for name, limits in zip("xyz", ends.T.tolist(), strict=False):
+            self.axes.set(**{f"{name}lim": limits})
         if self.plane is not None:
             self.axes.set_aspect("equal")
         else:
@@ -118,7 +118,7 @@ class Canvas:
         root = self.axes.get_figure(root=True)
         zooms, axes = iter(ZOOMS), self._axes
         self.axes.set_box_aspect(spans, zoom=next(zooms))
-        for _ in range(MOST_LOOKS):
+        for _ in range(MOST_ADJUSTMENTS):
             root.draw_without_rendering()
             edge = root.bbox.padded(-FREE_EDGE * root.dpi / 72.0)
             boxes = [text.get_window_extent() for text in self.axis_words]
@@ -151,7 +151,7 @@ class Canvas:
         return np.asarray(self.axes.transData.transform(seen))
 
     def _most_ticks(self, place: int, ends: Floats) -> int:
-        """How many ticks an axis has room for, as the figure is now; ends are the lowest and highest corner shown."""
+        """The number of ticks that fit on an axis of the figure as it is; `ends` are its lowest and highest corner."""
         if self.plane is None:
             line = np.repeat(ends.mean(axis=0)[None], 2, axis=0)
             line[:, place] = ends[:, place]
@@ -165,7 +165,7 @@ class Canvas:
         return int(np.clip(points / (ROOM_UP if upright else ROOM_ACROSS), 3, TICKS))
 
     def _direction(self, place: int) -> str:
-        """What an axis is called: "x" where it is one of the base frame, else its direction."""
+        """The name of an axis: "x" if it is one of the base frame, else its direction."""
         if self.plane is None:
             return "xyz"[place]
         along = self.plane[place]
@@ -197,7 +197,7 @@ def canvas_on(ax: Axes | None, plane: Floats | None) -> Canvas:
 
 
 def _dress(axes: Any) -> None:
-    """Axes in space without walls, with names that are easily read."""
+    """Remove the walls of axes in space, and write their names upright."""
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.labelpad = LABEL_OFF
         axis.set_rotate_label(False)

@@ -1,4 +1,4 @@
-"""Names where they hide neither each other nor the joints: each is tried around its place until it is free."""
+"""Places names so that they hide neither each other nor joints: the best of several places around each joint."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..arrays import Floats
 from .canvas import Canvas
 
 DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 45))), np.sin(np.radians(range(0, 360, 45)))], axis=1)
-"""Where around its place a name is tried, to the right first."""
+"""Directions from its joint in which a name is tried, to the right first."""
 
 DISTANCES = (6.0, 14.0)
-"""How far off, one after the other [points]."""
+"""Distances at which it is tried, one after the other [points]."""
 
 OFF = 12.0
-"""What a point farther off counts against what a name covers [points]: a name is to be seen to belong to its joint."""
+"""Area [points²] that a name may rather cover than be a point farther from its joint."""
 
 JOINT, LINE = 4.0, 1.5
-"""Half the sides of the squares that a joint's marker, and a dot of a line, keep free [points]."""
+"""Half the sides of the squares kept free around a joint's marker, and around a dot of a line [points]."""
 
 DOTS = 24
-"""Dots that stand for a line."""
+"""Dots that represent a line."""
 
 APART = 1.0
-"""Least room between two names [points]."""
+"""Least distance between two names [points]."""
 
 
 def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Floats) -> None:
@@ -36,7 +36,7 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
 
     Parameters
     ----------
-    joints, lines : what is not to be covered: points (n, 3), and both ends of lines (k, 2, 3) [length].
+    joints, lines : not to be covered: points (n, 3), and both ends of lines (k, 2, 3) [length].
     """
     if not texts:
         return
@@ -46,20 +46,22 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
     point = root.dpi / 72.0
     shares = np.linspace(0.0, 1.0, DOTS)[:, None, None]
     dots = (lines[:, 0] + shares * (lines[:, 1] - lines[:, 0])).reshape(-1, 3)
-    spots = [(spot, JOINT) for spot in canvas.on_screen(joints)] + [(spot, LINE) for spot in canvas.on_screen(dots)]
-    taken = [np.concatenate([spot - half * point, spot + half * point]) for spot, half in spots]
+    squares = [(place, JOINT) for place in canvas.on_screen(joints)] + [
+        (place, LINE) for place in canvas.on_screen(dots)
+    ]
+    taken = [np.concatenate([place - half * point, place + half * point]) for place, half in squares]
     legend = canvas.axes.get_legend()
-    others = canvas.axis_words + ([] if legend is None else [legend])
-    taken += [other.get_window_extent().extents for other in others]
+    words = canvas.axis_words + ([] if legend is None else [legend])
+    taken += [word.get_window_extent().extents for word in words]
     for text in texts:
-        spot = canvas.on_screen(_place(canvas, text)[None])[0]
+        place = canvas.on_screen(_place(canvas, text)[None])[0]
         extent = text.get_window_extent()
         size = np.array([extent.width, extent.height])
         boxes = [
             np.concatenate([centre - size / 2.0, centre + size / 2.0])
             for off in DISTANCES
             for direction in DIRECTIONS
-            for centre in [spot + direction * (off * point + np.abs(direction) @ size / 2.0)]
+            for centre in [place + direction * (off * point + np.abs(direction) @ size / 2.0)]
         ]
         far = np.repeat(DISTANCES, len(DIRECTIONS)) * OFF * point**2
         best = boxes[int(np.argmin(_overlaps(np.array(boxes), np.array(taken), APART * point) + far))]
@@ -67,10 +69,10 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
         _move(canvas, text, (best[:2] + best[2:]) / 2.0)
 
 
-def _overlaps(boxes: Floats, others: Floats, apart: float) -> Floats:
+def _overlaps(boxes: Floats, taken: Floats, apart: float) -> Floats:
     """The areas that boxes (n, 4: left, bottom, right, top), widened, share with others (k, 4), (n,) [pixels²]."""
-    low = np.maximum(boxes[:, None, :2] - apart, others[:, :2])
-    high = np.minimum(boxes[:, None, 2:] + apart, others[:, 2:])
+    low = np.maximum(boxes[:, None, :2] - apart, taken[:, :2])
+    high = np.minimum(boxes[:, None, 2:] + apart, taken[:, 2:])
     return np.asarray(np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1))
 
 

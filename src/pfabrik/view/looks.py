@@ -1,4 +1,4 @@
-"""How things look, in pictures and in the viewer: one colour, one meaning; lightness and shape tell them apart too."""
+"""Colours and markers of pictures and the viewer: one meaning each, which lightness or shape distinguish too."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from ..description.joint_types import JointType
 BASE, PLATFORM, LINK, EDGE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a"
 ACTUATED, PASSIVE = "#1a1a1a", "#ffffff"
 HELD = "#d55e00"
-"""What a limit holds back, or what is not as it was asked for: nothing else has this colour."""
+"""Colour of what is at a limit or not on its target, and of nothing else."""
 
 ASKED, ACHIEVED, SHADE = "#8c8c8c", "#00204d", "#ececec"
 
 LINE_COLOURS = ("#00204d", "#0072b2", "#009e73", "#e69f00", "#cc79a7", "#999999")
-"""Of lines that only their names tell apart; neighbours also differ in dashes."""
+"""Colours of lines that differ in their names only; neighbours also differ in dashes."""
 
 MARKERS: dict[JointType, str] = {
     "revolute": "o",

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIZE, SLIDE_SIZE = 20.0, 44.0
-"""Areas of markers [points²]: a slide's is to be seen behind that of a joint in the same place."""
+"""Areas of markers [points²]: that of a slide is larger, so that it shows behind a joint in the same place."""
 
 RAIL_DASHES = (0, (4, 2))
 
@@ -100,14 +100,18 @@ def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
     for mark in marks:
         kinds.setdefault((mark.joint.type, bool(mark.joint.actuated), bool(mark.held_by)), []).append(mark)
     return [
-        canvas.marks(np.array([mark.place for mark in own]), zorder=2 if kind == "prismatic" else 3, **look(*key))
-        for key, own in sorted(kinds.items())
+        canvas.marks(
+            np.array([mark.place for mark in marks_of_kind]),
+            zorder=2 if kind == "prismatic" else 3,
+            **marker_style(*key),
+        )
+        for key, marks_of_kind in sorted(kinds.items())
         for kind in key[:1]
     ]
 
 
-def look(kind: JointType, actuated: bool, held: bool) -> dict[str, Any]:
-    """How the marker of a joint looks: shape by type, filled where it is actuated, orange where a limit holds it."""
+def marker_style(kind: JointType, actuated: bool, held: bool) -> dict[str, Any]:
+    """The style of a joint's marker: shape by type, filled if it is actuated, orange at a limit."""
     return {
         "marker": MARKERS[kind],
         "s": SLIDE_SIZE if kind == "prismatic" else SIZE,
@@ -118,7 +122,7 @@ def look(kind: JointType, actuated: bool, held: bool) -> dict[str, Any]:
 
 
 def draw_key(canvas: Canvas, skeleton: Skeleton) -> None:
-    """What the markers mean, above the axes."""
+    """Draw the key of markers above the axes."""
     handles = key_of(skeleton)
     canvas.axes.legend(handles=handles, **KEY, ncols=min(len(handles), 3))
 
@@ -132,7 +136,7 @@ KEY: dict[str, Any] = {
     "columnspacing": 1.2,
     "borderaxespad": 0.0,
 }
-"""How a key is set above axes."""
+"""Settings of a key above axes."""
 
 
 def key_of(skeleton: Skeleton) -> list[Artist]:
@@ -140,9 +144,9 @@ def key_of(skeleton: Skeleton) -> list[Artist]:
     from matplotlib.lines import Line2D
 
     kinds = sorted({(mark.joint.type, bool(mark.joint.actuated)) for mark in skeleton.marks})
-    looks = [(kind + ", actuated" * actuated, look(kind, actuated, False)) for kind, actuated in kinds]
+    looks = [(kind + ", actuated" * actuated, marker_style(kind, actuated, False)) for kind, actuated in kinds]
     if skeleton.is_held:
-        looks.append(("at a limit", look("fixed", False, True) | {"marker": "o", "facecolor": HELD}))
+        looks.append(("at a limit", marker_style("fixed", False, True) | {"marker": "o", "facecolor": HELD}))
     return [
         Line2D(
             [],
@@ -160,7 +164,7 @@ def key_of(skeleton: Skeleton) -> list[Artist]:
 
 
 def write_names(canvas: Canvas, skeleton: Skeleton, named: set[str]) -> None:
-    """The limits that hold, at their joints, and the names of chosen joints."""
+    """Write active limits at their joints, and the names of chosen joints."""
     texts = []
     for mark in skeleton.marks:
         if mark.held_by or mark.joint.name in named:

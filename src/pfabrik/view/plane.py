@@ -1,4 +1,4 @@
-"""The plane that a planar machine moves in, told from the directions of its joints."""
+"""The plane that a planar machine moves in, from the directions of its joints."""
 
 from __future__ import annotations
 

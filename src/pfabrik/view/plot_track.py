@@ -1,4 +1,4 @@
-"""`plot_track`: a path that was followed: where the machine went, what its actuators did, how much room was left."""
+"""`plot_track`: a path that was followed: the machine on it, its actuators between their limits, and all margins."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ MOST_STRIPS = 6
 """Strips of actuators one below the other; further ones make another column."""
 
 HELD_BY = 1e-4
-"""Share of what is shown within which a value is at its limit."""
+"""Share of the range shown within which a value is at its limit."""
 
 ROOM = 0.14
-"""Room above and below a range, as a share of it: for the names of limits."""
+"""Space above and below a range for the names of limits, as a share of the range."""
 
 LIMIT_DASHES = (0, (8, 3, 1, 3))
 DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
@@ -67,7 +67,7 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
     figure = new_figure(11.5, 6.2, dpi=130) if figure is None else figure
     require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
     mechanism = track.mechanism
-    figure.suptitle(f"{mechanism.name}: {told(track)}", fontsize=SMALL + 4.0)
+    figure.suptitle(f"{mechanism.name}: {reached_in_words(track)}", fontsize=SMALL + 4.0)
     left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False))
     axes = {"path": draw_path(left, track, known)}  # first: its numbers are placed by drawing all there is
     strips, below = _grid(right, len(mechanism.actuator_names), has_margins := bool(limits_of(track)))
@@ -91,12 +91,12 @@ def checked_track(track: Track) -> NDArray[np.intp]:
     return known
 
 
-def told(solution: Solution) -> str:
-    """How many steps were reached, and how far the others stay from their targets."""
-    off = int((np.asarray(solution.status) != Status.REACHED).sum())
-    reached = f"{len(solution) - off} of {counted(len(solution), 'step')} reached"
+def reached_in_words(solution: Solution) -> str:
+    """The number of steps reached, and the largest distance of the others from their targets."""
+    n_unreached = int((np.asarray(solution.status) != Status.REACHED).sum())
+    reached = f"{len(solution) - n_unreached} of {counted(len(solution), 'step')} reached"
     farthest = f"{float(np.nanmax(solution.position_error)):.3g} {solution.mechanism.length_unit}"
-    return f"{reached}, the others at most {farthest} from their targets" if off else reached
+    return f"{reached}, the others at most {farthest} from their targets" if n_unreached else reached
 
 
 def _grid(figure: Any, actuators: int, with_margins: bool) -> tuple[list[Axes], Axes]:
@@ -116,48 +116,50 @@ def _grid(figure: Any, actuators: int, with_margins: bool) -> tuple[list[Axes], 
 
 
 def draw_path(figure: Any, track: Track, known: NDArray[np.intp]) -> Axes:
-    """The machine at the step that is farthest from its target, the path asked for and the path taken."""
+    """Draw the machine at the step that is farthest from its target, the target path and the achieved path."""
     shown = skeleton_of(track[int(known[np.argmax(track.position_error[known])])])
     canvas = canvas_on(new_axes(figure, plane := plane_of(track.mechanism)), plane)
     draw_machine(canvas, shown)
-    lines = draw_ways(canvas, track)
+    lines = draw_paths(canvas, track)
     labels = [*key_of(shown), *lines]
     figure.legend(handles=labels, loc="outside upper center", ncols=3, frameon=False, fontsize=SMALL)
-    canvas.frame(np.vstack([shown.points, ways_of(track)]), track.mechanism.length_unit)
+    canvas.frame(np.vstack([shown.points, places_along(track)]), track.mechanism.length_unit)
     axes: Axes = canvas.axes
     return axes
 
 
-def ways_of(track: Track) -> Floats:
-    """Every place that was asked for, or taken, (n, 3) [length]."""
+def places_along(track: Track) -> Floats:
+    """All finite positions of targets and answers, (n, 3) [length]."""
     places = np.vstack([track.targets[:, :3, 3], track.pose[:, :3, 3]])
     return np.asarray(places[np.isfinite(places).all(axis=1)])
 
 
-def draw_ways(canvas: Canvas, track: Track) -> list[Artist]:
-    """The path asked for, and the path taken: where targets were reached, and where they were not."""
-    off = track.status != Status.REACHED
+def draw_paths(canvas: Canvas, track: Track) -> list[Artist]:
+    """Draw the target path, and the achieved path: where targets were reached, and where they were not."""
+    is_unreached = track.status != Status.REACHED
     achieved = track.pose[:, :3, 3]
-    on_target, projected = (np.where(mask[:, None], achieved, np.nan) for mask in (~off | next_to(off), off))
-    asked = {"color": ASKED, "linestyle": "--", "linewidth": 1.4, "label": "asked for", "zorder": 20}
+    on_target, projected = (
+        np.where(mask[:, None], achieved, np.nan) for mask in (~is_unreached | next_to(is_unreached), is_unreached)
+    )
+    target_style = {"color": ASKED, "linestyle": "--", "linewidth": 1.4, "label": "asked for", "zorder": 20}
     lines = [
-        canvas.line(track.targets[:, :3, 3], **asked),
+        canvas.line(track.targets[:, :3, 3], **target_style),
         canvas.line(on_target, color=ACHIEVED, linewidth=2.0, label="reached", zorder=21),
     ]
-    if off.any():
+    if is_unreached.any():
         style = {"marker": "o", "markersize": 2.6, "markeredgewidth": 0.0}  # a single step has no line
         lines.append(canvas.line(projected, color=HELD, linewidth=2.6, label="not reached", zorder=22, **style))
     return lines
 
 
 def next_to(marked: Mask) -> Mask:
-    """The first and last step of every run of marked ones, so that lines on both sides of an end meet."""
+    """Mask of the first and last step of every run of marked steps, so that lines on both sides of an end meet."""
     padded = np.concatenate([[True], marked, [True]])
     return np.asarray(marked & ~(padded[:-2] & padded[2:]))
 
 
 def draw_actuator(axes: Axes, readout: Readout, values: Floats, solution: Solution) -> None:
-    """One actuator over the steps, its limits named at the axis, and where it is held by one."""
+    """Draw one actuator over the steps, its limits named at the axis, in orange where it is at one."""
     shade_steps(axes, np.asarray(solution.status) != Status.REACHED)
     bounds = [bound for bound in readout.limits if np.isfinite(bound)]
     for bound in bounds:
@@ -178,22 +180,22 @@ def draw_actuator(axes: Axes, readout: Readout, values: Floats, solution: Soluti
 
 
 def limits_of(track: Track) -> dict[str, Floats]:
-    """What a limit is called -> its margin at every step, those that come nearest to none first."""
-    found = {f"{joint} {bound}": np.asarray(margin) for (joint, bound), margin in margins(track).items()}
-    return dict(sorted(found.items(), key=lambda item: float(np.nanmin(item[1]))))
+    """Name of a limit -> its margin at every step, limits with the smallest margin first."""
+    by_name = {f"{joint} {bound}": np.asarray(margin) for (joint, bound), margin in margins(track).items()}
+    return dict(sorted(by_name.items(), key=lambda item: float(np.nanmin(item[1]))))
 
 
 def draw_margins(axes: Axes, track: Track) -> None:
-    """How much room every limit leaves; named are those that are the tightest at some step."""
+    """Draw the margin of every limit; those that are the smallest at some step are named."""
     shade_steps(axes, track.status != Status.REACHED)
-    found = limits_of(track)
-    every = np.array(list(found.values()))
-    least = np.nanmin(np.where(np.isnan(every), np.inf, every), axis=0)
-    tightest = [name for name, margin in found.items() if (margin <= least).any()][:MOST_MARGINS]
-    for margin in (margin for name, margin in found.items() if name not in tightest):
+    by_name = limits_of(track)
+    values = np.array(list(by_name.values()))
+    least = np.nanmin(np.where(np.isnan(values), np.inf, values), axis=0)
+    tightest = [name for name, margin in by_name.items() if (margin <= least).any()][:MOST_MARGINS]
+    for margin in (margin for name, margin in by_name.items() if name not in tightest):
         axes.plot(margin, color="#cccccc", linewidth=0.7, zorder=1)
     for place, name in enumerate(tightest):
-        axes.plot(found[name], label=name, linewidth=1.5, zorder=2, **line_style(place))
+        axes.plot(by_name[name], label=name, linewidth=1.5, zorder=2, **line_style(place))
     axes.axhline(0.0, color="black", linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
     axes.set(xlabel="step", ylabel="margin", xlim=(0, max(len(track) - 1, 1)), ylim=(min(-0.05, *least), 1.05))
     axes.tick_params(labelsize=SMALL)
@@ -210,14 +212,14 @@ def line_style(place: int) -> dict[str, Any]:
 
 
 def shade_steps(axes: Axes, marked: Mask) -> None:
-    """A grey band behind every run of marked steps."""
+    """Draw a grey band behind every run of marked steps."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
     for start, stop in edges.reshape(-1, 2):
         axes.axvspan(start - 0.5, stop - 0.5, color=SHADE, linewidth=0, zorder=0)
 
 
 def common_keys() -> list[Artist]:
-    """What the legend explains once for all panels."""
+    """The entries of the legend that all panels share."""
     from matplotlib.lines import Line2D
 
     return [

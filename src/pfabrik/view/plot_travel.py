@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEIGHT = 0.55
-"""Of a row [inches]."""
+"""Height of a row [inches]."""
 
 MOST_FOR_NAMES = 0.8
 """The largest share of a side that names beyond its bars may take."""
 
 LETTERS = 16
-"""Of a line of names, about."""
+"""Approximate length of a line of names."""
 
 BESIDE = 4.0
-"""How far beyond a bar that begins [points]."""
+"""Distance of these lines from the end of a bar [points]."""
 
 STUB = 0.25
 """Length of a bar without end, as a share of the longest one that has one."""
@@ -50,7 +50,7 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
 
     Returns
     -------
-    dict : axes by what they show: "along" [length], and "about" [deg]; those that were asked for.
+    dict : axes by what they show: "along" [length] and "about" [deg], if there are such directions.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
 
 
 def _rows(reaches: Sequence[Reach]) -> list[list[Reach]]:
-    """Reaches in rows: one for each direction, with its opposite where that was asked for too."""
+    """Reaches in rows: one for each direction, with its opposite if that is one of them too."""
     rows: list[list[Reach]] = []
     for reach in reaches:
         for row in rows:
@@ -92,7 +92,7 @@ def _rows(reaches: Sequence[Reach]) -> list[list[Reach]]:
 
 
 def _draw(axes: Axes, kind: str, rows: list[list[Reach]], unit: str) -> float:
-    """One panel: a row a direction, first the way it points, to the right; the length of its longest bar."""
+    """Draw one panel, a row for each direction, its own side to the right; returns the length of the longest bar."""
     from matplotlib.ticker import MaxNLocator
 
     ends = [_shown(each, unit) for row in rows for each in row if np.isfinite(each.distance)]
@@ -113,7 +113,7 @@ def _draw(axes: Axes, kind: str, rows: list[list[Reach]], unit: str) -> float:
 
 
 def _make_room(axes: Axes, longest: float) -> None:
-    """Widen a panel until what is written beyond the bars is within it."""
+    """Widen a panel until the text beyond the bars is within it."""
     left = axes.get_xlim()[0]
     width = axes.get_window_extent().width
     widest = max(text.get_window_extent().width for text in axes.texts) + BESIDE * axes.figure.dpi / 72.0
@@ -123,27 +123,27 @@ def _make_room(axes: Axes, longest: float) -> None:
 
 
 def _bar(axes: Axes, reach: Reach, side: float, height: int, longest: float, unit: str) -> None:
-    """One way as far as it goes, and what stops it, on two lines at its end."""
-    bounded = np.isfinite(reach.distance)
-    length = _shown(reach, unit) if bounded else STUB * longest
-    colour = PLATFORM if bounded else "none"
+    """Draw one reach as a bar, with the limit that stops it on two lines at its end."""
+    is_bounded = np.isfinite(reach.distance)
+    length = _shown(reach, unit) if is_bounded else STUB * longest
+    colour = PLATFORM if is_bounded else "none"
     axes.barh(
-        height, side * length, 0.5, color=colour, edgecolor=EDGE, linewidth=0.8, linestyle="-" if bounded else "--"
+        height, side * length, 0.5, color=colour, edgecolor=EDGE, linewidth=0.8, linestyle="-" if is_bounded else "--"
     )
-    told = [f"{length:.4g}", *_stop(reach)] if bounded else ["unlimited"]
+    lines = [f"{length:.4g}", *_stop(reach)] if is_bounded else ["unlimited"]
     align = "left" if side > 0.0 else "right"
     offset = (BESIDE * side, 0.0)
     style: dict[str, Any] = {"ha": align, "va": "center", "fontsize": SMALL - 1.0, "color": LINK}
-    axes.annotate("\n".join(told), (side * length, height), offset, textcoords="offset points", **style)
+    axes.annotate("\n".join(lines), (side * length, height), offset, textcoords="offset points", **style)
 
 
 def _stop(reach: Reach) -> list[str]:
-    """The limits that stop a way, those beyond the second as how many there are."""
+    """The limits that stop a reach; those beyond the second are counted."""
     if not reach.stopped_by:
         return wrap(reach.why, LETTERS)
-    first = short_names(reach.stopped_by[:2])
-    more = len(reach.stopped_by) - 2
-    return wrap(f"{first}; {more} more" if more > 0 else first, LETTERS)
+    named = short_names(reach.stopped_by[:2])
+    n_more = len(reach.stopped_by) - 2
+    return wrap(f"{named}; {n_more} more" if n_more > 0 else named, LETTERS)
 
 
 def _shown(reach: Reach, unit: str) -> float:

@@ -21,7 +21,7 @@ WITHOUT_DATES: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
-"""So that the same picture is the same file."""
+"""Metadata without dates, so that equal pictures are equal files."""
 
 ROOM = 0.05
 """Free edge around what is drawn [inches]."""
@@ -32,7 +32,7 @@ def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = 
 
     Parameters
     ----------
-    tight : whether its edges are where the drawing ends; else where the figure does.
+    tight : True to crop the picture to the drawing; else it is as large as the figure.
     """
     from matplotlib import rc_context
 

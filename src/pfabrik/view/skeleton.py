@@ -1,4 +1,4 @@
-"""What is drawn of a mechanism, whatever draws it: bodies, joints, rails and the reference point, as plain points."""
+"""The drawing of a mechanism as plain points, for pictures and the viewer: bodies, joints, rails, reference point."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..errors import InvalidArgument
 Role: TypeAlias = Literal["base", "platform", "link"]
 
 SAME_ANGLE = 6
-"""Digits of an angle [rad] about a body's middle: corners in line with it keep the order of the description."""
+"""Digits to which angles about a body's middle count [rad]: equal ones keep the order of the description."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Skeleton:
 
     @property
     def is_held(self) -> bool:
-        """Whether a limit holds it back."""
+        """True if a limit is active."""
         return any(mark.held_by for mark in self.marks)
 
     @property
@@ -72,7 +72,7 @@ class Skeleton:
 
 
 def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
-    """What is drawn of a mechanism at home, or of one answer.
+    """The skeleton of a mechanism at home, or of one answer.
 
     A prismatic joint without a centre is drawn at its carriage, or between its neighbours; one on the base has a rail.
 
@@ -87,7 +87,7 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
     held: dict[str, list[str]] = {}
     for limit in () if solution is None else solution._limits[0]:
         held.setdefault(limit.joint, []).append(limit.bound)
-    carriers = [places[name] for name in joints_on(mechanism, mechanism.end_effector)]
+    ends = [places[name] for name in joints_on(mechanism, mechanism.end_effector)]
     return Skeleton(
         mechanism,
         tuple(
@@ -97,7 +97,7 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
         tuple(Mark(joint, places[joint.name], tuple(held.get(joint.name, ()))) for joint in mechanism.joints),
         np.reshape(list(rails.values()), (-1, 2, 3)),
         np.array(reference),
-        None if mechanism.end_effector_is_joint else np.array([middle(carriers), reference]),
+        None if mechanism.end_effector_is_joint else np.array([middle(ends), reference]),
     )
 
 

@@ -1,1 +1,1 @@
-"""How big a workspace is, what bounds it, and where it is singular."""
+"""Workspaces: their size, the limits that bound them, and their singularities."""

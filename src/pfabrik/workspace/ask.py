@@ -1,4 +1,4 @@
-"""The question how big a workspace is."""
+"""`workspace`: checks its arguments, and searches for the border."""
 
 from __future__ import annotations
 
@@ -45,30 +45,30 @@ def workspace(
     executor: Executor | None = None,
     on_progress: OnProgress | None = None,
 ) -> Workspace:
-    """Where the end effector can go, in one working mode: how far, how much, and what stops it.
+    """The workspace of one working mode: its size, its ends, and the limits that form its border.
 
-    By default over the positions at home's orientation. What `fixed` holds is taken out: with "z" it is a slice, with
-    "x", "y" and "z" the orientations at that position. A machine that has one position or none is looked at over its
-    rotations too; one that a universal joint carries, over the two angles of this joint.
+    By default it spans the positions at home's orientation. With "z" in `fixed` it is a slice, with "x", "y" and "z" it
+    spans the orientations at that position. For a machine with at most one translation it spans rotations too; for one
+    whose end effector a universal joint carries, the two angles of this joint.
 
     Parameters
     ----------
-    over : two or three coordinates to look over, of "x", "y", "z" (of the reference point, in the base frame) and
+    over : two or three coordinates, of "x", "y", "z" (of the reference point, in the base frame) and
         "tilt_x", "tilt_y", "yaw": R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held.
-    fixed : values of other coordinates [length or rad]; what is neither is as at the start.
+    fixed : values of other coordinates [length or rad]; those in neither are as at the start.
     orientation : R_0, a matrix (3, 3) or a SciPy Rotation, by default the start's; or "any": positions that are reached
         with some orientation or other (the reachable workspace), without a start in any working mode.
     tilt : the largest angle by which the platform must be able to lean to every side [rad]: only positions count where
         it can ("total" workspace up to a tilt).
-    within : coordinate -> (least, greatest), where to look; default: as far as anything is within reach.
+    within : coordinate -> (least, greatest), the range searched; default: as far as anything is within reach.
     resolution : size of the smallest cells, at the border [length; rad where all coordinates are angles]; angles beside
         lengths: that divided by L. Default: L/100 or 0.01 rad, L/50 with a tilt, L/25 where no closed
         forms answer; halved where a workspace would be smaller than 24 cells.
-    start : a single Solution or joint vector q: whose working mode is meant, and what hangs together with it is
+    start : a single Solution or joint vector q, which sets the working mode; the component that contains it is
         `at_start`; default home.
-    executor : of `concurrent.futures`, or one like it: where points are measured; default: here, on all cores. Where no
-        closed forms answer, points are explored here, each from one that is within reach, and what is apart from
-        these is found where some of 96 points that are spread over each look at the rest are within it.
+    executor : of `concurrent.futures`, or one like it, that measures points; default: here, on all cores. Without
+        closed forms, points are explored here, each from one within reach; a separate component is found if one of 96
+        samples, spread over the points not yet reached, is within it.
     on_progress : called with (points done, points in all, about); default: a bar on a terminal, if it takes more than
         two seconds.
 
@@ -91,21 +91,21 @@ def workspace(
     hold: Literal["orientation", "position"] = "position" if is_any else "orientation"
     question = MapQuestion(space, begin, _turns(space, tilt), hold, *_ends(space, within))
     with telling("workspace", on_progress) as tell:
-        return _found(question, resolution, executor, tell)
+        return _refined_workspace(question, resolution, executor, tell)
 
 
-def _found(
+def _refined_workspace(
     question: MapQuestion, resolution: float | None, executor: Executor | None, tell: OnProgress | None
 ) -> Workspace:
-    """At the resolution asked for; else at the default one, or finer, until enough cells go across."""
+    """The workspace at a resolution; by default one that is refined until enough cells span its shortest side."""
     step = step_of(question, resolution)
     for _ in range(MOST_HALVINGS):
-        found = Workspace(question, step, *searched(question, step, Measure(question, executor, tell)))
-        cells = np.ptp(found.bounds, axis=0) / step if len(found.faces) else np.inf
+        space = Workspace(question, step, *searched(question, step, Measure(question, executor, tell)))
+        cells = np.ptp(space.bounds, axis=0) / step if len(space.faces) else np.inf
         if resolution is not None or np.min(cells) >= FEWEST_CELLS:
             break
         step = 0.5 * step
-    return found
+    return space
 
 
 def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:
@@ -121,7 +121,7 @@ def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:
 
 
 def _turns(space: Space, tilt: float | None) -> Floats:
-    """Rotations (k, 3, 3) that all are asked of each pose."""
+    """Rotations (k, 3, 3) by all of which each pose must be within reach."""
     if tilt is None:
         return np.eye(3)[None]
     if isinstance(tilt, bool) or not isinstance(tilt, int | float | np.number) or not 0.0 <= tilt <= math.pi:
@@ -138,7 +138,7 @@ def _require_turning(space: Space, argument: str, kind: Literal["rotation", "til
 
 
 def _ends(space: Space, within: Mapping[str, tuple[float, float]] | None) -> tuple[Floats, Floats]:
-    """Where the map ends, (d,) each: half a turn either way for angles, if not said otherwise."""
+    """The ends of the map, (d,) each; by default half a turn either way for angles, infinite for lengths."""
     half_turn = np.where(space.is_angle, math.pi, np.inf)
     lowest, highest = -half_turn, half_turn
     for name, ends in require_mapping("within", within, "ends by coordinate, such as {'z': (100, 200)}").items():

@@ -20,17 +20,17 @@ from .surface import BorderMesh, mesh_of
 from .verdicts import MapQuestion
 
 FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
-"""Resolutions [L or rad]: where closed forms tell margins; where they do for each of many tilts; elsewhere."""
+"""Resolutions [L or rad]: where closed forms give margins; where they do for each of many tilts; elsewhere."""
 
 FIRST_CELLS = {(2, True): 1 / 48, (3, True): 1 / 12, (2, False): 1 / 12, (3, False): 1 / 5}
-"""How wide the first cells are [L or rad], by coordinates, and whether closed forms tell margins."""
+"""Width of the first cells [L or rad], by the number of coordinates and by whether closed forms give margins."""
 
 FIRST_REACH = {True: 2.5, False: 1.5}
-"""How far the first look goes to each side [L or rad], likewise."""
+"""Extent of the first grid to each side [L or rad], by whether closed forms give margins."""
 
 
 def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[BorderMesh, BorderMesh, Parts]:
-    """The border at cells of size `step`, (d,), the same at cells twice as large, and the parts that hang together."""
+    """The border at cells of size `step`, (d,), the border at cells twice as large, and the connected parts."""
     space, exact = question.space, question.has_margins
     lattice = Lattice(space.start, step, measure)
     unit = np.where(space.is_angle, 1.0, question.mechanism.characteristic_length)
@@ -59,10 +59,12 @@ def step_of(question: MapQuestion, resolution: float | None) -> Floats:
 def sliced(
     question: MapQuestion, fixed: Mapping[str, float], resolution: Floats | float
 ) -> tuple[MapQuestion, Floats, BorderMesh, BorderMesh, Parts]:
-    """A question with further coordinates fixed, the size of the smallest cells, and what was found."""
+    """A question with further coordinates fixed, the size of the smallest cells, and the result of `searched`."""
     space = question.space.with_fixed(fixed)
     kept = [question.space.names.index(name) for name in space.names]
-    asked = dataclasses.replace(question, space=space, lowest=question.lowest[kept], highest=question.highest[kept])
-    step = resolution[kept] if isinstance(resolution, np.ndarray) else step_of(asked, resolution)
+    slice_question = dataclasses.replace(
+        question, space=space, lowest=question.lowest[kept], highest=question.highest[kept]
+    )
+    step = resolution[kept] if isinstance(resolution, np.ndarray) else step_of(slice_question, resolution)
     with telling("slice") as tell:
-        return asked, step, *searched(asked, step, Measure(asked, None, tell))
+        return slice_question, step, *searched(slice_question, step, Measure(slice_question, None, tell))

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 Kind = Literal["sphere", "box", "cylinder"]
 
 NEAREST_FACES, POINTS_A_SIDE = 400, 12
-"""Faces that are looked at closely, those nearest to the shape, and points along each of their sides."""
+"""Number of faces nearest to the shape that are sampled, and points along each of their sides."""
 
 SAMPLES = 4096
 """Points on the shape that must be within the workspace."""
 
 GIVES, MOST_GIVES = 0.998, 50
-"""By how much the shape shrinks where one of them is not, and how often at most."""
+"""Factor by which the shape shrinks if one of them is not, and the largest number of times."""
 
 FIRST_GRID, LOOKED_AT, MOST_STEPS = 13, 4, 60
 """A search for the best centre: points on each axis that it begins with, the best of them that it goes on from."""
@@ -35,13 +35,13 @@ MOST_VERTICES = 20_000
 
 @dataclass(frozen=True)
 class Inscribed:
-    """A shape all of which is within reach.
+    """A shape that lies within reach.
 
     Attributes
     ----------
     kind : "sphere" (in a plane: a circle), "box" or "cylinder".
     centre : (d,) [length or rad].
-    extents : how long it is along each coordinate, (d,): the sides of a box, diameters, and a cylinder's height last.
+    extents : length along each coordinate, (d,): the sides of a box, diameters, and a cylinder's height last.
     """
 
     kind: Kind
@@ -55,17 +55,17 @@ class Inscribed:
         return float(share[self.kind] * np.prod(self.extents))
 
 
-def inscribed(found: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:
+def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:
     """The largest shape of a kind about a centre, or anywhere."""
-    extents = _extents(found, kind, proportions)
-    vertices = found.vertices[np.unique(found.faces)]
+    extents = _extents(region, kind, proportions)
+    vertices = region.vertices[np.unique(region.faces)]
     if not len(vertices):
         raise InvalidArgument("workspace", "nothing within reach", "a workspace that a shape fits into")
-    middle = _best_centre(found, kind, extents, vertices) if centre is None else _checked_centre(found, centre)
-    scale = _distance_to_faces(found, kind, extents, middle)
+    middle = _best_centre(region, kind, extents, vertices) if centre is None else _checked_centre(region, centre)
+    scale = _distance_to_faces(region, kind, extents, middle)
     shell = _shell(kind, extents)
     for _ in range(MOST_GIVES):
-        if np.all(found.contains(middle + scale * shell)):
+        if np.all(region.contains(middle + scale * shell)):
             return Inscribed(kind, middle, scale * extents)
         scale *= GIVES
     raise InvalidArgument(
@@ -73,20 +73,20 @@ def inscribed(found: Region, kind: Kind, centre: ArrayLike | None, proportions: 
     )
 
 
-def _extents(found: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
-    """The shape of size one: how long it is along each coordinate, (d,)."""
-    d = len(found.names)
+def _extents(region: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
+    """The lengths along each coordinate of the shape of size one, (d,)."""
+    d = len(region.names)
     if not isinstance(kind, str) or kind not in get_args(Kind):
         raise UnknownName("shape", kind, get_args(Kind))
     if kind == "cylinder" and d != 3:
         raise InvalidArgument("kind", "'cylinder'", "a sphere or a box: the workspace lies in a plane")
-    alike = len(set(found.units[:2] if kind == "cylinder" else found.units)) == 1
+    alike = len(set(region.units[:2] if kind == "cylinder" else region.units)) == 1
     if kind != "box" and not alike:
         raise InvalidArgument(
-            "kind", f"'{kind}'", f"a box: the coordinates {', '.join(found.names)} differ in their units"
+            "kind", f"'{kind}'", f"a box: the coordinates {', '.join(region.names)} differ in their units"
         )
     if proportions is None:
-        return np.ones(d) if len(set(found.units)) == 1 else np.ptp(found.bounds, axis=0)
+        return np.ones(d) if len(set(region.units)) == 1 else np.ptp(region.bounds, axis=0)
     n = {"sphere": 0, "box": d, "cylinder": 2}[kind]
     expected = f"{n} positive numbers" if n else "None: a sphere has but one"
     given = as_floats("proportions", proportions, expected)
@@ -95,16 +95,16 @@ def _extents(found: Region, kind: Kind, proportions: ArrayLike | None) -> Floats
     return given[[0, 0, 1]] if kind == "cylinder" else given
 
 
-def _checked_centre(found: Region, centre: ArrayLike) -> Floats:
-    expected = f"a point of shape ({len(found.names)},) within reach: {', '.join(found.names)}"
+def _checked_centre(region: Region, centre: ArrayLike) -> Floats:
+    expected = f"a point of shape ({len(region.names)},) within reach: {', '.join(region.names)}"
     point = as_floats("centre", centre, expected)
-    if point.shape != (len(found.names),) or not np.isfinite(point).all() or not found.contains(point):
+    if point.shape != (len(region.names),) or not np.isfinite(point).all() or not region.contains(point):
         raise InvalidArgument("centre", f"{np.asarray(centre).tolist()}", expected)
     return point
 
 
 def _scales(kind: Kind, extents: Floats, away: Floats) -> Floats:
-    """How large the shape is whose surface goes through points (..., d) seen from its centre."""
+    """The sizes of shapes whose surfaces pass through points (..., d), measured from the centre."""
     shares = 2.0 * np.abs(away) / extents
     if kind == "box":
         return np.asarray(shares.max(axis=-1))
@@ -113,9 +113,9 @@ def _scales(kind: Kind, extents: Floats, away: Floats) -> Floats:
     return np.maximum(np.hypot(shares[..., 0], shares[..., 1]), shares[..., 2])
 
 
-def _distance_to_faces(found: Region, kind: Kind, extents: Floats, centre: Floats) -> float:
-    """The size at which the shape meets the mesh: its nearest faces are looked at closely."""
-    corners = found.vertices[found.faces]
+def _distance_to_faces(region: Region, kind: Kind, extents: Floats, centre: Floats) -> float:
+    """The size at which the shape touches the mesh, from samples of the nearest faces."""
+    corners = region.vertices[region.faces]
     nearest = _scales(kind, extents, corners - centre).min(axis=1)
     chosen = np.argsort(nearest)[:NEAREST_FACES]
     d = corners.shape[1]
@@ -145,33 +145,33 @@ def _shell(kind: Kind, extents: Floats) -> Floats:
     return directions / _scales(kind, extents, directions)[:, None]
 
 
-def _best_centre(found: Region, kind: Kind, extents: Floats, vertices: Floats) -> Floats:
-    """Where the shape can be largest, as far as a search from the best points of a grid finds."""
+def _best_centre(region: Region, kind: Kind, extents: Floats, vertices: Floats) -> Floats:
+    """The centre of the largest shape that a search from the best points of a grid finds."""
     vertices = vertices[:: max(1, len(vertices) // MOST_VERTICES)]
-    low, high = found.bounds
+    low, high = region.bounds
     axes = [np.linspace(a, b, FIRST_GRID + 2)[1:-1] for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(low))
-    inside = grid[np.asarray(found.contains(grid))]
+    inside = grid[np.asarray(region.contains(grid))]
 
     def size(centre: Floats) -> float:
         return float(_scales(kind, extents, vertices - centre).min())
 
-    begins = inside if len(inside) else found._question.space.start[None]
+    begins = inside if len(inside) else region._question.space.start[None]
     best = sorted(begins, key=size, reverse=True)[:LOOKED_AT]
-    return max((_climbed(size, found, centre, (high - low) / FIRST_GRID) for centre in best), key=size)
+    return max((_climbed(size, region, centre, (high - low) / FIRST_GRID) for centre in best), key=size)
 
 
-def _climbed(size: Any, found: Region, centre: Floats, steps: Floats) -> Floats:
-    """From a centre to better ones, a step along a coordinate at a time; steps halve where none is better."""
+def _climbed(size: Any, region: Region, centre: Floats, steps: Floats) -> Floats:
+    """Improve a centre by steps along one coordinate at a time; steps are halved if none is better."""
     best = size(centre)
     for _ in range(MOST_STEPS):
         tried = [centre + sign * way for way in np.diag(steps) for sign in (1.0, -1.0)]
         sizes = [size(each) for each in tried]
         place = int(np.argmax(sizes))
-        if sizes[place] > best and found.contains(tried[place]):
+        if sizes[place] > best and region.contains(tried[place]):
             centre, best = tried[place], sizes[place]
         else:
             steps = 0.5 * steps
-        if (steps < 0.1 * found.resolution).all():
+        if (steps < 0.1 * region.resolution).all():
             break
     return centre

@@ -12,7 +12,7 @@ from ..arrays import Floats, Ints
 from ..rotations import from_rotvec
 
 AZIMUTHS, RING = 24, math.radians(6.0)
-"""Tilts to every side are asked for in so many directions, and in steps no larger than this [rad]."""
+"""Number of directions of tilts to every side, and the largest step between tilts [rad]."""
 
 Verdict: TypeAlias = Callable[[Floats], tuple[Floats, Ints]]
 """From poses (n, 4, 4) to margins and bindings (n,)."""
@@ -30,15 +30,15 @@ def tilts_up_to(angle: float) -> Floats:
 
 
 def least_of_all(turns: Floats, poses: Floats, verdict: Verdict) -> tuple[Floats, Ints]:
-    """The least margin over all turns, and its binding, of poses (n, 4, 4); those beyond one are asked for no other."""
+    """The least margin over all turns, and its binding, of poses (n, 4, 4); the first negative margin is final."""
     if len(turns) == 1:
         return verdict(turned(turns[0], poses))
     margins, bindings = np.full(len(poses), np.inf), np.full(len(poses), -1)
     for turn in turns:
         rows = np.flatnonzero(margins >= 0.0)
-        own, binding = verdict(turned(turn, poses[rows]))
-        worse = own < margins[rows]
-        margins[rows[worse]], bindings[rows[worse]] = own[worse], binding[worse]
+        margin, binding = verdict(turned(turn, poses[rows]))
+        worse = margin < margins[rows]
+        margins[rows[worse]], bindings[rows[worse]] = margin[worse], binding[worse]
     return margins, bindings
 
 

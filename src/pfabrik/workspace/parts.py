@@ -1,4 +1,4 @@
-"""Which parts of a workspace hang together, and which of them a point is in."""
+"""The connected parts of a workspace, and the part that a point is in."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from .sampled_lattice import Lattice, codes, corners
 
 
 class Parts:
-    """Lattice points within reach, each labelled with the part it is in; looked for when first asked about."""
+    """Lattice points within reach, each labelled with its part; computed at first use."""
 
-    def __init__(self, lattice: Lattice, found: Refined) -> None:
+    def __init__(self, lattice: Lattice, cells: Refined) -> None:
         self._origin, self._step, self._points = lattice.origin, lattice.step, lattice.points
-        self._cells = sorted((*found.within, found.border), key=lambda each: each.width)
+        self._cells = sorted((*cells.within, cells.border), key=lambda each: each.width)
 
     @cached_property
     def labels(self) -> Ints:
-        """The parts of lattice points by their numbers, (n,), 0 the one met first; -1 for those not within reach."""
+        """The parts of lattice points by their numbers, (n,), 0 for the part met first; -1 for points out of reach."""
         d, n = len(self._step), len(self._points)
         roots = connected(n, np.concatenate([_links(each, d) for each in self._cells]))
         within = np.zeros(n, bool)
@@ -34,7 +34,7 @@ class Parts:
 
     @property
     def count(self) -> int:
-        """How many parts there are."""
+        """Number of parts."""
         return int(self.labels.max(initial=-1)) + 1
 
     @cached_property
@@ -48,34 +48,34 @@ class Parts:
     def of(self, points: Floats) -> Ints:
         """The parts of points (n, d), (n,): of the nearest corner within reach of the cell each is in; -1 if none."""
         d, places = len(self._step), (points - self._origin) / self._step
-        found = np.full(len(points), -1)
+        parts = np.full(len(points), -1)
         for cells, known in zip(self._cells, self._known, strict=True):
             width = cells.width
-            rows = np.flatnonzero(found < 0)
+            rows = np.flatnonzero(parts < 0)
             low = np.floor(places[rows] / width).astype(np.int64) * width
-            hit = known.find(codes(low)) >= 0
-            rows, low = rows[hit], low[hit]
+            is_known = known.find(codes(low)) >= 0
+            rows, low = rows[is_known], low[is_known]
             around = low[:, None] + width * corners(d)
             labels = self.labels[self._points.find(codes(around))]
             far = np.linalg.norm((around - places[rows, None]) * self._step, axis=2)
             nearest = np.where(labels >= 0, far, np.inf).argmin(axis=1)
-            found[rows] = labels[np.arange(len(rows)), nearest]
-        return found
+            parts[rows] = labels[np.arange(len(rows)), nearest]
+        return parts
 
 
 def _links(cells: Cells, d: int) -> Ints:
     """Pairs (n, 2) of numbers of corners within, along the edges of cells."""
     inside = cells.margins >= 0.0
-    found = [np.zeros((0, 2), np.int64)]
+    pairs = [np.zeros((0, 2), np.int64)]
     for a in range(2**d):
         for b in (a | 1 << axis for axis in range(d) if not a >> axis & 1):
-            both = inside[:, a] & inside[:, b]
-            found.append(cells.corners[both][:, (a, b)])
-    return np.concatenate(found)
+            is_link = inside[:, a] & inside[:, b]
+            pairs.append(cells.corners[is_link][:, (a, b)])
+    return np.concatenate(pairs)
 
 
 def connected(n: int, pairs: Ints) -> Ints:
-    """For each of n nodes joined in pairs (m, 2), the lowest node that it hangs together with, (n,)."""
+    """For each of n nodes joined in pairs (m, 2), the lowest node that it is connected with, (n,)."""
     from ..kernels.lattice import join
 
     lowest = np.arange(n)

@@ -23,28 +23,28 @@ MOST_FACES = 40_000
 
 LIGHT = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
 DARKEST = 0.55
-"""How bright faces are that look away from the light."""
+"""Brightness of faces that point away from the light."""
 
 WITHIN = "#eef3f7"
-"""What is within reach, in a plane."""
+"""Colour of the area within reach, in a plane."""
 
 SHORTEST_NAMED = 0.08
-"""Share of the picture's diagonal that a stretch of a border is long before its limit is written beside it."""
+"""Shortest stretch of a border that its limit is written beside, as a share of the picture's diagonal."""
 
 OFF, SIDEWAYS = 5.0, 0.2
-"""How far from the border its name is [points], and from which share of a direction on it stands to that side."""
+"""Distance of a name from the border [points]; component of a direction from which on it stands to that side."""
 
 Strings: TypeAlias = NDArray[np.str_]
 
 
-def plot(found: Region, ax: Axes | None = None) -> Axes:
+def plot(region: Region, ax: Axes | None = None) -> Axes:
     """Draw a workspace on matplotlib axes, or on those of a new figure, which is `ax.figure`."""
-    d = len(found.names)
+    d = len(region.names)
     axes = axes_for(ax, d)
     from matplotlib.lines import Line2D
 
-    groups = groups_of(found)
-    (_draw_solid if d == 3 else _draw_plane)(axes, found, groups)
+    groups = groups_of(region)
+    (_draw_solid if d == 3 else _draw_plane)(axes, region, groups)
     handles = [Line2D([], [], color=colour, linewidth=4, label=label) for label, colour, *_ in groups]
     if handles:
         anchor = (1.12 if d == 3 else 1.02, 0.5)
@@ -57,27 +57,27 @@ def plot(found: Region, ax: Axes | None = None) -> Axes:
             title_fontsize=SMALL,
         )
         legend.set_title("border formed by")
-    axes.set_title(f"{found.mechanism.name}: {in_words(found)}", fontsize=SMALL + 1)
+    axes.set_title(f"{region.mechanism.name}: {in_words(region)}", fontsize=SMALL + 1)
     return axes
 
 
-def _face_colours(found: Region, groups: list[Group]) -> Strings:
-    colours = np.full(len(found.limits), REST)
+def _face_colours(region: Region, groups: list[Group]) -> Strings:
+    colours = np.full(len(region.limits), REST)
     for group in groups:
         colours[group.limits] = group.colour
     return colours
 
 
-def _draw_plane(axes: Any, found: Region, groups: list[Group]) -> None:
+def _draw_plane(axes: Any, region: Region, groups: list[Group]) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    points = shown(found, found.vertices)
-    segments = points[found.faces]
-    loops = _loops(found.faces)
+    points = shown(region, region.vertices)
+    segments = points[region.faces]
+    loops = _loops(region.faces)
     for loop in loops:
-        _name_stretches(axes, found, points, loop)
+        _name_stretches(axes, region, points, loop)
     if loops:
         ends = [np.vstack([points[loop], points[loop[:1]]]) for loop in loops]
         codes = [[Path.MOVETO, *[Path.LINETO] * (len(end) - 2), Path.CLOSEPOLY] for end in ends]
@@ -85,21 +85,21 @@ def _draw_plane(axes: Any, found: Region, groups: list[Group]) -> None:
     axes.add_collection(
         LineCollection(
             list(segments),
-            colors=_face_colours(found, groups)[found.face_limit].tolist(),
+            colors=_face_colours(region, groups)[region.face_limit].tolist(),
             linewidths=1.8,
             capstyle="round",
         )
     )
-    axes.set(**dict(zip(("xlabel", "ylabel"), labels(found), strict=True)))
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
     axes.autoscale_view()
     axes.margins(0.1)  # for the names beside the border
-    if len(set(found.units)) == 1:
+    if len(set(region.units)) == 1:
         axes.set_aspect("equal")
 
 
-def _name_stretches(axes: Any, found: Region, points: Floats, loop: list[int]) -> None:
+def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int]) -> None:
     """Write the limit that forms each stretch of a border beside its middle, outside; short stretches have no room."""
-    limit_of = dict(zip(map(tuple, found.faces.tolist()), found.face_limit.tolist(), strict=True))
+    limit_of = dict(zip(map(tuple, region.faces.tolist()), region.face_limit.tolist(), strict=True))
     limits = np.array([limit_of[pair] for pair in zip(loop, [*loop[1:], loop[0]], strict=True)])
     changes = np.flatnonzero(limits != np.roll(limits, 1))
     first = int(changes[0]) if len(changes) else 0
@@ -113,7 +113,7 @@ def _name_stretches(axes: Any, found: Region, points: Floats, loop: list[int]) -
         middle = stretch[int(np.searchsorted(along, 0.5 * along[-1]))]
         outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(lengths[middle], 1e-300)
         axes.annotate(
-            " ".join(found.limits[limits[middle]]).strip(),
+            " ".join(region.limits[limits[middle]]).strip(),
             corners[middle] + 0.5 * steps[middle],
             xytext=OFF * outward,
             textcoords="offset points",
@@ -123,35 +123,37 @@ def _name_stretches(axes: Any, found: Region, points: Floats, loop: list[int]) -
         )
 
 
-def _draw_solid(axes: Any, found: Region, groups: list[Group]) -> None:
+def _draw_solid(axes: Any, region: Region, groups: list[Group]) -> None:
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    vertices, faces, limits = _thinned(shown(found, found.vertices), found.faces, found.face_limit)
+    vertices, faces, limits = _thinned(shown(region, region.vertices), region.faces, region.face_limit)
     spans = np.ptp(vertices, axis=0) if len(vertices) else np.ones(3)
-    box = spans if len(set(found.units)) == 1 else np.ones(3)
+    box = spans if len(set(region.units)) == 1 else np.ones(3)
     corners = vertices[faces]
     scaled = corners / spans * box
     normals = _smooth(np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0]), faces, len(vertices))
     bright = DARKEST + (1.0 - DARKEST) * 0.5 * (1.0 + normals @ LIGHT)
-    palette = np.array([to_rgb(colour) for colour in _face_colours(found, groups).tolist()])
+    palette = np.array([to_rgb(colour) for colour in _face_colours(region, groups).tolist()])
     colours = palette[limits] * bright[:, None]
     axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.2))
     if len(vertices):
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(tuple(box / box.max()), zoom=0.86)
-    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(found), strict=True)))
+    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(region), strict=True)))
     axes.locator_params(nbins=5)
 
 
-def shown(found: Region, points: Floats) -> Floats:
+def shown(region: Region, points: Floats) -> Floats:
     """Coordinates as people read them: angles in degrees."""
-    return points * np.where([unit == "rad" for unit in found.units], 180.0 / np.pi, 1.0)
+    return points * np.where([unit == "rad" for unit in region.units], 180.0 / np.pi, 1.0)
 
 
-def labels(found: Region) -> list[str]:
-    return [f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(found.names, found.units, strict=True)]
+def labels(region: Region) -> list[str]:
+    return [
+        f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(region.names, region.units, strict=True)
+    ]
 
 
 def _smooth(normals: Floats, faces: Ints, n: int) -> Floats:
@@ -165,7 +167,7 @@ def _smooth(normals: Floats, faces: Ints, n: int) -> Floats:
 
 
 def _loops(segments: Ints) -> list[list[int]]:
-    """Closed ways along segments (f, 2), each by the places it leads over."""
+    """Closed loops of segments (f, 2), each as the places that it passes."""
     following: dict[int, list[int]] = {}
     for start, end in segments.tolist():
         following.setdefault(start, []).append(end)

@@ -1,4 +1,4 @@
-"""From a coarse look at everything to small cells at the border: cells are divided where the border may be."""
+"""Refines a coarse grid towards the border: cells are divided where the border may be."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
 from .numbering import Numbering
-from .sampled_lattice import MIDDLE, Lattice, codes, corners, ways
+from .sampled_lattice import MIDDLE, Lattice, codes, corners, offsets
 
 GROWS = 0.5
-"""By which share of its size a box grows to the side where something touches it."""
+"""Share of its size by which a box grows to a side that the workspace touches."""
 
 HORIZON = 24
-"""How many times as far as the first look went one may go before a workspace counts as endless."""
+"""Factor by which the grid may exceed its first extent before a workspace counts as unbounded."""
 
 MORE = 16
-"""How many times as many points as the first look has another may have where the first found nothing."""
+"""Factor by which a finer grid may have more points than the first, if that found nothing within reach."""
 
 SPREAD = 0.5
-"""Share of the difference of margins at a cell's corners below which the least says that the border may be within."""
+"""Share of the spread of margins at a cell's corners below which the smallest suggests a border within the cell."""
 
 THIN = 4
-"""Steps of the smallest cells that are looked at for a border that shows at no corner."""
+"""Width in steps of the smallest cells that are searched for a border that shows at no corner."""
 
 
 class Cells(NamedTuple):
@@ -33,7 +33,7 @@ class Cells(NamedTuple):
     Attributes
     ----------
     codes : of their lowest corners, (n,).
-    width : how many steps they are wide.
+    width : in steps of the lattice.
     corners : numbers of the lattice points at all corners, (n, 2^d).
     margins : the margins there, (n, 2^d).
     """
@@ -45,17 +45,17 @@ class Cells(NamedTuple):
 
     @property
     def touched(self) -> Mask:
-        """Whether any corner of each is within reach."""
+        """Mask of the cells with some corner within reach."""
         return np.asarray((self.margins >= 0.0).any(axis=1))
 
     @property
     def inside(self) -> Mask:
-        """Whether all corners of each are within reach."""
+        """Mask of the cells with all corners within reach."""
         return np.asarray((self.margins >= 0.0).all(axis=1))
 
     @property
     def thin(self) -> Mask:
-        """Whether the border may enter each and leave it between its corners: margins fall towards it fast enough."""
+        """Mask of the cells that the border may enter and leave between corners: margins fall fast enough."""
         if self.width < THIN:
             return np.zeros(len(self.codes), bool)
         with np.errstate(invalid="ignore"):
@@ -81,7 +81,7 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
     Parameters
     ----------
     levels : how often the first cells are halved.
-    reach : how many of the first cells it is looked for to each side of the start, before anything is found.
+    reach : number of the first cells to each side of the start in the first grid.
     """
     cells = _first(lattice, levels, reach)
     within: list[Cells] = []
@@ -102,7 +102,7 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
 
 
 def _first(lattice: Lattice, levels: int, reach: int) -> Cells:
-    """Cells over a box that nothing within reach touches; smaller ones where the first find nothing at all."""
+    """Cells over a box whose faces are out of reach; smaller cells if the first have no corner within reach."""
     most = MORE * (2 * reach + 1) ** lattice.d
     while True:
         cells = _box(lattice, 1 << levels, reach)
@@ -141,37 +141,39 @@ def _refuse_endless(lattice: Lattice, axis: int) -> NoReturn:
 
 
 def _cells(lattice: Lattice, code: Ints, numbers: Ints, width: int) -> Cells:
-    """All cells of a box, of whose points the codes and numbers are given, (n, ...) each."""
+    """All cells of a box, from the codes and numbers of its points, (n, ...) each."""
     sides = (slice(None, -1), slice(1, None))
-    each = [numbers[tuple(sides[side] for side in corner)].ravel() for corner in corners(lattice.d).tolist()]
-    at_corners = np.stack(each, axis=1)
+    numbers_of_corners = [
+        numbers[tuple(sides[side] for side in corner)].ravel() for corner in corners(lattice.d).tolist()
+    ]
+    at_corners = np.stack(numbers_of_corners, axis=1)
     return Cells(code[(sides[0],) * lattice.d].ravel(), width, at_corners, lattice.margins[at_corners])
 
 
 def _divided(lattice: Lattice, cells: Cells) -> Cells:
     """The halves of cells, along each coordinate."""
     d, width = lattice.d, cells.width // 2
-    numbers = lattice.number(cells.codes[:, None] + ways(width * np.indices((3,) * d).reshape(d, -1).T))
+    numbers = lattice.number(cells.codes[:, None] + offsets(width * np.indices((3,) * d).reshape(d, -1).T))
     places = (corners(d)[:, None] + corners(d)) @ 3 ** np.arange(d)[::-1]
     at_corners = numbers[:, places].reshape(-1, 2**d)
-    code = (cells.codes[:, None] + ways(width * corners(d))).ravel()
+    code = (cells.codes[:, None] + offsets(width * corners(d))).ravel()
     return Cells(code, width, at_corners, lattice.margins[at_corners])
 
 
 def _with_neighbours(lattice: Lattice, cells: Cells) -> Cells:
-    """With all cells that the border goes on into: so it has no end but where it began."""
-    d, every, width = lattice.d, corners(lattice.d), cells.width
-    known, latest, found = Numbering(), cells, [cells.corners]
+    """Cells with all cells that the border continues into, so that it is closed."""
+    d, cell_corners, width = lattice.d, corners(lattice.d), cells.width
+    known, latest, numbers_found = Numbering(), cells, [cells.corners]
     known.number(cells.codes)
     while len(latest.codes):
         inside, before = latest.margins >= 0.0, len(known)
-        for axis, way in enumerate(width * ways(np.eye(d, dtype=np.int64))):
+        for axis, offset in enumerate(width * offsets(np.eye(d, dtype=np.int64))):
             for side in (0, 1):
-                face = inside[:, every[:, axis] == side]
-                known.number(latest.codes[face.any(axis=1) & ~face.all(axis=1)] + way * (2 * side - 1))
+                face = inside[:, cell_corners[:, axis] == side]
+                known.number(latest.codes[face.any(axis=1) & ~face.all(axis=1)] + offset * (2 * side - 1))
         new = known.codes[before:]
-        numbers = lattice.number(new[:, None] + ways(width * every))
+        numbers = lattice.number(new[:, None] + offsets(width * cell_corners))
         latest = Cells(new, width, numbers, lattice.margins[numbers])
-        found.append(numbers)
-    at_corners = np.concatenate(found)
+        numbers_found.append(numbers)
+    at_corners = np.concatenate(numbers_found)
     return Cells(known.codes, width, at_corners, lattice.margins[at_corners])

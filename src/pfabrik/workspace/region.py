@@ -1,4 +1,4 @@
-"""What is within reach: a border, what forms it, and the parts that it encloses."""
+"""The region within reach: its border, the limits that form it, and the parts that it encloses."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXPONENTS = {1: "", 2: "²", 3: "³"}
 
 
 class Region:
-    """The fields of a `Workspace`, which says what they are; what draws, writes or fills one reads these."""
+    """The fields of a `Workspace`, which documents them; functions that draw, write or fill a workspace read these."""
 
     def __init__(
         self,
@@ -39,11 +39,11 @@ class Region:
 
     @cached_property
     def face_limit(self) -> Ints:
-        """The limit of most of its vertices."""
-        own = self._mesh.limits[self.faces]
-        found = np.where((own[:, 1:2] == own[:, 2:]).any(axis=1), own[:, 1], own[:, 0])
-        found.setflags(write=False)
-        return found
+        """The limit of most vertices of each face, (f,)."""
+        limits = self._mesh.limits[self.faces]
+        most = np.where((limits[:, 1:2] == limits[:, 2:]).any(axis=1), limits[:, 1], limits[:, 0])
+        most.setflags(write=False)
+        return most
 
     @property
     def size(self) -> float:
@@ -52,23 +52,23 @@ class Region:
 
     @property
     def uncertainty(self) -> float:
-        """By how much `size` differs from that at twice the resolution [`size_unit`]."""
+        """Difference of `size` from the size at twice the resolution [`size_unit`]."""
         return abs(self._mesh.size - self._coarser.size)
 
     @property
     def size_unit(self) -> str:
-        """Such as "mm³", or "rad² mm"."""
+        """Unit of `size`, such as "mm³", or "rad² mm"."""
         counts = {unit: self.units.count(unit) for unit in sorted(set(self.units), reverse=True)}
         return " ".join(unit + EXPONENTS[count] for unit, count in counts.items())
 
     @property
     def volume(self) -> float:
-        """Of three coordinates [`size_unit`]."""
+        """Volume over three coordinates [`size_unit`]."""
         return self._size_of(3, "volume")
 
     @property
     def area(self) -> float:
-        """Of two coordinates [`size_unit`]."""
+        """Area over two coordinates [`size_unit`]."""
         return self._size_of(2, "area")
 
     def _size_of(self, d: int, what: str) -> float:
@@ -96,9 +96,9 @@ class Region:
         return {limit: float(total[limit] / sizes.sum()) for limit in order}
 
     def contains(self, points: ArrayLike) -> bool | Mask:
-        """Whether points (..., d) are within reach [length or rad]: asked anew, not read off the mesh; bools (...).
+        """True where points (..., d) [length or rad] are within reach; solved anew, not read off the mesh; bools (...).
 
-        Of one of several `components`, whether they are within it.
+        For one of several `components`, True where they are within it.
         """
         array = self._points("points", points)
         rows = array.reshape(-1, array.shape[-1])

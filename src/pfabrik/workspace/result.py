@@ -1,4 +1,4 @@
-"""A workspace that was found: its size, its border and what forms it, its parts."""
+"""A workspace: its size, its border and the limits that form it, its components."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 
 class Workspace(Region):
-    """Where a mechanism can go, over two or three coordinates.
+    """The workspace of a mechanism over two or three coordinates.
 
     Attributes
     ----------
     names : of the d coordinates: of "x", "y", "z", "tilt_x", "tilt_y", "yaw", or "pivot[0]", "pivot[1]".
     units : of each coordinate: that of lengths, or "rad".
-    resolution : size of the cells that the border was looked for in, (d,) [length or rad].
+    resolution : size of the cells at the border, (d,) [length or rad].
     vertices : points on the border, just inside, (v, d) [length or rad].
     faces : places of vertices, (f, d): triangles, right-handed as seen from outside; in a plane, segments with the
         inside on their left. They are closed.
@@ -37,18 +37,18 @@ class Workspace(Region):
 
     @cached_property
     def components(self) -> tuple[Workspace, ...]:
-        """The parts that do not hang together, each a workspace of its own: the start's first, then by size."""
+        """The connected components, each a workspace of its own: that of the start first, then by size."""
         if self._part is not None:
             return (self,)
         labels, coarse = (self._parts.labels[mesh.inner] for mesh in (self._mesh, self._coarser))
-        found = []
+        components = []
         for part in range(self._parts.count):
             mesh = self._mesh.among(labels == part)
             if len(mesh.faces):
                 coarser = self._coarser.among(coarse == part)
-                found.append(Workspace(self._question, self.resolution, mesh, coarser, self._parts, part))
+                components.append(Workspace(self._question, self.resolution, mesh, coarser, self._parts, part))
         start = self._start_part
-        return tuple(sorted(found, key=lambda each: (each._part != start, -each.size)))
+        return tuple(sorted(components, key=lambda each: (each._part != start, -each.size)))
 
     @property
     def at_start(self) -> Workspace | None:
@@ -62,7 +62,7 @@ class Workspace(Region):
         return int(self._parts.of(start)[0]) if self._question.measure(start)[0][0] >= 0.0 else -1
 
     def slice(self, fixed: Mapping[str, float], *, resolution: float | None = None) -> Workspace:
-        """The workspace with further coordinates fixed, looked for anew.
+        """The workspace with further coordinates fixed, searched anew.
 
         Parameters
         ----------
@@ -82,7 +82,7 @@ class Workspace(Region):
 
         Parameters
         ----------
-        centre : (d,); default: where the largest has its own, as far as a search finds.
+        centre : (d,); default: that of the largest shape that a search finds.
         proportions : sides of the box, (d,), default all equal; diameter and height of the cylinder, which stands along
             the last coordinate, default equal.
         """

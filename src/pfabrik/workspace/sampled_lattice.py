@@ -22,8 +22,8 @@ def codes(places: Ints) -> Ints:
     return np.asarray(code)
 
 
-def ways(places: Ints) -> Ints:
-    """By how much codes change from one place to another that is `places` (..., d) farther."""
+def offsets(places: Ints) -> Ints:
+    """Differences of codes between places that are `places` (..., d) apart."""
     return codes(places) - codes(np.zeros(places.shape[-1], np.int64))
 
 
@@ -39,7 +39,7 @@ def corners(d: int) -> Ints:
 
 
 class Lattice:
-    """What is known of lattice points: each is measured when it is first asked for.
+    """Lattice points with their margins; each point is measured at its first use.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Where a workspace is singular, and which of its parts no motion joins without passing there; along a path too."""
+"""Singularities of a workspace, and the parts that they separate; singularities along a path."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 POINTS = 20_000
-"""Points that a map has by default, about."""
+"""Approximate number of points of a map by default."""
 
 ROWS_A_BLOCK = 512
 
 LEAST_SHARE = 1e-3
-"""Share of the points below which a part is not counted in words: at the border single points stand alone."""
+"""Share of the points below which a part is not counted in words: single points at the border are such."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,15 +46,15 @@ class SingularityMap:
 
     Attributes
     ----------
-    workspace : the workspace it is of.
+    workspace : the workspace that it covers.
     step : distance of the points along each coordinate, (d,) [length or rad].
     points : those within reach, (n, d) [length or rad].
     measures : as of `singularity`, (n,) each.
-    signs : on which side of the parallel singularities each point is, 1 or -1; NaN where that has no meaning, as with
-        more actuators than freedoms.
-    parts : which part each point is in, (n,): no motion within the workspace leads from one to another but through a
-        parallel singularity, or over a gap. 0 is the largest.
-    locus_vertices, locus_faces : where the parallel measure changes its sign: points (v, d), and segments or triangles
+    signs : the side of the parallel singularities that each point is on, 1 or -1; NaN where that has no meaning, as
+        with more actuators than freedoms.
+    parts : the part that each point is in, (n,): a motion within the workspace from one part to another passes a
+        parallel singularity, or a gap. 0 is the largest.
+    locus_vertices, locus_faces : the zero set of the signed parallel measure: points (v, d), and segments or triangles
         between them, (f, d).
     """
 
@@ -79,8 +79,8 @@ class SingularityMap:
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
         n = int((self.sizes > LEAST_SHARE).sum())
-        found = f"{n} part{'s' * (n != 1)} between parallel singularities" if len(self.locus_faces) else "none parallel"
-        return f"<SingularityMap of {counted(len(self.points), 'point')}: {found}, least parallel measure {least:.3g}>"
+        parts = f"{n} part{'s' * (n != 1)} between parallel singularities" if len(self.locus_faces) else "none parallel"
+        return f"<SingularityMap of {counted(len(self.points), 'point')}: {parts}, least parallel measure {least:.3g}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ def singularity_map(
     resolution: float | None = None,
     on_progress: OnProgress | None = None,
 ) -> SingularityMap | SingularityTrack:
-    """How near to singular a mechanism is over a workspace, or along a path, and where it is.
+    """Measures of nearness to singularities over a workspace, or along a path, and the loci of singularities.
 
     Parameters
     ----------
@@ -154,15 +154,15 @@ def singularity_map(
     step = _step(over, resolution)
     places = _places(over, step)
     with telling("singularities", on_progress) as tell:
-        reached, found, signs = _measured(over, places * step + question.space.start, tell)
+        reached, measures, signs = _measured(over, places * step + question.space.start, tell)
     places = places[reached]
-    signed = np.where(np.isnan(signs), 1.0, signs) * np.asarray(found.parallel)
+    signed = np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel)
     vertices, faces = _locus(places, signed)
     return SingularityMap(
         workspace=over,
         step=step,
         points=places * step + question.space.start,
-        measures=found,
+        measures=measures,
         signs=signs,
         parts=_parts(places, signed),
         locus_vertices=vertices * step + question.space.start,
@@ -171,11 +171,11 @@ def singularity_map(
 
 
 def _along(track: Track) -> SingularityTrack:
-    found, signs = _of(track)
-    kept = np.asarray(track.status) < Status.FAILED
-    signs = np.where(kept, signs, np.nan)
+    measures, signs = _of(track)
+    is_feasible = np.asarray(track.status) < Status.FAILED
+    signs = np.where(is_feasible, signs, np.nan)
     crossings = np.flatnonzero(signs[1:] * signs[:-1] < 0.0) + 1
-    return SingularityTrack(found, signs, crossings)
+    return SingularityTrack(measures, signs, crossings)
 
 
 def _of(answers: Solution) -> tuple[Singularity, Floats]:
@@ -183,7 +183,7 @@ def _of(answers: Solution) -> tuple[Singularity, Floats]:
 
 
 def _step(over: Workspace, resolution: float | None) -> Floats:
-    """The distance of the points, (d,): the resolution of the workspace times what makes for so many points."""
+    """The distance of the points, (d,): a multiple of the resolution of the workspace."""
     d = len(over.names)
     if resolution is None:
         cells = over.size / float(np.prod(over.resolution))
@@ -192,7 +192,7 @@ def _step(over: Workspace, resolution: float | None) -> Floats:
 
 
 def _leading(over: Workspace) -> int:
-    """The coordinate that a resolution is of: the first length, if there is one."""
+    """The coordinate that a resolution belongs to: the first length, if there is one."""
     return next((axis for axis, unit in enumerate(over.units) if unit != "rad"), 0)
 
 
@@ -208,16 +208,16 @@ def _places(over: Workspace, step: Floats) -> Ints:
 
 
 def _measured(over: Workspace, points: Floats, tell: OnProgress | None) -> tuple[Ints, Singularity, Floats]:
-    """Which points were reached in the working mode asked for, and their measures and signs."""
+    """Rows of the points that are reached in the question's working mode, and their measures and signs."""
     question, options = over._question, Options(working_mode="keep", on_invalid="mark")
     rows, blocks, signs = [np.zeros(0, np.int64)], [], [np.zeros(0)]
     for begin in range(0, max(len(points), 1), ROWS_A_BLOCK):
         poses = question.space.poses(points[begin : begin + ROWS_A_BLOCK])
         answers = solve_ik(question.mechanism, poses, start=question.start, options=options)
         reached = np.flatnonzero(np.asarray(answers.status) == Status.REACHED)
-        found, sign = _of(answers[reached])
+        measures, sign = _of(answers[reached])
         rows.append(reached + begin)
-        blocks.append(found)
+        blocks.append(measures)
         signs.append(sign)
         if tell is not None:
             tell(begin + len(poses), len(points))
@@ -232,7 +232,7 @@ def _joined(blocks: list[Singularity]) -> Singularity:
 
 
 def _locus(places: Ints, signed: Floats) -> tuple[Floats, Ints]:
-    """Where a signed measure of lattice places (n, d) is zero: vertices (v, d) in steps, and faces (f, d)."""
+    """The zero set of a signed measure of lattice places (n, d): vertices (v, d) in steps, and faces (f, d)."""
     numbering = Numbering()
     numbering.number(codes(places))
     around = numbering.find(codes(places[:, None] + corners(places.shape[1])))
@@ -244,15 +244,15 @@ def _locus(places: Ints, signed: Floats) -> tuple[Floats, Ints]:
 
 
 def _parts(places: Ints, signed: Floats) -> Ints:
-    """The part of each lattice place, (n,): those hang together that lie next to each other and have the same sign."""
+    """The part of each lattice place, (n,): neighbours of the same sign are in one part."""
     n, d = places.shape
     numbering = Numbering()
     numbering.number(codes(places))
     pairs = [np.zeros((0, 2), np.int64)]
-    for way in np.eye(d, dtype=np.int64):
-        beside = numbering.find(codes(places + way))
-        joined = np.flatnonzero((beside >= 0) & ((signed[beside] >= 0.0) == (signed >= 0.0)))
-        pairs.append(np.stack([joined, beside[joined]], axis=1))
+    for offset in np.eye(d, dtype=np.int64):
+        neighbours = numbering.find(codes(places + offset))
+        joined = np.flatnonzero((neighbours >= 0) & ((signed[neighbours] >= 0.0) == (signed >= 0.0)))
+        pairs.append(np.stack([joined, neighbours[joined]], axis=1))
     _, labels, counts = np.unique(connected(n, np.concatenate(pairs)), return_inverse=True, return_counts=True)
     rank = np.empty(len(counts), np.int64)
     rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))

@@ -9,16 +9,15 @@ if TYPE_CHECKING:
     from .region import Region
 
 
-def in_words(found: Region) -> str:
+def in_words(region: Region) -> str:
     """The size of a workspace, to the digit that is uncertain: "4,970,000 ± 2,000 mm³"."""
-    return (
-        f"{rounded(found.size, found.uncertainty)} ± {rounded(found.uncertainty, found.uncertainty)} {found.size_unit}"
-    )
+    size, uncertainty = region.size, region.uncertainty
+    return f"{rounded(size, uncertainty)} ± {rounded(uncertainty, uncertainty)} {region.size_unit}"
 
 
-def kind_of(found: Region, name: str) -> str:
-    """What a limit's joint is: "revolute, actuated"; empty where it is none's."""
-    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in found.mechanism.joints}
+def kind_of(region: Region, name: str) -> str:
+    """The kind of a limit's joint, as "revolute, actuated"; empty for a limit that is no joint's."""
+    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in region.mechanism.joints}
     return kinds.get(name, "")
 
 

@@ -1,4 +1,4 @@
-"""Which coordinates of a pose a workspace is looked at over, and the poses that they stand for."""
+"""The coordinates that span a workspace, and the poses that they stand for."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TURNS = ("tilt_x", "tilt_y", "yaw")
 twist about z. R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held."""
 
 MOST = 3
-"""Coordinates that a workspace can be looked at over."""
+"""Largest number of coordinates of a workspace."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Space:
         return tuple("rad" if turns else self.mechanism.length_unit for turns in self.is_angle)
 
     def with_fixed(self, fixed: Mapping[str, float]) -> Space:
-        """With coordinates fixed that vary here."""
+        """The space with some of its coordinates fixed."""
         checked = _checked_fixed(fixed, self.names)
         names = tuple(name for name in self.names if name not in checked)
         if self.joint is not None or not checked or len(names) < 2:
@@ -103,20 +103,20 @@ def space_of(
 
     Raises
     ------
-    UnknownName, InvalidArgument : coordinates that there are none of, or none left to vary; an orientation that is no
-        rotation, or that the task has no place for.
+    UnknownName, InvalidArgument : unknown coordinates, or none left to vary; an orientation that is no rotation, or
+        that the task leaves out.
     """
     joint = _pivot(mechanism)
     known = (*POSITIONS, *TURNS, *(_coordinate_names(joint) if joint else ()))
     fixed = _checked_fixed(fixed, known)
-    asked = _checked_over(over, known, fixed)
-    if joint is not None and _is_about(joint, asked, fixed, orientation):
-        return _of_joint(mechanism, joint, asked, fixed)
+    chosen = _checked_over(over, known, fixed)
+    if joint is not None and _is_about(joint, chosen, fixed, orientation):
+        return _of_joint(mechanism, joint, chosen, fixed)
     rotation = _rotation(mechanism, orientation, start)
     held = {name: float(value) for name, value in zip(POSITIONS, start[:3, 3], strict=True)} | dict.fromkeys(TURNS, 0.0)
     held |= fixed
-    names = tuple(name for name in free_coordinates(mechanism) if name not in fixed) if asked is None else asked
-    if asked is None:
+    names = tuple(name for name in free_coordinates(mechanism) if name not in fixed) if chosen is None else chosen
+    if chosen is None:
         places = tuple(name for name in names if name in POSITIONS)
         names = places if len(places) > 1 or len(names) > MOST else names
         if not places:
@@ -204,7 +204,7 @@ def _checked_over(
 
 
 def _pivot(mechanism: Mechanism) -> str | None:
-    """The universal joint that alone connects base and end effector, whose two angles then say the whole pose."""
+    """The universal joint that alone connects base and end effector, whose two angles then give the whole pose."""
     name = carrying_joint(mechanism)
     if name is None or any(task_of(mechanism).axes):
         return None
@@ -215,16 +215,16 @@ def _coordinate_names(joint: str) -> tuple[str, ...]:
     return tuple(f"{joint}[{place}]" for place in range(2))
 
 
-def _is_about(joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float], orientation: Any) -> bool:
-    """Whether a question is about the coordinates of the joint that carries the end effector."""
-    if asked is None:
+def _is_about(joint: str, over: Sequence[str] | None, fixed: Mapping[str, float], orientation: Any) -> bool:
+    """True if a question is about the coordinates of the joint that carries the end effector."""
+    if over is None:
         return orientation is None and not set(fixed) & {*POSITIONS, *TURNS}
-    return all(name.startswith(f"{joint}[") for name in asked)
+    return all(name.startswith(f"{joint}[") for name in over)
 
 
-def _of_joint(mechanism: Mechanism, joint: str, asked: Sequence[str] | None, fixed: Mapping[str, float]) -> Space:
+def _of_joint(mechanism: Mechanism, joint: str, over: Sequence[str] | None, fixed: Mapping[str, float]) -> Space:
     names = _coordinate_names(joint)
-    if fixed or (asked is not None and set(asked) != set(names)):
-        raise InvalidArgument("over", ", ".join(asked or fixed), f"all coordinates of '{joint}': {', '.join(names)}")
+    if fixed or (over is not None and set(over) != set(names)):
+        raise InvalidArgument("over", ", ".join(over or fixed), f"all coordinates of '{joint}': {', '.join(names)}")
     home = home_coordinates(mechanism)[columns(mechanism)[joint]]
     return Space(mechanism, names, home, {}, np.eye(3), joint)

@@ -20,10 +20,10 @@ from .refining import Cells
 from .sampled_lattice import Lattice, places_of
 
 CLOSE, CLOSE_ONE_BY_ONE = 1e-3, 1e-2
-"""How exactly a vertex is on the border, where closed forms tell margins and elsewhere [steps of the lattice]."""
+"""Accuracy of vertices, where closed forms give margins and elsewhere [steps of the lattice]."""
 
 MOST_LOOKS = 40
-"""Looks at an edge after which its vertex is left where it is: halving alone takes ten."""
+"""Largest number of points measured on an edge; bisection alone takes ten."""
 
 Edge: TypeAlias = tuple[int, int]
 Face: TypeAlias = tuple[Edge, ...]
@@ -47,12 +47,12 @@ class BorderMesh(NamedTuple):
 
     @property
     def size(self) -> float:
-        """What it encloses: area or volume."""
+        """The area or volume that it encloses."""
         return float(self.shares.sum())
 
     @property
     def shares(self) -> Floats:
-        """What each face adds to the area or volume enclosed, (f,)."""
+        """The contribution of each face to the area or volume enclosed, (f,)."""
         if not len(self.faces):
             return np.zeros(0)
         ends = (self.vertices - self.vertices.mean(axis=0))[self.faces]
@@ -97,10 +97,10 @@ def crossed_edges(cells: Cells, n: int) -> tuple[Ints, Ints]:
     upper = np.full(n * d, -1)  # by the lower end of an edge, and its axis
     edges = [np.zeros((0, d), np.int64)]
     for which in np.flatnonzero(np.diff(starts)).tolist():
-        own = cells.corners[order[starts[which] : starts[which + 1]]]
+        numbers = cells.corners[order[starts[which] : starts[which + 1]]]
         for face in _faces(which, d):
-            edge = np.stack([own[:, a] * d + (a ^ b).bit_length() - 1 for a, b in face], axis=1)
-            upper[edge] = own[:, [b for _, b in face]]
+            edge = np.stack([numbers[:, a] * d + (a ^ b).bit_length() - 1 for a, b in face], axis=1)
+            upper[edge] = numbers[:, [b for _, b in face]]
             edges.append(edge)
     distinct = np.flatnonzero(upper >= 0)
     place = np.empty(n * d, np.int64)
@@ -135,9 +135,9 @@ _SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), 
 
 
 def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
-    """How the border crosses a square, given by its corners in turn: from edge to edge, what is within on its left.
+    """The segments of the border in a square, given by its corners in turn, from edge to edge, the inside on the left.
 
-    Where opposite corners are within, they are kept apart: whoever looks at the square decides the same.
+    Where opposite corners are within, they are kept apart, so that both cells of a square agree.
     """
     within = [bool(case >> corner & 1) for corner in side]
     edges = [(min(pair), max(pair)) for pair in zip(side, (*side[1:], side[0]), strict=True)]
@@ -148,7 +148,7 @@ def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
 
 
 def _vertices(lattice: Lattice, ends: Ints, width: int) -> tuple[Floats, Ints, Ints]:
-    """Where the border crosses edges, what forms it there, and the ends within; (e, ...) each."""
+    """The crossings of the border with edges, their limits, and the ends within; (e, ...) each."""
     margins = lattice.margins[ends]
     within, every = (margins[1] >= 0.0).astype(np.int64), np.arange(ends.shape[1])
     places = places_of(lattice.points.codes, lattice.d)
@@ -161,12 +161,12 @@ def _vertices(lattice: Lattice, ends: Ints, width: int) -> tuple[Floats, Ints, I
 def crossings(
     measure: Measure, inner: Floats, outer: Floats, inside: Floats, outside: Floats, close: float
 ) -> tuple[Floats, Ints]:
-    """The last points within on the ways from points within to points beyond, (n, d), and what is exceeded next, (n,).
+    """The last points within on lines from points within to points beyond, (n, d), and the limits exceeded next, (n,).
 
     Parameters
     ----------
     inside, outside : the margins at both ends, (n,).
-    close : how exactly they are told [share of the way].
+    close : their accuracy [share of the way].
     """
     near, far = np.zeros(len(inner)), np.ones(len(inner))
     inside, outside = inside.copy(), outside.copy()
@@ -176,14 +176,14 @@ def crossings(
         rows = rows[far[rows] - near[rows] > close]
         if not len(rows):
             break
-        wide = far[rows] - near[rows]
-        at = near[rows] + wide * _share(inside[rows], outside[rows], halve[rows], close / wide)
-        found, binding = measure(inner[rows] + at[:, None] * (outer - inner)[rows])
-        kept = found >= 0.0
-        near[rows[kept]], inside[rows[kept]] = at[kept], found[kept]
-        far[rows[~kept]], outside[rows[~kept]] = at[~kept], found[~kept]
+        width = far[rows] - near[rows]
+        at = near[rows] + width * _share(inside[rows], outside[rows], halve[rows], close / width)
+        margins, binding = measure(inner[rows] + at[:, None] * (outer - inner)[rows])
+        kept = margins >= 0.0
+        near[rows[kept]], inside[rows[kept]] = at[kept], margins[kept]
+        far[rows[~kept]], outside[rows[~kept]] = at[~kept], margins[~kept]
         limits[rows[~kept]] = binding[~kept]
-        halve[rows] = far[rows] - near[rows] > 0.5 * wide
+        halve[rows] = far[rows] - near[rows] > 0.5 * width
     unknown = np.flatnonzero(limits < 0) if measure.question.has_margins else np.arange(len(inner))
     if len(unknown):
         limits[unknown] = measure.name_limits((inner + far[:, None] * (outer - inner))[unknown])
@@ -191,7 +191,7 @@ def crossings(
 
 
 def _share(inside: Floats, outside: Floats, halve: Mask, close: Floats) -> Floats:
-    """Where to look next: half way, or just beyond where margins would be zero if they fell evenly."""
+    """The share of the way to measure next: half, or just beyond the zero of linearly interpolated margins."""
     with np.errstate(invalid="ignore"):
         even = inside / (inside - outside)
     usable = np.isfinite(even) & ~halve

@@ -1,4 +1,4 @@
-"""Which coordinates of a map are within reach, how far inside or beyond, and what forms the border there."""
+"""Margins of the points of a map, and the limits that form the border."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from .orientations import least_of_all
 from .space import Space
 
 Limits: TypeAlias = tuple[tuple[str, str], ...]
-"""(joint, bound) of limits: as of `Feasibility`; or a coordinate and "min", "max", its end in what was looked at."""
+"""(joint, bound) of limits: as of `Feasibility`; or a coordinate and "min", "max", its end in the map."""
 
 INSIDE, OUTSIDE = 1.0, -1.0
-"""What stands for a margin where no closed form tells one: its sign is all that counts."""
+"""Values in place of margins where no closed form gives them: only the sign counts."""
 
 GEOMETRY = ("", "reach")
-"""What forms the border where no limit of a joint does, and no closed form tells which leg."""
+"""The limit of a border that no limit of a joint forms, where no closed form gives the leg."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapQuestion:
-    """What is asked of every point of a map.
+    """The question that every point of a map answers: its poses, its working mode, and the ends of the map.
 
     Attributes
     ----------
-    start : a configuration whose working mode is kept; None for home's.
+    start : a configuration whose working mode is kept; None for that of home.
     turns : rotations (k, 3, 3) in the base frame; a point counts where its pose is within reach turned by each of them.
     hold : "orientation"; or "position", where it counts with whatever orientation.
     lowest, highest : where the map ends, (d,) [length or rad].
@@ -60,17 +60,17 @@ class MapQuestion:
 
     @property
     def has_margins(self) -> bool:
-        """Whether closed forms tell margins; else points are asked for one by one, and only told whether reached."""
+        """True if closed forms give margins; else points are solved one by one, and only known as reached or not."""
         return self.hold == "orientation" and not model_of(self.mechanism).why_poses_do_not_suffice
 
     @property
     def limits(self) -> Limits:
         """The limits that borders are formed by, in the order of `measure`."""
-        own = _known_limits(self.mechanism, self.has_margins)
-        return own + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
+        limits = _known_limits(self.mechanism, self.has_margins)
+        return limits + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
 
     def explorer(self) -> Explorer | None:
-        """What explores from the start, where points are asked for one by one, and it can."""
+        """An explorer that begins at the start, where points are solved one by one by the closure engine; else None."""
         engine = engine_of(self.mechanism)
         if self.has_margins or self.hold == "position" or len(self.turns) > 1 or not isinstance(engine, ClosureEngine):
             return None
@@ -82,7 +82,7 @@ class MapQuestion:
         return Explorer(engine, start, self.space.poses(at[None])[0], at / self._lengths)
 
     def explored(self, points: Floats, explorer: Explorer, tell: Tell) -> tuple[Floats, Ints]:
-        """As `measure`, from what was within reach before."""
+        """Margins and bindings as of `measure`, by an explorer, from configurations that were reached before."""
         reached, _ = explorer.explore(self.space.poses(points), points / self._lengths, tell)
         margins, bindings = np.where(reached, INSIDE, OUTSIDE), np.full(len(points), self._unknown)
         return self._cut(points, margins, bindings)
@@ -93,29 +93,31 @@ class MapQuestion:
 
     @property
     def _lengths(self) -> Floats:
-        """What one is of each coordinate, (d,) [length or rad]: L of a length."""
+        """The unit of each coordinate, (d,) [length or rad]: L for a length, 1 for an angle."""
         return np.where(self.space.is_angle, 1.0, self.mechanism.characteristic_length)
 
     def _cut(self, points: Floats, margins: Floats, bindings: Ints) -> tuple[Floats, Ints]:
-        """Margins and bindings with the ends of what is looked at."""
-        first = len(_known_limits(self.mechanism, self.has_margins))
+        """Margins and bindings with the ends of the map as limits too."""
+        n_limits = len(_known_limits(self.mechanism, self.has_margins))
         lengths = self._lengths
         for axis, column in enumerate(points.T):
             for side, end in enumerate((self.lowest[axis], self.highest[axis])):
                 if np.isfinite(end):
-                    past = (column - end) / lengths[axis] * (1 - 2 * side)
-                    cut = past < np.minimum(margins, 0.0)
-                    margins[cut], bindings[cut] = past[cut], first + 2 * axis + side
+                    excess = (column - end) / lengths[axis] * (1 - 2 * side)
+                    cut = excess < np.minimum(margins, 0.0)
+                    margins[cut], bindings[cut] = excess[cut], n_limits + 2 * axis + side
         return margins, bindings
 
     def _of_poses(self, poses: Floats) -> tuple[Floats, Ints]:
         if self.has_margins:
-            found = feasibility(self.mechanism, poses, start=self.start)
-            return np.nan_to_num(found.margin, copy=False, nan=-np.inf, posinf=np.inf, neginf=-np.inf), found.binding
+            feasible = feasibility(self.mechanism, poses, start=self.start)
+            return np.nan_to_num(
+                feasible.margin, copy=False, nan=-np.inf, posinf=np.inf, neginf=-np.inf
+            ), feasible.binding
         return np.where(self._answers(poses)[1], INSIDE, OUTSIDE), np.full(len(poses), self._unknown)
 
     def _answers(self, poses: Floats) -> tuple[Solution, Mask]:
-        """Answers to poses, and which of them count as reached."""
+        """Answers to poses, and the mask of those that count as reached."""
         kept = self.hold == "orientation" or self.start is not None
         options = Options(hold=self.hold, working_mode="keep" if kept else "any", on_invalid="mark")
         answers = solve_ik(self.mechanism, poses, start=self.start, options=options)
@@ -131,7 +133,7 @@ class MapQuestion:
 
     def name_limits(self, points: Floats, explorer: Explorer | None = None) -> Ints:
         """Which of `limits` points (n, d) just beyond the border are beyond, (n,)."""
-        margins, bindings = self.measure(points) if explorer is None else self.explored(points, explorer, _untold)
+        margins, bindings = self.measure(points) if explorer is None else self.explored(points, explorer, _no_progress)
         if self.has_margins or len(self.turns) > 1:
             return bindings
         rows = np.flatnonzero((margins < 0.0) & (bindings == self._unknown))
@@ -139,7 +141,7 @@ class MapQuestion:
         if explorer is None:
             coordinates = self._answers(poses)[0]._coordinates
         else:
-            coordinates = explorer.explore(poses, points[rows] / self._lengths, _untold)[1]
+            coordinates = explorer.explore(poses, points[rows] / self._lengths, _no_progress)[1]
         place = {limit: index for index, limit in enumerate(_known_limits(self.mechanism, self.has_margins))}
         for row, held in zip(rows.tolist(), active_limits(self.mechanism, coordinates), strict=True):
             if held:
@@ -147,8 +149,8 @@ class MapQuestion:
         return bindings
 
 
-def _untold(done: int) -> None:
-    """What is looked at again counts for nothing."""
+def _no_progress(done: int) -> None:
+    """Report no progress: these points were counted before."""
 
 
 def _known_limits(mechanism: Mechanism, has_margins: bool) -> Limits:

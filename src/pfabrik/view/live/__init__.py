@@ -1,1 +1,1 @@
-"""The viewer in the browser: what was asked (session), what is shown (scene, panel), and the server (viewer)."""
+"""The viewer in the browser: target and answer (session), the page (scene, panel), and the server (viewer)."""

@@ -23,7 +23,7 @@ class Patch:
     Attributes
     ----------
     corners : of its triangles, (k, 3, 3), or both ends of its segments, (k, 2, 3), in the base frame [length].
-    name, share : the limits that form it, and how much of the border that is.
+    name, share : the limits that form it, and their share of the border.
     """
 
     name: str
@@ -35,17 +35,17 @@ class Patch:
 def border_of(start: Solution, on_progress: Callable[[int, int], None]) -> tuple[list[Patch], str]:
     """The border of the workspace at a configuration's orientation, in its working mode, and its size in words.
 
-    What the workspace is not looked over is as in that configuration. Where it is one of angles, there are no patches.
+    Other coordinates are as in that configuration. A workspace over angles has no patches.
     """
-    found = workspace(start.mechanism, start=start, on_progress=on_progress)
-    size = in_words(found)
-    if not set(found.names) <= set(POSITIONS):
-        return [], f"workspace over {', '.join(found.names)}: {size}; it has no place in the scene"
-    corners = _in_space(start.pose[:3, 3], found.names, np.asarray(found.vertices))[found.faces]
-    limits = np.asarray(found.face_limit)
+    space = workspace(start.mechanism, start=start, on_progress=on_progress)
+    size = in_words(space)
+    if not set(space.names) <= set(POSITIONS):
+        return [], f"workspace over {', '.join(space.names)}: {size}; it has no place in the scene"
+    corners = _in_space(start.pose[:3, 3], space.names, np.asarray(space.vertices))[space.faces]
+    limits = np.asarray(space.face_limit)
     return [
         Patch(group.label, group.share, group.colour, corners[np.isin(limits, group.limits)])
-        for group in groups_of(found)
+        for group in groups_of(space)
     ], size
 
 

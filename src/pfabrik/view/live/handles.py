@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import viser
 
 FAR = 1e6
-"""How far a handle goes [L]: the answer, not the handle, says what is out of reach."""
+"""Range of a handle [L]: the answer, not the handle, shows what is out of reach."""
 
 
 class Handles:

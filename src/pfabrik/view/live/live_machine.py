@@ -1,4 +1,4 @@
-"""One machine as it is shown: what is asked of it, and everything in the page that shows the answer."""
+"""One machine as it is shown: its session, and all elements of the page that show the answer."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class LiveMachine:
 
     Attributes
     ----------
-    session : what is asked of it, and the answer.
+    session : its target and its answer.
     track : the path that can be played, or None.
     modes : those that were found last.
-    wanted, actuators : what the user asks for, which runs ahead of the answers: a pose (4, 4) [length], and values
-        (n_a,) [length or rad].
+    wanted, actuators : targets of the user, which run ahead of the answers: a pose (4, 4) [length], and values (n_a,)
+        [length or rad].
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class LiveMachine:
         self.refresh()
 
     def refresh(self) -> None:
-        """Show what the session says."""
+        """Show the answer of the session."""
         session = self.session
         self.wanted, self.actuators = session.target.copy(), session.actuators.copy()
         with self._server.atomic():
@@ -74,7 +74,7 @@ class LiveMachine:
         self._server.flush()
 
     def page(self) -> str:
-        """What is shown as a page of its own, HTML: the machine as it is, or on its way along a path."""
+        """The scene as a page of its own, HTML: the machine as it is, or moving along its path."""
         self._handles.show_all(False)
         serializer = self._server.get_scene_serializer()
         if self.track is not None:
@@ -89,7 +89,7 @@ class LiveMachine:
 
 
 def checked(what: object) -> Shown:
-    """What is to be shown, checked before anything is served."""
+    """The machine, configuration and path to show, checked before anything is served."""
     if isinstance(what, Track):
         return what.mechanism, what[int(checked_track(what)[0])], what
     mechanism, solution = checked_shown(what)

@@ -1,4 +1,4 @@
-"""A worker that answers the newest question: older ones that still wait are dropped."""
+"""A worker that runs the newest job; older jobs that still wait are dropped."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class Newest:
         self._thread.start()
 
     def post(self, job: Callable[[], object]) -> None:
-        """Ask for a job, in place of the one that waits."""
+        """Post a job, in place of the one that waits."""
         with self._condition:
             self._waiting = job
             self._condition.notify()
 
     def end(self) -> None:
-        """Let the thread end; what waits is dropped."""
+        """Let the thread end; a waiting job is dropped."""
         with self._condition:
             self._waiting, self._ended = None, True
             self._condition.notify()

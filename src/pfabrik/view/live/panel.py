@@ -1,4 +1,4 @@
-"""What stands beside the scene: status, margins, sliders, modes, playback. It tells what the user does, no more."""
+"""The panel beside the scene: status, margins, sliders, modes, playback. It only reports what the user does."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ if TYPE_CHECKING:
     from .border_patches import Patch
 
 BARS = 8
-"""Margins that have a bar; of further ones only the number is told."""
+"""Margins that have a bar; further ones are only counted."""
 
 FAR = 2.0
-"""How far from home sliders go where no limit says it [L or half turns]."""
+"""Range of sliders on each side of home where there is no limit [L or half turns]."""
 
 STEPS = 1000.0
-"""Steps of a slider, about."""
+"""Approximate number of steps of a slider."""
 
 
 @dataclass(frozen=True)
 class Actions:
-    """What a panel calls, each at once and without waiting."""
+    """Callbacks of a panel; none of them waits."""
 
     change_target: Callable[[str, float], None]
     change_actuator: Callable[[int, float], None]
@@ -83,7 +83,7 @@ class Panel:
         gui.add_button("Save as a page").on_click(lambda event: actions.save(event.client))
 
     def show(self, session: Session) -> None:
-        """Bring everything up to an answer, but for the slider that the user has hold of."""
+        """Update everything to an answer, except the slider that the user holds."""
         self._status.content = status_html(session)
         self._margins.content = margins_html(session)
         self._pose.content = pose_html(session)
@@ -95,18 +95,18 @@ class Panel:
             self._set(slider, float(readout.display(value)))
 
     def tell(self, words: str, *, alarming: bool = False) -> None:
-        """A note of what is going on, or of what went wrong."""
+        """Show a note on progress, or on an error."""
         colour = HELD if alarming else ACHIEVED
         lines = "<br>".join(escape(line) for line in words.splitlines())
         self._note.content = f'<div data-pfabrik="note" style="{BOX};color:{colour}">{lines}</div>' if words else ""
 
     @property
     def wants_workspace(self) -> bool:
-        """Whether the user wants to see the workspace."""
+        """True if the user wants to see the workspace."""
         return bool(self._workspace.value)
 
     def tell_border(self, patches: Sequence[Patch]) -> None:
-        """Which limit has which colour, and how much of the border it forms."""
+        """Show the colour of each limit, and the share of the border that it forms."""
         rows = "".join(
             f'<div><span style="color:{each.colour}">&#9632;</span> {escape(each.name)}: {each.share:.0%}</div>'
             for each in patches
@@ -124,7 +124,7 @@ class Panel:
             self._set(self._step, step)
 
     def release(self) -> None:
-        """Nothing is in the user's hands any more: sliders follow the answers again."""
+        """Let all sliders follow the answers again."""
         self._touched = None
 
     def _set(self, slider: Any, value: float) -> None:
@@ -151,7 +151,7 @@ class Panel:
         return self._heard(slider, lambda shown: self._actions.change_actuator(place, readout.coordinate(shown)))
 
     def _heard(self, slider: Any, tell: Callable[[float], None]) -> Any:
-        """A slider that tells what the user makes of it."""
+        """Report the values that the user gives a slider; returns the slider."""
 
         def moved(event: Any) -> None:
             self._touched = event.target
@@ -188,7 +188,7 @@ class Panel:
 
 
 def coordinates_of(mechanism: Mechanism) -> tuple[str, ...]:
-    """What a target's sliders are called: the coordinates that the task counts, a rotation as angles."""
+    """The names of a target's sliders: the coordinates of the task, a rotation as angles."""
     task = task_of(mechanism)
     return tuple(compress(("x", "y", "z", "roll", "pitch", "yaw"), (*task.axes, *task.turns)))
 
@@ -218,24 +218,24 @@ BOX = "margin:0.3em 0.8em;font-size:0.85em;line-height:1.35"
 
 
 def status_html(session: Session) -> str:
-    """What became of what was asked for, with the limits that hold it back, by name."""
+    """The status of the answer, with the limits that block its target, as HTML."""
     reached = session.solution.status == Status.REACHED
-    first, *others = session.sentence.split("; ")
-    rest = "".join(f"<div>{escape(each)}</div>" for each in others)
+    status, *reasons = session.sentence.split("; ")
+    lines = "".join(f"<div>{escape(reason)}</div>" for reason in reasons)
     colour = ACHIEVED if reached else HELD
     return (
-        f'<div style="{BOX};color:{colour}"><b data-pfabrik="status">{escape(first)}</b>'
-        f'<div data-pfabrik="held">{rest}</div></div>'
+        f'<div style="{BOX};color:{colour}"><b data-pfabrik="status">{escape(status)}</b>'
+        f'<div data-pfabrik="held">{lines}</div></div>'
     )
 
 
 def margins_html(session: Session) -> str:
     """The nearest limits as bars, 1 in the middle of a range and 0 on the limit."""
-    found = nearest_first(session.solution)
-    if not found:
+    margins = nearest_first(session.solution)
+    if not margins:
         return ""
-    rows = "".join(_bar(f"{joint} {bound}", margin) for joint, bound, margin in found[:BARS])
-    more = f"<div>and {len(found) - BARS} others, farther off</div>" if len(found) > BARS else ""
+    rows = "".join(_bar(f"{joint} {bound}", margin) for joint, bound, margin in margins[:BARS])
+    more = f"<div>and {len(margins) - BARS} others, farther off</div>" if len(margins) > BARS else ""
     return f'<div data-pfabrik="margins" style="{BOX}">{rows}{more}</div>'
 
 
@@ -254,7 +254,7 @@ COPY = (
     "(navigator.clipboard?navigator.clipboard.writeText(t.value):Promise.reject()).catch(()=>document.execCommand('copy'));"
     "this.textContent='Copied';setTimeout(()=>this.textContent='Copy pose',900)"
 )
-"""What the button does: the clipboard where the browser allows it, else the older way."""
+"""Script of the button: copies by the clipboard if the browser allows it, else by a command of the document."""
 
 
 def pose_html(session: Session) -> str:

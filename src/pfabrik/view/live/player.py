@@ -1,4 +1,4 @@
-"""Steps of a path, each when it is due."""
+"""Plays a path: its steps, each at its time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Player:
         threading.Thread(target=self._run, daemon=True).start()
 
     def stop(self) -> None:
-        """Take no more steps."""
+        """Stop playing."""
         self._stopped.set()
 
     def _run(self) -> None:

@@ -35,7 +35,7 @@ GIZMO = 0.35
 """Size of the handles to drag [L]."""
 
 PLAIN: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
-"""Of many small meshes: what computers without a graphics card would spend most of their time on."""
+"""Settings of many small meshes that save the time of computers without a graphics card."""
 
 MACHINE = "/machine"
 
@@ -79,8 +79,8 @@ class Scene:
         self._lines.batched_positions, self._lines.batched_wxyzs = positions, turns
         self._lines.batched_scales, self._lines.batched_colors = scales, colours
         corners = (part.corners for part in skeleton.parts if len(part.corners) >= 3)
-        for face, own in zip(self._faces, corners, strict=True):
-            face.vertices = fan(own / self._length)[0]
+        for face, face_corners in zip(self._faces, corners, strict=True):
+            face.vertices = fan(face_corners / self._length)[0]
         for kind, joints in self._joints.items():
             marks = _of_kind(skeleton, kind)
             joints.batched_positions, joints.batched_colors = self._places(marks), _colours(marks)
@@ -88,9 +88,8 @@ class Scene:
         self._name(skeleton)
 
     def show_path(self, track: Track) -> None:
-        """The path that was asked for, and the one that was taken."""
-        ways = (("asked", track.targets, ASKED), ("taken", track.pose, ACHIEVED))
-        for name, poses, colour in ways:
+        """Show the target path and the achieved path."""
+        for name, poses, colour in (("asked", track.targets, ASKED), ("taken", track.pose, ACHIEVED)):
             places = (poses[:, :3, 3] / self._length).astype(np.float32)
             places = places[np.isfinite(places).all(axis=1)]
             if len(places) > 1:
@@ -98,7 +97,7 @@ class Scene:
                 self._scene.add_line_segments(f"{MACHINE}/path/{name}", segments, rgb(colour), thickness=2.0)
 
     def show_border(self, patches: Sequence[Patch]) -> None:
-        """The border of a workspace, in place of the one before."""
+        """Show the border of a workspace, in place of the one before."""
         self.hide_border()
         for place, patch in enumerate(patches):
             name, corners = f"{MACHINE}/workspace/{place}", (patch.corners / self._length).astype(np.float32)
@@ -111,7 +110,7 @@ class Scene:
             self._border.append(self._scene.add_mesh_simple(name, corners.reshape(-1, 3), faces, **style))
 
     def hide_border(self) -> None:
-        """Take the border away."""
+        """Hide the border."""
         for part in self._border:
             part.remove()
         self._border = []
@@ -163,8 +162,8 @@ class Scene:
         along = lines[:, 1] - lines[:, 0]
         lengths = np.linalg.norm(along, axis=1)
         scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
-        found = (lines.mean(axis=1), upright_to(along), scales)
-        middles, turns, scales = (each.astype(np.float32) for each in found)
+        placements = (lines.mean(axis=1), upright_to(along), scales)
+        middles, turns, scales = (values.astype(np.float32) for values in placements)
         return middles, turns, scales, np.array(colours, np.uint8)
 
     def _name(self, skeleton: Skeleton) -> None:

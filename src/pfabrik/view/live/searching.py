@@ -14,45 +14,45 @@ from .newest import Newest
 
 
 class Searches:
-    """One search at a time, beside the answers; what it finds for a machine that is no longer shown is dropped.
+    """One search at a time, beside the answers; results for a machine that is no longer shown are dropped.
 
     Parameters
     ----------
-    stage : what is shown now.
-    lock : held by whoever changes what is shown.
+    shown : returns the machine that is shown now.
+    lock : held while the machine shown is changed.
     """
 
     def __init__(
         self,
-        stage: Callable[[], LiveMachine],
+        shown: Callable[[], LiveMachine],
         lock: AbstractContextManager[object],
         on_error: Callable[[Exception], None],
     ) -> None:
-        self._stage, self._lock, self._newest = stage, lock, Newest(on_error)
+        self._shown, self._lock, self._newest = shown, lock, Newest(on_error)
 
     def find_modes(self, kind: str) -> None:
         """List the "working" modes of the pose, or the "assembly" modes of the actuator values."""
-        stage = self._stage()
-        stage.panel.release()
-        stage.panel.tell(f"looking for {kind} modes …")
-        session = stage.session
+        machine = self._shown()
+        machine.panel.release()
+        machine.panel.tell(f"looking for {kind} modes …")
+        session = machine.session
         mechanism, target, actuators = session.mechanism, session.target.copy(), session.actuators.copy()
 
         def search() -> None:
-            found = working_modes(mechanism, target) if kind == "working" else assembly_modes(mechanism, actuators)
-            words = [f"{number}: {_kept(mode)}" for number, mode in enumerate(found, 1)]
+            modes = working_modes(mechanism, target) if kind == "working" else assembly_modes(mechanism, actuators)
+            words = [f"{number}: {_kept(mode)}" for number, mode in enumerate(modes, 1)]
             with self._lock:
-                if self._stage() is stage:
-                    stage.modes = tuple(found)
-                    stage.panel.list_modes(kind, stage.modes, words)
-                    stage.panel.tell("" if found else f"no {kind} mode was found")
+                if self._shown() is machine:
+                    machine.modes = tuple(modes)
+                    machine.panel.list_modes(kind, machine.modes, words)
+                    machine.panel.tell("" if modes else f"no {kind} mode was found")
 
         self._newest.post(search)
 
     def show_workspace(self, wanted: bool) -> None:
-        """Show the border of the workspace at this orientation, or take it away."""
-        stage = self._stage()
-        scene, panel, start = stage.scene, stage.panel, stage.session.start
+        """Show the border of the workspace at this orientation, or hide it."""
+        machine = self._shown()
+        scene, panel, start = machine.scene, machine.panel, machine.session.start
         if not wanted:
             self._newest.post(lambda: None)
             scene.hide_border()
@@ -68,7 +68,7 @@ class Searches:
 
             patches, size = border_of(start, progress)
             with self._lock:
-                if self._stage() is stage and panel.wants_workspace:
+                if self._shown() is machine and panel.wants_workspace:
                     scene.show_border(patches)
                     panel.tell_border(patches)
                     panel.tell(size)
@@ -81,6 +81,6 @@ class Searches:
 
 
 def _kept(mode: Solution) -> str:
-    """Whether a mode keeps the limits, and which it does not."""
+    """The limits that a mode exceeds, in words; "within limits" if there are none."""
     beyond = by_bound(exceeded(mode))
     return f"beyond {beyond}" if beyond else "within limits"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import viser
 
 DISTANCE = 2.1
-"""How far the camera is from the middle of the machine, in radii of it."""
+"""Distance of the camera from the middle of the machine, in radii of the machine."""
 
 SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
 
@@ -51,7 +51,7 @@ def serve(host: str, port: int) -> viser.ViserServer:
 
 
 def aim_camera(server: viser.ViserServer, mechanism: Mechanism, points: Floats) -> None:
-    """Where the camera starts, so that points (n, 3) [length] are seen; a planar machine from the front."""
+    """Place the camera so that points (n, 3) [length] are in view; a planar machine is viewed from the front."""
     seen = points / mechanism.characteristic_length
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))

@@ -1,4 +1,4 @@
-"""What was asked of a machine last, and its answer: the viewer without anything to look at."""
+"""The last request to a machine and its answer: the state of the viewer, without a page."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from ...poses import pose
 from ...rotations import to_rpy
 
 DIGITS = 9
-"""Digits after the point of what is shown: below is rounding, and no -0.0."""
+"""Digits after the point that are shown: further ones are rounding; no -0.0 is shown."""
 
 
 class Session:
-    """One machine, what it is asked for, and what it answers.
+    """One machine, its target or actuator values, and its answer.
 
     Every answer starts from the one before, and stays in its working mode, as far as that was feasible.
 
     Attributes
     ----------
-    target : the pose asked for, (4, 4); where something else was asked for, the pose that came of it.
-    actuators : the actuator values asked for, or those that came of what was, (n_a,) [length or rad].
+    target : the target pose, (4, 4); the answer's pose if actuator values or a configuration were given.
+    actuators : the given actuator values, else those of the answer, (n_a,) [length or rad].
     solution : the answer.
     start : the last feasible answer, which the next one starts from.
-    asked : what was asked for last: a "pose", "actuators", or a "configuration" that was given.
+    asked : what was given last: a "pose", "actuators", or a "configuration".
     """
 
     def __init__(self, mechanism: Mechanism, solution: Solution | None = None) -> None:
@@ -65,12 +65,12 @@ class Session:
 
     @property
     def sentence(self) -> str:
-        """What became of what was asked for."""
+        """The answer in one sentence."""
         return as_sentence(self.solution, self.actuators if self.asked == "actuators" else None)
 
     @property
     def pose_as_python(self) -> str:
-        """The target as what is typed in Python."""
+        """The target as a Python expression."""
         place = ", ".join(f"{value:.6g}" for value in self.target[:3, 3].round(DIGITS) + 0.0)
         turned = np.degrees(to_rpy(self.target[:3, :3])).round(DIGITS) + 0.0
         angles = ", ".join(f"{value:.6g}" for value in turned)

@@ -1,4 +1,4 @@
-"""`view`: a machine in the browser, to drag, to drive, and to see what stops it."""
+"""`view`: a machine in the browser, to drag and to drive, with the limits that stop it."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Viewer:
 
     @property
     def target(self) -> Floats:
-        """The pose that is asked for, (4, 4) [length]."""
+        """The target pose, (4, 4) [length]."""
         return self._stage.session.target.copy()
 
     def show(self, solution: Solution) -> None:
@@ -114,7 +114,7 @@ class Viewer:
         self._answer(lambda stage: stage.session.show(solution))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write what is shown as a page of its own, which opens without this program and without a network.
+        """Write the scene as a page of its own, which opens without this program and without a network.
 
         A Track is in it as a film. The file appears when it is complete, or not at all.
         """
@@ -129,7 +129,7 @@ class Viewer:
             pass
 
     def close(self) -> None:
-        """End it: its page stays as it is, and answers no more."""
+        """Close the viewer: its page stays as it is, but no longer answers."""
         if self._closed.is_set():
             return
         self._closed.set()
@@ -211,7 +211,7 @@ class Viewer:
     # The machine, and its file.
 
     def _build(self, shown: Shown) -> None:
-        """Show a machine in place of what was shown."""
+        """Show a machine in place of the one shown before."""
         actions = Actions(
             self._change_target,
             self._change_actuator,
@@ -231,7 +231,7 @@ class Viewer:
             self._prepare()
 
     def _prepare(self) -> None:
-        """Compile what answers need before the first is asked for: for once, that takes longer than a motion."""
+        """Compile the kernels of answers ahead, since that takes longer than a motion of the mouse."""
         mechanism, panel = self.mechanism, self._stage.panel
         if mechanism != self._ready:
             panel.tell("getting ready; a new version compiles what answers need, once …")
@@ -240,7 +240,7 @@ class Viewer:
             panel.tell("")
 
     def _changed(self, path: Path) -> None:
-        """The file was written: show what is in it now, or say what is wrong with it."""
+        """Show the new content of the watched file, or its fault."""
         try:
             mechanism = load(path)
         except (PfabrikError, OSError) as error:
@@ -258,6 +258,6 @@ class Viewer:
             return self._stage.page()
 
     def _send(self, client: Any) -> None:
-        """The page as a download."""
+        """Send the page as a download."""
         if client is not None:
             client.send_file_download(f"{self.mechanism.name}.html", self._page().encode())

@@ -1,4 +1,4 @@
-"""A file that is looked at again whenever it is written."""
+"""A file that is watched for changes."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 INTERVAL = 0.25
-"""Time between two looks [s]."""
+"""Time between two checks [s]."""
 
 
 class Watch:
     """Calls back, from a thread of its own, each time a file has been written.
 
     Editors write in several ways: what counts is that its time, size or place on the disk is another, and that it is
-    the same in two looks one after the other, so that a file half written is not read.
+    the same in two checks one after the other, so that a file half written is not read.
     """
 
     def __init__(self, path: Path, changed: Callable[[Path], None]) -> None:
@@ -25,7 +25,7 @@ class Watch:
         self._thread.start()
 
     def end(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         self._ended.set()
         if threading.current_thread() is not self._thread:
             self._thread.join(timeout=5.0)
@@ -40,9 +40,9 @@ class Watch:
             before = now
 
     def _state(self) -> tuple[int, int, int] | None:
-        """What tells one version from another; None while there is no file."""
+        """Time, size and place on the disk of the file; None while there is no file."""
         try:
-            found = self._path.stat()
+            stat = self._path.stat()
         except OSError:
             return None
-        return found.st_mtime_ns, found.st_size, found.st_ino
+        return stat.st_mtime_ns, stat.st_size, stat.st_ino

@@ -1,0 +1,169 @@
+"""Arguments and options that several commands have: MECH, numbers, a target, projection."""
+
+from __future__ import annotations
+
+import functools
+import math
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import click
+from click.core import ParameterSource
+from click.shell_completion import CompletionItem
+
+import pfabrik as pf
+
+from ..cells import is_finite
+from ..errors import counted
+from .printing import note
+
+if TYPE_CHECKING:
+    from ..targets import Target
+
+STANDARD_INPUT = "-"
+
+Triple: TypeAlias = tuple[float, float, float]
+
+
+class MechanismName(click.types.StringParamType):
+    """A text that completes to names of the catalogue, and to files."""
+
+    name = "mech"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Names that begin so; else the shell's own completion of files."""
+        names = [name for name in pf.catalog() if name.startswith(incomplete)]
+        return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
+
+
+MECH = MechanismName()
+
+
+def load(mech: str) -> pf.Mechanism:
+    """The mechanism of an argument MECH: a catalogue name, a file, or ``-`` for standard input."""
+    if mech != STANDARD_INPUT:
+        return pf.load(mech)
+    from ..files import loads
+
+    return loads(sys.stdin.read(), "standard input")
+
+
+class Finite(click.types.FloatParamType):
+    """A float that is neither infinite nor NaN."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number, or a failure that names the option."""
+        if isinstance(value, str) and not is_finite(value):
+            self.fail(f"found '{value}'; expected a finite number", param, ctx)
+        number: float = super().convert(value, param, ctx)
+        return number
+
+
+FINITE = Finite()
+
+
+@dataclass(frozen=True)
+class TargetOptions:
+    """The values of ``--position`` [length], ``--rpy`` [deg] and ``--joint``; None where an option is not given."""
+
+    position: Triple | None
+    rpy: Triple | None
+    joint: str | None
+
+    @property
+    def is_given(self) -> bool:
+        """True if any of the options is given."""
+        return (self.position, self.rpy, self.joint) != (None, None, None)
+
+    def of(self, mechanism: pf.Mechanism) -> Target:
+        """The target that the options give; home's pose where they give none."""
+        if self.joint is None:
+            position = self.position or mechanism.reference_point
+            return pf.pose(position, rpy=self.rpy or (0, 0, 0), degrees=True)
+        if self.position is not None or self.rpy is not None:
+            raise click.UsageError("--joint says it all: it does not go with --position or --rpy")
+        return joint_target(mechanism, self.joint)
+
+
+rpy_option = click.option(
+    "--rpy", type=FINITE, nargs=3, metavar="R P Y", help="Roll, pitch, yaw [deg] from home. Default: 0 0 0."
+)
+
+
+def targeted(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--position``, ``--rpy`` and ``--joint``, which the command gets as one `target`."""
+
+    @click.option("--position", type=FINITE, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home.")
+    @rpy_option
+    @click.option(
+        "--joint",
+        metavar="NAME=VALUE[,VALUE...]",
+        help="Coordinates [deg or length] of the joint between base and end effector, in place of the others.",
+    )
+    @functools.wraps(command)
+    def with_target(*, position: Triple | None, rpy: Triple | None, joint: str | None, **parameters: Any) -> Any:
+        return command(target=TargetOptions(position, rpy, joint), **parameters)
+
+    return with_target
+
+
+def joint_target(mechanism: pf.Mechanism, words: str) -> dict[str, float | list[float]]:
+    """Joint name -> coordinates [rad or length], from words such as ``pivot=5,10``."""
+    from ..description.joint_types import KINDS
+
+    name, equals, listed = words.partition("=")
+    values = listed.split(",")
+    if not equals or not all(map(is_finite, values)):
+        raise click.UsageError(f"--joint: found '{words}'; expected NAME=VALUE[,VALUE...] with finite numbers")
+    kinds = KINDS[mechanism.joint(name).type].coordinates
+    if len(values) != len(kinds):
+        raise click.UsageError(f"--joint {words}: found {counted(len(values), 'value')}; expected {len(kinds)}")
+    numbers = zip(map(float, values), kinds, strict=True)
+    coordinates = [math.radians(number) if kind == "angle" else number for number, kind in numbers]
+    return {name: coordinates if len(coordinates) > 1 else coordinates[0]}
+
+
+def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--hold`` and ``--projection``, which the command gets as `options` for the solver."""
+
+    @click.option(
+        "--hold",
+        type=click.Choice(["orientation", "position", "none"]),
+        default="orientation",
+        show_default=True,
+        help="What an answer to a target out of reach keeps exactly, if any pose does.",
+    )
+    @click.option(
+        "--projection",
+        type=click.Choice(["nearest", "centroid"]),
+        default="nearest",
+        show_default=True,
+        help="Which answer that is: the nearest, or where the chains' ends agree.",
+    )
+    @functools.wraps(command)
+    def with_options(
+        *,
+        hold: Literal["orientation", "position", "none"],
+        projection: Literal["nearest", "centroid"],
+        **parameters: Any,
+    ) -> Any:
+        options = pf.Options(hold=None if hold == "none" else hold, projection=projection)
+        return command(options=options, **parameters)
+
+    return with_options
+
+
+def note_left_out(given: Iterable[str], mechanism: pf.Mechanism) -> None:
+    """Note that the task leaves out what was given."""
+    for option in given:
+        note(f"{option} has no effect: the task is {' '.join(mechanism.task)}")
+
+
+def note_unused_projection(reason: str) -> None:
+    """Note that ``--hold`` or ``--projection`` is given where nothing is projected."""
+    context = click.get_current_context()
+    for name in ("hold", "projection"):
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            note(f"--{name} has no effect with {reason}: nothing is projected")

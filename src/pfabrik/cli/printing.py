@@ -1,0 +1,40 @@
+"""The two streams: answers on stdout, as text or as one JSON object; notes and complaints on stderr."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+
+def json_option(help: str = "One JSON object on stdout; angles in radians.") -> Callable[..., Any]:
+    """The option ``--json``, which a command gets as `as_json`."""
+    return click.option("--json", "as_json", is_flag=True, help=help)
+
+
+def print_answer(
+    as_json: bool, to_object: Callable[[], object], to_text: Callable[[], str], *, to_stderr: bool = False
+) -> None:
+    """Print an answer as JSON on stdout, or as text on stdout or stderr; only the form that is printed is made."""
+    if as_json:
+        print_json(to_object())
+    else:
+        click.echo(to_text(), err=to_stderr)
+
+
+def print_json(answer: object) -> None:
+    """Print one JSON object on stdout."""
+    click.echo(json.dumps(answer, allow_nan=False))
+
+
+def note(remark: str) -> None:
+    """Print a note on stderr."""
+    complain(f"note: {remark}")
+
+
+def complain(message: str) -> None:
+    """Print each line of a message on stderr, marked as ours."""
+    for line in message.splitlines() or ["failed without a message"]:
+        click.echo(f"pfabrik: {line}", err=True)
