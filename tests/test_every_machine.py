@@ -53,8 +53,8 @@ def test_home_is_reached_with_the_coordinates_of_the_description(name: str) -> N
 
 @pytest.mark.parametrize("name", names("closure.delta_small_cones"))
 def test_what_forward_kinematics_assembles_is_reached_and_gives_the_same_pose_again(name: str) -> None:
-    mechanism = machine(name)
-    there = pf.solve_fk(mechanism, any_values(mechanism, 4 if INTERPRETED else 12, 0.6))
+    mechanism, count = machine(name), 4 if INTERPRETED or name in ("closure.H4", "closure.Par4") else 12  # as slow
+    there = pf.solve_fk(mechanism, any_values(mechanism, count, 0.6))
     assert_feasible(mechanism, there)
     for start in (None, there):
         answer = pf.solve_ik(mechanism, there.pose, start=start)
