@@ -6,6 +6,7 @@ Twice, from what an answer tells: by the positions of joint centres, and by the 
 from __future__ import annotations
 
 import dataclasses
+import os
 from functools import lru_cache
 from itertools import combinations
 
@@ -13,10 +14,59 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pfabrik import Joint, Mechanism, Solution
+import pfabrik as pf
+from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.description.home_mobility import universal_axes
+from pfabrik.description.task import task_of
 
 Array = NDArray[np.float64]
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+"""Kernels run as plain Python, a hundred times slower."""
+
+
+def home_values(mechanism: Mechanism) -> Array:
+    """Actuator values at home, (n_a,)."""
+    return np.array([drive.home for drive in mechanism.drives])
+
+
+def actuator_units(mechanism: Mechanism) -> Array:
+    """L of every actuator that is a length, 1 of an angle, (n_a,)."""
+    return np.array([1.0 if drive.kind == "angle" else mechanism.characteristic_length for drive in mechanism.drives])
+
+
+def pose_errors(mechanism: Mechanism, poses: Array, targets: Array) -> Array:
+    """How far poses are from targets, (n,) [L or rad]; of a joint end effector only the position counts."""
+    apart = np.linalg.norm((poses - targets)[..., :3, 3], axis=-1) / mechanism.characteristic_length
+    turned = np.linalg.norm((poses - targets)[..., :3, :3], axis=(-2, -1)) / np.sqrt(2.0)
+    return np.maximum(apart, 0.0 if mechanism.end_effector_is_joint else turned)
+
+
+def assert_feasible(mechanism: Mechanism, answer: Solution) -> None:
+    """What REACHED and PROJECTED promise, measured without the library: finite, assembled, within all limits."""
+    for name in ("pose", "actuators", "position_error", "rotation_error", "actuator_error", "residual", "limit_excess"):
+        assert np.isfinite(getattr(answer, name)).all(), name
+    assert np.max(answer.status) <= Status.PROJECTED
+    assert np.max(answer.residual) <= 1e-9 * mechanism.characteristic_length
+    assert np.max(pf.closure_residual(answer)) <= 1e-9 * mechanism.characteristic_length
+    assert np.max(answer.limit_excess) <= 1e-9
+    assert np.max(gap_of_joints(mechanism, answer)) <= 2e-9
+    assert np.max(excess_of_joints(mechanism, answer)) <= 1.0001e-9
+
+
+def task_errors(mechanism: Mechanism, poses: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """How far poses are from targets in what the task sets, (n,) [L and rad]."""
+    position, rotation = task_of(mechanism).errors(poses, targets)
+    turning = 0.0 if mechanism.end_effector_is_joint else 1.0
+    return np.hypot(position / mechanism.characteristic_length, turning * rotation)
+
+
+def assert_honest(mechanism: Mechanism, targets: np.ndarray, answer: Solution) -> None:
+    """Feasible, and REACHED where and only where the pose is the target in what the task sets."""
+    assert_feasible(mechanism, answer)
+    reached, error = answer.status == Status.REACHED, task_errors(mechanism, answer.pose, targets)
+    assert np.all(error[reached] <= 1.5e-9)
+    assert np.all(error[~reached] > 1e-10)
+
 
 # --- by the positions of joint centres -------------------------------------------------------------------------------
 

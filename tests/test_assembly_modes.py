@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -12,12 +11,12 @@ import pytest
 import checks
 import oracles
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import planar, published
 from machines.published import PUBLISHED
 from oracles import assembly
-from pfabrik.errors import InvalidArgument, MobilityWarning, PfabrikError
+from pfabrik.errors import MobilityWarning, PfabrikError
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 SAUER = assembly.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
 
 
@@ -275,10 +274,3 @@ def test_a_singular_but_isolated_configuration_is_no_continuum() -> None:
     assert 1 <= len(modes) <= 2
     for mode in modes:
         np.testing.assert_allclose(mode.pose[:2, 3], [0.0, 0.0], rtol=0, atol=1e-2)
-
-
-@pytest.mark.parametrize("actuators", [[5.0, 5.0], [5.0] * 4, [5.0, 5.0, np.nan], ["a", "b", "c"], None, [[5.0] * 3]])
-def test_what_is_no_single_set_of_actuator_values_is_refused(actuators: object) -> None:
-    mechanism, _ = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
-    with pytest.raises(InvalidArgument, match="actuators"):
-        pf.assembly_modes(mechanism, actuators)

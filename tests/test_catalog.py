@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from functools import cache
 
@@ -12,8 +11,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import checks
-import oracles_by_leg as by_leg
+import oracles
 import pfabrik as pf
+from checks import INTERPRETED
+from machines import machine
 from machines.published import PUBLISHED, moved_from_home
 from oracles import search
 from paper import geometric
@@ -21,7 +22,6 @@ from pfabrik import Mechanism, Solution, Status
 from pfabrik.catalog import catalog_file, description
 
 Array = NDArray[np.float64]
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 KEPT = 1e-9  # what a result promises, of L or in radians
 NAMES = pf.catalog()
 
@@ -55,11 +55,6 @@ FREEDOMS = {
 OVER_CONSTRAINTS = {"five_bar": 3, "rrr": 6, "rpr": 6, "prr": 6, "agile_eye": 6, "orthoglide": 12}
 """Loop conditions that follow from others: three of every planar or spherical loop, such as the Orthoglide's three
 parallelograms; and three more there, because three legs hold two rotations each. None elsewhere."""
-
-
-@cache
-def machine(name: str) -> Mechanism:
-    return pf.load(name)
 
 
 def drawn_actuators(mechanism: Mechanism, count: int, seed: int) -> Array:
@@ -118,15 +113,6 @@ def pose_errors(mechanism: Mechanism, poses: Array, targets: Array) -> Array:
     return np.max([off[:, 0], *(np.linalg.norm(counted[name], axis=1) for name in mechanism.task)], axis=0)
 
 
-def assert_feasible(mechanism: Mechanism, solution: Solution) -> None:
-    assert np.isfinite(solution.pose).all()
-    assert np.isfinite(solution.actuators).all()
-    assert (solution.status <= Status.PROJECTED).all()
-    assert pf.closure_residual(solution).max() <= KEPT * mechanism.characteristic_length
-    assert checks.gap_of_joints(mechanism, solution).max() <= 2 * KEPT
-    assert checks.excess_of_joints(mechanism, solution).max() <= 2 * KEPT
-
-
 # Any target: half of the rows anywhere, half where a feasible configuration puts the end effector
 
 FEW, MANY = (2 if INTERPRETED else 100), 2000
@@ -167,7 +153,7 @@ def at_bounds(name: str, count: int) -> tuple[Array, Solution]:
 @pytest.mark.parametrize("name", NAMES)
 def test_limits_are_kept_and_loops_closed_for_any_target(name: str, count: int) -> None:
     for found in (anywhere(name, count)[1], assembled(name, count), inside(name, count)[1], at_bounds(name, count)[1]):
-        assert_feasible(machine(name), found)
+        checks.assert_feasible(machine(name), found)
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -196,8 +182,8 @@ def test_what_is_called_out_of_reach_is(name: str, count: int) -> None:
 
 def reached_in_closed_form(mechanism: Mechanism, targets: Array) -> NDArray[np.bool_] | None:
     """Which targets (n, 4, 4) a closed form reaches, (n,); None without one."""
-    for solve_ik in (by_leg.solve_ik, geometric.solve_ik):
-        with suppress(by_leg.Unsuitable, geometric.NoClosedForm):
+    for solve_ik in (oracles.solve_ik, geometric.solve_ik):
+        with suppress(oracles.NoClosedForm, geometric.NoClosedForm):
             return np.asarray(solve_ik(mechanism, targets).reached)
     return None
 
@@ -254,28 +240,12 @@ def test_a_file_begins_with_a_line_that_says_what_the_machine_is(name: str) -> N
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_saved_machine_is_the_same(name: str, tmp_path: object) -> None:
-    path = f"{tmp_path}/{name}.toml"
-    pf.save(machine(name), path)
-    assert pf.load(path) == machine(name)
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_machines_have_the_freedoms_that_the_literature_counts(name: str) -> None:
     counted = pf.mobility(machine(name))
     assert (counted.platform, counted.mobility) == FREEDOMS[name]
     assert counted.uncontrolled == 0
     assert counted.over_constraints == OVER_CONSTRAINTS.get(name, 0)
     assert counted.internal == (6 if name == "nrpm" else 0)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_home_is_reached_and_is_where_the_file_says(name: str) -> None:
-    mechanism = machine(name)
-    home = pf.solve_ik(mechanism, mechanism.home_pose)
-    assert home.status is Status.REACHED
-    expected = [mechanism.home_coordinate(actuator) for actuator in mechanism.actuator_names]
-    np.testing.assert_allclose(home.actuators, expected, atol=1e-9 * mechanism.characteristic_length)
 
 
 # Published numbers
@@ -313,16 +283,6 @@ def test_the_delta_sinks_by_the_published_amount_for_one_degree() -> None:
     assert mechanism.home_pose[2, 3] == pytest.approx(-96.859, abs=1e-3)
     sunk = pf.solve_fk(mechanism, np.radians([1.0, 1.0, 1.0])).pose[2, 3] - mechanism.home_pose[2, 3]
     assert sunk == pytest.approx(-1.992, abs=1.5e-3)
-
-
-@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
-def test_the_3rps_shifts_sideways_as_lee_and_shah_say(row: list[float]) -> None:
-    azimuth, tilt, height = row[:3]
-    about_z = Rotation.from_rotvec([0, 0, azimuth])
-    turn = about_z * Rotation.from_rotvec([0, tilt, 0]) * about_z.inv()
-    found = pf.solve_ik(machine("rps"), pf.pose([*row[3:5], height], rotation=turn))
-    assert found
-    np.testing.assert_allclose(found.actuators, row[5:], atol=1e-6)
 
 
 @pytest.mark.parametrize(

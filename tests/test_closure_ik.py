@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -13,82 +10,14 @@ from scipy.spatial.transform import Rotation
 
 import checks
 import pfabrik as pf
-from machines import closure, ring
-from machines.closure import MACHINES, X, Z, chain, joint
-from pfabrik import Mechanism, Options, Solution, Status
-
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-FEW = ("upu", "four_bar_driven", "hinge")
-"""Enough for the interpreted run, which takes a hundred times as long."""
+from checks import INTERPRETED, assert_feasible, assert_honest, home_values
+from machines import closure, machine, ring
+from machines.closure import X, Z, chain, joint
+from oracles import any_targets, any_values
+from pfabrik import Mechanism, Solution, Status
 
 compiled = pytest.mark.skipif(INTERPRETED, reason="many searches: minutes without the compiler")
 pytestmark = pytest.mark.filterwarnings("error", "ignore::pfabrik.errors.MobilityWarning")
-
-_MADE: dict[str, Mechanism] = {}
-
-
-def machine(name: str) -> Mechanism:
-    if name not in _MADE:
-        _MADE[name] = MACHINES[name]()
-    return _MADE[name]
-
-
-def every_machine(*but: str) -> list[str]:
-    return [name for name in (FEW if INTERPRETED else MACHINES) if name not in but]
-
-
-def home_values(mechanism: Mechanism) -> np.ndarray:
-    return np.array([mechanism.home_coordinate(name) for name in mechanism.actuator_names])
-
-
-def random_values(mechanism: Mechanism, n: int, share: float = 1.0, seed: int = 0) -> np.ndarray:
-    """Actuator values within a share of their ranges, from home, (n, n_a)."""
-    rng, length = np.random.default_rng(seed), mechanism.characteristic_length
-    columns = []
-    for name, home in zip(mechanism.actuator_names, home_values(mechanism), strict=True):
-        own = mechanism.joint(name)
-        reach = 0.4 * length if own.type == "prismatic" else 1.5
-        low, high = own.range or (home - reach, home + reach)
-        columns.append(home + share * (rng.uniform(low, high, n) - home))
-    return np.stack(columns, axis=1)
-
-
-def random_targets(mechanism: Mechanism, n: int, seed: int = 0) -> np.ndarray:
-    """Poses near and far, up to 1e6 L and turned by any angle, some on joint centres, the last one home, (n, 4, 4)."""
-    rng, length = np.random.default_rng(seed), mechanism.characteristic_length
-    targets = np.tile(np.eye(4), (n, 1, 1))
-    away = length * rng.choice([0, 1e-6, 0.05, 0.3, 1, 10, 1e3, 1e6], (n, 1))
-    turn = rng.choice([0, 1e-6, 0.05, 0.4, 3], (n, 1))
-    targets[:, :3, 3] = mechanism.reference_point + away * rng.normal(size=(n, 3))
-    targets[:, :3, :3] = Rotation.from_rotvec(turn * rng.uniform(-1, 1, (n, 3))).as_matrix()
-    centres = [each.at for each in mechanism.joints if each.at is not None][: n // 4]
-    for row, centre in enumerate(centres):
-        targets[row, :3, 3] = centre
-    targets[-1] = mechanism.home_pose
-    return targets
-
-
-def errors(mechanism: Mechanism, poses: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """How far poses are from targets, (n,) [L or rad]; of a joint end effector only the position counts."""
-    apart = np.linalg.norm((poses - targets)[:, :3, 3], axis=1) / mechanism.characteristic_length
-    turned = np.linalg.norm((poses - targets)[:, :3, :3], axis=(1, 2)) / np.sqrt(2.0)
-    return np.maximum(apart, 0.0 if mechanism.end_effector_is_joint else turned)
-
-
-def assert_feasible(mechanism: Mechanism, answer: Solution) -> None:
-    """Every row is an assembled configuration within all limits, by its own `joints`."""
-    assert np.max(answer.status) <= Status.PROJECTED
-    assert np.max(checks.gap_of_joints(mechanism, answer)) <= 2e-9
-    assert np.max(pf.closure_residual(answer)) <= 1e-9 * mechanism.characteristic_length
-    assert np.max(checks.excess_of_joints(mechanism, answer)) <= 1.0001e-9
-
-
-def assert_honest(mechanism: Mechanism, targets: np.ndarray, answer: Solution) -> None:
-    """Feasible, and REACHED where and only where the pose is the target."""
-    assert_feasible(mechanism, answer)
-    reached, error = answer.status == Status.REACHED, errors(mechanism, answer.pose, targets)
-    assert np.all(error[reached] <= 1.01e-9)
-    assert np.all(error[~reached] > 1e-10)
 
 
 def turned_by(mechanism: Mechanism, first: Solution, second: Solution) -> float:
@@ -106,114 +35,6 @@ def turned_by(mechanism: Mechanism, first: Solution, second: Solution) -> float:
         turn = np.abs(2.0 * np.sin(0.5 * off))
         changes.append(np.where(slides, off / mechanism.characteristic_length, turn).max())
     return float(max(changes))
-
-
-# --- promises, on every machine --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", every_machine("delta_small_cones"))
-def test_what_forward_kinematics_assembles_is_reached_and_gives_the_same_pose_again(name: str) -> None:
-    mechanism = machine(name)
-    there = pf.solve_fk(mechanism, random_values(mechanism, 4 if INTERPRETED else 12, 0.6))
-    assert_feasible(mechanism, there)
-    for seed in (None, there):
-        answer = pf.solve_ik(mechanism, there.pose, start=seed)
-        assert np.all(answer.status == Status.REACHED)
-        assert_honest(mechanism, there.pose, answer)
-        again = pf.solve_fk(mechanism, answer.actuators, start=answer)
-        assert np.all(again.status == Status.REACHED)
-        assert np.max(errors(mechanism, again.pose, answer.pose)) <= 1e-8
-
-
-@compiled
-@pytest.mark.parametrize("name", every_machine())
-def test_any_finite_target_has_an_honest_answer(name: str) -> None:
-    mechanism = machine(name)
-    targets = random_targets(mechanism, 16)
-    assert_honest(mechanism, targets, pf.solve_ik(mechanism, targets))
-
-
-@pytest.mark.parametrize(
-    "count", [pytest.param(6, marks=pytest.mark.slow), pytest.param(64, marks=pytest.mark.campaign)]
-)
-@pytest.mark.parametrize("hold", ["orientation", "position", None])
-@pytest.mark.parametrize("name", MACHINES)
-def test_any_finite_target_has_an_honest_answer_whatever_a_projection_holds(
-    name: str, hold: str | None, count: int
-) -> None:
-    mechanism = machine(name)
-    home = pf.solve_ik(mechanism, mechanism.home_pose)
-    targets = random_targets(mechanism, count, seed=1)
-    for seed in (None, home):
-        answer = pf.solve_ik(mechanism, targets, start=seed, options=Options(hold=hold))
-        assert_honest(mechanism, targets, answer)
-
-
-@compiled
-@pytest.mark.parametrize("name", every_machine())
-def test_any_finite_actuator_values_have_an_honest_answer(name: str) -> None:
-    mechanism = machine(name)
-    asked = random_values(mechanism, 6, share=3.0)
-    answer = pf.solve_fk(mechanism, asked)
-    assert_feasible(mechanism, answer)
-    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
-    off = np.abs(answer.actuators - asked) / np.where(slides, mechanism.characteristic_length, 1.0)
-    assert np.array_equal(answer.status == Status.REACHED, off.max(axis=1) <= 1e-9)
-
-
-@pytest.mark.parametrize("name", every_machine())
-def test_home_is_reached_with_the_coordinates_of_the_description(name: str) -> None:
-    mechanism = machine(name)
-    for answer in (pf.solve_ik(mechanism, mechanism.home_pose), pf.solve_fk(mechanism, home_values(mechanism))):
-        assert answer.status == Status.REACHED
-        for each, value in answer.joints.items():
-            np.testing.assert_allclose(value, mechanism.home_coordinate(each), atol=1e-9)
-
-
-@compiled
-@pytest.mark.parametrize("name", every_machine())
-def test_a_row_alone_is_answered_as_in_a_batch_and_survives_being_stored(name: str) -> None:
-    mechanism = machine(name)
-    targets = random_targets(mechanism, 6, seed=2)
-    together = pf.solve_ik(mechanism, targets)
-    stored = pickle.loads(pickle.dumps(together))
-    json.dumps(together.to_dict(), allow_nan=False)
-    for row in range(len(targets)):
-        alone = pf.solve_ik(mechanism, targets[row])
-        assert alone.status == together.status[row]
-        np.testing.assert_allclose(alone.pose, together.pose[row], atol=1e-9 * mechanism.characteristic_length)
-        for each, value in alone.joints.items():
-            np.testing.assert_allclose(value, together[row].joints[each], atol=1e-9)
-            np.testing.assert_array_equal(stored[row].joints[each], together.joints[each][row])
-
-
-@pytest.mark.parametrize("name", every_machine("agile_eye"))
-def test_rows_that_are_no_poses_are_marked_and_spoil_nothing(name: str) -> None:
-    mechanism = machine(name)
-    targets = np.tile(mechanism.home_pose, (4, 1, 1))
-    targets[1, 0, 0], targets[2, :3, :3] = np.nan, 2.0 * np.eye(3)
-    answer = pf.solve_ik(mechanism, targets, options=Options(on_invalid="mark"))
-    assert answer.status.tolist() == [Status.REACHED, Status.INVALID, Status.INVALID, Status.REACHED]
-    assert all(np.isnan(value[1]).all() and np.isfinite(value[3]).all() for value in answer.joints.values())
-    assert np.isnan(pf.closure_residual(answer)).tolist() == [False, True, True, False]
-
-
-@compiled
-@pytest.mark.parametrize("change", ["reversed", "shuffled", "smaller", "larger"])
-@pytest.mark.parametrize("name", every_machine("agile_eye", "slider"))  # descriptions without a length
-def test_how_a_machine_is_described_does_not_change_what_it_reaches(name: str, change: str) -> None:
-    mechanism = machine(name)
-    factor = {"smaller": 1e-3, "larger": 1e6}.get(change, 1.0)
-    other = {"reversed": closure.reversed_joints, "shuffled": closure.shuffled}.get(
-        change, lambda each: closure.scaled(each, factor)
-    )(mechanism)
-    reached = pf.solve_fk(mechanism, random_values(mechanism, 2, 0.4)).pose
-    targets = np.concatenate([reached, random_targets(mechanism, 3, seed=3)])
-    moved = targets.copy()
-    moved[:, :3, 3] *= factor
-    answer = pf.solve_ik(other, moved)
-    assert_honest(other, moved, answer)
-    assert np.array_equal(answer.status, pf.solve_ik(mechanism, targets).status)
 
 
 # --- paths -----------------------------------------------------------------------------------------------------------
@@ -235,7 +56,7 @@ SMOOTH = ("tricept", "delta_uu", "pinned_delta", "orthoglide", "puu", "exechon",
 @compiled
 @pytest.mark.parametrize("name", SMOOTH)
 def test_a_path_out_of_reach_and_back_is_followed_without_leaps_and_ends_as_it_began(name: str) -> None:
-    mechanism = machine(name)
+    mechanism = machine(f"closure.{name}")
     path = round_trip(mechanism, shift=1.2, turn=0.3)
     answer = pf.track(mechanism, path)
     assert_honest(mechanism, path, answer)
@@ -249,7 +70,7 @@ def test_a_path_out_of_reach_and_back_is_followed_without_leaps_and_ends_as_it_b
 @pytest.mark.parametrize("name", ["delta_uu", "pinned_delta", "puu"])
 def test_an_orientation_out_of_reach_does_not_pull_a_path_into_another_branch(name: str) -> None:
     """Nothing turns these platforms: far turns asked for drew the search through open loops to other branches."""
-    mechanism = machine(name)
+    mechanism = machine(f"closure.{name}")
     path = round_trip(mechanism, shift=0.0, turn=2.9)
     answer = pf.track(mechanism, path)
     assert_honest(mechanism, path, answer)
@@ -259,7 +80,7 @@ def test_an_orientation_out_of_reach_does_not_pull_a_path_into_another_branch(na
 
 @compiled
 def test_a_projection_is_never_further_away_than_where_it_started() -> None:
-    mechanism = machine("delta_uu")
+    mechanism = machine("closure.delta_uu")
     home = pf.solve_ik(mechanism, mechanism.home_pose)
     for turn in np.linspace(2.0, 3.1, 8):
         target = mechanism.home_pose.copy()
@@ -276,8 +97,8 @@ def test_a_projection_is_never_further_away_than_where_it_started() -> None:
 )
 def test_a_start_far_away_keeps_its_working_mode_as_a_path_does(count: int) -> None:
     """A single step of Newton's method leaps over a wrist's singularity."""
-    mechanism, followed = machine("arm"), 0
-    there = pf.solve_fk(mechanism, random_values(mechanism, count, 0.8, seed=11))
+    mechanism, followed = machine("closure.arm"), 0
+    there = pf.solve_fk(mechanism, any_values(mechanism, count, 0.8, seed=11))
     for row in range(0, count, 2):
         begin, end = there.pose[row], there.pose[row + 1]
         share = np.linspace(0, 1, 100)[:, None]
@@ -301,7 +122,7 @@ def test_a_start_far_away_keeps_its_working_mode_as_a_path_does(count: int) -> N
 def arm_with_tool(tip: str) -> Mechanism:
     """An arm placed by the hinge of a tool that hangs on it alone."""
     joints = [
-        *chain(1, *closure._ARM, end="hand"),
+        *chain(1, *closure.ARM, end="hand"),
         joint(tip, "tip", ("hand", "tool"), (300, 0, 340), Z, range=(-0.5, 0.5)),
     ]
     return Mechanism("arm with a tool", joints, "tip")
@@ -309,7 +130,7 @@ def arm_with_tool(tip: str) -> Mechanism:
 
 @pytest.mark.parametrize("name", ["gripper", "platform_gripper"])
 def test_a_loop_beyond_the_end_effector_is_closed_too(name: str) -> None:
-    mechanism = machine(name)
+    mechanism = machine(f"closure.{name}")
     values = np.repeat(home_values(mechanism)[None], 5, axis=0)
     values[:, mechanism.actuator_names.index("g1")] = np.linspace(-0.3, 0.3, 5)
     answer = pf.solve_fk(mechanism, values)
@@ -330,7 +151,7 @@ def test_a_driven_tool_that_no_path_passes_keeps_its_range(asked: float, status:
 @compiled
 def test_what_nothing_asks_of_stays_where_it_was() -> None:
     mechanism = arm_with_tool("R")
-    answer = pf.solve_ik(mechanism, random_targets(mechanism, 24))
+    answer = pf.solve_ik(mechanism, any_targets(mechanism, 24))
     assert np.all(answer.joints["tip"] == 0.0)
 
 
@@ -350,7 +171,7 @@ def test_a_platform_welded_to_the_base_stays_there() -> None:
 @compiled
 @pytest.mark.parametrize("distance", [1e7, 1e9, 1e12, 1e100, 1e200, 1e300])
 def test_a_target_however_far_is_approached_like_one_that_is_far(distance: float) -> None:
-    mechanism = machine("delta_uu")
+    mechanism = machine("closure.delta_uu")
     near, far = (pf.solve_ik(mechanism, mechanism.home_pose[:3, 3] + [away, 0, 0]) for away in (1e5, distance))
     assert far.status == Status.PROJECTED
     assert far.position_error == pytest.approx(distance, rel=1e-4)
@@ -404,7 +225,7 @@ def test_universal_and_revolute_joints_may_turn_further_than_half_way() -> None:
 @pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.campaign)])
 def test_every_pose_of_an_arm_within_its_ranges_is_reached(count: int) -> None:
     """The poses come from random joint angles, so that each is in reach, in whatever working mode."""
-    mechanism, rng = machine("arm"), np.random.default_rng(4)
+    mechanism, rng = machine("closure.arm"), np.random.default_rng(4)
     moved = {}
     for each in mechanism.joints:
         low, high = each.range or (-7.0, 7.0)
@@ -418,7 +239,7 @@ def test_every_pose_of_an_arm_within_its_ranges_is_reached(count: int) -> None:
 @compiled
 def test_the_agile_eye_has_eight_assembly_modes() -> None:
     """C. M. Gosselin, J. Sefrioui, M. J. Richard: a spherical 3-RRR has at most eight."""
-    mechanism = machine("agile_eye")
+    mechanism = machine("closure.agile_eye")
     modes = pf.assembly_modes(mechanism, [0.2, -0.3, 0.4])
     assert len(modes) == 8
     for mode in modes:

@@ -17,13 +17,13 @@ import pytest
 from numba.core.caching import NullCache
 
 import pfabrik as pf
+from checks import INTERPRETED
 from copied import copied
-from machines import MACHINES
+from machines import machine
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels import _jit, ahead
 from pfabrik.kernels.reaching.solve import solve_by_passes
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 TESTS = Path(__file__).parent
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 FEW = ("five_bar", "nrpm", "hexapod_rus", "serial_spherical", "serial_arm")
@@ -38,10 +38,6 @@ from test_compiled_and_interpreted import answers
 path, *names = sys.argv[1:]
 np.savez(path, **{f"{name} {field}": values for name in names for field, values in answers(name).items()})
 """
-
-
-def machine(name: str) -> pf.Mechanism:
-    return MACHINES[name]() if name in MACHINES else pf.load(name)
 
 
 def some_targets(mechanism: pf.Mechanism, n: int, seed: int = 0, share: float = 0.2) -> np.ndarray:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 import pfabrik as pf
-from machines import MACHINES as REACHING_MACHINES
-from machines.closure import MACHINES as CLOSURE_MACHINES
+from machines import machine
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.description.joint_types import KINDS
-from pfabrik.errors import InvalidArgument
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 NAMES = (
@@ -27,11 +23,6 @@ NAMES = (
     "mixed",
     "serial_spherical",
 )
-
-
-def machine(name: str) -> Mechanism:
-    made = REACHING_MACHINES | CLOSURE_MACHINES
-    return made[name]() if name in made else pf.load(name)
 
 
 def near_home(mechanism: Mechanism, n: int = 3) -> Solution:
@@ -150,28 +141,6 @@ def test_a_joint_vector_keeps_its_working_mode() -> None:
 def bent(answer: Solution) -> list[bool]:
     p = answer.points
     return [bool(np.cross(p[b] - p[a], p["p3"] - p[b])[0] > 0) for a, b in (("p1", "p2"), ("p5", "p4"))]
-
-
-@pytest.mark.parametrize(
-    ("q", "named"),
-    [
-        ([0.0], r"found shape \(1,\); expected shape \(\.\.\., 36\)"),
-        (0.0, r"found shape \(\)"),
-        ("home", "q: found str"),
-        ([np.nan] * 36, "a number that is not finite"),
-    ],
-)
-def test_what_is_no_joint_vector_is_refused(q: Any, named: str) -> None:
-    mechanism = pf.load("stewart")
-    with pytest.raises(InvalidArgument, match=named):
-        pf.configuration(mechanism, q)
-    with pytest.raises(InvalidArgument, match=named.replace("q:", "start:")):
-        pf.solve_ik(mechanism, mechanism.home_pose, start=q)
-
-
-def test_what_is_no_mechanism_has_no_configuration() -> None:
-    with pytest.raises(InvalidArgument, match="mechanism"):
-        pf.configuration("stewart", [0.0])  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["stewart", "servo_hexapod", "rps", "nrpm"])

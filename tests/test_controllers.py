@@ -12,11 +12,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from machines.redescribed import moved
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.export.klipper import klipper
 from pfabrik.export.linuxcnc import linuxcnc
 from test_export_c import COMPILERS, needs_compiler
-from test_invariance import moved
 
 STUBS = {
     "rtapi_app.h": "#define EXPORT_SYMBOL(name) struct unused_##name { int i; }\n"

@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import closure
 from pfabrik import Joint, Mechanism, Status
 from pfabrik.cli import main
 from pfabrik.errors import InvalidMechanism, MobilityWarning
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 N = 3 if INTERPRETED else 40
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 

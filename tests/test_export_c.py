@@ -18,7 +18,7 @@ from machines import closure, published
 from pfabrik.cli import main
 from pfabrik.description.joint_types import KINDS
 from pfabrik.description.task import task_of
-from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+from pfabrik.errors import UnsupportedMechanism
 from pfabrik.export.export_c import c_source
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.wording import in_words
@@ -394,14 +394,6 @@ def test_chains_without_code_are_refused_by_name_and_nothing_is_written(name: st
     assert said in str(caught.value)
     assert "cannot be exported" in str(caught.value)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"precision": "half"}, {"parts": ()}, {"parts": ("ik", "dynamics")}, {"parts": "ik"}, {"name": "my kins"}]
-)
-def test_wrong_arguments_are_named(wrong: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(InvalidArgument, match=next(iter(wrong))):
-        pf.export_c(machine("stewart"), tmp_path / "machine.c", **wrong)
 
 
 @needs_compiler

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from machines import closure
+from machines import closure, five_bar
 from pfabrik import Joint, Mechanism, Status
 from pfabrik.errors import InvalidMechanism
 
@@ -93,23 +93,11 @@ def test_a_leaf_is_noted_by_check(tmp_path) -> None:  # type: ignore[no-untyped-
     assert "note: nothing but joint 'G' connects 'finger_l'" in result.stderr
 
 
-def five_bar_at(tip: tuple[float, float], elbows: tuple[tuple[float, float], tuple[float, float]]) -> Mechanism:
-    (a, b), (x, y) = elbows, tip
-    joints = [
-        Joint("A", "revolute", ("base", "a1"), at=(0, 0, 0), axis=Z, actuated=True),
-        Joint("B", "revolute", ("base", "b1"), at=(100, 0, 0), axis=Z, actuated=True),
-        Joint("E", "revolute", ("a1", "a2"), at=(*a, 0), axis=Z),
-        Joint("F", "revolute", ("b1", "b2"), at=(*b, 0), axis=Z),
-        Joint("T", "revolute", ("a2", "b2"), at=(x, y, 0), axis=Z),
-    ]
-    return Mechanism("5-bar", joints, "T")
-
-
 @pytest.mark.parametrize("elbows", [((25, 40), (75, 40)), ((20, 32), (75, 40))])
 def test_a_five_bar_stretched_out_at_home_is_not_said_to_be_stuck(elbows) -> None:  # type: ignore[no-untyped-def]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        mechanism = five_bar_at((50, 80), elbows)
+        mechanism = five_bar([(0, 0), (100, 0)], elbows, (50, 80))
     assert pf.mobility(mechanism).platform == 2
     assert pf.solve_ik(mechanism, [50, 70, 0])
 

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 import pfabrik as pf
 from in_mujoco import Model
+from machines.redescribed import moved
 from pfabrik.cli import main
 from pfabrik.interop import from_mjcf, to_mjcf
 from pfabrik.motion.fitting_task import fitting_tasks, has_dependent_coordinates
@@ -39,17 +40,6 @@ CHOSEN = {
 }
 
 
-def turned(mechanism: pf.Mechanism, rotation: np.ndarray) -> pf.Mechanism:
-    """A machine of hinges and balls, turned about the origin."""
-
-    def moved(joint: pf.Joint) -> pf.Joint:
-        axis = None if joint.axis is None else rotation @ joint.axis
-        return dataclasses.replace(joint, at=rotation @ joint.at, axis=axis)
-
-    joints = [moved(joint) for joint in mechanism.joints]
-    return pf.Mechanism("turned", joints, mechanism.end_effector, rotation @ mechanism.reference_point)
-
-
 @pytest.mark.parametrize("name", CHOSEN)
 def test_the_task_that_fits_is_what_the_author_of_a_machine_chose(name: str) -> None:
     assert str(fitting_tasks(pf.load(name))[0]) == CHOSEN[name]
@@ -61,7 +51,7 @@ def test_where_the_author_chose_otherwise_that_is_among_the_others() -> None:
 
 def test_a_plane_that_stands_upright_has_a_tilt_in_place_of_the_yaw() -> None:
     """What of the tilt leads out of the plane never varies: all three freedoms are set, and poses in it reached."""
-    upright = turned(pf.load("rrr"), from_rotvec(np.array([np.pi / 2, 0.0, 0.0])))
+    upright = moved(pf.load("rrr"), from_rotvec(np.array([np.pi / 2, 0.0, 0.0])), np.zeros(3))
     best = fitting_tasks(upright)[0]
     assert (best.words, best.count, best.n_constant) == (("x", "z", "tilt"), 3, 1)
     machine = upright._with(task=best.words)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,46 +13,18 @@ from scipy.spatial.transform import Rotation
 import checks
 import oracles
 import pfabrik as pf
-from machines import MACHINES, closure, published
+from checks import INTERPRETED, actuator_units, assert_feasible, home_values
+from machines import closure, machine, published
 from machines.published import PUBLISHED
 from oracles import assembly
 from pfabrik import Status
-from pfabrik.errors import InvalidArgument, UnknownName
 
 CATALOGUE = ("five_bar", "stewart", "nrpm")
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-
-_MADE: dict[str, pf.Mechanism] = {}
-
-
-def machine(name: str) -> pf.Mechanism:
-    if name not in _MADE:
-        _MADE[name] = MACHINES[name]() if name in MACHINES else pf.load(name)
-    return _MADE[name]
-
-
-def home_values(mechanism: pf.Mechanism) -> np.ndarray:
-    return np.array([mechanism.home_coordinate(name) for name in mechanism.actuator_names])
 
 
 def deviation(mechanism: pf.Mechanism, values: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """Difference of actuator values, lengths relative to L."""
-    slides = [mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names]
-    return np.subtract(values, asked) / np.where(slides, mechanism.characteristic_length, 1.0)
-
-
-def assert_feasible(mechanism: pf.Mechanism, asked: np.ndarray, answer: pf.Solution) -> None:
-    """What REACHED and PROJECTED promise, measured without the library."""
-    for name in ("pose", "actuators", "actuator_error", "residual", "limit_excess"):
-        assert np.isfinite(getattr(answer, name)).all(), name
-    assert np.max(answer.status) <= Status.PROJECTED
-    assert np.max(answer.residual) <= 1e-9 * mechanism.characteristic_length
-    assert np.max(answer.limit_excess) <= 1e-9
-    assert np.max(checks.gap_of_points(mechanism, answer)) <= 1e-9
-    assert np.max(checks.excess_of_points(mechanism, answer)) <= 1e-9
-    error = np.abs(deviation(mechanism, answer.actuators, asked)).max(axis=-1)
-    np.testing.assert_allclose(answer.actuator_error, error, rtol=1e-9, atol=1e-9)
-    assert np.all(error[np.asarray(answer.status) == Status.REACHED] <= 1e-9)
+    return np.subtract(values, asked) / actuator_units(mechanism)
 
 
 def assert_same_pose(mechanism: pf.Mechanism, found: np.ndarray, expected: np.ndarray, atol: float = 1e-7) -> None:
@@ -71,99 +42,7 @@ def is_same_pose(mechanism: pf.Mechanism, found: np.ndarray, expected: np.ndarra
     return np.maximum(away, np.abs(found[..., :3, :3] - expected[..., :3, :3]).max(axis=(-1, -2))) <= atol
 
 
-# --- the oracles themselves ------------------------------------------------------------------------------------------
-
-
-def test_oracle_planar_3rpr_has_as_many_roots_as_its_sextic() -> None:
-    """f is a trigonometric polynomial of degree three: its roots are those of a sextic on the unit circle."""
-    rng = np.random.default_rng(1)
-    counts = []
-    for _ in range(60):
-        geometry = assembly.Planar3RPR(*rng.uniform([2, 2, 0.3, 3, -1, 3], [4, 4, 2.5, 6, 2, 6]))
-        p = geometry.lengths(*rng.uniform([-3, -2, -2], [3, 4, 4]))
-        samples = geometry.f(2 * np.pi * np.arange(16) / 16, p)
-        harmonics = np.fft.fft(samples) / 16
-        assert np.abs(harmonics[4:13]).max() <= 1e-12 * np.abs(harmonics).max()
-        roots = np.roots([harmonics[k] for k in (3, 2, 1, 0, -1, -2, -3)])
-        real = np.sort(np.angle(roots[np.abs(np.abs(roots) - 1) < 1e-8]))
-        np.testing.assert_allclose(geometry.roots(p), real, atol=1e-6)
-        for solution in geometry.solutions(p):
-            np.testing.assert_allclose(geometry.lengths(*solution), p, atol=1e-9)
-        counts.append(len(real))
-    assert {2, 4} <= set(counts)
-
-
-@pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
-def test_oracle_planar_3rpr_finds_the_published_poses(case: str) -> None:
-    geometry = assembly.Planar3RPR(**PUBLISHED[case]["geometry"])
-    np.testing.assert_allclose(geometry.solutions(PUBLISHED[case]["p"]), PUBLISHED[case]["poses_theta_x_y"], atol=1e-12)
-
-
-def test_oracle_planar_3rpr_finds_two_positions_at_one_angle() -> None:
-    """Level, the platform's and the base's corners lie on parallel lines: f touches zero there, and y may be either."""
-    geometry = assembly.Planar3RPR(L2=5.0, L3=3.0, gamma=0.4, x1=2.0, x2=5 * np.cos(0.4) - 2, y2=5 * np.sin(0.4))
-    found = geometry.solutions(geometry.lengths(0.0, 1.0, 2.0))
-    for expected in ((0.0, 1.0, 2.0), (0.0, 1.0, -2.0)):
-        assert min(np.abs(np.subtract(each, expected)).max() for each in found) <= 1e-6
-
-
-@pytest.mark.parametrize("transition, below, above", PUBLISHED["sauer_intervals"]["transitions_p2_from_to"])
-def test_oracle_planar_3rpr_counts_change_at_the_published_transitions(
-    transition: float, below: int, above: int
-) -> None:
-    geometry = assembly.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
-    for p2, count in ((transition - 3e-6, below), (transition + 3e-6, above)):
-        assert len(geometry.solutions([5, p2, 3])) == count
-
-
-def test_oracle_five_bar_tips_are_a_forearm_from_both_elbows() -> None:
-    mechanism = machine("five_bar")
-    tips = assembly.five_bar_tips(mechanism, [0.0, 0.0])
-    assert len(tips) == 2
-    assert min(np.linalg.norm(tip - mechanism.reference_point) for tip in tips) <= 1e-12 * 200
-    assert assembly.five_bar_tips(mechanism, np.radians([60.0, -60.0])) == []
-
-
-def test_oracle_three_spheres_meet_in_two_points_at_their_radii() -> None:
-    radii = np.linalg.norm(published.TRIPOD_FEET - published.TRIPOD_TIP, axis=1)
-    found = assembly.spheres_meet(published.TRIPOD_FEET, radii)
-    assert len(found) == 2
-    for point in found:
-        np.testing.assert_allclose(np.linalg.norm(published.TRIPOD_FEET - point, axis=1), radii)
-    assert assembly.spheres_meet(published.TRIPOD_FEET, [10.0, 10.0, 10.0]) == []
-
-
-def test_oracle_six_struts_agree_with_a_solver_of_other_hands() -> None:
-    for case in ("gsp_mathworks_home", "gsp_linuxcnc_home"):
-        geometry, lengths = PUBLISHED[case]["geometry"], PUBLISHED[case]["L"]
-        ours, hits = assembly.gough_modes(geometry["base"], geometry["platform"], lengths)
-        theirs = assembly.gough_modes_by_least_squares(geometry["base"], geometry["platform"], lengths)
-        assert len(ours) == len(theirs) == 8
-        assert hits.min() >= 20
-        for pose in theirs:
-            assert np.abs(ours - pose).max(axis=(1, 2)).min() <= 1e-7
-
-
-def test_oracle_six_struts_finds_all_40_of_dietmaiers_postures() -> None:
-    found, _ = assembly.gough_modes(
-        published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, published.DIETMAIER_LENGTHS, starts=8000
-    )
-    assert len(found) == 40
-    lengths = oracles.leg_lengths(published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, found)
-    np.testing.assert_allclose(lengths, np.tile(published.DIETMAIER_LENGTHS, (40, 1)), atol=1e-11)
-
-
-@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
-def test_oracle_3rps_finds_the_published_pose(row: list[float]) -> None:
-    geometry = PUBLISHED["rps_leeshah"]["geometry"]
-    pose, lengths = lee_shah_pose(row), row[5:]
-    azimuth = np.radians(geometry["azimuth_deg"])
-    tops = geometry["platform_radius"] * np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
-    tops = tops @ pose[:3, :3].T + pose[:3, 3]
-    side = np.sqrt(3.0) * geometry["platform_radius"]
-    found = assembly.rps_tops(geometry["base_radius"], side, lengths)
-    assert min(np.abs(each - tops).max() for each in found) <= 1e-8
-    assert len(found) % 2 == 0  # each has its mirror image below the base
+# --- the check of joints ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["stewart", "nrpm", "five_bar", "tripod_rps", "hexaglide", "planar_rrr"])
@@ -182,11 +61,6 @@ def test_the_check_of_joints_accepts_home_and_notices_one_wrong_joint(name: str)
 
 
 # --- closed forms and published answers ------------------------------------------------------------------------------
-
-
-def lee_shah_pose(row: list[float]) -> np.ndarray:
-    a, b, pz, px, py = row[:5]
-    return pf.pose([px, py, pz], rotation=Rotation.from_euler("ZYZ", [a, b, -a]))
 
 
 @pytest.mark.parametrize("p, rpy, lengths", PUBLISHED["gsp_conroy"]["rows_p_rpy_L"])
@@ -219,7 +93,7 @@ def test_published_parasitic_motion_of_a_3rps_from_its_leg_lengths(row: list[flo
     mechanism = published.rps(geometry["base_radius"], geometry["platform_radius"], 200.0)
     answer = pf.solve_fk(mechanism, row[5:])
     assert answer.status is Status.REACHED
-    np.testing.assert_allclose(answer.pose, lee_shah_pose(row), rtol=0, atol=1e-7)
+    np.testing.assert_allclose(answer.pose, published.lee_shah_pose(row), rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
@@ -268,20 +142,6 @@ def test_serial_arm_is_a_sum_of_its_links() -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * 600)
 
 
-@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-def test_home_coordinates_give_home(name: str) -> None:
-    mechanism = machine(name)
-    answer = pf.solve_fk(mechanism, home_values(mechanism))
-    assert answer.status is Status.REACHED
-    assert_same_pose(mechanism, answer.pose, mechanism.home_pose, atol=1e-9)
-    for joint in mechanism.joints:
-        if joint.type != "fixed":
-            home = np.zeros(3) if joint.type == "spherical" else mechanism.home_coordinate(joint.name)
-            scale = mechanism.characteristic_length if joint.type == "prismatic" else 1.0
-            np.testing.assert_allclose(answer.joints[joint.name], home, rtol=0, atol=1e-8 * scale)
-
-
 # --- there and back --------------------------------------------------------------------------------------------------
 
 
@@ -290,7 +150,7 @@ def assert_round_trip(mechanism: pf.Mechanism, targets: np.ndarray, least: float
     reached = pf.solve_ik(mechanism, targets)
     assert reached
     back = pf.solve_fk(mechanism, reached.actuators)
-    assert_feasible(mechanism, reached.actuators, back)
+    assert_feasible(mechanism, back)
     same = is_same_pose(mechanism, back.pose, reached.pose)
     assert same.mean() >= least
     rng = np.random.default_rng(5)
@@ -302,21 +162,12 @@ def assert_round_trip(mechanism: pf.Mechanism, targets: np.ndarray, least: float
     assert is_same_pose(mechanism, again.pose, reached.pose).all()
 
 
+@pytest.mark.parametrize("count", [10 if INTERPRETED else 300, pytest.param(10_000, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_forward_after_inverse_returns_the_pose(name: str) -> None:
+def test_forward_after_inverse_returns_the_pose(name: str, count: int) -> None:
     mechanism = machine(name)
-    targets = oracles.inside_targets(mechanism, np.random.default_rng(6), 10 if INTERPRETED else 300)
-    assert_round_trip(mechanism, targets, least=0.99)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_forward_after_inverse_returns_10000_poses(name: str) -> None:
-    mechanism = machine(name)
-    drawn = oracles.random_targets(mechanism, np.random.default_rng(7), 60_000)
-    targets = drawn[pf.solve_ik(mechanism, drawn).status == Status.REACHED][:10_000]
-    assert len(targets) == 10_000
-    assert_round_trip(mechanism, targets, least=0.999)
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(6), count)
+    assert_round_trip(mechanism, targets, least=0.99 if count < 1000 else 0.999)
 
 
 def tilted_targets(mechanism: pf.Mechanism, rng: np.random.Generator, n: int, tilt: float) -> np.ndarray:
@@ -337,26 +188,8 @@ def test_a_hexapod_tilted_up_to_30_degrees_is_found_from_home_without_a_start(co
     targets = tilted_targets(mechanism, np.random.default_rng(8), count, np.radians(30.0))
     lengths = oracles.actuators(mechanism, targets)
     answer = pf.solve_fk(mechanism, lengths)
-    assert_feasible(mechanism, lengths, answer)
+    assert_feasible(mechanism, answer)
     assert is_same_pose(mechanism, answer.pose, targets).mean() >= 0.999
-
-
-@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-def test_joint_coordinates_place_every_body_where_the_pose_is(name: str) -> None:
-    """Answers near home, in or out of reach: all coordinates, passive ones included, walked through body by body."""
-    mechanism = machine(name)
-    rng = np.random.default_rng(9)
-    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
-    scale = np.where(slides, 0.05 * mechanism.characteristic_length, 0.1)
-    for _ in range(2 if INTERPRETED else 10):
-        asked = home_values(mechanism) + scale * rng.uniform(-1, 1, len(scale))
-        answer = pf.solve_fk(mechanism, asked)
-        assert_feasible(mechanism, asked, answer)
-        assert checks.gap_of_joints(mechanism, answer).max() <= 1e-8
-        assert pf.closure_residual(answer) <= 1e-9 * mechanism.characteristic_length
-        driven = np.array([answer.joints[actuator] for actuator in mechanism.actuator_names])
-        assert np.abs(deviation(mechanism, driven, answer.actuators)).max() <= 1e-9
 
 
 @pytest.mark.parametrize("name", ["stewart", "rps"])
@@ -428,7 +261,7 @@ def test_strokes_outside_their_range_are_projected_onto_it() -> None:
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
     assert not answer
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     assert answer.actuator_error == pytest.approx(10.0 / mechanism.characteristic_length, rel=1e-6)
     height = np.sqrt(280.0**2 - 60.0**2 - 20.0**2)
     np.testing.assert_allclose(answer.pose, pf.pose([0, 0, height]), rtol=0, atol=1e-4)
@@ -442,7 +275,7 @@ def test_the_end_of_a_stroke_is_tested_on_both_sides(beyond: float, status: Stat
     asked = np.full(6, 280.0 + beyond * mechanism.characteristic_length)
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is status
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
 
 
 def test_one_stroke_outside_is_named_and_the_others_are_kept() -> None:
@@ -451,7 +284,7 @@ def test_one_stroke_outside_is_named_and_the_others_are_kept() -> None:
     asked = np.array([165.0, 150.0, 165.0, 165.0, 165.0, 165.0])
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     assert answer.actuator_error == pytest.approx(5.0 / mechanism.characteristic_length, rel=1e-6)
     assert [(limit.joint, limit.bound) for limit in answer.active_limits] == [(mechanism.actuator_names[1], "min")]
 
@@ -463,7 +296,7 @@ def test_a_stroke_that_the_cones_do_not_allow_is_projected() -> None:
     asked[1] = 150.0
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     assert answer.actuator_error > 5.0 / mechanism.characteristic_length
     assert any(limit.bound == "cone" for limit in answer.active_limits)
 
@@ -478,7 +311,7 @@ def test_limits_of_passive_joints_are_kept() -> None:
     held = (oracles.margin(free, drawn) >= 0.02) & (oracles.margin(mechanism, drawn) < -0.05)
     lengths = oracles.actuators(mechanism, drawn[held][: 5 if INTERPRETED else 40])
     answer = pf.solve_fk(mechanism, lengths)
-    assert_feasible(mechanism, lengths, answer)
+    assert_feasible(mechanism, answer)
     assert (answer.status == Status.PROJECTED).mean() >= 0.9  # the others are within limits in another assembly mode
     for status, limits in zip(answer.status, answer.active_limits, strict=True):
         assert status == Status.REACHED or limits
@@ -492,10 +325,10 @@ def test_elbows_too_far_apart_come_together() -> None:
     assert assembly.five_bar_tips(mechanism, asked) == []
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     y, z = np.meshgrid(np.linspace(-150.1, 150, 121), np.linspace(0.1, 250, 101))
     targets = oracles.poses(np.stack([0 * y.ravel(), y.ravel(), z.ravel()], axis=1))
-    inside = targets[oracles.reachable(mechanism, targets)]
+    inside = targets[oracles.margin(mechanism, targets) >= 0]
     nearest = np.linalg.norm(oracles.actuators(mechanism, inside) - asked, axis=1).min()
     assert np.linalg.norm(answer.actuators - asked) <= 1.05 * nearest
 
@@ -507,19 +340,11 @@ def test_struts_too_short_to_meet_end_in_a_closed_machine() -> None:
     asked = np.array([5.0, 3.0, 3.0])
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     transition = PUBLISHED["sauer_intervals"]["transitions_p2_from_to"][0][0]
     assert np.linalg.norm(deviation(mechanism, answer.actuators, asked)) <= 1.01 * (
         (transition - 3.0) / mechanism.characteristic_length
     )
-
-
-def test_a_hexapod_with_one_strut_far_too_short_ends_in_a_closed_machine() -> None:
-    mechanism = published.published_gough("gsp_conroy", [0, 0, 3])
-    asked = np.array([0.05, 3.5, 3.5, 3.5, 3.5, 30.0])
-    answer = pf.solve_fk(mechanism, asked)
-    assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
 
 
 def test_twelve_values_that_agree_give_the_pose() -> None:
@@ -527,7 +352,7 @@ def test_twelve_values_that_agree_give_the_pose() -> None:
     targets = oracles.inside_targets(mechanism, np.random.default_rng(11), 10 if INTERPRETED else 100, least=0.02)
     values = oracles.actuators(mechanism, targets)
     answer = pf.solve_fk(mechanism, values)
-    assert_feasible(mechanism, values, answer)
+    assert_feasible(mechanism, answer)
     assert is_same_pose(mechanism, answer.pose, targets).mean() >= 0.99
 
 
@@ -538,7 +363,7 @@ def test_more_readings_than_freedoms_that_agree_are_reached_from_home(name: str)
     poses, values = readings(np.random.default_rng(1), 10 if INTERPRETED else 100)
     answer = pf.solve_fk(mechanism, values)
     assert (answer.status == Status.REACHED).all()
-    assert_feasible(mechanism, values, answer)
+    assert_feasible(mechanism, answer)
     assert_same_pose(mechanism, answer.pose, poses)
 
 
@@ -550,7 +375,7 @@ def test_more_readings_than_freedoms_that_nearly_agree_are_answered_as_nearly(na
     _, exact = readings(rng, 5 if INTERPRETED else 30)
     asked = exact + rng.normal(0.0, 1e-3, exact.shape) * mechanism.characteristic_length
     answer = pf.solve_fk(mechanism, asked)
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     assert (answer.status == Status.PROJECTED).all()
     errors = [np.linalg.norm(deviation(mechanism, values, asked), axis=1) for values in (answer.actuators, exact)]
     assert (errors[0] <= errors[1] + 1e-9).all()
@@ -562,7 +387,7 @@ def test_an_arm_of_a_redundant_machine_is_not_turned_beyond_its_range() -> None:
     asked[mechanism.actuator_names.index("A1")] = np.radians(150.0)
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     assert answer.actuator_error >= np.radians(15.0) - 1e-9
 
 
@@ -578,7 +403,7 @@ def test_twelve_values_within_their_ranges_that_cannot_be_assembled_are_projecte
         asked[column] = high if name[0] in "AB" else low
     answer = pf.solve_fk(mechanism, asked)
     assert answer.status is Status.PROJECTED
-    assert_feasible(mechanism, asked, answer)
+    assert_feasible(mechanism, answer)
     assert checks.gap_of_joints(mechanism, answer).max() <= 1e-8
     assert answer.actuator_error > 0.01
 
@@ -586,59 +411,24 @@ def test_twelve_values_within_their_ranges_that_cannot_be_assembled_are_projecte
 # --- calls -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "actuators",
-    [
-        [200.0] * 5,
-        [200.0] * 7,
-        [],
-        200.0,
-        [[200.0] * 5] * 2,
-        [200.0] * 5 + [np.nan],
-        [200.0] * 5 + [np.inf],
-        ["long"] * 6,
-        "home",
-        None,
-        [200.0 + 1j] * 6,
-        [True] * 6,
-        [[200.0, 200.0], [200.0]],
-    ],
-)
-def test_what_are_no_actuator_values_is_refused_by_name(actuators: object) -> None:
-    with pytest.raises(InvalidArgument, match="actuators"):
-        pf.solve_fk(machine("stewart"), actuators)
-
-
-def test_bad_rows_are_named_or_marked() -> None:
+def test_batch_axes_come_first_on_every_field_in_both_directions() -> None:
     mechanism = machine("stewart")
-    asked = np.tile(home_values(mechanism), (5, 1))
-    asked[1, 0], asked[3, 5] = np.nan, np.inf
-    with pytest.raises(InvalidArgument, match="actuators") as caught:
-        pf.solve_fk(mechanism, asked)
-    assert caught.value.rows == (1, 3)
-    marked = pf.solve_fk(mechanism, asked, options=pf.Options(on_invalid="mark"))
-    assert list(marked.status) == [Status.REACHED, Status.INVALID, Status.REACHED, Status.INVALID, Status.REACHED]
-    assert np.isnan(marked.pose[[1, 3]]).all()
-    np.testing.assert_allclose(marked.pose[[0, 2, 4]], np.tile(mechanism.home_pose, (3, 1, 1)), atol=1e-7)
-    assert not marked
-
-
-def test_batch_axes_come_first_on_every_field() -> None:
-    mechanism = machine("stewart")
-    answer = pf.solve_fk(mechanism, np.tile(home_values(mechanism), (2, 3, 1)))
-    for name in ("status", "residual", "limit_excess", "actuator_error", "iterations"):
-        assert np.shape(getattr(answer, name)) == (2, 3), name
-    assert answer.pose.shape == (2, 3, 4, 4)
-    assert answer.actuators.shape == (2, 3, 6)
-    assert answer.points["CL1"].shape == (2, 3, 3)
-    assert answer.joints["BL1"].shape == (2, 3)
-    assert answer.joints["AL1"].shape == (2, 3, 2)
-    assert answer.joints["CL1"].shape == (2, 3, 3)
-    assert pf.closure_residual(answer).shape == (2, 3)
-    assert answer[1].status.shape == (3,)
-    assert answer[1][2].status is Status.REACHED
-    assert np.shape(answer[1][2].joints["BL1"]) == ()
+    answers = (
+        pf.solve_fk(mechanism, np.tile(home_values(mechanism), (2, 3, 1))),
+        pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 3, 1, 1))),
+    )
+    shapes = {"BL1": (2, 3), "AL1": (2, 3, 2), "CL1": (2, 3, 3)}
+    for answer in answers:
+        for name in ("status", "residual", "limit_excess", "actuator_error", "iterations"):
+            assert np.shape(getattr(answer, name)) == (2, 3), name
+        assert (len(answer), answer.pose.shape, answer.actuators.shape) == (2, (2, 3, 4, 4), (2, 3, 6))
+        assert answer.points["CL1"].shape == (2, 3, 3)
+        assert {name: answer.joints[name].shape for name in shapes} == shapes
+        assert pf.closure_residual(answer).shape == (2, 3)
+        assert answer[1].status.shape == (3,)
+        assert answer[1][2].status is Status.REACHED and np.shape(answer[1][2].joints["BL1"]) == ()
     assert pf.solve_fk(mechanism, np.empty((0, 6))).pose.shape == (0, 4, 4)
+    assert pf.solve_ik(mechanism, np.empty((0, 4, 4))).pose.shape == (0, 4, 4)
 
 
 def test_integers_lists_and_strided_arrays_are_values() -> None:
@@ -648,57 +438,6 @@ def test_integers_lists_and_strided_arrays_are_values() -> None:
     np.testing.assert_array_equal(pf.solve_fk(mechanism, np.asfortranarray(asked)).pose, expected)
     np.testing.assert_array_equal(pf.solve_fk(mechanism, np.repeat(asked, 2, axis=1)[:, ::2]).pose, expected)
     np.testing.assert_array_equal(pf.solve_fk(mechanism, [205] * 6).pose, pf.solve_fk(mechanism, [205.0] * 6).pose)
-
-
-@pytest.mark.parametrize("name", [*CATALOGUE, "mixed", "hexapod_rus", "planar_rrr"])
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-def test_a_row_alone_is_answered_as_in_a_batch(name: str) -> None:
-    mechanism = machine(name)
-    rng = np.random.default_rng(12)
-    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
-    scale = np.where(slides, 0.3 * mechanism.characteristic_length, 0.5)
-    asked = home_values(mechanism) + scale * rng.uniform(-1, 1, (4 if INTERPRETED else 20, len(scale)))
-    batch = pf.solve_fk(mechanism, asked)
-    for i, row in enumerate(asked):
-        alone = pf.solve_fk(mechanism, row)
-        assert alone.status == batch.status[i]
-        for field in ("pose", "actuators", "actuator_error"):  # stacked products round differently from single ones
-            np.testing.assert_allclose(getattr(alone, field), getattr(batch, field)[i], rtol=1e-8, atol=1e-8)
-        named = [
-            [(limit.joint, limit.bound) for limit in each] for each in (alone.active_limits, batch.active_limits[i])
-        ]
-        assert named[0] == named[1]
-
-
-@pytest.mark.parametrize("n", [4 if INTERPRETED else 20, pytest.param(200, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize("name", [*CATALOGUE, *MACHINES])
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-def test_limits_are_kept_and_loops_closed_for_any_finite_values(name: str, n: int) -> None:
-    mechanism = machine(name)
-    rng = np.random.default_rng(13)
-    slides = np.array([mechanism.joint(each).type == "prismatic" for each in mechanism.actuator_names])
-    size = rng.choice([0.1, 1.0, 10.0, 1e4], n)[:, None] * np.where(slides, mechanism.characteristic_length, 1.0)
-    asked = home_values(mechanism) + size * rng.uniform(-1, 1, (n, len(slides)))
-    assert_feasible(mechanism, asked, pf.solve_fk(mechanism, asked))
-
-
-def test_truth_is_reached_everywhere() -> None:
-    mechanism = machine("stewart")
-    inside, outside = home_values(mechanism), np.full(6, 400.0)
-    assert bool(pf.solve_fk(mechanism, inside)) is True
-    assert bool(pf.solve_fk(mechanism, outside)) is False
-    assert bool(pf.solve_fk(mechanism, [inside, inside])) is True
-    assert bool(pf.solve_fk(mechanism, [inside, outside])) is False
-
-
-def test_seeds_that_do_not_fit_are_refused() -> None:
-    mechanism = machine("stewart")
-    values = home_values(mechanism)
-    other = pf.solve_ik(machine("five_bar"), machine("five_bar").home_pose)
-    pair = pf.solve_fk(mechanism, np.tile(values, (2, 1)))
-    for seed in (other, pair, values):
-        with pytest.raises(InvalidArgument, match="start"):
-            pf.solve_fk(mechanism, values, start=seed)
 
 
 def test_actuators_are_given_by_name_in_any_order() -> None:
@@ -714,35 +453,6 @@ def test_actuators_are_given_by_name_in_any_order() -> None:
     one = pf.solve_fk(mechanism, {name: float(np.ravel(value)[0]) for name, value in by_name.items()})
     assert one.shape == ()
     np.testing.assert_array_equal(one.pose, expected.pose[0])
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "told"),
-    [
-        ({"BL1": None}, InvalidArgument, "no value of BL1; expected one for each of BL1"),
-        ({"BL7": 200.0}, UnknownName, "BL7"),
-        ({"AL1": 0.0}, UnknownName, "AL1"),
-        ({"BL1": [200.0, 201.0], "BL2": [200.0] * 3}, InvalidArgument, r"shapes \(2,\), \(3,\)"),
-        ({"BL1": "long"}, InvalidArgument, r"actuators\['BL1'\]: found str"),
-        ({"BL1": np.nan}, InvalidArgument, "not finite"),
-    ],
-)
-def test_actuators_by_a_wrong_name_or_shape_are_told(change: dict[str, object], error: type, told: str) -> None:
-    mechanism = machine("stewart")
-    values = dict(zip(mechanism.actuator_names, home_values(mechanism), strict=True)) | change
-    with pytest.raises(error, match=told):
-        pf.solve_fk(mechanism, {name: value for name, value in values.items() if value is not None})
-
-
-def test_answers_of_inverse_kinematics_carry_the_same_fields() -> None:
-    """One kind of Solution: joints and closure of an IK answer, seeds across both directions."""
-    mechanism = machine("stewart")
-    ik = pf.solve_ik(mechanism, pf.pose([5, -4, 200], rpy=[0.1, 0.05, -0.1]))
-    fk = pf.solve_fk(mechanism, ik.actuators, start=ik)
-    assert_same_pose(mechanism, fk.pose, ik.pose)
-    assert pf.closure_residual(ik) <= 1e-9 * mechanism.characteristic_length
-    assert checks.gap_of_joints(mechanism, ik).max() <= 1e-8
-    assert pf.solve_ik(mechanism, ik.pose, start=fk)
 
 
 def test_values_beyond_the_bound_of_a_wheel_are_not_answered_a_turn_away() -> None:

@@ -1,9 +1,8 @@
-"""The three closed forms: against other closed forms in NumPy, the library's own engines and brute force."""
+"""The paper's closed forms: against other closed forms in NumPy and the library's own engines."""
 
 from __future__ import annotations
 
 import dataclasses
-import os
 import pickle
 import re
 from collections.abc import Callable
@@ -13,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 import oracles
-import oracles_by_leg as by_leg
 import pfabrik as pf
+from checks import INTERPRETED, home_values
 from paper import geometric
 from paper.geometric import NoClosedForm, arms, facts, targets
 from paper.geometric.topologies import TOPOLOGIES, closed_form
@@ -25,16 +24,11 @@ from pfabrik import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument
 from pfabrik.tolerances import TOLERANCES
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
-EXAMPLES: dict[str, Callable[[], Mechanism]] = {
-    "R*-R-R": lambda: pf.load("five_bar"),
-    "U-P*-S": lambda: pf.load("stewart"),
-    "R*-P*-[U-P*-S, U-P*-S]": lambda: pf.load("nrpm"),
-}
+EXAMPLES = {"R*-R-R": "five_bar", "U-P*-S": "stewart", "R*-P*-[U-P*-S, U-P*-S]": "nrpm"}
 """A machine of every topology with a closed form."""
-NAMES = ("five_bar", "stewart", "nrpm")
+NAMES = tuple(EXAMPLES.values())
 ON_THE_EDGE = 1e-8
 """Margins that the oracle does not tell from 0."""
 DOCS = Path(__file__).parents[1] / "docs"
@@ -44,40 +38,20 @@ def some_targets(mechanism: Mechanism, n: int = 2000, seed: int = 11) -> oracles
     return oracles.random_targets(mechanism, np.random.default_rng(seed), n // 20 if INTERPRETED else n)
 
 
-def relimited(mechanism: Mechanism, **limits: Any) -> Mechanism:
-    return mechanism.with_limits(limits)
-
-
 def redescribed(mechanism: Mechanism, **changes: dict[str, Any]) -> Mechanism:
     """The mechanism with some fields of some joints replaced."""
     joints = [dataclasses.replace(joint, **changes.get(joint.name, {})) for joint in mechanism.joints]
     return dataclasses.replace(mechanism, joints=tuple(joints))
 
 
-# --- the registry ----------------------------------------------------------------------------------------------------
-
-
-def test_every_topology_of_the_registry_has_an_example_and_is_documented() -> None:
-    assert [topology.chain for topology in TOPOLOGIES] == list(EXAMPLES)
-    page = (DOCS / "geometric.md").read_text(encoding="utf-8")
-    for topology in TOPOLOGIES:
-        assert f"`{topology.chain}`" in page
-
-
 @pytest.mark.parametrize("topology", TOPOLOGIES, ids=str)
-def test_a_topology_is_told_from_its_sub_chains(topology: Any) -> None:
-    mechanism = EXAMPLES[topology.chain]()
+def test_every_topology_has_an_example_is_told_from_its_sub_chains_and_says_where_it_is_from(topology: Any) -> None:
+    mechanism = pf.load(EXAMPLES[topology.chain])
     assert {str(chain) for chain in pf.decompose(mechanism)} == {topology.chain}
-    assert closed_form(mechanism).kernel is topology.kernel
-    renamed = dataclasses.replace(mechanism, name="anything")
-    assert closed_form(renamed).kernel is topology.kernel
-
-
-@pytest.mark.parametrize("topology", TOPOLOGIES, ids=str)
-def test_every_closed_form_says_how_many_solutions_which_branch_and_where_from(topology: Any) -> None:
+    assert closed_form(dataclasses.replace(mechanism, name="anything")).kernel is topology.kernel
+    assert f"`{topology.chain}`" in (DOCS / "geometric.md").read_text(encoding="utf-8")
     said = getattr(topology.kernel, "py_func", topology.kernel).__doc__
-    assert "solution" in said
-    assert "Degenerate" in said or "rule" in said
+    assert "solution" in said and ("Degenerate" in said or "rule" in said)
     source = said.split("Source: ")[1].split()[0].rstrip(".")
     assert f"**{source}**" in (DOCS / "references.md").read_text(encoding="utf-8")
 
@@ -89,40 +63,22 @@ def test_every_closed_form_says_how_many_solutions_which_branch_and_where_from(t
 def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     mechanism = pf.load(name)
     wanted = some_targets(mechanism, 4000)
-    answer = geometric.solve_ik(mechanism, wanted)
-    margin = oracles.margin(mechanism, wanted)
-    clear = abs(margin) > ON_THE_EDGE
-    np.testing.assert_array_equal(answer.reached[clear], margin[clear] > 0)
+    answer, expected = geometric.solve_ik(mechanism, wanted), oracles.solve_ik(mechanism, wanted)
+    clear = abs(expected.margin) > ON_THE_EDGE
+    np.testing.assert_array_equal(answer.reached[clear], expected.reached[clear])
     assert 0.2 < answer.reached.mean() < 0.8
-    expected = oracles.actuators(mechanism, wanted)[answer.reached]
-    np.testing.assert_allclose(answer.actuators[answer.reached], expected, rtol=0, atol=1e-10)
-
-
-def test_the_solver_reaches_every_redundant_target_that_the_closed_form_reaches() -> None:
-    mechanism = pf.load("nrpm")
-    wanted = some_targets(mechanism)
-    answer, solution = geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
-    assert (solution.status[answer.reached] == pf.Status.REACHED).all()
+    off = answer.actuators[answer.reached] - expected.actuators[answer.reached]
+    np.testing.assert_allclose(off, 0.0, atol=1e-10)
 
 
 def test_a_grid_of_candidates_finds_nearly_every_reachable_target_and_no_other() -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism)
-    reached = geometric.solve_ik(mechanism, wanted).reached
-    margin = oracles.margin(mechanism, wanted)
+    reached, margin = geometric.solve_ik(mechanism, wanted).reached, oracles.margin(mechanism, wanted)
+    assert (pf.solve_ik(mechanism, wanted).status[reached] == pf.Status.REACHED).all()
     assert not reached[margin < -ON_THE_EDGE].any()
     assert reached[margin > 0].mean() > 0.97
     assert margin[~reached].max() < 0.1
-
-
-def arm_slacks(mechanism: Mechanism, wanted: oracles.Array, values: oracles.Array) -> oracles.Array:
-    """Smallest slack of every arm at the swings and extensions among actuator values (n, n_a), shape (n, arms)."""
-    column = mechanism.actuator_names.index
-    slacks = []
-    for arm in oracles.arms(mechanism):
-        swing, extension = values[:, column(arm.hinge.name)], values[:, column(arm.slide.name)]
-        slacks.append(arm.lines(wanted, swing).slack(extension))
-    return np.stack(slacks, axis=1)
 
 
 def test_redundant_answers_close_and_keep_every_limit() -> None:
@@ -130,31 +86,27 @@ def test_redundant_answers_close_and_keep_every_limit() -> None:
     wanted = some_targets(mechanism)
     answer = geometric.solve_ik(mechanism, wanted)
     wanted, values = wanted[answer.reached], answer.actuators[answer.reached]
-    assert (arm_slacks(mechanism, wanted, values) > -ON_THE_EDGE).all()
     column = mechanism.actuator_names.index
     for arm in oracles.arms(mechanism):
-        table = arm.lines(wanted, values[:, column(arm.hinge.name)]).table
         extension = values[:, column(arm.slide.name)]
+        lines = arm.lines(wanted, values[:, column(arm.hinge.name)])
+        assert (lines.slack(extension) > -ON_THE_EDGE).all()
         for j, strut in enumerate(arm.struts):
-            length = np.hypot(np.sqrt(table[:, j, 1]), table[:, j, 0] - extension)
+            length = np.hypot(np.sqrt(lines.table[:, j, 1]), lines.table[:, j, 0] - extension)
             np.testing.assert_allclose(values[:, column(strut.slide.name)], length, rtol=0, atol=1e-9)
 
 
-# --- branches of cranks ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "elbow", [(-3.4, -1.2), (-5.0, -1.0), (-6.0, 0.2), (-1.6, 4.2), (-7.0, 1.0), (-1.7, 2.5), None]
-)
-@pytest.mark.parametrize("crank", [(-0.5, 4.5), (-6.5, 0.4), (-8.0, 8.0), (-3.0, 3.0), None])
+@pytest.mark.parametrize("elbow", [(-3.4, -1.2), (-6.0, 0.2), (-1.6, 4.2), (-1.7, 2.5), None])
+@pytest.mark.parametrize("crank", [(-0.5, 4.5), (-8.0, 8.0), None])
 def test_a_leg_takes_its_other_branch_where_homes_breaks_a_limit_and_only_there(elbow: Any, crank: Any) -> None:
     """As leg by leg in NumPy; an elbow may have two intervals of bends, and a crank counts where its range has it."""
-    mechanism = relimited(pf.load("five_bar"), p1=crank, p5=(-3.0, 3.0), p2=elbow, p4=(-2.5, 1.7))
+    mechanism = pf.load("five_bar").with_limits(p1=crank, p5=(-3.0, 3.0), p2=elbow, p4=(-2.5, 1.7))
     wanted = some_targets(mechanism, 500)
-    answer, expected = geometric.solve_ik(mechanism, wanted), by_leg.solve_ik(mechanism, wanted)
+    answer, expected = geometric.solve_ik(mechanism, wanted), oracles.solve_ik(mechanism, wanted)
     np.testing.assert_array_equal(answer.reached, expected.reached)
     assert answer.reached.any()
-    np.testing.assert_allclose(answer.actuators, expected.actuators, rtol=0, atol=1e-9)
+    off = answer.actuators[answer.reached] - expected.actuators[answer.reached]
+    np.testing.assert_allclose(off, 0.0, atol=1e-9)
 
 
 def five_bar(crank: float = 100.0, forearm: float = 100.0, stretched: bool = False) -> Mechanism:
@@ -172,69 +124,43 @@ def five_bar(crank: float = 100.0, forearm: float = 100.0, stretched: bool = Fal
     return Mechanism("unlimited 5-bar", joints, "T")
 
 
-def test_a_leg_reaches_out_to_its_stretch_and_not_beyond() -> None:
+def test_a_leg_reaches_out_to_its_stretch_and_not_beyond_and_only_in_its_plane() -> None:
     mechanism = five_bar(110.0, 70.0)
-    slack = TOLERANCES.limit * mechanism.characteristic_length
-    direction = np.array([0.6, 0.8, 0.0])
-    for distance, reached in ((180 - 1e-3, True), (180 + 0.5 * slack, True), (180 + 2 * slack, False)):
-        assert geometric.solve_ik(mechanism, distance * direction).reached is reached
-    for distance, reached in ((40 + 1e-3, True), (40 - 0.5 * slack, True), (40 - 2 * slack, False)):
-        assert geometric.solve_ik(mechanism, distance * direction).reached is reached
-    answer = geometric.solve_ik(mechanism, 180 * direction)
+    slack, out = TOLERANCES.limit * mechanism.characteristic_length, np.array([0.6, 0.8, 0.0])
+    reached = [180 * out, (180 + 0.5 * slack) * out, (40 - 0.5 * slack) * out, [90, 80, 0.5 * slack]]
+    missed = [(180 + 2 * slack) * out, (40 - 2 * slack) * out, [90, 80, -2 * slack]]
+    assert geometric.solve_ik(mechanism, reached + missed).reached.tolist() == [True] * 4 + [False] * 3
+    answer = geometric.solve_ik(mechanism, 180 * out)
     assert answer.actuators[0] == pytest.approx(np.arctan2(0.8, 0.6), abs=1e-6)
-
-
-def test_a_tip_off_its_plane_is_not_reached() -> None:
-    mechanism = five_bar()
-    slack = TOLERANCES.limit * mechanism.characteristic_length
-    assert geometric.solve_ik(mechanism, [90, 80, 0.5 * slack])
-    assert not geometric.solve_ik(mechanism, [90, 80, -2 * slack])
 
 
 def test_where_a_leg_has_no_side_the_branch_is_the_documented_one() -> None:
     on_shoulder = geometric.solve_ik(five_bar(), [0.0, 0, 0])
-    assert on_shoulder
-    assert on_shoulder.actuators[0] == 0.0  # every angle serves: home's
+    assert on_shoulder and on_shoulder.actuators[0] == 0.0  # every angle serves: home's
     mechanism = five_bar(stretched=True)
     bent = geometric.solve_ik(mechanism, 0.9 * np.array(mechanism.reference_point))
-    assert bent
-    assert bent.actuators[0] == pytest.approx(np.arccos(0.9))  # home is stretched: to the left
-
-
-def test_a_tip_has_no_orientation() -> None:
-    bar = pf.load("five_bar")
-    wanted = some_targets(bar, 100)
-    turned = wanted.copy()
-    turned[:, :3, :3] = Rotation.random(len(wanted), random_state=1).as_matrix()
-    np.testing.assert_array_equal(geometric.solve_ik(bar, turned).actuators, geometric.solve_ik(bar, wanted).actuators)
+    assert bent and bent.actuators[0] == pytest.approx(np.arccos(0.9))  # home is stretched: to the left
 
 
 # --- redundant coordinates -------------------------------------------------------------------------------------------
-
-
-def grid_of(mechanism: Mechanism) -> oracles.Array:
-    """All candidates of an arm, (c, 2); the arms are alike."""
-    arm = oracles.arms(mechanism)[0]
-    sides = [np.linspace(*joint.range, arms.CANDIDATES_A_SIDE) for joint in (arm.hinge, arm.slide)]
-    return np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T
 
 
 @pytest.mark.parametrize("started", [False, True])
 def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool) -> None:
     mechanism = pf.load("nrpm")
     wanted = some_targets(mechanism, 200, seed=2)
-    column = mechanism.actuator_names.index
-    starts = np.tile([mechanism.home_coordinate(name) for name in mechanism.actuator_names], (len(wanted), 1))
+    column, every_arm = mechanism.actuator_names.index, oracles.arms(mechanism)
+    sides = [np.linspace(*j.range, arms.CANDIDATES_A_SIDE) for j in (every_arm[0].hinge, every_arm[0].slide)]
+    grid = np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T  # the arms are alike
+    starts = np.tile(home_values(mechanism), (len(wanted), 1))
     if started:
         rng = np.random.default_rng(4)
-        for arm in oracles.arms(mechanism):
+        for arm in every_arm:
             for joint in (arm.hinge, arm.slide):
                 starts[:, column(joint.name)] = rng.uniform(*joint.range, len(wanted))
     answer = geometric.solve_ik(mechanism, wanted, start=SimpleNamespace(actuators=starts) if started else None)
-    grid = grid_of(mechanism)
-    found = np.ones(len(wanted), bool)
-    stayed = 0
-    for arm in oracles.arms(mechanism):
+    found, stayed = np.ones(len(wanted), bool), 0
+    for arm in every_arm:
         columns = [column(arm.hinge.name), column(arm.slide.name)]
         size = np.ptp([arm.hinge.range, arm.slide.range], axis=1)
         keeps = arm.lines(wanted, starts[:, columns[0]]).slack(starts[:, columns[1]]) >= 0
@@ -263,24 +189,12 @@ def test_an_answer_as_start_keeps_its_redundant_coordinates() -> None:
         np.testing.assert_allclose(again.actuators, first.actuators, rtol=0, atol=1e-6)
 
 
-def test_a_single_start_serves_every_row_as_it_serves_one() -> None:
-    mechanism = pf.load("nrpm")
-    wanted = some_targets(mechanism, 400)
-    near = geometric.solve_ik(mechanism, pf.pose([30, 20, 215]))
-    batch = geometric.solve_ik(mechanism, wanted, start=near)
-    rows = SimpleNamespace(actuators=np.tile(near.actuators, (len(wanted), 1)))
-    np.testing.assert_array_equal(batch.actuators, geometric.solve_ik(mechanism, wanted, start=rows).actuators)
-    for row in range(0, len(wanted), 37):
-        single = geometric.solve_ik(mechanism, wanted[row], start=near)
-        np.testing.assert_array_equal(single.actuators, batch.actuators[row])
-
-
 def test_a_start_out_of_range_does_not_stay() -> None:
     mechanism = pf.load("nrpm")
     home = geometric.solve_ik(mechanism, mechanism.home_pose).actuators
+    free = [name for name in mechanism.actuator_names if name[0] == "D"]
+    wide = mechanism.with_limits(dict.fromkeys([*free, "CL1", "CR1", "EL1", "ER1", "CL2", "CR2", "EL2", "ER2"]))
     for joint, value, slack in (("A1", np.radians(135), 1e-9), ("B2", 130.0, 1e-9 * mechanism.characteristic_length)):
-        wide = relimited(mechanism, **{name: None for name in mechanism.actuator_names if name[0] == "D"})
-        wide = wide.with_limits(dict.fromkeys(("CL1", "CR1", "EL1", "ER1", "CL2", "CR2", "EL2", "ER2")))
         column = mechanism.actuator_names.index(joint)
         for beyond, stays in ((0.5 * slack, True), (2 * slack, False)):
             start = home.copy()
@@ -292,30 +206,15 @@ def test_a_start_out_of_range_does_not_stay() -> None:
 
 
 def test_arms_without_ranges_search_a_turn_and_a_length_to_either_side() -> None:
-    mechanism = relimited(pf.load("nrpm"), **{f"{name}{i}": None for name in "AB" for i in (1, 2, 3)})
+    limited = pf.load("nrpm")
+    mechanism = limited.with_limits(dict.fromkeys(f"{name}{i}" for name in "AB" for i in (1, 2, 3)))
     wanted = some_targets(mechanism, 400)
-    limited = geometric.solve_ik(pf.load("nrpm"), wanted)
     answer, solution = geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
-    assert answer.reached.sum() > 0.9 * limited.reached.sum()
+    assert answer.reached.sum() > 0.9 * geometric.solve_ik(limited, wanted).reached.sum()
     assert (solution.status[answer.reached] == pf.Status.REACHED).all()
 
 
 # --- limits on both sides of their thresholds ------------------------------------------------------------------------
-
-
-def cone_angle(mechanism: Mechanism, joint: str, other: str, target: oracles.Array) -> float:
-    """Angle between the axis of a cone, fixed to base or platform, and its line [rad]."""
-    at = {name: np.array(mechanism.joint(name).at) for name in (joint, other)}
-    for name, point in at.items():
-        if mechanism.end_effector in mechanism.joint(name).connects:
-            at[name] = target[:3, :3] @ (point - mechanism.reference_point) + target[:3, 3]
-    cone = mechanism.joint(joint).cone
-    axis = np.array(cone.axis)
-    if cone.fixed_to == mechanism.end_effector:
-        axis = target[:3, :3] @ axis
-    line = at[other] - at[joint]
-    return float(np.arctan2(np.linalg.norm(np.cross(axis, line)), axis @ line))
-
 
 BESIDE = {
     "five_bar": pf.pose([0, 20, 190]),
@@ -323,100 +222,60 @@ BESIDE = {
     "nrpm": pf.pose([6, -4, 204], rpy=[0.03, 0.02, -0.05]),
 }
 """Targets near home, where every limit can be put on either side."""
-RANGED = [("five_bar", "p1"), ("five_bar", "p2"), ("five_bar", "p4"), ("five_bar", "p5"), ("stewart", "BL1")]
-RANGED += [("stewart", "BR3"), ("nrpm", "DL2"), ("nrpm", "DR1")]
 
 
-@pytest.mark.parametrize("name, joint", RANGED)
+@pytest.mark.parametrize(
+    ("name", "joint"), [("five_bar", "p1"), ("five_bar", "p4"), ("stewart", "BL1"), ("nrpm", "DL2"), ("nrpm", "DR1")]
+)
 def test_a_range_is_kept_to_its_tolerance_and_no_further(name: str, joint: str) -> None:
     mechanism, target = pf.load(name), BESIDE[name]
     value, home = pf.solve_ik(mechanism, target).joints[joint], mechanism.home_coordinate(joint)
-    slides = mechanism.joint(joint).type == "prismatic"
-    slack = TOLERANCES.limit * (mechanism.characteristic_length if slides else 1.0)
+    is_slide = mechanism.joint(joint).type == "prismatic"
+    slack = TOLERANCES.limit * (mechanism.characteristic_length if is_slide else 1.0)
     low, high = mechanism.joint(joint).range
     for inside, stays in ((0.5 * slack, True), (2 * slack, False)):
         limits = (low, value - inside) if value > home else (value + inside, high)
-        answer = geometric.solve_ik(relimited(mechanism, **{joint: limits}), target)
+        answer = geometric.solve_ik(mechanism.with_limits({joint: limits}), target)
         if name == "nrpm":  # the arm moves, and so the limit is kept
             assert (answer.actuators[mechanism.actuator_names.index(joint)] == pytest.approx(value, abs=1e-6)) == stays
         else:
             assert answer.reached is stays
 
 
-@pytest.mark.parametrize("joint, other", [("AL1", "CL1"), ("AR2", "CR2"), ("CL3", "AL3"), ("CR1", "AR1")])
-def test_a_cone_is_kept_to_its_tolerance_and_no_further(joint: str, other: str) -> None:
-    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuator_names))
+@pytest.mark.parametrize("joint", ["AL1", "CR1"])
+def test_a_cone_is_kept_to_its_tolerance_and_no_further(joint: str) -> None:
+    stewart = pf.load("stewart")
+    others = {each.name: None for each in stewart.joints if (each.cone or each.range) and each.name != joint}
+    alone, cone = stewart.with_limits(others), stewart.joint(joint).cone
     aside = [BESIDE["stewart"] @ pf.pose([0, y, 0], rpy=[0.01 * y, 0, 0]) for y in (-40, 40)]
-    target = max(aside, key=lambda each: cone_angle(stewart, joint, other, each))
-    angle = cone_angle(stewart, joint, other, target)
-    assert angle > cone_angle(stewart, joint, other, stewart.home_pose)
-    cone = stewart.joint(joint).cone
-    wide = {each.name: None for each in stewart.joints if each.cone and each.name != joint}
+    target = min(aside, key=lambda each: oracles.solve_ik(alone, each).margin)
+    angle = cone.half_angle * (1.0 - oracles.solve_ik(alone, target).margin) + TOLERANCES.limit
     for inside, reached in ((0.5e-9, True), (2e-9, False)):
-        limited = relimited(stewart, **wide, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
+        limited = alone.with_limits({joint: dataclasses.replace(cone, half_angle=float(angle) - inside)})
         assert geometric.solve_ik(limited, target).reached is reached
-
-
-@pytest.mark.parametrize("joint, other", [("CL1", "EL1"), ("CR3", "ER3"), ("EL2", "CL2")])
-def test_a_cone_on_a_crossbar_moves_the_arm_when_it_is_exceeded(joint: str, other: str) -> None:
-    nrpm, target = pf.load("nrpm"), BESIDE["nrpm"]
-    angle = cone_angle(nrpm, joint, other, target)  # at home's arms a crossbar is where it is at home
-    cone = nrpm.joint(joint).cone
-    columns = [nrpm.actuator_names.index(f"{letter}{joint[-1]}") for letter in "AB"]
-    at_home = [nrpm.home_coordinate(nrpm.actuator_names[column]) for column in columns]
-    for inside, stays in ((0.5e-9, True), (2e-9, False)):
-        limited = relimited(nrpm, **{joint: dataclasses.replace(cone, half_angle=angle - inside)})
-        answer = geometric.solve_ik(limited, target)
-        assert (answer.actuators[columns] == at_home).all() == stays
 
 
 def test_cones_of_half_a_turn_and_more_limit_nothing() -> None:
     stewart = pf.load("stewart")
-    wide = {
-        joint.name: dataclasses.replace(joint.cone, half_angle=np.pi) if joint.cone else None
-        for joint in stewart.joints
-    }
-    wanted = some_targets(stewart, 400)
+    wide = {j.name: dataclasses.replace(j.cone, half_angle=np.pi) if j.cone else None for j in stewart.joints}
     for mechanism in (stewart.with_limits(wide), stewart.without_limits()):
-        assert geometric.solve_ik(mechanism, wanted)
-
-
-def test_a_strut_without_length_keeps_every_cone() -> None:
-    stewart = pf.load("stewart").with_limits(dict.fromkeys(pf.load("stewart").actuator_names))
-    head = np.array(stewart.joint("CL1").at) - stewart.reference_point
-    only = {joint.name: None for joint in stewart.joints if joint.cone and joint.name not in ("AL1", "CL1")}
-    foot = np.array(stewart.joint("AL1").at)
-    answer = geometric.solve_ik(stewart.with_limits(only), foot - head)
-    assert answer
-    assert answer.actuators[stewart.actuator_names.index("BL1")] == pytest.approx(0.0, abs=1e-12)
+        assert geometric.solve_ik(mechanism, some_targets(stewart, 400))
 
 
 # --- descriptions that count otherwise -------------------------------------------------------------------------------
 
 
-def test_a_strut_may_be_described_from_its_other_end_and_counted_from_home() -> None:
-    stewart = pf.load("stewart")
-    foot, head = (np.array(stewart.joint(name).at) for name in ("AL1", "CL1"))
-    counted = {"along": None, "axis": head - foot, "home": 10.0, "range": (-40.0, 85.0)}
-    backwards = {"along": None, "axis": foot - head, "home": 3.0, "range": (-72.0, 53.0)}
-    other = redescribed(
+def test_struts_arms_and_cranks_may_be_described_from_their_other_end_and_counted_from_home() -> None:
+    stewart, nrpm, bar = map(pf.load, ("stewart", "nrpm", "five_bar"))
+    strut = {name: np.array(stewart.joint(name).at) for name in ("AL2", "CL2", "AR1", "CR1")}
+    turned_strut = redescribed(
         stewart,
         AL1={"connects": ("cylinderL1", "base")},
         BL1={"connects": ("rodL1", "cylinderL1")},
         CL2={"connects": ("platform", "rodL2")},
-        BL2=counted | {"axis": np.subtract(stewart.joint("CL2").at, stewart.joint("AL2").at)},
-        BR1=backwards | {"axis": np.subtract(stewart.joint("AR1").at, stewart.joint("CR1").at)},
+        BL2={"along": None, "axis": strut["CL2"] - strut["AL2"], "home": 10.0, "range": (-40.0, 85.0)},
+        BR1={"along": None, "axis": strut["AR1"] - strut["CR1"], "home": 3.0, "range": (-72.0, 53.0)},
     )
-    wanted = some_targets(stewart)
-    answer, solution = geometric.solve_ik(other, wanted), pf.solve_ik(other, wanted)
-    plain = geometric.solve_ik(stewart, wanted)
-    np.testing.assert_array_equal(answer.reached, solution.status == pf.Status.REACHED)
-    np.testing.assert_array_equal(answer.reached, plain.reached)
-    np.testing.assert_allclose(answer.actuators[answer.reached], solution.actuators[answer.reached], rtol=0, atol=1e-9)
-
-
-def test_arms_and_cranks_may_be_described_from_their_other_end() -> None:
-    nrpm, bar = pf.load("nrpm"), pf.load("five_bar")
     turned_arm = redescribed(
         nrpm,
         A1={"connects": ("arm1", "base"), "axis": np.negative(nrpm.joint("A1").axis)},
@@ -428,11 +287,14 @@ def test_arms_and_cranks_may_be_described_from_their_other_end() -> None:
         p4={"connects": ("link3", "link4"), "axis": np.negative(bar.joint("p4").axis)},
         p5={"connects": ("link4", "base")},
     )
-    for mechanism, other, signs in ((nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})):
+    machines = (stewart, turned_strut, {}), (nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})
+    for mechanism, other, signs in machines:
         wanted = some_targets(mechanism, 400)
         plain, answer = geometric.solve_ik(mechanism, wanted), geometric.solve_ik(other, wanted)
-        expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuator_names]
         np.testing.assert_array_equal(answer.reached, plain.reached)
+        expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuator_names]
+        if mechanism is stewart:  # whose coordinates count otherwise
+            expected = np.where(plain.reached[:, None], pf.solve_ik(other, wanted).actuators, np.nan)
         np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
 
 
@@ -450,41 +312,26 @@ def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_batch_is_answered_row_by_row(name: str) -> None:
+def test_batches_rows_and_every_form_of_a_target_are_answered_alike(name: str) -> None:
     mechanism = pf.load(name)
     wanted = some_targets(mechanism, 300)[: 2 * (len(some_targets(mechanism, 300)) // 2)]
     flat = geometric.solve_ik(mechanism, wanted)
-    assert flat.reached.shape == (len(wanted),)
     assert not flat
-    np.testing.assert_array_equal(
-        np.isnan(flat.actuators), np.tile(~flat.reached, (len(mechanism.actuator_names), 1)).T
-    )
+    np.testing.assert_array_equal(np.isnan(flat.actuators).all(axis=1), ~flat.reached)
     folded = geometric.solve_ik(mechanism, wanted.reshape(2, -1, 4, 4))
     assert folded.reached.shape == (2, len(wanted) // 2)
     np.testing.assert_array_equal(folded.actuators.reshape(flat.actuators.shape), flat.actuators)
     for row in range(0, len(wanted), 29):
         single = geometric.solve_ik(mechanism, wanted[row])
-        assert single.actuators.shape == flat.actuators.shape[1:]
         assert single.reached is bool(flat.reached[row]) is bool(single)
         np.testing.assert_array_equal(single.actuators, flat.actuators[row])
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_targets_come_in_every_form_that_the_solver_takes(name: str) -> None:
-    mechanism = pf.load(name)
-    wanted = some_targets(mechanism, 60)
-    expected = geometric.solve_ik(mechanism, wanted)
-    locked = wanted.copy()
-    locked.setflags(write=False)
     strided = np.asfortranarray(np.repeat(wanted, 2, axis=0))[::2]
-    for form in (wanted.tolist(), locked, strided, RigidTransform.from_matrix(wanted)):
-        answer = geometric.solve_ik(mechanism, form)
-        np.testing.assert_allclose(answer.actuators, expected.actuators, rtol=0, atol=1e-9)
-    level = oracles.poses(wanted[:, :3, 3])
-    np.testing.assert_array_equal(
-        geometric.solve_ik(mechanism, wanted[:, :3, 3]).actuators,
-        geometric.solve_ik(mechanism, level).actuators,
-    )
+    for form in (wanted.tolist(), strided, RigidTransform.from_matrix(wanted)):
+        np.testing.assert_allclose(geometric.solve_ik(mechanism, form).actuators, flat.actuators, rtol=0, atol=1e-9)
+    level = geometric.solve_ik(mechanism, oracles.poses(wanted[:, :3, 3]))
+    np.testing.assert_array_equal(geometric.solve_ik(mechanism, wanted[:, :3, 3]).actuators, level.actuators)
+    if name == "five_bar":  # a tip has no orientation
+        np.testing.assert_array_equal(level.actuators, flat.actuators)
     if not INTERPRETED:
         assert len(closed_form(mechanism).kernel.signatures) == 1
 
@@ -507,9 +354,6 @@ def test_rows_that_are_no_poses_are_named_as_the_solver_names_them(name: str) ->
         errors.append(caught.value)
     assert errors[0].rows == errors[1].rows == (70, 71, 72, 73, 74)
     assert str(errors[0]) == str(errors[1])
-    for row in range(70, 76):
-        with pytest.raises(InvalidArgument):
-            geometric.solve_ik(mechanism, wanted[row])
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.1])
@@ -522,12 +366,11 @@ def test_a_rotation_typed_with_few_digits_counts_as_the_solver_counts_it(factor:
         with pytest.raises(InvalidArgument):
             geometric.solve_ik(stewart, rough)
         return
-    for noise in (rough, np.round(BESIDE["stewart"], 7)):
-        expected = pf.solve_ik(stewart, noise).actuators
-        np.testing.assert_allclose(geometric.solve_ik(stewart, noise).actuators, expected, rtol=0, atol=1e-11)
+    expected = pf.solve_ik(stewart, rough).actuators
+    np.testing.assert_allclose(geometric.solve_ik(stewart, rough).actuators, expected, rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("distance", [1e4, 1e10, 1e12, 1e160, 1e308])
+@pytest.mark.parametrize("distance", [1e4, 1e12, 1e160, 1e308])
 @pytest.mark.parametrize("name", NAMES)
 def test_no_target_is_too_far_to_be_missed(name: str, distance: float) -> None:
     for mechanism in (pf.load(name), pf.load(name).without_limits()):
@@ -536,9 +379,6 @@ def test_no_target_is_too_far_to_be_missed(name: str, distance: float) -> None:
         may_reach = name != "five_bar" and mechanism == mechanism.without_limits() and distance < facts.HORIZON * length
         assert answer.reached.tolist() == [may_reach, may_reach]
         assert np.isnan(answer.actuators).all() == (not may_reach)
-
-
-STEWART, FIVE_BAR = pf.load("stewart"), pf.load("five_bar")
 
 
 def two_struts(tip: bool = False) -> Mechanism:
@@ -562,21 +402,20 @@ def spinning() -> Mechanism:
         Joint(f"spin{k}", "revolute", bodies, at=(0, 0, 200), axis=(0, 0, 1), actuated=k == 1)
         for k, bodies in enumerate((("platform", "tool"), ("tool", "platform")), 1)
     ]
-    return dataclasses.replace(STEWART, joints=(*STEWART.joints, *tool))
+    return dataclasses.replace(pf.load("stewart"), joints=(*pf.load("stewart").joints, *tool))
 
 
-UNSUITABLE = {
+STRAY = {"along": None, "axis": (0, 0, 1), "range": (-10, 10)}
+UNSUITABLE: dict[str, Callable[[], Mechanism]] = {
     "another topology": lambda: pf.load("delta"),
     "the cone of A1 turns with its strut": lambda: redescribed(two_struts(), A1={"cone": Cone((1, 0, 0), 0.9, "c1")}),
     "A1 has ranges about two axes": lambda: redescribed(
         two_struts(), A1={"axes": ((-60, 100, 0), (0, 0, 1)), "range": ((-1, 1), (-1, 1))}
     ),
-    "BL1 does not point along its strut": lambda: redescribed(
-        STEWART, BL1={"along": None, "axis": (0, 0, 1), "range": (-10, 10)}
-    ),
+    "BL1 does not point along its strut": lambda: redescribed(pf.load("stewart"), BL1=STRAY),
     "its end effector is a joint": lambda: two_struts(tip=True),
-    "the range of p3 ties its legs together": lambda: redescribed(FIVE_BAR, p3={"range": (-1, 1)}),
-    "its axes are not all parallel": lambda: redescribed(FIVE_BAR, p2={"axis": (1, 0.01, 0)}),
+    "the range of p3 ties its legs together": lambda: redescribed(pf.load("five_bar"), p3={"range": (-1, 1)}),
+    "its axes are not all parallel": lambda: redescribed(pf.load("five_bar"), p2={"axis": (1, 0.01, 0)}),
     "actuated joint spin1 is in no sub-chain": spinning,
     "its task leaves out a part of the pose": lambda: dataclasses.replace(pf.load("nrpm"), task=("z", "tilt")),
 }
@@ -589,21 +428,22 @@ def test_what_has_no_closed_form_is_told_what_has(reason: str) -> None:
         geometric.solve_ik(mechanism, mechanism.home_pose)
     error = caught.value
     assert (error.mechanism, error.sub_chains) == (mechanism.name, tuple(map(str, pf.decompose(mechanism))))
-    assert [part in str(error) for part in (mechanism.name, *error.sub_chains, *EXAMPLES)].count(False) == 0
+    assert all(part in str(error) for part in (mechanism.name, *error.sub_chains, *EXAMPLES))
     assert vars(pickle.loads(pickle.dumps(error))) == vars(error)
 
 
-def test_wrong_calls_are_told() -> None:
-    stewart = pf.load("stewart")
-    for mechanism, target, start, argument in (
-        ("stewart", [0, 0, 190], None, "mechanism"),
-        (stewart, [0, 190], None, "target"),
-        (stewart, "up", None, "target"),
-        (stewart, [0, 0, 190], "home", "start"),
-        (stewart, [0, 0, 190], SimpleNamespace(actuators=[1, 2]), "start"),
-        (stewart, [[0, 0, 190]] * 3, SimpleNamespace(actuators=np.ones((2, 6))), "start"),
-        (stewart, [0, 0, 190], geometric.solve_ik(stewart, [0, 0, 1e4]), "start"),
-    ):
-        with pytest.raises(InvalidArgument) as caught:
-            geometric.solve_ik(mechanism, target, start=start)
-        assert caught.value.argument == argument
+@pytest.mark.parametrize(
+    ("target", "start", "argument"),
+    [
+        ([0, 190], None, "target"),
+        ("up", None, "target"),
+        ([0, 0, 190], "home", "start"),
+        ([0, 0, 190], SimpleNamespace(actuators=[1, 2]), "start"),
+        ([[0, 0, 190]] * 3, SimpleNamespace(actuators=np.ones((2, 6))), "start"),
+        ([0, 0, 190], SimpleNamespace(actuators=np.full(6, np.nan)), "start"),
+    ],
+)
+def test_wrong_calls_are_told(target: Any, start: Any, argument: str) -> None:
+    with pytest.raises(InvalidArgument) as caught:
+        geometric.solve_ik(pf.load("stewart"), target, start=start)
+    assert caught.value.argument == argument

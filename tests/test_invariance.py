@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import os
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +11,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import MACHINES
-from pfabrik import Joint, Mechanism, Solution, Status
+from checks import INTERPRETED
+from machines import MACHINES, machine
+from machines.redescribed import moved, relabelled, scaled
+from pfabrik import Mechanism, Solution, Status
 from pfabrik.model import model_of
 from pfabrik.platform.seeds import seeds_of
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 ROWS = 2 if INTERPRETED else 12
 NAMES = ["five_bar", "stewart", "nrpm", *MACHINES]
 # Where a pose does not decide the arrangement of a chain, the search has a choice, which may turn on the last bit.
@@ -31,14 +29,6 @@ STRUTS = ("stewart", "hexapod_ups", "tripod_rps", "planar_rpr")
 # position suits the orientation it may even decide which valley: so much is granted to one row of a batch.
 AS_NEAR, ELSEWHERE = 1e-2, 1
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-
-_MADE: dict[str, Mechanism] = {}
-
-
-def machine(name: str) -> Mechanism:
-    if name not in _MADE:
-        _MADE[name] = MACHINES[name]() if name in MACHINES else pf.load(name)
-    return _MADE[name]
 
 
 def some_targets(mechanism: Mechanism, seed: int) -> np.ndarray:
@@ -64,80 +54,6 @@ def _plane_of(mechanism: Mechanism) -> np.ndarray | None:
         return None
     axes = np.array([joint.axis for joint in mechanism.joints if joint.type == "revolute"])
     return axes[0] if np.abs(np.cross(axes, axes[0])).max() < 1e-9 and not mechanism.name.startswith("3-") else None
-
-
-def with_joints(mechanism: Mechanism, change: Callable[[Joint], Joint], **fields: object) -> Mechanism:
-    return dataclasses.replace(mechanism, joints=[change(joint) for joint in mechanism.joints], **fields)
-
-
-def moved(mechanism: Mechanism, R: np.ndarray, t: np.ndarray) -> Mechanism:
-    def move(joint: Joint) -> Joint:
-        return dataclasses.replace(
-            joint,
-            at=None if joint.at is None else R @ joint.at + t,
-            axis=None if joint.axis is None else R @ joint.axis,
-            axes=None if joint.axes is None else tuple(R @ axis for axis in joint.axes),
-            cone=None if joint.cone is None else dataclasses.replace(joint.cone, axis=R @ joint.cone.axis),
-        )
-
-    return with_joints(mechanism, move, reference_point=R @ mechanism.reference_point + t)
-
-
-def scaled(mechanism: Mechanism, size: float) -> Mechanism:
-    def scale(joint: Joint) -> Joint:
-        slides = joint.type == "prismatic"
-        return dataclasses.replace(
-            joint,
-            at=None if joint.at is None else size * np.array(joint.at),
-            home=size * joint.home if slides else joint.home,
-            range=tuple(size * np.array(joint.range)) if slides and joint.range else joint.range,
-        )
-
-    return with_joints(mechanism, scale, reference_point=size * np.array(mechanism.reference_point))
-
-
-def relabelled(mechanism: Mechanism, rng: np.random.Generator) -> tuple[Mechanism, dict[str, str]]:
-    """Other names for joints and bodies, the joints in another order, some described from their other body."""
-    names = {joint.name: f"j{n}" for joint, n in zip(mechanism.joints, rng.permutation(99), strict=False)}
-    bodies = {body: f"b{n}" for body, n in zip(mechanism.bodies, rng.permutation(99), strict=False)}
-
-    def rename(joint: Joint) -> Joint:
-        swap = rng.random() < 0.5
-        signed = swap and joint.type in ("revolute", "prismatic") and joint.along is None
-        return dataclasses.replace(
-            joint,
-            name=names[joint.name],
-            connects=tuple(bodies[body] for body in joint.connects)[:: -1 if swap else 1],
-            along=joint.along and tuple(names[other] for other in joint.along)[:: -1 if swap else 1],
-            cone=joint.cone and dataclasses.replace(joint.cone, fixed_to=bodies[joint.cone.fixed_to]),
-            home=-joint.home if signed else joint.home,
-            range=(-joint.range[1], -joint.range[0]) if signed and joint.range else joint.range,
-        )
-
-    end = mechanism.end_effector
-    joints = [rename(joint) for joint in mechanism.joints]
-    order = rng.permutation(len(joints))
-    other = Mechanism(
-        "another", [joints[i] for i in order], {**names, **bodies}[end], mechanism.reference_point,
-        base=bodies[mechanism.base],
-    )  # fmt: skip
-    return other, names
-
-
-def signs(mechanism: Mechanism, other: Mechanism, names: dict[str, str]) -> np.ndarray:
-    """-1 for each actuator of `mechanism` whose coordinate `other` counts the other way."""
-    bodies = {}
-    for joint in mechanism.joints:
-        for body in joint.connects:
-            mates = [set(other.joint(names[j.name]).connects) for j in mechanism.joints if body in j.connects]
-            common = set.intersection(*mates)
-            bodies.setdefault(body, common)
-    found = []
-    for name in mechanism.actuator_names:
-        joint, mate = mechanism.joint(name), other.joint(names[name])
-        same = mate.connects[0] in bodies[joint.connects[0]] and mate.connects[1] in bodies[joint.connects[1]]
-        found.append(1.0 if same or joint.along is not None else -1.0)
-    return np.array(found)
 
 
 def assert_same_answers(
@@ -227,7 +143,8 @@ def test_a_unit_of_another_power_of_two_gives_the_same_answer_to_the_last_bit(na
 @given(seed=seeds)
 def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: int) -> None:
     original = machine(name)
-    other, names = relabelled(original, np.random.default_rng(seed))
+    other, names, swapped = relabelled(original, np.random.default_rng(seed))
+    signs = [-1.0 if a in swapped and original.joint(a).along is None else 1.0 for a in original.actuator_names]
     targets = some_targets(original, seed)
     expected, answer = pf.solve_ik(original, targets), pf.solve_ik(other, targets)
     places = [
@@ -236,7 +153,7 @@ def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: 
         for back, new in names.items()
         if new == mate
     ]
-    actuators = (expected.actuators * signs(original, other, names))[:, places]
+    actuators = (expected.actuators * signs)[:, places]
     assert_same_answers(name, answer, expected, expected.pose, actuators)
     reached = expected.status == Status.REACHED
     for joint, points in expected.points.items():
@@ -250,7 +167,7 @@ def test_other_names_order_and_viewpoints_give_the_same_answer(name: str, seed: 
 def test_searches_start_from_the_same_places_however_a_machine_is_described(name: str) -> None:
     """What is drawn is a leg's by where it is, and counts along its axis whichever way that is described."""
     original = machine(name)
-    other, _ = relabelled(original, np.random.default_rng(0))
+    other, _, _ = relabelled(original, np.random.default_rng(0))
     np.testing.assert_allclose(seeds_of(model_of(other)).poses, seeds_of(model_of(original)).poses, atol=1e-6)
 
 

@@ -6,7 +6,6 @@ longer than all else, so `make test` runs them as plain Python, and a campaign c
 
 from __future__ import annotations
 
-import os
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +15,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import MACHINES
 from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
@@ -26,7 +26,6 @@ from pfabrik.kernels.reaching import moving_frames, restrict, solve
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
     *([] if INTERPRETED else [pytest.mark.campaign]),
@@ -345,7 +344,7 @@ def off_plane(compiled: CompiledPlan, nodes: np.ndarray) -> float:
 def test_a_pass_outward_starts_at_the_base_and_keeps_lengths_planes_rails_and_ranges(name: str) -> None:
     machine = MACHINES[name]() if name in MACHINES else pf.load(name)
     if name == "tripod_rps":  # a platform's cone may contradict the hinge's plane
-        machine = machine.with_limits(S1=None, S2=None, S3=None)
+        machine = machine.with_limits(C1=None, C2=None, C3=None)
     compiled = compile_plan(machine)
     rng = np.random.default_rng(10)
     length = compiled.plan.length

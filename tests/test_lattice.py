@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from pfabrik.workspace.numbering import Numbering
 from pfabrik.workspace.parts import connected
-from pfabrik.workspace.sampled_lattice import codes, places_of, ways
+from pfabrik.workspace.sampled_lattice import codes, offsets, places_of
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -29,7 +29,7 @@ def test_points_are_numbered_in_the_order_in_which_they_are_met(d: int) -> None:
 def test_a_code_tells_where_its_place_is_from_another() -> None:
     rng = np.random.default_rng(1)
     first, way = rng.integers(-1000, 1000, (2, 50, 3))
-    assert (codes(first) + ways(way) == codes(first + way)).all()
+    assert (codes(first) + offsets(way) == codes(first + way)).all()
 
 
 def test_what_is_joined_has_the_same_lowest_point() -> None:

@@ -11,10 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import closure
+from machines import closure, machine
 from pfabrik.closure.configurations import new_rows
 from pfabrik.decomposition.leg_table import LegTable
-from pfabrik.description.home_mobility import end_effector_freedom
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.feasibility import _margins
@@ -33,11 +32,6 @@ SERVED = [name for name in pf.catalog() if not model_of(pf.load(name)).why_poses
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
 COMPLETED = [name for name in IN_FRONT if model_of(pf.load(name)).legs.task["unset"][0]]
 TARGETS = 300
-
-
-@lru_cache
-def machine(name: str) -> pf.Mechanism:
-    return pf.load(name)
 
 
 def table(name: str) -> LegTable:
@@ -150,15 +144,6 @@ def test_derivatives_of_constraints_are_their_differences(name: str) -> None:
                 other[:, :3, :3] = Rotation.from_rotvec(vector).as_matrix() @ other[:, :3, :3]
             moved.append(constraints(name, other)[0])
         np.testing.assert_allclose(slopes[:, :, axis], (moved[0] - moved[1]) / (2 * step), atol=1e-7)
-
-
-@pytest.mark.parametrize("name", CONSTRAINED)
-def test_constraints_leave_the_freedom_of_the_mechanism(name: str) -> None:
-    rows, slopes = constraints(name, machine(name).home_pose[None].copy())
-    assert np.abs(rows).max() <= 1e-12
-    columns = slice(0, 3) if machine(name).end_effector_is_joint else slice(0, 6)
-    rank = np.linalg.matrix_rank(slopes[0][:, columns], tol=1e-6)
-    assert rank == columns.stop - end_effector_freedom(machine(name), frozenset())
 
 
 @pytest.mark.parametrize("name", COMPLETED)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import excess_of_joints, gap_of_joints
-from machines import closure
+from machines import closure, machine
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.engine import engine_of
 from pfabrik.model import model_of
@@ -33,11 +32,6 @@ TURNS = {
     "6-RRPS": ANY,
 }
 """About which axes a platform can turn."""
-
-
-@lru_cache
-def machine(name: str) -> pf.Mechanism:
-    return closure.ON_ARMS[name]()
 
 
 def targets(mechanism: pf.Mechanism, n: int, shift: float, turn: float, about: tuple[int, ...]) -> np.ndarray:
@@ -93,21 +87,6 @@ def test_what_neither_task_nor_legs_tell_stays_where_it_was(name: str, task: str
     assert_as_on_joint_coordinates(mechanism, wanted, answers)
     again = pf.solve_ik(mechanism, wanted[0], start=answers[0])
     np.testing.assert_allclose(again.pose, answers[0].pose, atol=1e-9 * mechanism.characteristic_length)
-
-
-@pytest.mark.parametrize("name", TURNS)
-def test_forward_kinematics_returns_what_inverse_kinematics_was_given(name: str) -> None:
-    mechanism = machine(name)
-    answers = pf.solve_ik(mechanism, targets(mechanism, 40, 0.1, 0.2, TURNS[name]))
-    reached = [each for each in answers if each]
-    back = pf.solve_fk(mechanism, np.array([each.actuators for each in reached]))
-    assert (np.asarray(back.status) == pf.Status.REACHED).all()
-    assert gap_of_joints(mechanism, back).max() <= 1e-9
-    off = np.abs(back.pose - np.array([each.pose for each in reached])).max(axis=(1, 2))
-    assert (off <= 1e-7 * mechanism.characteristic_length).mean() >= 0.9  # others are assemblies of their own
-    for each in reached[:5]:
-        there = pf.solve_fk(mechanism, each.actuators, start=each)
-        np.testing.assert_allclose(there.pose, each.pose, atol=1e-7 * mechanism.characteristic_length)
 
 
 @pytest.mark.parametrize("name", TURNS)

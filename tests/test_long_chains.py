@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
 import pfabrik as pf
+from checks import INTERPRETED
 from pfabrik import Cone, Joint, Mechanism, Status
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = [
     pytest.mark.skipif(INTERPRETED, reason="cubes of hundreds take minutes in plain Python"),
     pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from pfabrik.answers.differential import mobility
 from pfabrik.description.enclosing import enclosing_radius
 from pfabrik.description.graph import cone_line
-from pfabrik.description.home_mobility import end_effector_freedom, universal_axes
+from pfabrik.description.home_mobility import universal_axes
 from pfabrik.description.joint_types import JOINT_TYPES, KINDS
 from pfabrik.description.mechanism import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
@@ -63,6 +63,11 @@ def slider(**changes: object) -> list[Joint]:
         Joint(**{"name": "s", "type": "prismatic", "connects": ("base", "block"), "axis": (1, 0, 0), "actuated": True}
               | changes),
     ]  # fmt: skip
+
+
+def stray(*names: object) -> list[Joint]:
+    """Joints between two bodies that nothing else connects."""
+    return [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate(names)]
 
 
 def changed(joints: list[Joint], which: str, /, **changes: object) -> list[Joint]:
@@ -200,31 +205,6 @@ class TestLimits:
 
 
 class TestFreedom:
-    def test_hexapod_has_six_freedoms_and_none_when_locked(self):
-        machine = stewart()
-        assert mobility(machine).mobility == 6
-        assert end_effector_freedom(machine, frozenset()) == 6
-        struts = [drive.column for drive in machine.drives]
-        assert end_effector_freedom(machine, frozenset(struts)) == 0
-        assert end_effector_freedom(machine, frozenset(struts[1:])) == 1
-
-    def test_struts_between_spherical_joints_spin_without_moving_the_platform(self):
-        joints = [
-            dataclasses.replace(joint, type="spherical") if joint.type == "universal" else joint for joint in hexapod()
-        ]
-        machine = Mechanism("6-SPS", joints, "platform", (0, 0, 150))
-        assert mobility(machine).mobility == 12
-        assert end_effector_freedom(machine, frozenset()) == 6
-
-    def test_five_bar_moves_in_its_plane(self):
-        machine = Mechanism("5", five_bar(), "tip")
-        assert mobility(machine).mobility == 2
-        assert end_effector_freedom(machine, frozenset()) == 2
-
-    def test_slider_crank_has_one_freedom(self):
-        machine = Mechanism("s", slider(), "block", (3, 0, 0))
-        assert mobility(machine).mobility == end_effector_freedom(machine, frozenset()) == 1
-
     def test_cylindrical_and_fixed_joints_count_two_and_none(self):
         joints = [
             Joint("c", "cylindrical", ("base", "arm"), at=(0, 0, 0), axis=Z),
@@ -275,14 +255,6 @@ class TestCones:
         with pytest.raises(InvalidArgument, match="C0"):
             cone_line(machine, machine.joint("C0"))
 
-    def test_several_next_joints_are_a_fault(self):
-        faults = faults_of(changed(hexapod(), "C0", cone=Cone(Z, 3, "rod0")), "platform", reference_point=(0, 0, 0))
-        assert "'platform', which leads to several joints ('C1', " in faults["joint[2].cone"]
-
-    def test_no_next_joint_is_a_fault(self):
-        joints = [*hexapod(), Joint("T", "spherical", ("platform", "tool"), at=(0, 0, 0), cone=Cone(Z, 1, "platform"))]
-        assert "leads to no other joint" in faults_of(joints, "tool", reference_point=(0, 0, 0))["joint[18].cone"]
-
     @pytest.mark.parametrize("short", [0.5, 2.0])
     def test_home_may_exceed_its_cone_by_the_slack_and_no_more(self, short):
         machine = stewart()
@@ -294,10 +266,6 @@ class TestCones:
         else:
             with pytest.raises(InvalidMechanism, match=r"joint 'A0'.cone.half_angle: .* angle at home to 'C0'"):
                 machine.with_limits(A0=cone)
-
-    def test_next_joint_at_the_same_place_is_a_fault(self):
-        joints = changed(five_bar(), "c", type="spherical", axis=None, cone=Cone(Z, 3, "crank1"), at=(1, 3, 0))
-        assert "'tip' at the same place" in faults_of(joints)["joint[2].cone"]
 
 
 SQUARE = {"axis": None, "axes": (Z, (1, 0, 0)), "actuated": False}
@@ -417,12 +385,6 @@ class TestFaults:
         faults = faults_of(slider(**changes), "block", reference_point=(0, 0, 0))
         assert any(text in each for each in faults.values()) and len(faults) == 1
 
-    def test_prismatic_joint_along_joints_without_centres_or_distance_is_refused(self):
-        joints = changed(slider(axis=None, along=("o", "q")), "q", at=(0, 0, 0))
-        assert "same place" in faults_of(joints, "block", reference_point=(0, 0, 0))["joint[3].along"]
-        joints = changed(slider(axis=None, along=("o", "q")), "o", type="prismatic", at=None)
-        assert "without a centre" in faults_of(joints, "block", reference_point=(0, 0, 0))["joint[3].along"]
-
     @pytest.mark.parametrize(("head", "place", "text"), [
         ({"name": " "}, "name", "a text"),
         ({"base": "bse"}, "base", "'bse', which no joint connects; did you mean 'base'?"),
@@ -442,40 +404,35 @@ class TestFaults:
         faults = faults_of(**({"joints": five_bar()} | head))
         assert text in faults[place] and len(faults) == 1
 
-    def test_duplicate_names_are_a_fault(self):
-        assert "'a', the name of an earlier joint" in faults_of(changed(five_bar(), "b", name="a"))["joint[1].name"]
-
-    def test_nothing_actuated_is_a_fault(self):
-        joints = [dataclasses.replace(joint, actuated=False) for joint in five_bar()]
-        assert "no actuated joint" in faults_of(joints)["joint"]
-
-    def test_dangling_body_is_named_with_a_near_miss(self):
-        faults = faults_of(changed(five_bar(), "d", connects=("crnk2", "arm2")))
-        assert "'crnk2', which no other joint connects; did you mean 'crank2'?" in faults["joint[3].connects"]
+    @pytest.mark.parametrize(("joints", "end_effector", "place", "text"), [
+        (changed(five_bar(), "b", name="a"), "tip", "joint[1].name", "'a', the name of an earlier joint"),
+        ([dataclasses.replace(each, actuated=False) for each in five_bar()], "tip", "joint", "no actuated joint"),
+        (changed(five_bar(), "d", connects=("crnk2", "arm2")), "tip", "joint[1].connects joint[3].connects",
+         "'crnk2', which no other joint connects; did you mean 'crank2'?"),
+        ([*five_bar(), *stray("x", "y")], "tip", "joint[5].connects", "'u', 'v', apart from the rest"),
+        ([*five_bar(), *stray({}, "y")], "tip", "joint[5].name joint[5].connects", "'u', 'v', apart from the rest"),
+        ([*five_bar(), *stray("x", "y")], "u", "end_effector", "no joints lead from the base"),
+        (changed(five_bar(), "a", name="arm1"), "arm1", "end_effector", "both a body and a joint"),
+        (changed(five_bar(), "tip", type="cylindrical"), "tip", "end_effector", "a cylindrical joint"),
+        (changed(slider(axis=None, along=("o", "q")), "q", at=(0, 0, 0)), "block", "joint[3].along", "same place"),
+        (changed(slider(axis=None, along=("o", "q")), "o", type="prismatic", at=None), "block", "joint[3].along",
+         "without a centre"),
+        (changed(hexapod(), "C0", cone=Cone(Z, 3, "rod0")), "platform", "joint[2].cone",
+         "'platform', which leads to several joints ('C1', "),
+        ([*hexapod(), Joint("T", "spherical", ("platform", "tool"), at=(0, 0, 0), cone=Cone(Z, 1, "platform"))], "tool",
+         "joint[18].cone", "leads to no other joint"),
+        (changed(five_bar(), "c", type="spherical", axis=None, cone=Cone(Z, 3, "crank1"), at=(1, 3, 0)), "tip",
+         "joint[2].cone", "'tip' at the same place"),
+    ])  # fmt: skip
+    def test_fault_between_joints_is_named(self, joints, end_effector, place, text):
+        head = {} if end_effector in ("tip", "arm1") else {"reference_point": (0, 0, 0)}
+        faults = faults_of(joints, end_effector, **head)
+        assert list(faults) == place.split() and text in faults[place.split()[-1]]
 
     def test_tool_that_hangs_on_an_end_effector_joint_is_no_dangling_body(self):
         joints = [Joint("x", "revolute", ("base", "arm"), at=(0, 0, 0), axis=Z, actuated=True),
                   Joint("y", "spherical", ("arm", "tool"), at=(1, 0, 0))]  # fmt: skip
         assert Mechanism("arm", joints, "y").bodies == ("base", "arm", "tool")
-
-    def test_disconnected_bodies_are_a_fault(self):
-        stray = [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate("xy")]
-        assert "'u', 'v', apart from the rest" in faults_of([*five_bar(), *stray])["joint[5].connects"]
-
-    def test_a_name_that_is_no_name_apart_from_the_rest_is_a_fault(self):
-        stray = [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate([{}, "y"])]
-        assert list(faults_of([*five_bar(), *stray])) == ["joint[5].name", "joint[5].connects"]
-
-    def test_end_effector_without_a_path_to_the_base_is_a_fault(self):
-        stray = [Joint(name, "spherical", ("u", "v"), at=(float(i), 0, 0)) for i, name in enumerate("xy")]
-        faults = faults_of([*five_bar(), *stray], "u", reference_point=(0, 0, 0))
-        assert "no joints lead from the base" in faults["end_effector"] and len(faults) == 1
-
-    def test_end_effector_name_shared_by_a_body_and_a_joint_is_a_fault(self):
-        assert "both a body and a joint" in faults_of(changed(five_bar(), "a", name="arm1"), "arm1")["end_effector"]
-
-    def test_sliding_end_effector_joint_is_a_fault(self):
-        assert "a cylindrical joint" in faults_of(changed(five_bar(), "tip", type="cylindrical"))["end_effector"]
 
     @pytest.mark.parametrize("size", [1e-10, 1e-8])
     def test_machine_without_size_is_a_fault(self, size):
@@ -485,11 +442,9 @@ class TestFaults:
         else:
             assert "at least 1e-09" in faults_of(joints)["joint"]
 
-    def test_largest_number_is_accepted(self):
-        Mechanism("5", changed(five_bar(), "a", range=(-1e12, 1e12)), "tip")
-
-    def test_locked_coordinate_is_accepted(self):
-        Mechanism("5", changed(five_bar(), "a", range=(0, 0)), "tip")
+    @pytest.mark.parametrize("span", [(-1e12, 1e12), (0, 0)])
+    def test_the_largest_numbers_and_a_locked_coordinate_are_accepted(self, span):
+        Mechanism("5", changed(five_bar(), "a", range=span), "tip")
 
     @pytest.mark.parametrize("excess", [0.5, 2.0])
     def test_home_may_exceed_its_range_by_the_slack_and_no_more(self, excess):
@@ -549,9 +504,6 @@ class TestEnclosingSphere:
         cube = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
         assert enclosing_radius(cube) == pytest.approx(math.sqrt(0.75), rel=1e-14)
 
-    def test_obtuse_triangle_is_spanned_by_its_longest_side(self):
-        assert enclosing_radius([(0, 0, 0), (4, 0, 0), (1, 0.5, 0)]) == 2.0
-
     @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=1, max_size=30), st.floats(1e-9, 1e9))
     @settings(max_examples=60, deadline=None)
     def test_no_centre_does_better(self, points, scale):
@@ -559,12 +511,6 @@ class TestEnclosingSphere:
         assert radius == pytest.approx(_by_descent(np.array(points)), rel=2e-2, abs=1e-12)
         diameter = max(math.dist(a, b) for a in points for b in points)
         assert diameter / 2 * (1 - 1e-9) <= radius <= diameter * math.sqrt(3 / 8) * (1 + 1e-9)
-
-    @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=1, max_size=20), st.permutations(range(20)))
-    @settings(max_examples=40, deadline=None)
-    def test_order_of_the_points_does_not_matter(self, points, order):
-        shuffled = [points[index] for index in order if index < len(points)]
-        assert enclosing_radius(shuffled) == pytest.approx(enclosing_radius(points), rel=1e-12, abs=1e-300)
 
 
 def _by_descent(points: np.ndarray) -> float:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import excess_of_joints, excess_of_points, gap_of_joints, gap_of_points
-from machines import closure, positions
+from checks import INTERPRETED, excess_of_joints, excess_of_points, gap_of_joints, gap_of_points
+from machines import closure, five_bar
+from oracles import targets_about
 from oracles.nearest import Problem, drawn_targets, nearest
 from pfabrik import Joint, Leg, Mechanism, Options, Solution, Status
 from pfabrik.closure.close import close
@@ -23,11 +22,9 @@ from pfabrik.closure.projection import projection_modes
 from pfabrik.description.task import task_of
 from pfabrik.engine import engine_of
 from pfabrik.model import model_of
-from pfabrik.platform import rotation
 from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.rotations import angles_between
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 FEASIBLE = 1e-9
 """What loops may be open, and limits exceeded, as every answer promises [L or rad]."""
 SAME = 1e-6
@@ -47,13 +44,6 @@ CASES = [
 ]
 """Machines, and what is to be held; a 5-bar's tip and a delta's platform have no orientation to give up."""
 QUICK = ("five_bar", "stewart")
-SIZES = ((0.3, 0.3), (1.0, 0.8), (2.0, 1.2))
-"""How far from home targets are drawn [L], and how far they are turned [rad]."""
-MANY_ROOMS = {
-    f"closure.{name}"
-    for name in ("Par4", "H4", "exechon", "wandering_upu", "3-RRRS", "pinned_delta", "delta_uu", "delta with a shaft")
-}
-"""Machines whose poses fall into many parts: searches miss the nearest now and then."""
 NAMES = tuple(dict.fromkeys(name for name, _ in CASES))
 
 
@@ -94,24 +84,15 @@ def check_feasible(mechanism: Mechanism, targets: np.ndarray, answers: Solution)
 # --- feasibility -----------------------------------------------------------------------------------------------------
 
 
-def check_anywhere(name: str, hold: str | None, n: int) -> None:
-    mechanism, targets, answers = projections(name, hold, n)
+@pytest.mark.parametrize("n", [None, pytest.param(300, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(("name", "hold"), CASES)
+def test_limits_are_kept_and_loops_closed_however_far_the_target(name: str, hold: str | None, n: int | None) -> None:
+    mechanism, targets, answers = projections(name, hold, n or few(name))
     check_feasible(mechanism, targets, answers)
     targets[:, :3, 3] *= 1e6
     answers = pf.solve_ik(mechanism, targets, options=Options(hold=hold))
     assert (answers.status == Status.PROJECTED).all()
     check_feasible(mechanism, targets, answers)
-
-
-@pytest.mark.parametrize(("name", "hold"), CASES)
-def test_limits_are_kept_and_loops_closed_however_far_the_target(name: str, hold: str | None) -> None:
-    check_anywhere(name, hold, few(name))
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(("name", "hold"), CASES)
-def test_limits_are_kept_and_loops_closed_however_far_any_target(name: str, hold: str | None) -> None:
-    check_anywhere(name, hold, 300)
 
 
 # --- nearness --------------------------------------------------------------------------------------------------------
@@ -230,13 +211,6 @@ def test_where_the_reference_point_is_does_not_change_what_is_held(name: str) ->
     np.testing.assert_allclose(others.position_error[held] / near.characteristic_length, away, atol=1e-6)
 
 
-@pytest.mark.parametrize(("name", "hold"), CASES)
-def test_special_targets_have_feasible_answers(name: str, hold: str | None) -> None:
-    mechanism = pf.load(name)
-    targets = special_targets(mechanism)
-    check_feasible(mechanism, targets, pf.solve_ik(mechanism, targets, options=Options(hold=hold)))
-
-
 IN_A_PLANE = {"five_bar": (0.0, 1.0, 1.0), "rrr": (1.0, 1.0, 0.0), "rpr": (1.0, 1.0, 0.0)}
 """Directions in which machines move that cannot in others."""
 
@@ -352,7 +326,7 @@ def test_what_a_known_pose_holds_is_not_given_up_and_hardly_ever_farther(name: s
     """Poses that answer other targets have the part of these that is to be held, and hardly any of them is nearer."""
     mechanism, rng = HOLDING[name](), np.random.default_rng(5)
     length = mechanism.characteristic_length
-    known = pf.solve_ik(mechanism, drawn(mechanism, rng, count, 0.6, 0.7), options=Options(hold=None)).pose
+    known = pf.solve_ik(mechanism, targets_about(mechanism, rng, count, 0.6, 0.7), options=Options(hold=None)).pose
     targets = known.copy()
     if hold == "orientation":
         counting = np.array(task_of(mechanism).axes)
@@ -372,7 +346,7 @@ def test_what_a_known_pose_holds_is_not_given_up_and_hardly_ever_farther(name: s
 def test_without_a_start_nothing_is_given_up_for_home(by_legs: bool) -> None:
     """Upright targets at heights of poses that lean: home, upright and beside them, is nearer than what holds one."""
     mechanism, count = closure.rotopod(), 1 if INTERPRETED else 40
-    leaning = drawn(mechanism, np.random.default_rng(5), count, 0.6, 0.7)
+    leaning = targets_about(mechanism, np.random.default_rng(5), count, 0.6, 0.7)
     heights = pf.solve_ik(mechanism, leaning, options=Options(hold=None)).pose[:, 2, 3]
     targets = np.tile(mechanism.home_pose, (count, 1, 1))
     targets[:, 2, 3] = heights
@@ -409,31 +383,6 @@ def limits_of(mechanism: Mechanism) -> list[tuple[str, str]]:
     return ranged + [(joint.name, "cone") for joint in mechanism.joints if joint.cone is not None]
 
 
-def check_multipliers(name: str, hold: str | None, n: int, seed: int) -> None:
-    """Relaxing a limit gains no more than its multiplier says, tightening it costs no less; unnamed limits do nothing.
-
-    Where the limits that are met are independent, gain and cost are the same, and so the multiplier is both. Where they
-    are not, such as the cones of a parallelogram's two rods, a limit that gives way alone gains less.
-    """
-    mechanism, targets, answers = projections(name, hold, n, seed)
-    lengths = distances(mechanism, answers)
-    for target, answer, distance in zip(targets, answers, lengths, strict=True):
-        for limit in answer.active_limits:
-            gain, cost = (
-                abs(
-                    distance - distance_with(mechanism, limit.joint, limit.bound, side * GIVEN_WAY, target, answer.held)
-                )
-                for side in (1.0, -1.0)
-            )
-            unit = moved(mechanism, limit.joint, limit.bound, GIVEN_WAY)[1]
-            expected, inexact = limit.multiplier * unit, INEXACT * GIVEN_WAY * mechanism.characteristic_length
-            assert gain <= expected * (1.0 + CURVATURE) + inexact
-            assert cost >= expected * (1.0 - CURVATURE) - inexact
-        for limit in unnamed(mechanism, answer):
-            closer = distance - distance_with(mechanism, *limit, GIVEN_WAY, target, answer.held)
-            assert closer <= INEXACT * GIVEN_WAY * mechanism.characteristic_length
-
-
 def distance_with(
     mechanism: Mechanism, name: str, bound: str, share: float, target: np.ndarray, hold: str | None
 ) -> float:
@@ -457,15 +406,31 @@ def room_of(mechanism: Mechanism, answer: Solution, name: str, bound: str) -> fl
     return (value - low if bound == "min" else high - value) / (high - low)
 
 
+@pytest.mark.parametrize(("n", "seed"), [(1 if INTERPRETED else 3, 4), pytest.param(25, 5, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(("name", "hold"), CASES)
-def test_answers_come_nearer_as_their_limits_give_way(name: str, hold: str | None) -> None:
-    check_multipliers(name, hold, 1 if INTERPRETED else 3, seed=4)
+def test_answers_come_nearer_as_their_limits_give_way(name: str, hold: str | None, n: int, seed: int) -> None:
+    """Relaxing a limit gains no more than its multiplier says, tightening it costs no less; unnamed limits do nothing.
 
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(("name", "hold"), CASES)
-def test_answers_come_nearer_as_any_of_their_limits_give_way(name: str, hold: str | None) -> None:
-    check_multipliers(name, hold, 25, seed=5)
+    Where the limits that are met are independent, gain and cost are the same, and so the multiplier is both. Where they
+    are not, such as the cones of a parallelogram's two rods, a limit that gives way alone gains less.
+    """
+    mechanism, targets, answers = projections(name, hold, n, seed)
+    lengths = distances(mechanism, answers)
+    for target, answer, distance in zip(targets, answers, lengths, strict=True):
+        for limit in answer.active_limits:
+            gain, cost = (
+                abs(
+                    distance - distance_with(mechanism, limit.joint, limit.bound, side * GIVEN_WAY, target, answer.held)
+                )
+                for side in (1.0, -1.0)
+            )
+            unit = moved(mechanism, limit.joint, limit.bound, GIVEN_WAY)[1]
+            expected, inexact = limit.multiplier * unit, INEXACT * GIVEN_WAY * mechanism.characteristic_length
+            assert gain <= expected * (1.0 + CURVATURE) + inexact
+            assert cost >= expected * (1.0 - CURVATURE) - inexact
+        for limit in unnamed(mechanism, answer):
+            closer = distance - distance_with(mechanism, *limit, GIVEN_WAY, target, answer.held)
+            assert closer <= INEXACT * GIVEN_WAY * mechanism.characteristic_length
 
 
 def test_the_hardest_limit_is_named_first_in_any_unit() -> None:
@@ -623,43 +588,6 @@ def test_a_foot_that_is_asked_to_tilt_too_far_tilts_as_far_as_it_can() -> None:
     np.testing.assert_array_less(answers.rotation_error, nearest + 1e-9)
 
 
-EVERY = {
-    **{name: partial(pf.load, name) for name in pf.catalog()},
-    **{f"closure.{name}": make for name, make in (closure.MACHINES | closure.ON_ARMS).items()},
-    "closure.coaxial_rrr": closure.coaxial_rrr,
-    **{f"positions.{name}": make for name, make in positions.MACHINES.items()},
-}
-
-
-def drawn(mechanism: Mechanism, rng: np.random.Generator, n: int, shift: float, turn: float) -> np.ndarray:
-    """Poses (n, 4, 4) up to so far from home on each axis that counts [L and rad]."""
-    poses, counting = np.tile(mechanism.home_pose, (n, 1, 1)), np.array(task_of(mechanism).axes)
-    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length * counting
-    if not mechanism.end_effector_is_joint:
-        poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, (n, 3))).as_matrix() @ poses[:, :3, :3]
-    return poses
-
-
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-@pytest.mark.parametrize("count", [1 if INTERPRETED else 40, pytest.param(1500, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize("name", EVERY)
-def test_a_pose_that_is_answered_is_reached_when_it_is_asked_for(name: str, count: int) -> None:
-    """In whatever working mode it is, and at a dead point if it is at one: what was answered once is not refused.
-
-    But now and then where arms are to be searched for, which at a border have but one place.
-    """
-    mechanism = EVERY[name]()
-    model = model_of(mechanism)
-    count, has_arms = (count, len(model.legs.redundant) > 0) if model.has_legs else (1 + count // 20, False)
-    targets = drawn(mechanism, np.random.default_rng(2), count, *SIZES[-1])
-    answers = pf.solve_ik(mechanism, targets, options=Options(hold=None))
-    again = pf.solve_ik(mechanism, answers.pose)
-    off = again.position_error / mechanism.characteristic_length + again.rotation_error
-    most = 0.15 if count > 100 else 0.2  # of few rows more by chance
-    assert np.mean(off > 1e-6) <= (most if has_arms else 0.0)
-    assert (pf.solve_ik(mechanism, answers.pose, start=answers).status == Status.REACHED).all()
-
-
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 def test_a_target_that_a_search_starts_on_is_reached() -> None:
     """A 3-URU that turns about the middle of its base: all legs are at dead points there, however they stand."""
@@ -687,38 +615,10 @@ def test_a_target_that_a_search_starts_on_is_reached() -> None:
 def test_searches_mind_where_three_hinges_point_the_platform() -> None:
     """Where two hinges of a leg cannot point the third, no search ends; and both ways to point it are searched."""
     mechanism, rng = closure.coaxial_rrr(), np.random.default_rng(2)
-    targets = drawn(mechanism, rng, 3 if INTERPRETED else 300, 0.0, 1.0)
+    targets = targets_about(mechanism, rng, 3 if INTERPRETED else 300, 0.0, 1.0)
     answers = pf.solve_ik(mechanism, targets)
     least = angles_between(answers.pose[:, None, :3, :3], targets[None, :, :3, :3]).min(axis=0)
     assert np.mean(answers.rotation_error > least + 1e-6) <= 0.01
-
-
-@pytest.mark.campaign
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-@pytest.mark.parametrize("name", EVERY)
-def test_hardly_any_answer_to_another_target_is_nearer(name: str) -> None:
-    """Every answer is a feasible pose: of 6,000 none may be nearer to a target than its own, but for a few."""
-    mechanism, rng, wide = EVERY[name](), np.random.default_rng(2), Options(hold=None)
-    engine, length = engine_of(mechanism), mechanism.characteristic_length
-    turning = 0.0 if mechanism.end_effector_is_joint else mechanism.rotation_length
-    many, few, most = (2000, 300, 0.01) if isinstance(engine, LegsEngine) else (60, 40, 0.05)
-    if name in MANY_ROOMS:
-        most = 0.1
-    others = np.concatenate([drawn(mechanism, rng, many, *size) for size in SIZES])
-    others = pf.solve_ik(mechanism, others, options=wide).pose
-    targets = drawn(mechanism, rng, few, *SIZES[-1])
-    answers = pf.solve_ik(mechanism, targets, options=wide)
-    far, beaten = np.hypot(answers.position_error, turning * answers.rotation_error), 0
-    for target, own in zip(targets, far, strict=True):
-        position, rotation = task_of(mechanism).errors(others, np.repeat(target[None], len(others), axis=0))
-        beaten += np.hypot(position, turning * rotation).min() < own - 1e-6 * length
-    assert beaten <= most * few
-
-
-def test_where_no_constraint_follows_from_others_at_home_no_walk_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Walks take a second or more of a machine with many legs, before its first projection."""
-    monkeypatch.setattr(rotation, "around_home", None)
-    assert rotation.n_implied_rows.__wrapped__(pf.load("stewart")) == 0
 
 
 @pytest.mark.parametrize(
@@ -743,31 +643,18 @@ def test_a_platform_that_never_turns_is_not_looked_for_turned(
 
 
 # --- asked again ------------------------------------------------------------------------------------------------------
-
-AGAIN = {f"catalogue {name}": partial(pf.load, name) for name in pf.catalog()} | {
-    f"{kind} {name}": make
-    for kind, made in (("positions", positions.MACHINES), ("closure", closure.MACHINES), ("redundant", closure.ON_ARMS))
-    for name, make in made.items()
-}
-"""Every machine of the catalogue and of the tests."""
 NEARER = 1e-9
 """By how much an answer that is asked again may come nearer [L]."""
 
 
 def unlimited_five_bar(base: float, inner: float, outer: float) -> Mechanism:
     """A 5-bar without limits: feet at +- base / 2, links of these lengths, elbows out."""
-    tip, joints = np.array([0.03 * base, 0.75 * (inner + outer)]), []
-    for side, name in ((-1.0, "1"), (1.0, "2")):
-        foot = np.array([side * base / 2, 0.0])
+    tip, feet, elbows = np.array([0.03 * base, 0.75 * (inner + outer)]), np.array([[-1.0, 0], [1, 0]]) * base / 2, []
+    for side, foot in zip((-1.0, 1.0), feet, strict=True):
         away = np.linalg.norm(tip - foot)
         turn = np.arctan2(*(tip - foot)[::-1]) - side * np.arccos((inner**2 + away**2 - outer**2) / (2 * inner * away))
-        elbow = foot + inner * np.array([np.cos(turn), np.sin(turn)])
-        joints += [
-            Joint(f"A{name}", "revolute", ("base", f"a{name}"), at=(*foot, 0), axis=(0, 0, 1), actuated=True),
-            Joint(f"B{name}", "revolute", (f"a{name}", f"c{name}"), at=(*elbow, 0), axis=(0, 0, 1)),
-        ]
-    joints.append(Joint("tip", "revolute", ("c1", "c2"), at=(*tip, 0), axis=(0, 0, 1)))
-    return Mechanism("unlimited 5-bar", joints, "tip")
+        elbows.append(foot + inner * np.array([np.cos(turn), np.sin(turn)]))
+    return five_bar(feet, elbows, tip)
 
 
 def nearest_of_rings(targets: np.ndarray, feet: np.ndarray, radii: tuple[float, float]) -> np.ndarray:
@@ -806,65 +693,3 @@ def test_just_outside_two_rings_answers_are_their_nearest_points(base: float, in
     assert (answers.status == Status.PROJECTED).all()
     assert np.abs(answers.position_error - distances).max() <= NEARER * length
     assert answers.certified.mean() > 0.98
-
-
-def asked_of(mechanism: Mechanism, n: int, seed: int = 0) -> tuple[np.ndarray, Solution]:
-    """Targets in and out of the workspace, and just outside: beyond answers to those far out; and the answers."""
-    rng, length = np.random.default_rng(seed), mechanism.characteristic_length
-    far = np.repeat(mechanism.home_pose[None], n, axis=0)
-    away = rng.normal(size=(n, 3))
-    away *= rng.uniform(0.1, 2.0, (n, 1)) * length / np.linalg.norm(away, axis=1)[:, None]
-    far[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.4, 0.4, (n, 3))).as_matrix() @ far[:, :3, :3]
-    far[:, :3, 3] += away
-    border = pf.solve_ik(mechanism, far).pose
-    outward = far[:, :3, 3] - border[:, :3, 3]
-    size = np.linalg.norm(outward, axis=1)[:, None]
-    border[:, :3, 3] += np.where(size > 1e-6 * length, outward / np.maximum(size, 1e-300), 0.0) * (
-        length * 10.0 ** rng.uniform(-5, -2, (n, 1))
-    )
-    targets = np.concatenate([far, border])
-    return targets, pf.solve_ik(mechanism, targets)
-
-
-def pose_differences(mechanism: Mechanism, some: Solution, others: Solution) -> np.ndarray:
-    """By how much poses differ, (n,) [L or rad]."""
-    apart = np.abs(some.pose - others.pose)
-    apart[:, :3, 3] /= mechanism.characteristic_length
-    return np.asarray(apart.max(axis=(1, 2)))
-
-
-def check_asked_again(mechanism: Mechanism, n: int, seed: int = 0) -> None:
-    targets, answers = asked_of(mechanism, n, seed)
-    away = np.flatnonzero(answers.status == Status.PROJECTED)
-    if not len(away):
-        return
-    answers, targets = answers[away], targets[away]
-    again = pf.solve_ik(mechanism, targets, start=answers)
-    assert (again.status == Status.PROJECTED).all()
-    more = [own is None and other is not None for own, other in zip(answers.held, again.held, strict=True)]
-    length, same = mechanism.characteristic_length, again.held == answers.held
-    assert (same | more).all()
-    nearer = (distances(mechanism, answers) - distances(mechanism, again)) / length
-    assert nearer[same].max(initial=0.0) <= NEARER
-    assert nearer[same].min(initial=0.0) >= -NEARER
-    assert pose_differences(mechanism, answers, again)[same].max(initial=0.0) <= NEARER
-    there = pf.solve_ik(mechanism, answers.pose, start=answers)
-    assert (there.status == Status.REACHED).all()
-    assert pose_differences(mechanism, answers, there).max() <= NEARER
-    closed = model_of(mechanism).closure
-    turned = np.abs(there.actuators - answers.actuators) * closed.scale[closed.actuated]
-    assert turned.max() <= 10.0 * NEARER  # next to dead points a pose tells of its actuators less well than of itself
-
-
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-@pytest.mark.parametrize("name", AGAIN)
-def test_answers_asked_again_from_themselves_stay(name: str) -> None:
-    """No answer is nearer when it is asked again, none is farther, and its pose is reached from it as it is."""
-    check_asked_again(AGAIN[name](), 2 if INTERPRETED else 12)
-
-
-@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", AGAIN)
-def test_many_answers_asked_again_from_themselves_stay(name: str) -> None:
-    check_asked_again(AGAIN[name](), 200, seed=1)

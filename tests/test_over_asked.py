@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
+from checks import INTERPRETED
 from over_asked import random_case, wrong_of
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 BATCHES, SAMPLES = (1, 2) if INTERPRETED else (8, 6)
 
 

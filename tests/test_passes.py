@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 
 import numpy as np
@@ -10,12 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import excess_of_joints, gap_of_joints
+from checks import INTERPRETED, excess_of_joints, gap_of_joints
 from machines import MACHINES
 from machines.trunks import TRUNKS
 from pfabrik import Mechanism, Options, Status
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
 EVERY: dict[str, Callable[[], Mechanism]] = {

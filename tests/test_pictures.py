@@ -101,9 +101,9 @@ def test_an_answer_is_drawn_where_its_points_are() -> None:
     mechanism = tripod_rps()
     answer = pf.solve_ik(mechanism, (0, 0, 212))
     home, moved = places_of(mechanism), places_of(answer)
-    assert moved["S1"] == pytest.approx(answer.points["S1"])
-    assert moved["S1"][2] - home["S1"][2] == pytest.approx(12.0)
-    assert moved["P1"] == pytest.approx((answer.points["R1"] + answer.points["S1"]) / 2)
+    assert moved["C1"] == pytest.approx(answer.points["C1"])
+    assert moved["C1"][2] - home["C1"][2] == pytest.approx(12.0)
+    assert moved["B1"] == pytest.approx((answer.points["A1"] + answer.points["C1"]) / 2)
     assert skeleton_of(answer).reference == pytest.approx(answer.pose[:3, 3])
 
 
@@ -207,8 +207,8 @@ def test_what_cannot_be_drawn_is_refused() -> None:
             pf.plot(shown)  # type: ignore[arg-type]
     with pytest.raises(InvalidArgument, match="two-dimensional axes"):
         pf.plot(mechanism, Figure().add_subplot())
-    with pytest.raises(UnknownName, match="did you mean 'P1'"):
-        pf.plot(mechanism, names=["PP1"])
+    with pytest.raises(UnknownName, match="did you mean 'A1'"):
+        pf.plot(mechanism, names=["AA1"])
     with pytest.raises(InvalidArgument, match="no direction"):
         pf.plot_travel(pf.Travel(batch[0], ()))
     with pytest.raises(InvalidArgument, match="expected a Track"):

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
+from checks import INTERPRETED
 from pfabrik.kernels._jit import kernel
 from pfabrik.kernels.qp import factorise, new_qp, solve_qp
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = [] if INTERPRETED else [pytest.mark.campaign]  # a kernel of its own, as in `test_kernels`
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from checks import INTERPRETED
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.skipif(INTERPRETED, reason="hundreds of answers")
 ROOT = Path(__file__).parents[1]
 

@@ -260,47 +260,45 @@ def test_a_status_is_written_by_its_name() -> None:
     assert Status.PROJECTED == 1
 
 
-@pytest.mark.parametrize("started", [False, True])
-def test_joints_of_a_part_are_found_for_that_part(started: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As many rows as were asked for; the whole once, and nothing again after it."""
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many rows joint coordinates are computed of, call by call."""
     from pfabrik.platform import answers
 
-    machine, rows = pf.load("delta"), []
-
-    def counting(*told: object) -> object:
-        rows.append(len(told[2]))
-        return compute(*told)
-
+    rows: list[int] = []
     compute = answers.joint_coordinates
+
+    def counting(*arguments: object) -> object:
+        rows.append(len(arguments[2]))
+        return compute(*arguments)
+
     monkeypatch.setattr(answers, "joint_coordinates", counting)
+    return rows
+
+
+@pytest.mark.parametrize("started", [False, True])
+def test_joints_of_a_part_are_found_for_that_part(started: bool, counted: list[int]) -> None:
+    """As many rows as were asked for; the whole once, and nothing again after it."""
+    machine = pf.load("delta")
     targets = np.random.default_rng(0).uniform(-10, 10, (400, 3)) + machine.home_pose[:3, 3]
     start = pf.solve_ik(machine, targets) if started else None
     whole = pf.solve_ik(machine, targets, start=start)
     part, again = whole[100:110], whole[[5, 3, 5]]
     some, others = part.joints, again[1:].joints
-    assert rows == ([10, 10, 3, 3] if started else [10, 3])
+    assert counted == ([10, 10, 3, 3] if started else [10, 3])
     for name, values in whole.joints.items():
         np.testing.assert_allclose(some[name], values[100:110], rtol=0, atol=1e-12)
         np.testing.assert_allclose(others[name], values[[3, 5]], rtol=0, atol=1e-12)
-    assert rows[-1] == 400
-    before = len(rows)
+    assert counted[-1] == 400
+    before = len(counted)
     assert whole[7].points and len(whole[:50].joints) == len(whole.joints) and whole[3].q.shape == whole.q.shape[1:]
-    assert len(rows) == before
+    assert len(counted) == before
 
 
-def test_joints_of_all_rows_one_by_one_are_found_about_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pfabrik.platform import answers
-
-    machine, rows = pf.load("delta"), []
-
-    def counting(*told: object) -> object:
-        rows.append(len(told[2]))
-        return compute(*told)
-
-    compute = answers.joint_coordinates
-    monkeypatch.setattr(answers, "joint_coordinates", counting)
+def test_joints_of_all_rows_one_by_one_are_found_about_once(counted: list[int]) -> None:
+    machine = pf.load("delta")
     targets = np.random.default_rng(0).uniform(-40, 40, (300, 3)) + machine.home_pose[:3, 3]
     whole = pf.solve_ik(machine, targets)
     apart = np.array([row.q for row in whole])
-    assert len(rows) < 20 and sum(rows) < 2 * len(targets)
+    assert len(counted) < 20 and sum(counted) < 2 * len(targets)
     np.testing.assert_allclose(apart, whole.q, rtol=0, atol=1e-12)

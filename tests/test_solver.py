@@ -143,15 +143,6 @@ def test_a_refused_question_leaves_no_answer(name: str) -> None:
             solver.jacobian()
 
 
-def test_what_is_no_mechanism_or_no_single_start_is_refused() -> None:
-    with pytest.raises(InvalidArgument, match="mechanism: found str"):
-        pf.Solver("delta")  # type: ignore[arg-type]
-    mechanism = pf.load("delta")
-    batch = pf.solve_ik(mechanism, np.tile(mechanism.home_pose, (2, 1, 1)))
-    with pytest.raises(InvalidArgument, match="start: found batch shape"):
-        pf.Solver(mechanism, start=batch)
-
-
 @pytest.mark.parametrize("started", [False, True])
 def test_an_answer_may_be_asked_back_as_it_stands(started: bool) -> None:
     """What it answered in are views, which the next question clears before it looks."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -51,24 +49,6 @@ def test_a_path_of_coordinates_is_followed() -> None:
     np.testing.assert_allclose(pf.track(mechanism, {"pivot": path}).joints["pivot"], path, atol=1e-8)
     (kept,) = (mode for mode in pf.working_modes(mechanism, {"pivot": path[3]}) if mode)
     np.testing.assert_allclose(kept.joints["pivot"], path[3], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "target", "told"),
-    [
-        ("stewart", {"BL1": 200.0}, "found joint coordinates of BL1; expected a pose or position: no single joint"),
-        ("ankle_ups", {"pivt": (0.1, 0.0)}, "found coordinates of pivt; expected those of 'pivot'"),
-        ("ankle_ups", {"pivot": (0.1, 0.0), "BL": 100.0}, "found coordinates of pivot, BL; expected those of 'pivot'"),
-        ("ankle_ups", {}, "found coordinates of no joint"),
-        ("ankle_ups", {"pivot": 0.1}, r"target\['pivot'\]: found shape \(\); expected finite coordinates of shape"),
-        ("ankle_ups", {"pivot": (0.1, 0.0, 0.2)}, r"target\['pivot'\]: found shape \(3,\)"),
-        ("ankle_ups", {"pivot": "level"}, r"target\['pivot'\]: found str"),
-    ],
-)
-def test_coordinates_that_are_no_target_are_told(name: str, target: Any, told: str) -> None:
-    for options in (None, Options(on_invalid="mark")):
-        with pytest.raises(InvalidArgument, match=told):
-            pf.solve_ik(pf.load(name), target, options=options)
 
 
 def test_coordinates_that_are_not_finite_are_no_pose() -> None:

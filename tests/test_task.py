@@ -3,44 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import closure
+from checks import INTERPRETED
+from machines import closure, published
+from machines.published import PUBLISHED
 from pfabrik import Joint, Mechanism, Status
 from pfabrik.description.task import Task, task_of
 from pfabrik.errors import InvalidMechanism
 from pfabrik.files import dumps, loads
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 N = 4 if INTERPRETED else 100
-
-# 3-RPS: base and platform radius [mm]; rows of azimuth a and tilt b [rad], height, parasitic x and y, strut lengths.
-# The parasitic formula, and geometry, are those of Lee and Shah (1988).
-BASE_RADIUS, PLATFORM_RADIUS = 83.2358, 86.614
-PARASITIC = (
-    (0.3, 0.2, 203.835, -0.7124765104, 0.4874314058, 187.399173916, 207.690520708, 216.471509487),
-    (1.0, 0.25, 203.835, 0.5602625447, 1.2241959941, 192.282896017, 194.04141297, 225.240717896),
-    (-0.7, 0.15, 210, -0.0826534796, -0.4792152635, 200.118891036, 222.18144935, 207.763423258),
-    (2.5, 0.3, 190, -0.5486715017, -1.854792245, 210.506507305, 166.485057808, 193.083365189),
-)
 
 
 def rps(task: tuple[str, ...] | None = ("z", "tilt"), stroke: tuple[float, float] = (100.0, 300.0)) -> Mechanism:
-    joints = []
-    for i, angle in enumerate(np.radians([0, 120, 240]), 1):
-        outward = np.array([np.cos(angle), np.sin(angle), 0.0])
-        tangent = np.array([-outward[1], outward[0], 0.0])
-        joints += [
-            Joint(f"A{i}", "revolute", ("base", f"c{i}"), at=BASE_RADIUS * outward, axis=tangent),
-            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True, range=stroke),
-            Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=PLATFORM_RADIUS * outward + [0, 0, 200.0]),
-        ]
-    return Mechanism("3-RPS", joints, "platform", (0, 0, 200), task=task)
+    """The 3-RPS of Lee and Shah (1988)."""
+    geometry = PUBLISHED["rps_leeshah"]["geometry"]
+    free = published.rps(geometry["base_radius"], geometry["platform_radius"], 200.0)
+    return dataclasses.replace(free.with_limits({f"P{i}": stroke for i in (1, 2, 3)}), task=task)
 
 
 def asked_of(mechanism: Mechanism, task: tuple[str, ...]) -> Mechanism:
@@ -48,10 +32,8 @@ def asked_of(mechanism: Mechanism, task: tuple[str, ...]) -> Mechanism:
 
 
 @pytest.mark.parametrize("spin", [0.0, 0.4, -2.0])
-@pytest.mark.parametrize("row", PARASITIC)
-def test_parasitic_motion_is_the_published_one_whatever_the_target_says_of_it(
-    row: tuple[float, ...], spin: float
-) -> None:
+@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
+def test_parasitic_motion_is_the_published_one_whatever_the_target_says_of_it(row: list[float], spin: float) -> None:
     azimuth, tilt, z, x, y, *lengths = row
     turn = (
         Rotation.from_euler("z", azimuth) * Rotation.from_euler("y", tilt) * Rotation.from_euler("z", -azimuth + spin)

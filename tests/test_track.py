@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 from typing import Any
 
@@ -13,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 import checks
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import MACHINES
 from pfabrik import Joint, Mechanism, Options, Status
-from pfabrik.errors import InvalidArgument, UnknownName
+from pfabrik.errors import InvalidArgument
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 STEPS = 60 if INTERPRETED else 360
 CIRCLES = {"five_bar": (200.0, 60.0), "stewart": (220.0, 60.0), "nrpm": (200.0, 100.0)}
 """Height and radius of the circle in the plane x = 0 that each catalogue file names as its test path."""
@@ -192,29 +191,6 @@ def test_a_limited_crank_stays_within_its_range() -> None:
     followed = pf.track(arm((-2.0, 2.0)), path)
     np.testing.assert_array_equal(followed.status == Status.REACHED, angle <= 2.0)
     assert np.abs(followed.actuators[:, 0]).max() <= 2.0 + 1e-9
-
-
-def test_what_is_no_path_is_refused() -> None:
-    machine = pf.load("stewart")
-    for targets in (machine.home_pose, machine.reference_point, np.tile(machine.home_pose, (2, 3, 1, 1))):
-        with pytest.raises(InvalidArgument, match="path"):
-            pf.track(machine, targets)
-
-
-def test_a_path_cannot_change_its_working_mode() -> None:
-    machine = pf.load("stewart")
-    with pytest.raises(InvalidArgument, match="working_mode"):
-        pf.track(machine, [machine.reference_point], options=Options(working_mode="any"))
-
-
-def test_a_path_starts_from_a_single_feasible_answer_of_its_machine() -> None:
-    machine = pf.load("stewart")
-    pair = pf.solve_ik(machine, [machine.reference_point] * 2)
-    other = pf.solve_ik(pf.load("five_bar"), pf.load("five_bar").reference_point)
-    unknown = pf.solve_ik(machine, [[np.nan] * 3], options=Options(on_invalid="mark"))[0]
-    for seed in (pair, other, unknown, machine.home_pose):
-        with pytest.raises(InvalidArgument, match="start"):
-            pf.track(machine, [machine.reference_point], start=seed)
 
 
 def test_a_path_may_be_empty() -> None:
@@ -475,32 +451,3 @@ def test_a_track_survives_pickling() -> None:
     np.testing.assert_array_equal(again.pose, followed.pose)
     assert again.too_fast == followed.too_fast
     assert again.active_limits == followed.active_limits
-
-
-@pytest.mark.parametrize(
-    ("wrong", "named"),
-    [
-        ({"sample_time": 0.0}, "sample_time"),
-        ({"sample_time": -1.0}, "sample_time"),
-        ({"sample_time": np.inf}, "sample_time"),
-        ({"sample_time": "1"}, "sample_time"),
-        ({"sample_time": True}, "sample_time"),
-        ({"speed_limits": 1.0}, "sample_time"),
-        ({"sample_time": 0.1, "times": np.arange(9.0)}, "times"),
-        ({"times": np.arange(8.0)}, "times"),
-        ({"times": -np.arange(9.0)}, "times"),
-        ({"times": [2.0, np.nan, 1.0, *range(3, 9)]}, "times"),
-        ({"times": [0.0, np.inf, *range(2, 9)]}, "times"),
-        ({"sample_time": 0.1, "speed_limits": 0.0}, "speed_limits"),
-        ({"sample_time": 0.1, "speed_limits": [1.0, 2.0]}, "speed_limits"),
-        ({"sample_time": 0.1, "speed_limits": {"j1": np.nan}}, "speed_limits\\['j1'\\]"),
-    ],
-)
-def test_wrong_times_and_speeds_are_refused(wrong: dict[str, Any], named: str) -> None:
-    with pytest.raises(InvalidArgument, match=named):
-        pf.track(arm(None), turning(), **wrong)
-
-
-def test_a_speed_limit_of_an_unknown_actuator_is_refused() -> None:
-    with pytest.raises(UnknownName, match="j3"):
-        pf.track(arm(None), turning(), sample_time=0.1, speed_limits={"j3": 1.0})

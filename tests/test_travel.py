@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from typing import Any
 
@@ -11,14 +10,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import oracles_by_leg as by_leg
+import oracles
 import pfabrik as pf
+from checks import INTERPRETED
 from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
-from pfabrik.errors import InvalidArgument
 from pfabrik.tolerances import TOLERANCES
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 BESIDE = 1e-8
 """How far before the end must be reached, and after it must not [L or rad]: it is told to 1e-9, closed forms tell
 limits to 1e-9, and a way may meet a limit at a slant."""
@@ -53,7 +51,7 @@ def test_closed_forms_reach_all_the_way_and_no_farther(name: str) -> None:
     for ray, far in zip(rays, distances, strict=True):
         steps = np.append(np.linspace(0.0, far, 100, endpoint=False), (far - beside, far + beside))
         way = np.array(mechanism.reference_point) + np.outer(steps, ray / np.linalg.norm(ray))
-        reached = by_leg.solve_ik(mechanism, way).reached
+        reached = oracles.solve_ik(mechanism, way).reached
         np.testing.assert_array_equal(reached, [True] * 101 + [False])
 
 
@@ -310,38 +308,6 @@ def test_a_travel_is_a_sequence_that_becomes_json() -> None:
         },
         {"kind": "along", "direction": [0.0, 1.0, 0.0], "distance": None, "stopped_by": [], "cause": ""},
     ]
-
-
-@pytest.mark.parametrize(
-    ("name", "target", "asked", "named"),
-    [
-        ("stewart", [(0, 0, 195)] * 2, {}, r"solution: found batch shape \(2,\)"),
-        ("stewart", (0, 0, 195), {"along": (0, 0, 0)}, "along"),
-        ("stewart", (0, 0, 195), {"along": [(0, 0, 1), (0, np.nan, 1)]}, r"along.*rows?: 1"),
-        ("stewart", (0, 0, 195), {"about": (0, 1)}, "about: found shape"),
-        ("stewart", (0, 0, 195), {"about": 1.0}, "about: found shape"),
-        ("stewart", (0, 0, 195), {"along": "up"}, "along"),
-        ("stewart", (0, 0, 195), {"pivot": (0, 0)}, "pivot"),
-        ("stewart", (0, 0, 195), {"pivot": (0, 0, np.inf)}, "pivot"),
-        ("agile_eye", None, {"along": (0, 0, 1)}, "along.*within the task, rotation"),
-        ("rps", None, {"along": [(0, 0, 1), (0, 1, 1)]}, r"along.*within the task, z tilt.*rows?: 1"),
-        ("delta", None, {"about": (0, 0, 1)}, "about.*within the task, x y z"),
-    ],
-)
-def test_wrong_arguments_are_named(name: str, target: Any, asked: dict[str, Any], named: str) -> None:
-    machine = pf.load(name)
-    start = pf.solve_ik(machine, machine.home_pose if target is None else target)
-    with pytest.raises(InvalidArgument, match=named):
-        pf.travel(start, **asked)
-
-
-def test_what_is_no_feasible_configuration_is_no_start() -> None:
-    machine = pf.load("five_bar")
-    with pytest.raises(InvalidArgument, match="solution: found Mechanism"):
-        pf.travel(machine)  # type: ignore[arg-type]
-    exceeded = next(mode for mode in pf.working_modes(machine, (0, 10, 180)) if mode.status == Status.EXCEEDED)
-    with pytest.raises(InvalidArgument, match="solution: found an answer that is EXCEEDED"):
-        pf.travel(exceeded)
 
 
 def test_a_projected_answer_is_a_start_like_any_other() -> None:

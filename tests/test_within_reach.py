@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import gap_of_joints
+from checks import INTERPRETED, gap_of_joints
 from pfabrik import Joint, Mechanism, Options, Status
-
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

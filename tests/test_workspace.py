@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import closure
 from oracles.annuli import Ring, area, within
-from pfabrik.errors import InvalidArgument, PfabrikError
+from pfabrik.errors import InvalidArgument
 from pfabrik.workspace.border import groups_of
 from pfabrik.workspace.verdicts import MapQuestion
 
@@ -424,31 +424,6 @@ def test_motors_and_elbows_share_no_colour_where_there_are_too_few(monkeypatch: 
         "p2, 4 min",
         "p2, 4 max",
     }
-
-
-@pytest.mark.parametrize(
-    ("arguments", "argument"),
-    [
-        ({"resolution": 0.0}, "resolution"),
-        ({"resolution": float("nan")}, "resolution"),
-        ({"fixed": {"w": 1.0}}, "coordinate"),
-        ({"fixed": {"z": float("inf")}}, "fixed"),
-        ({"fixed": 3}, "fixed"),
-        ({"over": ["x"]}, "over"),
-        ({"over": ["x", "x"]}, "over"),
-        ({"over": ["x", "y"], "fixed": {"x": 1.0}}, "over"),
-        ({"orientation": "all"}, "orientation"),
-        ({"orientation": np.ones((3, 3))}, "orientation"),
-        ({"tilt": -1.0}, "tilt"),
-        ({"tilt": 0.1, "orientation": "any"}, "tilt"),
-        ({"within": {"x": (1.0, 0.0)}}, "within"),
-        ({"within": {"yaw": (0.0, 1.0)}}, "coordinate"),
-        ({"start": np.zeros(3)}, "start"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_by_name(arguments: dict[str, object], argument: str) -> None:
-    with pytest.raises(PfabrikError, match=argument):
-        pf.workspace(pf.load("stewart"), **arguments)  # type: ignore[arg-type]
 
 
 def test_where_nothing_is_within_reach_the_workspace_is_empty() -> None:

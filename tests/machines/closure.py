@@ -7,14 +7,16 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pfabrik import Cone, Joint, Mechanism
 from pfabrik.description.home_mobility import universal_axes
 
-from .positions import ring
+from .positions import five_bar, ring
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TURNS = (0.0, 120.0, 240.0)
+POSITION = ("x", "y", "z")
 _TYPES = {
     "R": "revolute",
     "P": "prismatic",
@@ -36,35 +38,62 @@ def joint(kind: str, name: str, bodies: tuple[str, str], at: Any, direction: Any
 
 def chain(leg: object, *steps: Step, start: str = "base", end: str = "platform") -> list[Joint]:
     """A serial leg: joints (kind, at, direction, {more}) one after the other."""
-    bodies = [start, *(f"{leg}.{k}" for k in range(1, len(steps))), end]
-    joints = []
+    bodies, joints = [start, *(f"{leg}.{k}" for k in range(1, len(steps))), end], []
     for k, (kind, at, *rest) in enumerate(steps):
-        direction, more = (*rest, None, {})[:2] if len(rest) < 2 else rest
+        direction, more = [*rest, None, {}][:2] if len(rest) < 2 else rest
         joints.append(joint(kind, f"{kind[0]}{leg}.{k + 1}", (bodies[k], bodies[k + 1]), at, direction, **(more or {})))
     return joints
 
 
-def _out(angle: float) -> np.ndarray:
+def around(*steps: Step, angles: Sequence[float] = TURNS, start: str = "base", end: str = "platform") -> list[Joint]:
+    """Copies of a serial leg, turned about z by angles [deg]: described at 0, where x points outward."""
+    joints = []
+    for leg, angle in enumerate(angles, 1):
+        R = Rotation.from_euler("z", angle, degrees=True).as_matrix()
+        joints += chain(leg, *(_turned(R, *step) for step in steps), start=start, end=end)
+    return joints
+
+
+def _turned(R: np.ndarray, kind: str, at: Any, direction: Any = None, more: dict[str, Any] | None = None) -> Step:
+    more = dict(more or {})
+    if "cone" in more:
+        more["cone"] = dataclasses.replace(more["cone"], axis=R @ more["cone"].axis)
+    return kind, at if at is None else R @ at, direction if direction is None else np.array(direction) @ R.T, more
+
+
+def strut(at: Any, end: Any, lower: Any, upper: Any, **slide: Any) -> tuple[Step, Step, Step]:
+    """A driven strut whose coordinate at home is its length, with joints (kind, direction, {more}) at both ends."""
+    line = np.subtract(end, at)
+    drive = ("P*", None, line, {"home": float(np.linalg.norm(line))} | slide)
+    return (lower[0], at, *lower[1:]), drive, (upper[0], end, *upper[1:])
+
+
+def pairs(elbow: Any, wrist: Any, across: Any, bodies: tuple[str, str], leg: int, names: str = "LR", kinds: str = "SS",
+          cone: float | None = None) -> list[Joint]:  # fmt: skip
+    """Two rods side by side between a body and another; their joints are B and C."""
+    joints, across, back = [], np.array(across), names.islower()
+    for sign, name in ((-1, names[0]), (1, names[1])):
+        b, c, rod = elbow + sign * across, wrist + sign * across, f"rod{leg}{name}" if back else f"rod{name}{leg}"
+        axes = (across, np.cross(c - b, across))
+        for place, at, ends, kind in (("B", b, (bodies[0], rod), kinds[0]), ("C", c, (rod, bodies[1]), kinds[1])):
+            more = {"cone": Cone(c - b, cone, bodies[0])} if cone is not None and place == "B" else {}
+            direction = None if kind == "S" else axes if place == "B" else axes[::-1]
+            label = f"{place}{leg}{name}" if back else f"{place}{name}{leg}"
+            joints.append(joint(kind, label, ends, at, direction, **more))
+    return joints
+
+
+def out(angle: float) -> np.ndarray:
+    """The direction outward at an angle [deg]."""
     return np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
-
-
-def _tangent(angle: float) -> np.ndarray:
-    return np.cross(Z, _out(angle))
 
 
 def upu(radial: bool = False, stroke: Any = (120, 260)) -> Mechanism:
     """3-UPU: a translating platform with tangential outer axes; with radial ones it wanders at home."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        a, c = 100 * _out(angle), (100 if radial else 60) * _out(angle) + [0, 0, 180]
-        outer = _out(angle) if radial else _tangent(angle)
-        inner = np.cross(c - a, outer)
-        joints += chain(
-            leg,
-            ("U", a, (outer, inner)),
-            ("P*", None, c - a, {"home": 190.0, "range": stroke}),
-            ("U", c, (inner, outer)),
-        )
+    a, c = np.array([100, 0, 0]), np.array([100 if radial else 60, 0, 180])
+    outer = X if radial else Y
+    inner = np.cross(c - a, outer)
+    joints = around(*strut(a, c, ("U", (outer, inner)), ("U", (inner, outer)), home=190.0, range=stroke))
     return Mechanism("wandering 3-UPU" if radial else "3-UPU", joints, "platform", (0, 0, 180))
 
 
@@ -72,13 +101,9 @@ def tricept() -> Mechanism:
     """3-UPS/UP: a passive centre leg carries the platform."""
     joints = chain(0, ("U", (0, 0, 0), (X, Y)), ("P", None, Z, {"range": (-70, 80)}))
     for leg, angle in enumerate(TURNS, 1):
-        a, c = 120 * _out(angle + 10), 40 * _out(angle) + [0, 0, 200]
-        joints += chain(
-            leg,
-            ("U", a, (_tangent(angle), _out(angle)), {"cone": Cone(c - a, 0.8, "base")}),
-            ("P*", None, c - a, {"home": float(np.linalg.norm(c - a)), "range": (150, 290)}),
-            ("S", c),
-        )
+        a, c = 120 * out(angle + 10), 40 * out(angle) + [0, 0, 200]
+        lower = ("U", (np.cross(Z, out(angle)), out(angle)), {"cone": Cone(c - a, 0.8, "base")})
+        joints += chain(leg, *strut(a, c, lower, ("S",), range=(150, 290)))
     return Mechanism("3-UPS/UP", joints, "platform", (0, 0, 230))
 
 
@@ -86,21 +111,11 @@ def delta(rods: str = "SS", linear: bool = False, cone: float | None = 0.9) -> M
     """A delta with two rods to an arm, ball or universal joints at their ends; arms that turn, or carriages."""
     joints = []
     for leg, angle in enumerate(TURNS, 1):
-        out, side = _out(angle), _tangent(angle)
-        hip, elbow, wrist = 100 * out, 160 * out - [0, 0, 60], 40 * out - [0, 0, 240]
+        side, hip = np.cross(Z, out(angle)), 100 * out(angle)
+        elbow, wrist = 160 * out(angle) - [0, 0, 60], 40 * out(angle) - [0, 0, 240]
         drive = ("P*", None, Z, {"range": (-90, 90)}) if linear else ("R*", hip, side, {"range": (-1.0, 1.2)})
         joints.append(joint(drive[0], f"A{leg}", ("base", f"arm{leg}"), *drive[1:3], **drive[3]))
-        for end, offset in (("l", -20 * side), ("r", 20 * side)):
-            b, c = elbow + offset, wrist + offset
-            axes = (side, np.cross(c - b, side))
-            for place, at, bodies in (
-                ("B", b, (f"arm{leg}", f"rod{leg}{end}")),
-                ("C", c, (f"rod{leg}{end}", "platform")),
-            ):
-                kind = rods["BC".index(place)]
-                own = None if kind == "S" else axes if place == "B" else axes[::-1]
-                more = {} if cone is None else {"cone": Cone(c - b, cone, bodies[0])} if place == "B" else {}
-                joints.append(joint(kind, f"{place}{leg}{end}", bodies, at, own, **more))
+        joints += pairs(elbow, wrist, 20 * side, (f"arm{leg}", "platform"), leg, "lr", rods, cone)
     return Mechanism(f"{'linear' if linear else 'rotary'} delta, {rods} rods", joints, "platform", (0, 0, -240))
 
 
@@ -121,9 +136,8 @@ def pinned_delta() -> Mechanism:
     """A rotary delta whose forearms are parallelograms of pins."""
     joints = []
     for leg, angle in enumerate(TURNS, 1):
-        out, side = _out(angle), _tangent(angle)
-        hip, elbow, wrist = 100 * out, 160 * out - [0, 0, 60], 40 * out - [0, 0, 240]
-        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), hip, side, range=(-1.0, 1.2)))
+        side, elbow, wrist = np.cross(Z, out(angle)), 160 * out(angle) - [0, 0, 60], 40 * out(angle) - [0, 0, 240]
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 100 * out(angle), side, range=(-1.0, 1.2)))
         joints += _pin_parallelogram(leg, f"arm{leg}", elbow, wrist, side, "platform")
     return Mechanism("delta with pins", joints, "platform", (0, 0, -240))
 
@@ -133,33 +147,25 @@ def orthoglide() -> Mechanism:
     joints = []
     for leg, (rail, side) in enumerate(((X, Y), (Y, Z), (Z, X)), 1):
         rail, side = np.array(rail), np.array(side)
-        b, c = -250 * rail, -40 * rail
         joints.append(joint("P*", f"A{leg}", ("base", f"carriage{leg}"), None, rail, range=(-90, 90)))
-        joints += _pin_parallelogram(leg, f"carriage{leg}", b, c, side, "platform")
+        joints += _pin_parallelogram(leg, f"carriage{leg}", -250 * rail, -40 * rail, side, "platform")
     return Mechanism("orthoglide", joints, "platform", (0, 0, 0))
 
 
 def puu() -> Mechanism:
     """3-PUU: a translating platform on three vertical rails."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        side, b, c = _tangent(angle), 150 * _out(angle), 50 * _out(angle) + [0, 0, -160]
-        inner = np.cross(c - b, side)
-        joints += chain(leg, ("P*", None, Z, {"range": (-80, 100)}), ("U", b, (side, inner)), ("U", c, (inner, side)))
-    return Mechanism("3-PUU", joints, "platform", (0, 0, -160))
+    inner = np.cross((-100, 0, -160), Y)
+    upper, lower = ("U", (150, 0, 0), (Y, inner)), ("U", (50, 0, -160), (inner, Y))
+    return Mechanism("3-PUU", around(("P*", None, Z, {"range": (-80, 100)}), upper, lower), "platform", (0, 0, -160))
 
 
 def exechon() -> Mechanism:
     """2-UPR/SPR."""
     joints = []
     for leg, y in ((1, -80.0), (2, 80.0)):
-        a, c = np.array([0.0, y, 0.0]), np.array([0.0, 0.4 * y, 180.0])
-        joints += chain(
-            leg,
-            ("U", a, (Y, X)),
-            ("P*", None, c - a, {"home": 200.0, "range": (130, 280)}),
-            ("R", c, X, {"range": (-1.2, 1.2)}),
-        )
+        limits = {"range": (-1.2, 1.2)}
+        joints += chain(leg, *strut((0, y, 0), (0, 0.4 * y, 180), ("U", (Y, X)), ("R", X, limits), home=200.0,
+                                    range=(130, 280)))  # fmt: skip
     a, c = np.array([110.0, 0, 0]), np.array([40.0, 0, 180.0])
     joints += chain(3, ("S", a, None, {"cone": Cone(c - a, 0.7, "base")}), ("P*", None, c - a), ("R", c, Y))
     return Mechanism("2-UPR/SPR", joints, "platform", (0, 0, 180))
@@ -169,119 +175,88 @@ def pru_upr() -> Mechanism:
     """2-PRU/UPR: two rails in a plane and a strut across; it rises and tilts. Half of its constraints are implied."""
     joints = []
     for leg, x in ((1, 250.0), (2, -250.0)):
-        b, c = np.array([x, 0.0, 0.0]), np.array([0.32 * x, 0.0, 300.0])
         joints += chain(
             leg,
             ("P*", None, np.sign(x) * np.array(X), {"range": (-120, 120)}),
-            ("R", b, Y, {"range": (-0.9, 0.9)}),
-            ("U", c, (Y, X), {"range": ((-1.0, 1.0), (-0.8, 0.8))}),
+            ("R", (x, 0.0, 0.0), Y, {"range": (-0.9, 0.9)}),
+            ("U", (0.32 * x, 0.0, 300.0), (Y, X), {"range": ((-1.0, 1.0), (-0.8, 0.8))}),
         )
-    a, c = np.array([0.0, -220.0, 0.0]), np.array([0.0, -80.0, 300.0])
-    joints += chain(
-        3,
-        ("U", a, (Y, X), {"range": ((-0.8, 0.8), (-0.8, 0.8))}),
-        ("P*", None, c - a, {"home": 331.0, "range": (230, 420)}),
-        ("R", c, X, {"range": (-1.0, 1.0)}),
-    )
+    lower, upper = ("U", (Y, X), {"range": ((-0.8, 0.8), (-0.8, 0.8))}), ("R", X, {"range": (-1.0, 1.0)})
+    joints += chain(3, *strut((0, -220, 0), (0, -80, 300), lower, upper, home=331.0, range=(230, 420)))
     return Mechanism("2-PRU/UPR", joints, "platform", (0, 0, 300), task=("z", "tilt"))
 
 
 def rotopod() -> Mechanism:
     """3-RRS on a circular rail: all motors turn about the platform's own axis."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        b, c = 200 * _out(angle), 80 * _out(angle) + [0, 0, 180]
-        joints += chain(
-            leg,
-            ("R*", (0, 0, 0), Z, {"range": (-0.9, 0.9)}),
-            ("R", b, _tangent(angle), {"range": (-0.9, 0.9)}),
-            ("S", c, None, {"cone": Cone(b - c, 0.8, "platform")}),
-        )
+    joints = around(
+        ("R*", (0, 0, 0), Z, {"range": (-0.9, 0.9)}),
+        ("R", (200, 0, 0), Y, {"range": (-0.9, 0.9)}),
+        ("S", (80, 0, 180), None, {"cone": Cone((120, 0, -180), 0.8, "platform")}),
+    )
     return Mechanism("rotopod", joints, "platform", (0, 0, 180), task=("z", "tilt"))
 
 
 def angled_prr() -> Mechanism:
     """Planar 3-PRR, its rails 27 degrees from square to the radii, with room for its rods to turn over."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        out, side = _out(angle), _tangent(angle)
-        joints += chain(
-            leg,
-            ("P*", None, 0.5 * out + side, {"range": (-100, 100)}),
-            ("R", 180 * out + 30 * side, Z, {"range": (-1.2, 1.2)}),
-            ("R", 60 * out, Z),
-        )
+    joints = around(
+        ("P*", None, (0.5, 1, 0), {"range": (-100, 100)}),
+        ("R", (180, 30, 0), Z, {"range": (-1.2, 1.2)}),
+        ("R", (60, 0, 0), Z),
+    )
     return Mechanism("angled 3-PRR", joints, "platform", (0, 0, 0), task=("x", "y", "rotation"))
 
 
 def cru() -> Mechanism:
     """3-CRU: guides with cylindrical joints, limited in slide and turn, elbows driven."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        side, out = _tangent(angle), _out(angle)
-        a, b, c = 120 * out, 170 * out + [0, 0, 90], 50 * out + [0, 0, 170]
-        joints += chain(
-            leg,
-            ("C", a, side, {"home": (0.2, 5.0), "range": ((-0.8, 1.1), (-60, 70))}),
-            ("R*", b, side, {"home": 0.5, "range": (-0.8, 1.8)}),
-            ("U", c, (side, np.cross(c - b, side))),
-        )
+    joints = around(
+        ("C", (120, 0, 0), Y, {"home": (0.2, 5.0), "range": ((-0.8, 1.1), (-60, 70))}),
+        ("R*", (170, 0, 90), Y, {"home": 0.5, "range": (-0.8, 1.8)}),
+        ("U", (50, 0, 170), (Y, np.cross((-120, 0, 80), Y))),
+    )
     return Mechanism("3-CRU", joints, "platform", (0, 0, 170))
 
 
 def planar_4rpr() -> Mechanism:
     """A planar platform on four driven struts: one more than it has freedoms."""
     joints = []
-    corners = [(-30, -20, 0), (30, -20, 0), (30, 20, 0), (-30, 20, 0)]
+    tops = [(-30, -20, 0), (30, -20, 0), (30, 20, 0), (-30, 20, 0)]
     feet = [(-150, -130, 0), (160, -120, 0), (150, 140, 0), (-140, 120, 0)]
-    for leg, (a, c) in enumerate(zip(np.array(feet, float), np.array(corners, float), strict=True), 1):
-        home = float(np.linalg.norm(c - a))
-        joints += chain(
-            leg, ("R", a, Z), ("P*", None, c - a, {"home": home, "range": (home - 60, home + 60)}), ("R", c, Z)
-        )
+    for leg, (a, c) in enumerate(zip(feet, tops, strict=True), 1):
+        home = float(np.linalg.norm(np.subtract(c, a)))
+        joints += chain(leg, *strut(a, c, ("R", Z), ("R", Z), range=(home - 60, home + 60)))
     return Mechanism("4-RPR", joints, "platform", (0, 0, 0))
 
 
 def canfield() -> Mechanism:
     """3-RSR: a pointing joint, its two halves mirror images."""
     joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        side, out = _tangent(angle), _out(angle)
-        joints += chain(
-            leg,
-            ("R*", 50 * out, side, {"range": (-1.2, 1.2)}),
-            ("S", 80 * out + [0, 0, 60], None, {"cone": Cone((0, 0, 1), 1.2, f"{leg}.1")}),
-            ("R", 50 * out + [0, 0, 120], side),
-        )
+    for leg in (1, 2, 3):
+        ball = {"cone": Cone((0, 0, 1), 1.2, f"{leg}.1")}
+        steps = ("R*", (50, 0, 0), Y, {"range": (-1.2, 1.2)}), ("S", (80, 0, 60), None, ball), ("R", (50, 0, 120), Y)
+        R = Rotation.from_euler("z", TURNS[leg - 1], degrees=True).as_matrix()
+        joints += chain(leg, *(_turned(R, *step) for step in steps))
     return Mechanism("Canfield joint", joints, "platform", (0, 0, 120))
 
 
 def agile_eye(reference: Sequence[float] = (0, 0, 0)) -> Mechanism:
     """A spherical 3-RRR: every axis passes through one point, neighbours at right angles."""
     axes = (((1, 0, 0), (0, 0, -1), (0, 1, 0)), ((0, 1, 0), (-1, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, -1, 0), (1, 0, 0)))
-    joints = []
+    joints, at = [], (0, 0, 0)
     for leg, (base, elbow, top) in enumerate(axes, 1):
-        joints += chain(
-            leg,
-            ("R*", (0, 0, 0), base, {"range": (-1.5, 1.5)}),
-            ("R", (0, 0, 0), elbow),
-            ("R", (0, 0, 0), top),
-        )
+        joints += chain(leg, ("R*", at, base, {"range": (-1.5, 1.5)}), ("R", at, elbow), ("R", at, top))
     return Mechanism("agile eye", joints, "platform", tuple(reference))
 
 
 def coaxial_rrr() -> Mechanism:
     """Spherical 3-RRR whose motors all turn about the vertical, with links of less than a right angle."""
-    joints, cranks, ends = [], np.radians(60.0), np.radians(65.0)
-    for leg, angle in enumerate(TURNS, 1):
-        b = np.sin(cranks) * _out(angle) - np.cos(cranks) * np.array(Z)
-        c = np.sin(ends) * _out(angle + 57.0) + np.cos(ends) * np.array(Z)
-        joints += chain(
-            leg,
-            ("R*", (0, 0, -100), Z),
-            ("R", 100 * b, b, {"range": (-1.7, 1.7)}),
-            ("R", 100 * c, c, {"range": (-1.5, 1.5)}),
-        )
+    cranks, ends = np.radians(60.0), np.radians(65.0)
+    b = np.sin(cranks) * out(0.0) - np.cos(cranks) * np.array(Z)
+    c = np.sin(ends) * out(57.0) + np.cos(ends) * np.array(Z)
+    joints = around(
+        ("R*", (0, 0, -100), Z),
+        ("R", 100 * b, b, {"range": (-1.7, 1.7)}),
+        ("R", 100 * c, c, {"range": (-1.5, 1.5)}),
+    )
     return Mechanism("coaxial spherical 3-RRR", joints, "platform", (0, 0, 0), task=("rotation",))
 
 
@@ -289,12 +264,8 @@ def ankle() -> Mechanism:
     """2-UPS/U: a universal joint straight between base and platform."""
     joints = [joint("U", "ankle", ("base", "platform"), (0, 0, 100), (X, Y), range=((-0.6, 0.7), (-0.5, 0.5)))]
     for leg, (a, c) in enumerate((((-60, 40, 0), (-50, 35, 110)), ((-60, -40, 0), (-50, -35, 110))), 1):
-        joints += chain(
-            leg,
-            ("U", a, (X, Y)),
-            ("P*", None, np.subtract(c, a), {"home": 110.0, "range": (80, 150)}),
-            ("S", c, None, {"cone": Cone((0, 0, -1), 0.7, "platform")}),
-        )
+        upper = ("S", None, {"cone": Cone((0, 0, -1), 0.7, "platform")})
+        joints += chain(leg, *strut(a, c, ("U", (X, Y)), upper, home=110.0, range=(80, 150)))
     return Mechanism("2-UPS/U", joints, "platform", (10, 0, 110))
 
 
@@ -316,13 +287,10 @@ def ranged_stewart() -> Mechanism:
     joints = []
     bases = ring(100, 0, [a + s for a in TURNS for s in (-14, 14)])
     tops = ring(62, 180, [a + s for a in TURNS for s in (-46, 46)])
-    for leg, (a, c) in enumerate(zip(np.array(bases), np.array(tops), strict=True), 1):
-        joints += chain(
-            leg,
-            ("U", a, (X, Y), {"range": ((-0.35, 0.35), (-0.3, 0.4))}),
-            ("P*", None, c - a, {"home": 200.0, "range": (150, 260)}),
-            ("S", c, None, {"cone": Cone(a - c, 0.3, "platform")}),
-        )
+    for leg, (a, c) in enumerate(zip(bases, tops, strict=True), 1):
+        lower = ("U", (X, Y), {"range": ((-0.35, 0.35), (-0.3, 0.4))})
+        upper = ("S", None, {"cone": Cone(np.subtract(a, c), 0.3, "platform")})
+        joints += chain(leg, *strut(a, c, lower, upper, home=200.0, range=(150, 260)))
     return Mechanism("ranged 6-UPS", joints, "platform", (0, 0, 180))
 
 
@@ -339,17 +307,10 @@ def five_bar_with_tool() -> Mechanism:
 
 
 def five_bar_with_limited_tip() -> Mechanism:
-    joints = [
-        joint("R*", "A1", ("base", "a1"), (-50, 0, 0), Z),
-        joint("R", "B1", ("a1", "c1"), (-120, 60, 0), Z),
-        joint("R*", "A2", ("base", "a2"), (50, 0, 0), Z),
-        joint("R", "B2", ("a2", "c2"), (120, 60, 0), Z),
-        joint("R", "tip", ("c1", "c2"), (0, 130, 0), Z, range=(-0.5, 0.3)),
-    ]
-    return Mechanism("5-bar with a limited tip", joints, "tip")
+    return five_bar([(-50, 0), (50, 0)], [(-120, 60), (120, 60)], (0, 130), tip=(-0.5, 0.3))
 
 
-_ARM = (
+ARM = (
     ("R*", (0, 0, 100), Z, {"range": (-2.9, 2.9)}),
     ("R*", (30, 0, 100), Y, {"range": (-1.9, 1.9), "home": 0.3}),
     ("R*", (30, 0, 350), Y, {"range": (-2.4, 2.4)}),
@@ -361,7 +322,7 @@ _ARM = (
 
 def arm() -> Mechanism:
     """A serial arm of six revolutes with a wrist that is none: no two last axes meet."""
-    return Mechanism("6R arm", chain(1, *_ARM), "platform", (300, 0, 340))
+    return Mechanism("6R arm", chain(1, *ARM), "platform", (300, 0, 340))
 
 
 def welded_tricept() -> Mechanism:
@@ -371,71 +332,58 @@ def welded_tricept() -> Mechanism:
         joint("F", "flange", ("platform", "plate"), (0, 0, 210)),
     ]
     for each in tricept().joints:
-        bodies = tuple(
-            {"base": "plinth", "platform": "plate"}.get(body, body) if each.type != "spherical" else body
-            for body in each.connects
-        )
-        cone = each.cone and dataclasses.replace(each.cone, fixed_to={"base": "plinth"}.get(each.cone.fixed_to, "?"))
-        joints.append(dataclasses.replace(each, connects=bodies, cone=cone))
+        welds = {} if each.type == "spherical" else {"base": "plinth", "platform": "plate"}
+        cone = each.cone and dataclasses.replace(each.cone, fixed_to="plinth")
+        joints.append(dataclasses.replace(each, connects=tuple(welds.get(b, b) for b in each.connects), cone=cone))
     return Mechanism("welded 3-UPS/UP", joints, "platform", (0, 0, 230))
 
 
 def carried_tip(kind: str) -> Mechanism:
     """The pinned delta with a tool: the joint between platform and tool is the end effector."""
-    direction = {"S": None, "U": (X, Y), "F": None, "R": Y}[kind]
-    more: dict[str, Any] = {"cone": Cone((0, 0, -1), 0.3, "platform")} if kind == "" else {}
-    joints = [*pinned_delta().joints, joint(kind, "tip", ("platform", "tool"), (5, 0, -260), direction, **more)]
+    direction = (X, Y) if kind == "U" else None
+    joints = [*pinned_delta().joints, joint(kind, "tip", ("platform", "tool"), (5, 0, -260), direction)]
     return Mechanism(f"delta with a {_TYPES[kind]} tip", joints, "tip")
+
+
+def _fingers(body: str, x: float, z: float, step: float) -> list[Joint]:
+    """A driven four-bar on a body."""
+    return [
+        joint("R*", "g1", (body, "finger1"), (x - 10, 0, z), Y, range=(-0.4, 0.4)),
+        joint("R", "g2", (body, "finger2"), (x + 10, 0, z), Y, range=(-0.5, 0.5)),
+        joint("R", "g3", ("finger1", "tie"), (x - 10, 0, z + step), Y),
+        joint("R", "g4", ("finger2", "tie"), (x + 10, 0, z + step), Y),
+    ]
 
 
 def with_gripper() -> Mechanism:
     """An arm whose gripper is a loop of its own, beyond the end effector, with a motor and limits."""
-    joints = [
-        *chain(1, *_ARM, end="hand"),
-        joint("R", "tip", ("hand", "palm"), (300, 0, 340), Z, range=(-0.5, 0.5)),
-        joint("R*", "g1", ("palm", "finger1"), (290, 0, 340), Y, range=(-0.4, 0.4)),
-        joint("R", "g2", ("palm", "finger2"), (310, 0, 340), Y, range=(-0.5, 0.5)),
-        joint("R", "g3", ("finger1", "tie"), (290, 0, 310), Y),
-        joint("R", "g4", ("finger2", "tie"), (310, 0, 310), Y),
-    ]
+    tip = joint("R", "tip", ("hand", "palm"), (300, 0, 340), Z, range=(-0.5, 0.5))
+    joints = [*chain(1, *ARM, end="hand"), tip, *_fingers("palm", 300, 340, -30)]
     return Mechanism("arm with a gripper", joints, "tip")
 
 
 def gripper_on_platform() -> Mechanism:
     """A tricept whose platform carries a driven four-bar that no path to it passes."""
-    joints = [
-        *tricept().joints,
-        joint("R*", "g1", ("platform", "finger1"), (-10, 0, 230), Y, range=(-0.4, 0.4)),
-        joint("R", "g2", ("platform", "finger2"), (10, 0, 230), Y, range=(-0.5, 0.5)),
-        joint("R", "g3", ("finger1", "tie"), (-10, 0, 260), Y),
-        joint("R", "g4", ("finger2", "tie"), (10, 0, 260), Y),
-    ]
+    joints = [*tricept().joints, *_fingers("platform", 0, 230, 30)]
     return Mechanism("3-UPS/UP with a gripper", joints, "platform", (0, 0, 230))
 
 
 def hinge() -> Mechanism:
-    return Mechanism(
-        "hinge",
-        [joint("R*", "R", ("base", "platform"), (10, 0, 0), Z, home=0.3, range=(-1, 2))],
-        "platform",
-        (50, 0, 0),
-    )
+    driven = joint("R*", "R", ("base", "platform"), (10, 0, 0), Z, home=0.3, range=(-1, 2))
+    return Mechanism("hinge", [driven], "platform", (50, 0, 0))
 
 
 def slider() -> Mechanism:
-    return Mechanism(
-        "slider", [joint("P*", "P", ("platform", "base"), None, X, home=7, range=(-50, 90))], "platform", (50, 0, 0)
-    )
+    driven = joint("P*", "P", ("platform", "base"), None, X, home=7, range=(-50, 90))
+    return Mechanism("slider", [driven], "platform", (50, 0, 0))
 
 
 def crooked_upr() -> Mechanism:
     """A leg U-P-R of arbitrary axes and one R-U-P-U, between three of UPS."""
+    ends = ((100, 0, 0), (60, 10, 180)), ((-20, 90, 0), (-30, 50, 185)), ((-80, -60, 0), (-40, -40, 180))
     joints = []
-    for leg, (a, c) in enumerate(
-        (((100, 0, 0), (60, 10, 180)), ((-20, 90, 0), (-30, 50, 185)), ((-80, -60, 0), (-40, -40, 180))), 1
-    ):
-        vector = np.subtract(c, a)
-        joints += chain(leg, ("U", a, (X, Y)), ("P*", None, vector, {"range": (-60, 70)}), ("S", c))
+    for leg, (a, c) in enumerate(ends, 1):
+        joints += chain(leg, ("U", a, (X, Y)), ("P*", None, np.subtract(c, a), {"range": (-60, 70)}), ("S", c))
     joints += chain(
         4,
         ("R*", (30, -100, 0), (1, 0.2, 0.1), {"range": (-1, 1)}),
@@ -481,63 +429,6 @@ MACHINES: dict[str, Callable[[], Mechanism]] = {
 }
 
 
-# --- the same machine, described otherwise ---------------------------------------------------------------------------
-
-
-def reversed_joints(mechanism: Mechanism) -> Mechanism:
-    """Every joint described from its other body; coordinates change sign."""
-    return _with_joints(mechanism, [_reversed(each) for each in mechanism.joints])
-
-
-def _reversed(each: Joint) -> Joint:
-    changes: dict[str, Any] = {"connects": each.connects[::-1]}
-    if each.along is None and each.type not in ("spherical", "fixed"):
-        swap = slice(None, None, -1 if each.type == "universal" else 1)
-        home = -np.ravel(each.home)[swap]
-        changes["home"] = tuple(home) if len(home) > 1 else float(home[0])
-        if each.range is not None:
-            pairs = -np.reshape(each.range, (-1, 2))[swap, ::-1]
-            changes["range"] = tuple(map(tuple, pairs)) if len(pairs) > 1 else tuple(pairs[0])
-    if each.axes is not None:
-        changes["axes"] = each.axes[::-1]
-    return dataclasses.replace(each, **changes)
-
-
-def shuffled(mechanism: Mechanism, seed: int = 0) -> Mechanism:
-    """Joints in another order, bodies with other names."""
-    rng = np.random.default_rng(seed)
-    names = {body: f"body{k}" for k, body in enumerate(rng.permutation(mechanism.bodies).tolist())}
-    joints = []
-    for each in mechanism.joints:
-        cone = each.cone and dataclasses.replace(each.cone, fixed_to=names[each.cone.fixed_to])
-        joints.append(dataclasses.replace(each, connects=tuple(names[b] for b in each.connects), cone=cone))
-    end = names.get(mechanism.end_effector, mechanism.end_effector)
-    order = [joints[k] for k in rng.permutation(len(joints))]
-    return Mechanism(mechanism.name, order, end, mechanism.reference_point, base=names[mechanism.base])
-
-
-def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """All lengths in another unit."""
-    joints = [_scaled(each, factor) for each in mechanism.joints]
-    return _with_joints(mechanism, joints, tuple(factor * np.array(mechanism.reference_point)))
-
-
-def _scaled(each: Joint, factor: float) -> Joint:
-    changes: dict[str, Any] = {} if each.at is None else {"at": tuple(factor * np.array(each.at))}
-    if each.type == "prismatic":
-        changes["home"] = factor * each.home
-        changes["range"] = each.range and tuple(factor * np.array(each.range))
-    if each.type == "cylindrical":
-        changes["home"] = (each.home[0], factor * each.home[1])
-        changes["range"] = each.range and (each.range[0], tuple(factor * np.array(each.range[1])))
-    return dataclasses.replace(each, **changes)
-
-
-def _with_joints(mechanism: Mechanism, joints: list[Joint], reference: Any = None) -> Mechanism:
-    point = mechanism.reference_point if reference is None else reference
-    return Mechanism(mechanism.name, joints, mechanism.end_effector, point, base=mechanism.base)
-
-
 def scara(task: Sequence[str] | None = ("x", "y", "z", "yaw")) -> Mechanism:
     """Two arms, a quill and a turning tool: all axes upright."""
     steps = (
@@ -549,47 +440,29 @@ def scara(task: Sequence[str] | None = ("x", "y", "z", "yaw")) -> Mechanism:
     return Mechanism("SCARA", chain(1, *steps, end="tool"), "tool", (350, 50, 0), task=task)
 
 
-H4_TWIST = 30.0
-"""Angle between the planes of the H4's arms and the plane of its two hinges [deg]."""
-
-
 def h4(task: Sequence[str] = ("x", "y", "z", "yaw")) -> Mechanism:
     """Four arms with pairs of rods on two half platforms, hinged to a third that turns as these shift: x, y, z, yaw."""
     joints = []
     for leg, (x, y) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1)), 1):
-        # the arm of a quadrant points outward; its pair of rods is held square to it
-        outward = np.array([x * np.sin(np.radians(H4_TWIST)), y * np.cos(np.radians(H4_TWIST)), 0.0])
-        across = np.cross(Z, outward)
-        foot = np.array([100.0 * x, 173.20508075688772 * y, 0.0])
-        elbow, wrist = foot + 250.0 * outward, np.array([60.0 * x, 90.0 * y, -500.0])
+        # the arm of a quadrant points outward, 30 degrees from the plane of the hinges; its rods are square to it
+        outward = np.array([x * np.sin(np.radians(30.0)), y * np.cos(np.radians(30.0)), 0.0])
+        across, foot = np.cross(Z, outward), np.array([100.0 * x, 173.20508075688772 * y, 0.0])
         half = "front" if y > 0 else "back"
         joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), foot, across, range=(-1.22, 1.57)))
-        for side, name in ((-1, "L"), (1, "R")):
-            offset = side * 40.0 * across
-            joints += [
-                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), elbow + offset),
-                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", half), wrist + offset),
-            ]
-    joints += [
-        joint("R", "Q1", ("front", "platform"), (0, 90, -500), Z, range=(-1.4, 1.4)),
-        joint("R", "Q2", ("back", "platform"), (0, -90, -500), Z),
-    ]
+        joints += pairs(foot + 250.0 * outward, [60.0 * x, 90.0 * y, -500.0], 40 * across, (f"arm{leg}", half), leg)
+    joints.append(joint("R", "Q1", ("front", "platform"), (0, 90, -500), Z, range=(-1.4, 1.4)))
+    joints.append(joint("R", "Q2", ("back", "platform"), (0, -90, -500), Z))
     return Mechanism("H4", joints, "platform", (0, 0, -500), task=tuple(task))
 
 
 def rrrs() -> Mechanism:
     """Three legs like those of a walking robot: a hip that swings, a thigh, a shank, and a ball at the end."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        out, side = _out(angle), _tangent(angle)
-        hip, thigh, knee = 120 * out, 150 * out, 210 * out + [0, 0, 80]
-        joints += chain(
-            leg,
-            ("R*", hip, Z, {"range": (-0.7, 0.7)}),
-            ("R*", thigh, side, {"range": (-0.9, 0.9)}),
-            ("R", knee, side, {"range": (-1.2, 1.2)}),
-            ("S", 70 * out + [0, 0, 190], {"cone": Cone((0, 0, -1), 1.2, "platform")}),
-        )
+    joints = around(
+        ("R*", (120, 0, 0), Z, {"range": (-0.7, 0.7)}),
+        ("R*", (150, 0, 0), Y, {"range": (-0.9, 0.9)}),
+        ("R", (210, 0, 80), Y, {"range": (-1.2, 1.2)}),
+        ("S", (70, 0, 190)),
+    )
     return Mechanism("3-RRRS", joints, "platform", (0, 0, 190))
 
 
@@ -598,13 +471,11 @@ def offset_cardans() -> Mechanism:
     joints = []
     feet, heads = ring(150, 0, (-8, 8, 112, 128, 232, 248)), ring(90, 200, (-40, 40, 80, 160, 200, 280))
     for leg, (foot, head) in enumerate(zip(np.array(feet), np.array(heads), strict=True), 1):
-        out = np.array([foot[0], foot[1], 0.0]) / np.hypot(foot[0], foot[1])
-        below = foot - 12 * np.cross(Z, out) - [0.0, 0.0, 12.0]
-        inner = np.cross(out, head - foot)
+        outward = foot / np.linalg.norm(foot)
         joints += chain(
             leg,
-            ("R", below, out, {"range": (-0.8, 0.8)}),
-            ("R", foot, inner, {"range": (-0.9, 0.9)}),
+            ("R", foot - 12 * np.cross(Z, outward) - [0.0, 0.0, 12.0], outward, {"range": (-0.8, 0.8)}),
+            ("R", foot, np.cross(outward, head - foot), {"range": (-0.9, 0.9)}),
             ("P*", None, (head - foot) / np.linalg.norm(head - foot), {"range": (-45, 60)}),
             ("S", head),
         )
@@ -615,22 +486,14 @@ def par4() -> Mechanism:
     """Four arms with pairs of rods on two half platforms; two bars keep these parallel, and one carries the tool."""
     joints = []
     for leg, angle in enumerate((45, 135, 225, 315), 1):
-        out, across = _out(angle), np.cross(Z, _out(angle))
-        half, x, y = "front" if out[1] > 0 else "back", np.sign(out[0]), np.sign(out[1])
-        elbow, wrist = 635 * out - [0, 0, 110], np.array([70 * x, 80 * y, -800])
-        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 275 * out, across, range=(-1.0, 1.4)))
-        for side, name in ((-1, "L"), (1, "R")):
-            offset = side * 50 * across
-            joints += [
-                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), elbow + offset),
-                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", half), wrist + offset),
-            ]
+        outward, across = out(angle), np.cross(Z, out(angle))
+        half, wrist = "front" if outward[1] > 0 else "back", np.sign(outward) * (70, 80, 0) - [0, 0, 800]
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 275 * outward, across, range=(-1.0, 1.4)))
+        joints += pairs(635 * outward - [0, 0, 110], wrist, 50 * across, (f"arm{leg}", half), leg)
     for bar, x in ((1, -60.0), (2, 60.0)):
         limit = {"range": (-1.5, 1.5)} if bar == 1 else {}
-        joints += [
-            joint("R", f"P{bar}", ("front", f"bar{bar}"), (x, 80, -800), Z, **limit),
-            joint("R", f"Q{bar}", ("back", f"bar{bar}"), (x, -80, -800), Z),
-        ]
+        joints.append(joint("R", f"P{bar}", ("front", f"bar{bar}"), (x, 80, -800), Z, **limit))
+        joints.append(joint("R", f"Q{bar}", ("back", f"bar{bar}"), (x, -80, -800), Z))
     return Mechanism("Par4", joints, "bar1", (-60, 0, -800), task=("x", "y", "z", "yaw"))
 
 
@@ -639,8 +502,8 @@ def ruu() -> Mechanism:
     joints = []
     for leg, angle in enumerate((20, 100, 200, 290), 1):
         sense = 1 if leg % 2 else -1
-        across = _out(angle) + 0.8 * sense * _tangent(angle)
-        foot, head = 150 * _out(angle), 40 * _out(angle + 15 * sense) + [0, 0, 130]
+        across = out(angle) + 0.8 * sense * np.cross(Z, out(angle))
+        foot, head = 150 * out(angle), 40 * out(angle + 15 * sense) + [0, 0, 130]
         elbow = foot + (60 + 5 * leg) * across / np.linalg.norm(across)
         level = np.cross(Z, head - elbow)
         joints += chain(
@@ -657,9 +520,9 @@ def rrur() -> Mechanism:
     joints = []
     for leg, (angle, turned) in enumerate(((20, 15), (110, -30), (200, 15), (290, -30)), 1):
         sense = np.sign(turned)
-        shoulder, wrist = 150 * _out(angle), 90 * _out(angle + 10 * sense)
-        across = _out(angle) + 0.8 * sense * _tangent(angle)
-        elbow, head = shoulder + 60 * across / np.linalg.norm(across), 40 * _out(angle + turned) + [0, 0, 60]
+        shoulder, wrist = 150 * out(angle), 90 * out(angle + 10 * sense)
+        across = out(angle) + 0.8 * sense * np.cross(Z, out(angle))
+        elbow, head = shoulder + 60 * across / np.linalg.norm(across), 40 * out(angle + turned) + [0, 0, 60]
         level = np.cross(Z, head - wrist)
         joints += chain(
             leg,
@@ -668,47 +531,34 @@ def rrur() -> Mechanism:
             ("U", wrist, (Z, level), {"range": ((-1.5, 1.2), (-0.8, 0.6))}),
             ("R", head, level),
         )
-    return Mechanism("4-RRUR", joints, "platform", (0, 0, 60), task=("x", "y", "z"))
+    return Mechanism("4-RRUR", joints, "platform", (0, 0, 60), task=POSITION)
 
 
 def hybrid() -> Mechanism:
     """A turntable below, three sliding legs with hinges at their feet in between, and a wrist of two hinges above."""
-    joints = [joint("R*", "turntable", ("base", "table"), (0, 0, -40), Z, range=(-1.0, 1.0))]
-    for leg, angle in enumerate(TURNS, 1):
-        foot, head = 120 * _out(angle), 70 * _out(angle) + [0, 0, 180]
-        joints += chain(
-            leg,
-            ("R", foot, _tangent(angle), {"range": (-0.7, 0.7)}),
-            ("P*", None, (head - foot) / np.linalg.norm(head - foot), {"range": (-50, 60)}),
-            ("S", head, None, {"cone": Cone((0, 0, -1), 1.0, "plate")}),
+    line = np.array([-50, 0, 180]) / np.hypot(50, 180)
+    joints = [
+        joint("R*", "turntable", ("base", "table"), (0, 0, -40), Z, range=(-1.0, 1.0)),
+        *around(
+            ("R", (120, 0, 0), Y, {"range": (-0.7, 0.7)}),
+            ("P*", None, line, {"range": (-50, 60)}),
+            ("S", (70, 0, 180), None, {"cone": Cone((0, 0, -1), 1.0, "plate")}),
             start="table",
             end="plate",
-        )
-    joints += chain(
-        "w",
-        ("R*", (0, 0, 200), X, {"range": (-1.2, 1.2)}),
-        ("R*", (0, 0, 220), Y, {"range": (-1.2, 1.2)}),
-        start="plate",
-        end="tool",
-    )
+        ),
+    ]
+    wrist = ("R*", (0, 0, 200), X, {"range": (-1.2, 1.2)}), ("R*", (0, 0, 220), Y, {"range": (-1.2, 1.2)})
+    joints += chain("w", *wrist, start="plate", end="tool")
     return Mechanism("R + 3-RPS + RR", joints, "tool", (0, 0, 260))
 
 
 def stretched_wrist(tool: tuple[float, float, float] = (0, 0, 270)) -> Mechanism:
     """Three sliding legs with hinges at their feet, and on their plate a wrist of two hinges: the first is in line with
     the tool at home, where both of its ways to point the tool meet."""
-    joints = []
-    for leg, angle in enumerate((0, 125, 240), 1):
-        foot, head = 100 * _out(angle), 55 * _out(angle) + [0, 0, 160]
-        joints += chain(
-            leg,
-            ("R", foot, _tangent(angle), {"range": (-0.5, 0.6)}),
-            ("P*", None, head - foot, {"home": float(np.linalg.norm(head - foot)), "range": (130, 210)}),
-            ("S", head, None, {"cone": Cone(foot - head, 0.7, "plate")}),
-            end="plate",
-        )
+    upper = ("S", None, {"cone": Cone((45, 0, -160), 0.7, "plate")})
+    leg = strut((100, 0, 0), (55, 0, 160), ("R", Y, {"range": (-0.5, 0.6)}), upper, range=(130, 210))
     wrist = ("R*", (0, 0, 190), Z, {"range": (-2.5, 2.9)}), ("R*", (0, 0, 220), X, {"range": (-0.3, 1.9)})
-    joints += chain("w", *wrist, start="plate", end="tool")
+    joints = around(*leg, angles=(0, 125, 240), end="plate") + chain("w", *wrist, start="plate", end="tool")
     return Mechanism("3-RPS + RR", joints, "tool", tool, task=("x", "y", "z", "tilt"))
 
 
@@ -716,15 +566,9 @@ def picker() -> Mechanism:
     """A delta whose tool a shaft turns: from a motor on the base, through cardan joints and a slide between them."""
     joints = []
     for leg, angle in enumerate(TURNS, 1):
-        out, across = _out(angle), _tangent(angle)
-        elbow, wrist = 535 * out - [0, 0, 105], 45 * out - [0, 0, 800]
-        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 200 * out, across, range=(-1.2, 1.5)))
-        for side, name in ((-1, "L"), (1, "R")):
-            offset = side * 50 * across
-            joints += [
-                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), elbow + offset),
-                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", "plate"), wrist + offset),
-            ]
+        across, elbow, wrist = np.cross(Z, out(angle)), 535 * out(angle) - [0, 0, 105], 45 * out(angle) - [0, 0, 800]
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 200 * out(angle), across, range=(-1.2, 1.5)))
+        joints += pairs(elbow, wrist, 50 * across, (f"arm{leg}", "plate"), leg)
     joints.append(joint("R", "bearing", ("plate", "tool"), (0, 0, -800), Z))
     joints += chain(
         "shaft",
@@ -739,10 +583,9 @@ def picker() -> Mechanism:
 
 def tricept_with_wrist() -> Mechanism:
     """Three sliding legs and a guide that cardan joints hold, and beyond the plate a wrist of three hinges."""
-    joints = [*tricept().joints]
+    joints, bodies = [*tricept().joints], ("platform", "wrist1", "wrist2", "tool")
     for k, (height, axis) in enumerate(((240, X), (260, Y), (280, Z))):
-        bodies = ("platform" if k == 0 else f"wrist{k}", f"wrist{k + 1}" if k < 2 else "tool")
-        joints.append(joint("R*", f"W{k}", bodies, (0, 0, height), axis, range=(-1.2, 1.2)))
+        joints.append(joint("R*", f"W{k}", bodies[k : k + 2], (0, 0, height), axis, range=(-1.2, 1.2)))
     return Mechanism("Tricept with a wrist", joints, "tool", (0, 0, 320))
 
 
@@ -750,16 +593,10 @@ def stretched_delta() -> Mechanism:
     """A delta whose cranks and rods are in line at home."""
     joints = []
     for leg, angle in enumerate(TURNS, 1):
-        out, across = _out(angle), _tangent(angle)
-        foot, wrist = 200 * out, 45 * out - [0, 0, 800]
+        across, foot, wrist = np.cross(Z, out(angle)), 200 * out(angle), 45 * out(angle) - [0, 0, 800]
         joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), foot, across, range=(-1.2, 1.5)))
-        for side, name in ((-1, "L"), (1, "R")):
-            offset = side * 50 * across
-            joints += [
-                joint("S", f"B{name}{leg}", (f"arm{leg}", f"rod{name}{leg}"), 0.65 * foot + 0.35 * wrist + offset),
-                joint("S", f"C{name}{leg}", (f"rod{name}{leg}", "plate"), wrist + offset),
-            ]
-    return Mechanism("stretched delta", joints, "plate", (0, 0, -800), task=("x", "y", "z"))
+        joints += pairs(0.65 * foot + 0.35 * wrist, wrist, 50 * across, (f"arm{leg}", "plate"), leg)
+    return Mechanism("stretched delta", joints, "plate", (0, 0, -800), task=POSITION)
 
 
 ON_ARMS: dict[str, Callable[[], Mechanism]] = {

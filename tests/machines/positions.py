@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from pfabrik import Cone, Joint, Mechanism
+
+from .redescribed import reversed_joint
 
 Point = Sequence[float]
 
@@ -20,135 +24,130 @@ def _pairs(spread: float) -> list[float]:
     return [120 * leg + side * spread for leg in range(3) for side in (-1, 1)]
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+def struts(feet: Sequence[Point], heads: Sequence[Point], lower: str = "universal", **drive: Any) -> list[Joint]:
+    """Driven struts U-P-S (or S-P-S) from base to platform, numbered from 1."""
+    joints = []
+    for i, (foot, head) in enumerate(zip(feet, heads, strict=True), 1):
+        joints += [
+            Joint(f"A{i}", lower, ("base", f"c{i}"), at=foot),  # type: ignore[arg-type]
+            Joint(f"B{i}", "prismatic", (f"c{i}", f"r{i}"), along=(f"A{i}", f"C{i}"), actuated=True, **drive),
+            Joint(f"C{i}", "spherical", (f"r{i}", "platform"), at=head),
+        ]
+    return joints
+
+
+def five_bar(feet: Sequence[Point], elbows: Sequence[Point], at: Point, **limits: Any) -> Mechanism:
+    """A 5-bar in the plane z = 0 (points of two numbers), driven at its feet A1 and A2; ranges by name."""
+    z, joints = (0, 0, 1), []
+    for i, (foot, elbow) in enumerate(zip(feet, elbows, strict=True), 1):
+        joints += [
+            Joint(
+                f"A{i}", "revolute", ("base", f"a{i}"), at=(*foot, 0), axis=z, actuated=True, range=limits.get(f"A{i}")
+            ),
+            Joint(f"B{i}", "revolute", (f"a{i}", f"c{i}"), at=(*elbow, 0), axis=z, range=limits.get(f"B{i}")),
+        ]
+    joints.append(Joint("tip", "revolute", ("c1", "c2"), at=(*at, 0), axis=z, range=limits.get("tip")))
+    return Mechanism("5-bar", joints, "tip", task=limits.get("task"))
 
 
 def hexapod_ups(stroke: tuple[float, float] = (150.0, 260.0)) -> Mechanism:
     """6-UPS, unsymmetric on purpose, cones on both sides."""
-    joints = []
-    bases, tops = ring(100, 0, _pairs(14)), ring(62, 180, _pairs(46))
-    for i, (a, c) in enumerate(zip(bases, tops, strict=True), 1):
-        a, c = np.array(a) + [i, -i, 0.5 * i], np.array(c) + [0.3 * i, i, -i]
-        joints += [
-            Joint(f"A{i}", "universal", ("base", f"cylinder{i}"), at=a, cone=Cone(c - a, 0.8, "base")),
-            Joint(
-                f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"A{i}", f"C{i}"), actuated=True, range=stroke
-            ),
-            Joint(f"C{i}", "spherical", (f"rod{i}", "platform"), at=c, cone=Cone(a - c, 0.7, "platform")),
-        ]
-    return Mechanism("unsymmetric 6-UPS", joints, "platform", (1.0, 2.0, 180.0))
+    i = np.arange(1, 7)
+    return Mechanism.from_legs(
+        "U-P*-S",
+        base=np.array(ring(100, 0, _pairs(14))) + np.stack([i, -i, 0.5 * i], axis=1),
+        platform=np.array(ring(62, 180, _pairs(46))) + np.stack([0.3 * i, i, -i], axis=1),
+        stroke=stroke,
+        A={"cone": {"half_angle": 0.8}},
+        C={"cone": {"half_angle": 0.7}},
+        name="unsymmetric 6-UPS",
+        reference_point=(1.0, 2.0, 180.0),
+    )
 
 
 def hexapod_rus() -> Mechanism:
     """6-RUS servo hexapod: horns of 30, rods about 130, ball joints whose cones are fixed to horn and platform."""
-    joints = []
-    for i, (a, c) in enumerate(zip(ring(100, 0, _pairs(20)), ring(70, 125, _pairs(40)), strict=True), 1):
-        side = 1 if i % 2 else -1
-        outward = np.array([np.cos(np.radians(_pairs(0)[i - 1])), np.sin(np.radians(_pairs(0)[i - 1])), 0.0])
-        along = side * np.cross([0, 0, 1.0], outward)
-        a, c = np.array(a), np.array(c)
-        b = a + 30 * along
-        joints += [
-            Joint(f"A{i}", "revolute", ("base", f"horn{i}"), at=a, axis=outward, actuated=True, range=(-1.5, 1.5)),
-            Joint(f"B{i}", "spherical", (f"horn{i}", f"rod{i}"), at=b, cone=Cone(c - b, 0.9, f"horn{i}")),
-            Joint(f"C{i}", "spherical", (f"rod{i}", "platform"), at=c, cone=Cone(b - c, 0.9, "platform")),
-        ]
-    return Mechanism("6-RSS servo hexapod", joints, "platform", (0, 0, 125))
+    base, outward, cone = np.array(ring(100, 0, _pairs(20))), np.array(ring(1, 0, _pairs(0))), {"half_angle": 0.9}
+    return Mechanism.from_legs(
+        "R*-S-S",
+        base=base,
+        via=base + 30 * np.tile([[1], [-1]], (3, 1)) * np.cross([0, 0, 1.0], outward),
+        platform=ring(70, 125, _pairs(40)),
+        A={"axis": outward.tolist(), "range": (-1.5, 1.5)},
+        B={"cone": cone},
+        C={"cone": cone},
+        name="6-RSS servo hexapod",
+        reference_point=(0, 0, 125),
+    )
 
 
 def hexaglide() -> Mechanism:
     """6-PUS: carriages on inclined rails, rigid rods."""
-    joints = []
-    for i, (a, c) in enumerate(zip(ring(120, 0, _pairs(15)), ring(60, 190, _pairs(40)), strict=True), 1):
-        axis = _unit(np.array([-a[0] / 300, -a[1] / 300, 1.0]))
-        joints += [
-            Joint(f"P{i}", "prismatic", ("base", f"carriage{i}"), axis=axis, actuated=True, range=(-60, 80)),
-            Joint(
-                f"U{i}",
-                "universal",
-                (f"carriage{i}", f"rod{i}"),
-                at=a,
-                cone=Cone(np.subtract(c, a), 0.8, f"carriage{i}"),
-            ),
-            Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=c),
-        ]
-    return Mechanism("6-PUS", joints, "platform", (0, 0, 190))
+    base = np.array(ring(120, 0, _pairs(15)))
+    return Mechanism.from_legs(
+        "P*-U-S",
+        base=base,
+        platform=ring(60, 190, _pairs(40)),
+        A={"axis": (base / -300 + [0, 0, 1]).tolist(), "range": (-60, 80)},
+        B={"cone": {"half_angle": 0.8}},
+        name="6-PUS",
+        reference_point=(0, 0, 190),
+    )
+
+
+THIRD = {"count": 3, "axis": (0, 0, 1)}
 
 
 def tripod_rps() -> Mechanism:
     """3-RPS: three freedoms; a general pose is out of its reach."""
-    joints = []
-    for i, (a, c) in enumerate(zip(ring(80, 0, [0, 120, 240]), ring(80, 200, [0, 120, 240]), strict=True), 1):
-        axis = np.cross([0, 0, 1], _unit(np.array(a)))
-        joints += [
-            Joint(f"R{i}", "revolute", ("base", f"cylinder{i}"), at=a, axis=axis, range=(-0.6, 0.6)),
-            Joint(
-                f"P{i}",
-                "prismatic",
-                (f"cylinder{i}", f"rod{i}"),
-                along=(f"R{i}", f"S{i}"),
-                actuated=True,
-                range=(150, 250),
-            ),
-            Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=c, cone=Cone((0, 0, -1), 0.6, "platform")),
-        ]
-    return Mechanism("3-RPS", joints, "platform", (0, 0, 200))
+    return Mechanism.from_legs(
+        "R-P*-S",
+        base=(80, 0, 0),
+        platform=(80, 0, 200),
+        copies=THIRD,
+        stroke=(150, 250),
+        A={"axis": "tangential", "range": (-0.6, 0.6)},
+        C={"cone": Cone((0, 0, -1), 0.6, "platform")},
+        name="3-RPS",
+        reference_point=(0, 0, 200),
+    )
 
 
 def tripod_prs() -> Mechanism:
     """3-PRS: vertical rails, then a revolute, then a rigid rod."""
-    joints = []
-    for i, (a, c) in enumerate(zip(ring(110, 0, [0, 120, 240]), ring(60, 150, [0, 120, 240]), strict=True), 1):
-        axis = np.cross([0, 0, 1], _unit(np.array(a)))
-        joints += [
-            Joint(
-                f"P{i}", "prismatic", ("base", f"carriage{i}"), axis=(0, 0, 1), actuated=True, range=(-80, 80), home=0.0
-            ),
-            Joint(f"R{i}", "revolute", (f"carriage{i}", f"rod{i}"), at=a, axis=axis, range=(-0.5, 0.5)),
-            Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=c),
-        ]
-    return Mechanism("3-PRS", joints, "platform", (0, 0, 150))
+    return Mechanism.from_legs(
+        "P*-R-S",
+        base=(110, 0, 0),
+        platform=(60, 0, 150),
+        copies=THIRD,
+        A={"axis": "vertical", "range": (-80, 80)},
+        B={"axis": "tangential", "range": (-0.5, 0.5)},
+        name="3-PRS",
+        reference_point=(0, 0, 150),
+    )
 
 
 def planar(chain: str) -> Mechanism:
-    """3-RRR, 3-RPR or 3-PRR in the x-y plane; centres at different heights along the axes."""
-    joints: list[Joint] = []
-    z = (0, 0, 1)
-    for i, angle in enumerate((90, 210, 330), 1):
-        a = np.array([*(200 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])), 5.0 * i])
-        turned = np.radians(angle + 25)  # legs through one point would be singular
-        c = np.array([*(50 * np.array([np.cos(turned), np.sin(turned)])), 30.0])
-        if chain == "RRR":
-            b = 0.5 * (a + c) + 70 * np.cross([0, 0, 1], _unit((c - a) * [1, 1, 0]))
-            joints += [
-                Joint(f"A{i}", "revolute", ("base", f"crank{i}"), at=a, axis=z, actuated=True, range=(-1.2, 1.2)),
-                Joint(f"B{i}", "revolute", (f"rod{i}", f"crank{i}"), at=b, axis=z, range=(-1.0, 1.0)),
-                Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=c, axis=z, range=(-2.0, 2.0)),
-            ]
-        elif chain == "RPR":
-            a[2] = c[2] = 0.0
-            joints += [
-                Joint(f"A{i}", "revolute", ("base", f"cylinder{i}"), at=a, axis=z),
-                Joint(
-                    f"B{i}",
-                    "prismatic",
-                    (f"cylinder{i}", f"rod{i}"),
-                    axis=c - a,
-                    actuated=True,
-                    home=150,
-                    range=(90, 230),
-                ),
-                Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=c, axis=(0, 0, -1)),
-            ]
-        else:
-            rail = np.cross([0, 0, 1], _unit(a * [1, 1, 0]))
-            joints += [
-                Joint(f"A{i}", "prismatic", (f"carriage{i}", "base"), axis=rail, actuated=True, range=(-70, 70)),
-                Joint(f"B{i}", "revolute", (f"carriage{i}", f"rod{i}"), at=a + 90 * rail, axis=z),
-                Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=c, axis=z),
-            ]
-    return Mechanism(f"planar 3-{chain}", joints, "platform", (0, 0, 30) if chain != "RPR" else (0, 0, 0))
+    """3-RRR, 3-RPR or 3-PRR in the x-y plane, at different heights along the axes; some joints from their far body."""
+    flat = chain == "RPR"
+    a = np.array(ring(200, 0, (90, 210, 330))) + [[0, 0, 0.0 if flat else 5.0 * i] for i in (1, 2, 3)]
+    c = np.array(ring(50, 0.0 if flat else 30.0, (115, 235, 355)))  # legs through one point would be singular
+    parts: dict[str, Any] = {"platform": c, "axis": "z", "reference_point": (0, 0, 0 if flat else 30)}
+    if chain == "RRR":
+        across = np.cross([0, 0, 1], (c - a) * [1, 1, 0])
+        parts |= {"base": a, "via": 0.5 * (a + c) + 70 * across / np.linalg.norm(across, axis=1)[:, None]}
+        parts |= {"A": {"range": (-1.2, 1.2)}, "B": {"range": (-1.0, 1.0)}, "C": {"range": (-2.0, 2.0)}}
+    elif flat:
+        slide = {"axis": (c - a).tolist(), "home": 150, "range": (90, 230)}
+        parts |= {"base": a, "B": slide, "C": {"axis": "-z"}}
+    else:
+        rails = np.cross([0, 0, 1], a * [1, 1, 0]) / 200
+        parts |= {"base": a + 90 * rails, "A": {"axis": rails.tolist(), "range": (-70, 70)}}
+    written = {"RRR": "R*-R-R", "RPR": "R-P*-R", "PRR": "P*-R-R"}[chain]
+    machine = Mechanism.from_legs(written, name=f"planar 3-{chain}", **parts)
+    far = {"RRR": "B", "RPR": "-", "PRR": "A"}[chain]
+    joints = [reversed_joint(joint) if joint.name[0] == far else joint for joint in machine.joints]
+    return dataclasses.replace(machine, joints=tuple(joints))
 
 
 def serial_planar(n: int = 4) -> Mechanism:

@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 from oracles import assembly
 from pfabrik import Joint, Mechanism
 
+from .positions import struts
+
 Array = NDArray[np.float64]
 
 PUBLISHED: dict[str, Any] = json.loads(
@@ -27,6 +29,13 @@ def moved_from_home(pose: Array, home_pose: Array) -> Array:
     result = np.array(pose, dtype=float)
     result[..., :3, :3] = pose[..., :3, :3] @ home_pose[:3, :3].T
     return result
+
+
+def lee_shah_pose(row: Sequence[float]) -> Array:
+    """The pose of a 3-RPS in a row of Lee and Shah's table: two angles, then z, x and y."""
+    a, b, pz, px, py = row[:5]
+    turn = Rotation.from_euler("ZYZ", [a, b, -a]).as_matrix()
+    return np.block([[turn, np.array([[px], [py], [pz]])], [np.zeros(3), 1.0]])
 
 
 # --- planar ----------------------------------------------------------------------------------------------------------
@@ -130,14 +139,8 @@ def gough(base: Any, platform: Any, home_pose: Array, name: str = "6-UPS") -> Me
 
     The library counts rotations from home: see `moved_from_home`.
     """
-    joints = []
-    for i, (a, b) in enumerate(zip(np.array(base, float), np.array(platform, float), strict=True), 1):
-        joints += [
-            Joint(f"A{i}", "universal", ("base", f"cylinder{i}"), at=a),
-            Joint(f"B{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"A{i}", f"C{i}"), actuated=True),
-            Joint(f"C{i}", "spherical", (f"rod{i}", "platform"), at=home_pose[:3, :3] @ b + home_pose[:3, 3]),
-        ]
-    return Mechanism(name, joints, "platform", tuple(home_pose[:3, 3]))
+    heads = np.array(platform, float) @ home_pose[:3, :3].T + home_pose[:3, 3]
+    return Mechanism(name, struts(np.array(base, float), heads), "platform", tuple(home_pose[:3, 3]))
 
 
 def published_gough(case: str, p: Sequence[float]) -> Mechanism:

@@ -1,26 +1,37 @@
-"""What answers are checked against; no code of the solver is used. Here: closed forms of three topologies.
+"""What answers are checked against: plain NumPy and SciPy on the description, never an engine or a kernel.
 
-`assembly` has closed forms and searches of other hands for forward kinematics, `nearest` a general optimiser for the
-feasible pose nearest to a target, `search` a blind search for a configuration that has a pose.
+`ik` has closed forms of legs: cranks, carriages, struts and guides, with all their branches; `arms` the best
+configuration of a redundant mechanism; `targets` draws targets on both sides of the border. `assembly` has closed forms
+and searches of other hands for forward kinematics, `nearest` a general optimiser for the feasible pose nearest to a
+target, `search` a blind search for a configuration that has a pose, `annuli` areas of workspaces.
 """
 
-from .closed_forms import (
-    Array,
+from .arms import ACCURACY, arms
+from .ik import Answer, WorkingModes, solve_ik, working_modes
+from .rods import NoClosedForm
+from .targets import (
     actuators,
-    arms,
+    any_targets,
+    any_values,
     edge,
     inside_targets,
     leg_lengths,
     margin,
     poses,
     random_targets,
-    reachable,
-    working_mode_margins,
+    targets_about,
 )
+from .turns import Array
 
 __all__ = [
+    "ACCURACY",
+    "Answer",
     "Array",
+    "NoClosedForm",
+    "WorkingModes",
     "actuators",
+    "any_targets",
+    "any_values",
     "arms",
     "edge",
     "inside_targets",
@@ -28,6 +39,7 @@ __all__ = [
     "margin",
     "poses",
     "random_targets",
-    "reachable",
-    "working_mode_margins",
+    "solve_ik",
+    "targets_about",
+    "working_modes",
 ]

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from pfabrik.description.mechanism import Mechanism
@@ -245,28 +244,6 @@ def _distinct(t: Array, R: Array, size: float) -> tuple[Array, NDArray[np.int_]]
     poses = np.tile(np.eye(4), (len(kept), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = R[kept], t[kept]
     return poses, np.array(hits, int)
-
-
-def gough_modes_by_least_squares(
-    base: Array, platform: Array, lengths: Sequence[float], starts: int = 60, seed: int = 0
-) -> Array:
-    """The same poses by SciPy's least squares on (t, rotation vector), ``(k, 4, 4)``: slower, and nothing is ours."""
-    base, platform, lengths = np.array(base, float), np.array(platform, float), np.array(lengths, float)
-    rng = np.random.default_rng(seed)
-    size = lengths.max()
-
-    def excess(unknown: Array) -> Array:
-        moved = unknown[:3] * size + Rotation.from_rotvec(unknown[3:]).apply(platform)
-        return (np.linalg.norm(moved - base, axis=1) - lengths) / size
-
-    ends = []
-    for turn in Rotation.random(starts, rng).as_rotvec():
-        start = np.concatenate([base.mean(0) / size + rng.uniform(-1, 1, 3), turn])
-        end = least_squares(excess, start, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        if np.abs(end.fun).max() < 1e-11:
-            ends.append(end.x)
-    found = np.array(ends)
-    return _distinct(found[:, :3] * size, Rotation.from_rotvec(found[:, 3:]).as_matrix(), size)[0]
 
 
 # --- 3-RPS -----------------------------------------------------------------------------------------------------------
