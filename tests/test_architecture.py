@@ -14,7 +14,10 @@ from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
 
+import click
+
 import pfabrik as pf
+from pfabrik.cli import main
 
 PACKAGE = Path(pf.__file__).parent
 SOURCES = sorted(path for path in PACKAGE.rglob("*.py") if path.stem != "__main__")
@@ -198,6 +201,15 @@ WRONG = [
     ["track", "stewart"],
     ["demo", "--steps", "0"],
 ]
+
+
+def test_the_help_of_all_commands_loads_none_and_says_what_theirs_says() -> None:
+    told, _ = loaded_by("numpy", [["--help"]])
+    assert told == [(None, []), (0, [])]
+    for name, line in main.subcommands.items():
+        command = main.get_command(click.Context(main), name)
+        assert command is not None and command.help is not None
+        assert line == " ".join(command.help.partition("\n\n")[0].split()), name
 
 
 def test_help_and_wrong_input_load_nothing_heavy() -> None:

@@ -12,13 +12,26 @@ __all__ = ["main"]
 
 @click.command(
     cls=CommandGroup,
-    subcommands=(
-        *("catalog", "new", "info", "check"),
-        *("ik", "fk", "track", "travel", "workspace", "time", "speed"),
-        *("plot", "view"),
-        *("import", "export", "verify"),
-        *("compile", "demo"),
-    ),
+    subcommands={
+        "catalog": "List the mechanisms supplied.",
+        "new": "Write a starting file for a machine of your own.",
+        "info": "Show what a mechanism is made of.",
+        "check": "Check a mechanism file.",
+        "ik": "Solve for one target.",
+        "fk": "Find the pose that has given actuator values.",
+        "track": "Follow a path of targets.",
+        "travel": "Tell how far the end effector can go along and about axes.",
+        "workspace": "Tell how big the workspace is, and which limits form its border.",
+        "time": "Find the fastest way along a path.",
+        "speed": "Tell how fast the platform may move.",
+        "plot": "Draw a machine at home, or where a target takes it.",
+        "view": "Show a machine in the browser: drag its target, drive its actuators, see what stops it.",
+        "import": "Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.",
+        "export": "Write a mechanism for another program.",
+        "verify": "Compare answers with those of MuJoCo.",
+        "compile": "Compile all kernels ahead.",
+        "demo": "Follow circles that leave the workspace.",
+    },
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -7,7 +7,7 @@ import keyword
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, NoReturn
@@ -28,13 +28,19 @@ class CommandGroup(click.Group):
     A name that is a word of Python has an underscore behind it there.
     """
 
-    def __init__(self, *args: Any, subcommands: Sequence[str] = (), **kwargs: Any) -> None:
+    def __init__(self, *args: Any, subcommands: Mapping[str, str], **kwargs: Any) -> None:
+        """Make a group of subcommands: name -> what it does, the first line of its help."""
         super().__init__(*args, **kwargs)
-        self.subcommands = tuple(subcommands)
+        self.subcommands = dict(subcommands)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the subcommands, in the order of the help."""
         return list(self.subcommands)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the subcommands without loading them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self.subcommands.items()))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Load one subcommand."""
