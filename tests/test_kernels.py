@@ -190,6 +190,13 @@ def test_the_difference_of_rotations_is_the_rotation_vector_between(angle: float
         np.testing.assert_allclose(between(A, B), angle * axis, rtol=0, atol=1e-11)
 
 
+def test_differences_of_yaw_are_within_half_a_turn() -> None:
+    for first, second in [(170.0, -170.0), (-170.0, 170.0), (10.0, -10.0), (179.0, -1.5)]:
+        A, B = (Rotation.from_euler("z", angle, degrees=True).as_matrix() for angle in (first, second))
+        expected = np.degrees(Rotation.from_matrix(A @ B.T).as_rotvec()[2])
+        assert np.degrees(quaternions.yaw_difference(A, B)) == pytest.approx(expected, abs=1e-12)
+
+
 def test_half_a_turn_has_two_rotation_vectors() -> None:
     rng = np.random.default_rng(5)
     for axis in np.vstack([np.eye(3), directions(rng, 20)]):
