@@ -19,6 +19,7 @@ from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from in_c import IS_THERE, InC
 from in_placo import peer
+from passes import passes
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
 from viewer import viewer
@@ -59,21 +60,22 @@ print(time.process_time() - start)
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
 
 
-NOTE = """Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the
-baseline.
+NOTE = """\
+Times are the shortest of several runs, subject and baseline by turns; a ratio below 1 is faster than the baseline.
 The closed forms (benchmarks/closed_forms.py) know their machine, use one core and blocks of 4096 poses, and return
-numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only
-when `points` is read. C is benchmarks/leg_table.c, compiled with -O3 -march=native: it knows its machine, looks at
-every limit, and goes row by row. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of
-reach within 1 L and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's
-method on joint positions; a delta has no other way than exactly. Newton's method in NumPy (benchmarks/newton.py)
-knows the hexapod, solves six equations in the pose for whole batches at a time, and looks at no passive joint and
-no limit; forward kinematics here closes all loops in all joint coordinates, and measures limits. Starts are answers
-up to 0.01 L and 0.01 rad away. PlaCo is a C++ solver of tasks with closed loops (benchmarks/in_placo.py); its rows are
-left out where it is not installed, as are those of the viewer without headless Chromium. The platform with 40 modes is
-that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of it, not for a pose; first
-answers count the processor's time. The viewer's motions are timed in a page of Chromium, which draws without a graphics
-card, from the motion of the mouse until the answer has been drawn."""
+numbers and a flag; pfabrik also measures pose error, loop gap and limit excess, and works out joint centres only when
+`points` is read. C is benchmarks/leg_table.c, compiled with -O3 -march=native: it knows its machine, looks at every
+limit, and goes row by row. Reachable targets lie within 0.2 L and 0.2 rad of home (NRPM: 0.4), those out of reach
+within 1 L and 0.5 rad; these are projected exactly where a row does not say "centroid", which is the paper's method
+on joint positions; a delta has no other way than exactly. Kernels of passes leave joint coordinates and measures out;
+accelerated passes have exact meetings and half-spaces (docs/p-fabrik.md). Newton's method in NumPy
+(benchmarks/newton.py) knows the hexapod, solves six equations in the pose for whole batches at a time, and looks at
+no passive joint and no limit; forward kinematics here closes all loops in all joint coordinates, and measures limits.
+Starts are answers up to 0.01 L and 0.01 rad away. PlaCo is a C++ solver of tasks with closed loops
+(benchmarks/in_placo.py); its rows are left out where it is not installed, as are those of the viewer without headless
+Chromium. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes
+are for all of it, not for a pose; first answers count the processor's time. The viewer's motions are timed in a page
+of Chromium, which draws without a graphics card, from the motion of the mouse until the answer has been drawn."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
@@ -202,6 +204,7 @@ def main() -> None:
         *calls(rng, runs),
         *batches(rng, runs, 10_000 if given.quick else 100_000),
         *peer(np.random.default_rng(2), runs),
+        *passes(np.random.default_rng(3), min(runs, 7), 200 if given.quick else 1000),
         *projections(rng, runs, 100 if given.quick else 1000),
         *forward(rng, runs, 200 if given.quick else 2000),
         *joint_coordinates(rng, runs, 200 if given.quick else 2000),

@@ -33,12 +33,14 @@ class Comparison(NamedTuple):
     ----------
     distance : of the answer.
     exact : of the answer by exact projection; NaN if it gives up the orientation.
+    accelerated : the same of the projection by half-spaces.
     searched : of the nearest feasible pose that the optimiser finds; NaN if it finds none.
     """
 
     step: int
     distance: float
     exact: float
+    accelerated: float
     searched: float
 
     @property
@@ -47,19 +49,24 @@ class Comparison(NamedTuple):
         return float(np.fmin(self.exact, self.searched))
 
 
-def compare(targets: Floats, solution: Track, exact: Solution, searches: int, tick: Tick) -> list[Comparison]:
-    """Projected answers, and those by exact projection, next to the nearest feasible poses of the same orientation.
+def compare(
+    targets: Floats, solution: Track, exact: Solution, accelerated: Solution, searches: int, tick: Tick
+) -> list[Comparison]:
+    """Projected answers, in three ways, next to the nearest feasible poses of the same orientation.
 
     Left out are answers that gave up the target's orientation.
     """
     held = (np.asarray(solution.status) == Status.PROJECTED) & (solution.rotation_error <= ROTATION)
     steps = np.flatnonzero(held)
     steps = steps[np.unique(np.linspace(0, len(steps) - 1, min(searches, len(steps))).astype(int))]
-    nearest = np.where(exact.rotation_error <= ROTATION, exact.position_error, np.nan)
+    nearest, by_half_spaces = (
+        np.where(each.rotation_error <= ROTATION, each.position_error, np.nan) for each in (exact, accelerated)
+    )
     model, found = model_of(solution.mechanism), []
     for step, x in zip(steps.tolist(), model.variables(solution[steps]), strict=True):
         searched = nearest_distance(model, targets[step], x)
-        found.append(Comparison(step, float(solution.position_error[step]), float(nearest[step]), searched))
+        distance, exactly = float(solution.position_error[step]), float(nearest[step])
+        found.append(Comparison(step, distance, exactly, float(by_half_spaces[step]), searched))
         tick()
     return found
 

@@ -51,7 +51,7 @@ class Efficacy:
 
 
 def run(case: Case, extent: Extent, tick: Tick) -> Efficacy:
-    """Follow the circle inside the workspace with either set of options."""
+    """Follow the circle inside the workspace with every set of options."""
     targets = case.inside.poses(extent.steps)
     runs = {name: follow(case, targets, options) for name, options in SETTINGS.items()}
     tick()
@@ -102,7 +102,7 @@ def summary(found: Efficacy) -> list[dict[str, Any]]:
 
 
 def steps(found: Efficacy) -> list[dict[str, Any]]:
-    """One row for each step: errors after the round trip, with either set of options."""
+    """One row for each step: errors after the round trip, with every set of options."""
     return [
         {
             "step": i,

@@ -63,11 +63,11 @@ class Efficiency:
     Attributes
     ----------
     targets : (n, 4, 4), in the workspace by the closed form; each the nearest one left to the one before.
-    answers : by options ("paper", "default") and start ("cold": home, "warm": the answer to the target before).
+    answers : by options ("paper", "accelerated", "default") and start ("cold": home, "warm": the answer to the target
+        before).
     agreement : largest difference of an actuator from the closed form's, cold, default options [length or rad]; None
         for redundant mechanisms, where both may be right.
-    times : of one target [s], by what was timed: ("paper", "default" or "geometric", start, "batch", "call" or
-        "single").
+    times : of one target [s], by what was timed: (options or "geometric", start, "batch", "call" or "single").
     pass_time : of a forward and backward pass of all chains [s].
     """
 

@@ -87,6 +87,7 @@ def draw_efficiency(found: Sequence[Efficiency], path: Path) -> None:
         "paper": [each.case.printed.iterations for each in found],
         "ours, cold start": [each.answers["paper", "cold"].iterations for each in found],
         "ours, warm start": [each.answers["paper", "warm"].iterations for each in found],
+        "accelerated, cold start": [each.answers["accelerated", "cold"].iterations for each in found],
     }
     draw_bars(right, [each.case.label for each in found], passes)
     right.set(yscale="log", ylabel="passes, average over targets reached", title="iterations")

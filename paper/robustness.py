@@ -12,7 +12,7 @@ from pfabrik import Mechanism, Status, Track, Workspace, solve_ik, track, worksp
 from .arrays import Floats, Mask
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
-from .study import CENTROID, NEAREST, Case, Extent, Tick
+from .study import CENTROID, NEAREST, SETTINGS, Case, Extent, Tick
 from .timing import clock, one_core
 from .tolerances import ROTATION
 
@@ -41,7 +41,8 @@ class Robustness:
     Attributes
     ----------
     solution : what `track` answered, projected as the paper does.
-    feasibility, exact_feasibility : of its steps, and of the same targets projected exactly.
+    feasibility, exact_feasibility, accelerated_feasibility : of its steps, and of the same targets projected exactly
+        and by half-spaces.
     jumps : by kind of actuator ("lengths", "angles"), then by part of the path: "inside", "outside", "edge" (between
         a step that is reached and one that is not).
     compared : projected steps next to the nearest feasible pose.
@@ -53,6 +54,7 @@ class Robustness:
     solution: Track
     feasibility: Feasibility
     exact_feasibility: Feasibility
+    accelerated_feasibility: Feasibility
     jumps: dict[str, dict[str, Jump]]
     compared: list[Comparison]
     workspace: Workspace
@@ -68,6 +70,11 @@ class Robustness:
         return np.array([pair.distance / pair.nearest for pair in self.compared])
 
     @property
+    def accelerated_ratios(self) -> Floats:
+        """The same for the projection by half-spaces."""
+        return np.array([pair.accelerated / pair.nearest for pair in self.compared])
+
+    @property
     def exact_ratios(self) -> Floats:
         """The same for the exact projection, over the distance of the nearest pose that the optimiser finds."""
         return np.array([pair.exact / pair.searched for pair in self.compared])
@@ -80,13 +87,15 @@ def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
     solution = track(mechanism, targets, options=CENTROID)
     finer = track(mechanism, case.leaving.poses(2 * extent.steps - 1), options=CENTROID)
     exact = solve_ik(mechanism, targets, options=NEAREST)
-    compared = compare(targets, solution, exact, extent.searches, tick)
+    accelerated = solve_ik(mechanism, targets, options=SETTINGS["accelerated"])
+    compared = compare(targets, solution, exact, accelerated, extent.searches, tick)
     return Robustness(
         case=case,
         targets=targets,
         solution=solution,
         feasibility=feasibility(solution),
         exact_feasibility=feasibility(exact),
+        accelerated_feasibility=feasibility(accelerated),
         jumps=jumps(solution, finer),
         compared=compared,
         workspace=workspace(mechanism, over=("y", "z"), fixed={"x": case.leaving.center[0]}),
@@ -146,6 +155,7 @@ def summary(found: Robustness) -> dict[str, Any]:
         "compared": len(found.compared),
         **ratio_cells("ratio", found.ratios),
         **ratio_cells("exact_ratio", found.exact_ratios),
+        **ratio_cells("accelerated_ratio", found.accelerated_ratios),
         "iterations_inside": float(np.mean(found.solution.iterations[~found.projected])),
         "iterations_outside": float(np.mean(found.solution.iterations[found.projected])),
         "length": mechanism.characteristic_length,
@@ -180,6 +190,7 @@ def steps(found: Robustness) -> list[dict[str, Any]]:
             "position_error": solution.position_error[i],
             "rotation_error": solution.rotation_error[i],
             "exact_projection": compared[i].exact if i in compared else "",
+            "accelerated_projection": compared[i].accelerated if i in compared else "",
             "nearest_by_search": compared[i].searched if i in compared else "",
             "iterations": solution.iterations[i],
             "rounds": solution.rounds[i],

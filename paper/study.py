@@ -23,9 +23,9 @@ CENTROID = Options(projection="centroid")
 NEAREST = Options(projection="nearest")
 """The exact projection, which the paper's is compared with."""
 
-SETTINGS = {"paper": Options.paper(), "default": Options()}
-"""The paper's passes, with its E and its projection; and what the library does unless told otherwise: where legs have
-closed forms it takes them, and no passes at all."""
+SETTINGS = {"paper": Options.paper(), "accelerated": Options.accelerated(), "default": Options()}
+"""The paper's passes, with its E and its projection; passes with exact meetings and half-spaces, which are not its own;
+and what the library does unless told otherwise: where legs have closed forms it takes them, and no passes at all."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from pfabrik.closure.first_order import forward_map, inverse_map, singularities,
 from pfabrik.errors import InvalidArgument
 from pfabrik.kernels.handle import Handle
 from pfabrik.kernels.platform.jacobians import jacobians, new_jacobian_tables
+from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
 from pfabrik.motion.mobility import generic_of
 from pfabrik.motion.singularities import KINDS, measures
@@ -258,14 +259,14 @@ class TestMobility:
         found = at_home(machine)
         assert (found.serial, found.parallel, found.kinds) == (np.inf, np.inf, ())
         assert np.isnan(found.lost).all()
-        assert np.array_equal(forward_map(machine, home(machine))[0], np.zeros((6, 1)))
+        assert np.array_equal(forward_map(model_of(machine), home(machine))[0], np.zeros((6, 1)))
 
 
 class TestJacobians:
     @pytest.mark.parametrize("name", CONTROLLED)
     def test_forward_jacobian_is_the_slope_of_the_pose(self, name):
         machine, q = closed(name)
-        forward = forward_map(machine, q)
+        forward = forward_map(model_of(machine), q)
         units = rate_units(machine)
         actuated = drives(machine)
         h = 1e-6
@@ -284,13 +285,13 @@ class TestJacobians:
     @pytest.mark.parametrize("name", ["hexapod_ups", "hexapod_rus", "hexaglide", "stewart"])
     def test_jacobians_of_six_freedoms_and_six_actuators_are_inverse(self, name):
         machine, q = closed(name)
-        product = inverse_map(machine, q) @ forward_map(machine, q)
+        product = inverse_map(model_of(machine), q) @ forward_map(model_of(machine), q)
         assert product == pytest.approx(np.broadcast_to(np.eye(6), (2, 6, 6)), abs=1e-10)
 
     @pytest.mark.parametrize("name", CONTROLLED)
     def test_jacobians_are_moore_penrose_inverses_in_lengths_of_l(self, name):
         machine, q = closed(name)
-        forward, inverse = forward_map(machine, q), inverse_map(machine, q)
+        forward, inverse = forward_map(model_of(machine), q), inverse_map(model_of(machine), q)
         units = rate_units(machine)[drives(machine)]
         twist = np.ones(forward.shape[1])
         twist[:3] = machine.characteristic_length
@@ -299,7 +300,7 @@ class TestJacobians:
 
     def test_a_hexapods_inverse_jacobian_is_its_strut_lines(self):
         machine = pf.load("stewart")
-        rows = inverse_map(machine, home(machine))[0]
+        rows = inverse_map(model_of(machine), home(machine))[0]
         for name, row in zip(machine.actuator_names, rows, strict=True):
             a, c = (np.array(machine.joint(each).at) for each in machine.joint(name).along)
             d = (c - a) / np.linalg.norm(c - a)
@@ -332,7 +333,7 @@ class TestJacobians:
         q = home(machine)
         q[0, columns(machine)["s1"]] = 0.3, -0.2, 0.1
         along = Rotation.from_rotvec((0.3, -0.2, 0.1)).apply(Z)  # all links are in line: no ball moves the tip so
-        assert forward_map(machine, q)[0, :, 0] == pytest.approx(along[0] * along, abs=1e-12)
+        assert forward_map(model_of(machine), q)[0, :, 0] == pytest.approx(along[0] * along, abs=1e-12)
 
     @pytest.mark.parametrize("shape", [(), (2,), (1, 2)])
     def test_results_take_the_shape_of_the_solution(self, shape):
@@ -352,7 +353,7 @@ class TestJacobians:
             found = function(machine, marked)
             assert np.isnan(found[1]).all()
             assert np.array_equal(found[[0, 2]], function(machine, q))
-        near = singularities(machine, marked)
+        near = singularities(model_of(machine), marked)
         assert np.isnan([near.serial[1], near.parallel[1], near.constraint[1], near.passive[1]]).all()
         assert np.isnan([near.lost[1], near.gained[1]]).all()
         assert near.kinds == [(), (), ()]
@@ -380,7 +381,7 @@ def drawn(machine: Mechanism, n: int, reach: float = 0.15) -> Solution:
 
 def off(machine: Mechanism, found: np.ndarray, expected: np.ndarray, *, forward: bool) -> np.ndarray:
     """Largest differences of Jacobians (n, a, b), with lengths in L, relative to the largest entry, (n,)."""
-    twists, actuators = units_of(machine)
+    twists, actuators = units_of(model_of(machine))
     scale = actuators / twists[:, None] if forward else twists / actuators[:, None]
     largest = np.abs(scale * expected).max(axis=(1, 2))
     return np.abs(scale * (found - expected)).max(axis=(1, 2)) / np.where(largest > 0.0, largest, 1.0)
@@ -401,8 +402,8 @@ class TestJacobiansOfLegs:
         found = [(each, forward_jacobian(each), inverse_jacobian(each)) for each in (batch, assembled, batch[3:4])]
         for solution, forward, inverse in found:
             q = solution._coordinates
-            assert off(machine, forward, forward_map(machine, q), forward=True).max() < 1e-11
-            assert off(machine, inverse, inverse_map(machine, q), forward=False).max() < 1e-11
+            assert off(machine, forward, forward_map(model_of(machine), q), forward=True).max() < 1e-11
+            assert off(machine, inverse, inverse_map(model_of(machine), q), forward=False).max() < 1e-11
         one = pf.solve_ik(machine, batch.pose[3])
         assert np.array_equal(forward_jacobian(one), forward_jacobian(pf.solve_ik(machine, batch.pose[3:4]))[0])
 
@@ -441,9 +442,9 @@ class TestJacobiansOfLegs:
         solution = pf.solve_ik(machine, targets)
         forward, inverse = forward_jacobian(solution), inverse_jacobian(solution)
         q = solution._coordinates
-        assert off(machine, forward, forward_map(machine, q), forward=True).max() < 1e-11
-        assert off(machine, inverse, inverse_map(machine, q), forward=False).max() < 1e-11
-        assert inverse_map(machine, q)[-1] == pytest.approx(inverse[-1], abs=0)
+        assert off(machine, forward, forward_map(model_of(machine), q), forward=True).max() < 1e-11
+        assert off(machine, inverse, inverse_map(model_of(machine), q), forward=False).max() < 1e-11
+        assert inverse_map(model_of(machine), q)[-1] == pytest.approx(inverse[-1], abs=0)
 
     def test_a_strut_along_the_outer_hinge_of_its_universal_joint_loses_a_freedom(self):
         """Nothing of the strut's length says so: its foot cannot swing across both hinges."""
@@ -464,8 +465,8 @@ class TestJacobiansOfLegs:
         assert solution
         forward, inverse = forward_jacobian(solution), inverse_jacobian(solution)
         q = solution._coordinates
-        assert off(machine, forward, forward_map(machine, q), forward=True).max() < 1e-11
-        assert off(machine, inverse, inverse_map(machine, q), forward=False).max() < 1e-11
+        assert off(machine, forward, forward_map(model_of(machine), q), forward=True).max() < 1e-11
+        assert off(machine, inverse, inverse_map(model_of(machine), q), forward=False).max() < 1e-11
         ranks = np.linalg.matrix_rank(inverse / np.linalg.norm(inverse, axis=(1, 2), keepdims=True), tol=1e-6)
         assert ranks.tolist() == [5, 6, 6, 6]
 
@@ -510,7 +511,7 @@ class TestSingularity:
     @pytest.mark.parametrize("name", CONTROLLED)
     def test_measures_are_those_of_all_singular_vectors(self, name):
         machine, q = closed(name)
-        found, exactly = singularities(machine, q), measures(machine, q)
+        found, exactly = singularities(model_of(machine), q), measures(machine, q)
         for kind in KINDS:
             np.testing.assert_allclose(getattr(found, kind), getattr(exactly, kind), rtol=1e-9)
         assert found.kinds == exactly.kinds
@@ -518,7 +519,11 @@ class TestSingularity:
     @pytest.mark.parametrize("name", CONTROLLED)
     def test_measures_are_the_norms_of_the_jacobians_and_the_twists_attain_them(self, name):
         machine, q = closed(name)
-        forward, inverse, near = forward_map(machine, q), inverse_map(machine, q), singularities(machine, q)
+        forward, inverse, near = (
+            forward_map(model_of(machine), q),
+            inverse_map(model_of(machine), q),
+            singularities(model_of(machine), q),
+        )
         units = rate_units(machine)[drives(machine)]
         twist = np.ones(forward.shape[1])
         twist[:3] = machine.characteristic_length
@@ -621,13 +626,13 @@ class TestSingularity:
         machine = MACHINES["serial_spherical"]()
         q = home(machine)
         q[0, columns(machine)["s2"]] = 0.4, 0.3, -0.2
-        near = singularities(machine, q)
+        near = singularities(model_of(machine), q)
         assert near.parallel == pytest.approx(0, abs=1e-12)
         assert near.kinds == [("parallel",)]
 
     def test_exactly_singular_jacobians_leave_the_singular_direction_out(self):
         stretched = five_bar(0.4, 2.4, 0.0)
-        inverse = inverse_map(stretched, home(stretched))[0]
+        inverse = inverse_map(model_of(stretched), home(stretched))[0]
         assert np.linalg.norm(inverse) < 10
         assert inverse @ [np.cos(2.4), np.sin(2.4), 0] == pytest.approx([0, 0], abs=1e-9)
         aligned = five_bar(0.4, 0.4 + np.pi, 1.0)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
@@ -22,7 +23,7 @@ from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, quaternions, vectors
 from pfabrik.kernels._jit import kernel
 from pfabrik.kernels.legs import complete_poses
-from pfabrik.kernels.reaching import moving_frames, restrict, solve
+from pfabrik.kernels.reaching import half_spaces, moving_frames, restrict, solve
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
@@ -84,6 +85,29 @@ def pass_once(plan, b, now, forward):
         reach.reach_forward(plan, b, now)
     else:
         reach.reach_backward(plan, b, now)
+
+
+@kernel
+def asks_of(plan, b, now, settings, column, free, goal):
+    asks = half_spaces.new_asks(plan)
+    asks.goal[:] = goal
+    half_spaces.open_asks(asks, half_spaces.PLATFORM + plan.trunk_joints.shape[0], column, free)
+    gap = half_spaces.ask_for_branch(plan, b, now, settings, asks)
+    k = asks.frame[0]
+    return gap, asks.problem.G[:k, :-1].copy(), asks.problem.h[:k].copy(), asks.equal[:k].copy()
+
+
+@kernel
+def least_step(plan, rows, h, equal):
+    asks = half_spaces.new_asks(plan)
+    k, n = rows.shape
+    half_spaces.open_asks(asks, n, 0, 0)
+    for i in range(k):
+        for j in range(n):
+            asks.problem.G[i, j] = rows[i, j]
+        half_spaces.close_row(asks, h[i], equal[i])
+    half_spaces.least_step(asks)
+    return asks.x[:n].copy()
 
 
 @kernel
@@ -440,3 +464,101 @@ def test_a_pass_inward_keeps_the_cones_of_the_platform() -> None:
             axis = now.pose[:3, :3] @ np.array(machine.joint(f"C{b + 1}").cone.axis)
             line = now.nodes[branch["first"]] - now.nodes[branch["last"]]
             assert np.arccos(axis @ unit(line)) <= 0.7 + 1e-9
+
+
+def test_a_pass_inward_keeps_the_cones_of_intermediate_platforms() -> None:
+    """The strut of an arm, seen from its target: within the cone that is fixed to the crossbar, where the arm is."""
+    machine = pf.load("nrpm")
+    free = {f"E{side}{i}": None for side in "LR" for i in "123"} | {f"D{side}{i}": None for side in "LR" for i in "123"}
+    compiled, limited = compile_plan(machine.with_limits(**free)), 0
+    rng = np.random.default_rng(15)
+    for _ in range(10):
+        now = at_home(compiled)
+        now.trunks[:] = rng.uniform(-0.3, 0.3, 6) * np.tile([1, 50], 3)
+        move_carriers(compiled.plan, now)
+        disturb(compiled, now, rng, 0.5)
+        for b, (i, side) in enumerate((i, side) for i in "123" for side in "LR"):
+            branch = compiled.plan.branches[b]
+            place_ends(compiled.plan, now)
+            pass_once(compiled.plan, b, now, True)
+            axis = now.carriers[branch["carrier"]][:, :3] @ unit(machine.joint(f"C{side}{i}").cone.axis)
+            angle = np.arccos(axis @ unit(now.nodes[branch["last"]] - now.nodes[branch["first"]]))
+            assert angle <= np.radians(50) + 1e-9
+            limited += angle > np.radians(50) - 1e-9
+    assert limited > 10
+
+
+def test_a_pass_inward_keeps_the_cones_of_links_where_they_are() -> None:
+    compiled, limited = compile_plan(MACHINES["serial_spherical"]()), 0
+    rng = np.random.default_rng(16)
+    for _ in range(50):
+        now = at_home(compiled)
+        disturb(compiled, now, rng, 2.0)
+        before = np.vstack([[0, 0, 1], np.diff(now.nodes, axis=0)])
+        pass_once(compiled.plan, 0, now, True)
+        angles = [np.arccos(unit(a) @ unit(b)) for a, b in zip(before, np.diff(now.nodes, axis=0), strict=False)]
+        assert max(angles) <= 0.9 + 1e-9
+        limited += sum(angle > 0.9 - 1e-9 for angle in angles)
+    assert limited > 20
+
+
+# --- half-spaces -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["nrpm", "trunk with struts"])
+def test_half_spaces_are_the_slopes_of_what_limits_are_exceeded_by(name: str) -> None:
+    """By central differences, in the joints of the trunk and in the platform's translation and turn."""
+    compiled = compile_plan(pf.load("nrpm") if name == "nrpm" else TRUNKS[name]())
+    plan, rng, step = compiled.plan, np.random.default_rng(17), 1e-6
+    length, column, lever = plan.length, half_spaces.PLATFORM, 0.7 * plan.length
+    settings = P.Settings(1e-9 * length, 10, 0, P.TRANSLATES + P.TURNS, 0, lever)
+    goal = np.array([0.0, 1e9 * length, 1.0, lever])
+    now = at_home(compiled)
+    disturb(compiled, now, rng, 0.1)
+    pose, trunks = now.pose.copy(), now.trunks.copy()
+
+    def asked(b: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        now.pose[:] = pose
+        now.pose[:3, 3] += length * x[:3]
+        now.pose[:3, :3] = Rotation.from_rotvec(x[3:6] * length / lever).as_matrix() @ pose[:3, :3]
+        slides = plan.trunk_joints["kind"] == P.SLIDE
+        now.trunks[:] = trunks + x[6:] * np.where(slides, length, 1.0)
+        move_carriers(plan, now)
+        _, rows, h, _ = asks_of(plan, b, now, settings, column, settings.free, goal)
+        return rows, h
+
+    for b in range(min(len(plan.branches), 3)):
+        n = column + len(plan.trunk_joints)
+        rows, _ = asked(b, np.zeros(n))
+        assert len(rows) >= 4
+        for j in range(n):
+            x = step * np.eye(n)[j]
+            (_, more), (_, less) = asked(b, x), asked(b, -x)
+            np.testing.assert_allclose(rows[:, j], (more - less) / (2 * step), atol=1e-6)
+
+
+def test_the_least_step_is_that_of_a_general_optimiser() -> None:
+    """Half-spaces and equations that do not contradict: to the millionth that a slack costs."""
+    plan, rng = compile_plan(TRUNKS["trunk with struts"]()).plan, np.random.default_rng(18)
+    for _ in range(20):
+        rows, inside = rng.normal(size=(7, 4)), rng.normal(size=4)
+        equal = np.array([1, 0, 0, 0, 0, 0, 0])
+        h = -rows @ inside - np.where(equal, 0.0, rng.uniform(0, 1, 7))
+        found = minimize(
+            lambda x: x @ x,
+            inside,
+            constraints=[
+                {"type": "ineq", "fun": lambda x, rows=rows, h=h: -(rows[1:] @ x + h[1:])},
+                {"type": "eq", "fun": lambda x, rows=rows, h=h: rows[:1] @ x + h[:1]},
+            ],
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 200},
+        )
+        np.testing.assert_allclose(least_step(plan, rows, h, equal), found.x, atol=1e-4)
+
+
+def test_half_spaces_that_contradict_are_missed_alike() -> None:
+    plan = compile_plan(TRUNKS["trunk with struts"]()).plan
+    rows, h = np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([0.3, 0.5])  # x <= -0.3, x >= 0.5
+    x = least_step(plan, rows, h, np.zeros(2, int))
+    np.testing.assert_allclose(x, [0.1, 0.0], atol=1e-6)

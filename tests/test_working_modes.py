@@ -264,7 +264,7 @@ def with_flag() -> pf.Mechanism:
     joints = [
         dataclasses.replace(joint, cone=None) if joint.name in ("B1", "C1") else joint for joint in mechanism.joints
     ]
-    corners = [("rod1", (60, 60, 60)), ("bar", (70, 60, 60)), ("tie", (60, 80, 60))]
+    corners = [("BC1", (60, 60, 60)), ("bar", (70, 60, 60)), ("tie", (60, 80, 60))]
     for k, (body, point) in enumerate(corners):
         joints.append(pf.Joint(f"flag{k}", "revolute", (body, corners[(k + 1) % 3][0]), at=point, axis=Z))
     return pf.Mechanism("hexapod with a flag", joints, "platform", mechanism.reference_point)

@@ -14,6 +14,7 @@ _CHOICES: dict[str, tuple[object, ...]] = {
     "working_mode": (None, "any", "keep"),
     "hold": (None, "orientation", "position"),
     "projection": ("nearest", "centroid"),
+    "passes": ("plain", "accelerated"),
     "on_invalid": ("raise", "mark"),
 }
 
@@ -38,8 +39,10 @@ class Options:
         express the mechanism.
     rotation_length : how a rotation counts beside a distance: by the angle times this [length per rad], in
         sqrt(distance^2 + (rotation_length angle)^2). None is `Mechanism.rotation_length`.
-    exact : True for answers as exact as can be; False for the paper's passes and projection alone, which end within
+    exact : True for answers as exact as can be; False for passes and their projection alone, which end within
         `tolerance`; then the loops are closed. Where joint positions do not express the mechanism it changes nothing.
+    passes : of `exact=False`: "plain", the paper's; or "accelerated", with exact meetings and half-spaces in place of
+        points, and a projection to where these hold, as near as it can be, in place of the centroid.
     actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
         of more encoders than the mechanism has freedoms never agree better than they are exact.
     on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
@@ -54,6 +57,7 @@ class Options:
     projection: Literal["nearest", "centroid"] = "nearest"
     rotation_length: float | None = None
     exact: bool = True
+    passes: Literal["plain", "accelerated"] = "plain"
     actuator_tolerance: float = TOLERANCES.position
     on_invalid: Literal["raise", "mark"] = "raise"
 
@@ -82,6 +86,11 @@ class Options:
     def paper(cls) -> Options:
         """The paper's K = 100 and E = 1e-2 [length], by passes alone."""
         return cls(tolerance=1e-2, max_iterations=100, max_rounds=1000, exact=False, projection="centroid")
+
+    @classmethod
+    def accelerated(cls) -> Options:
+        """P-FABRIK with exact meetings and half-spaces, by passes alone, to the usual tolerances."""
+        return cls(max_rounds=200, exact=False, passes="accelerated")
 
 
 def checked_options(options: Options | None) -> Options:

@@ -87,6 +87,63 @@ def pivoted() -> Mechanism:
     )
 
 
+def arms(
+    angles: tuple[float, ...],
+    crossbars: tuple[tuple[float, ...], ...],
+    *,
+    tilt: float = 0.0,
+    reach: float = 130.0,
+    elbows: bool = False,
+) -> Mechanism:
+    """A platform on arms that swing and extend, each with a crossbar that carries struts at some places along it.
+
+    Parameters
+    ----------
+    angles : of the arms about z [deg].
+    crossbars : places of each arm's struts along its crossbar.
+    tilt : of the hinges of the arms against their crossbars [deg].
+    reach : distance of the arms from the centre.
+    elbows : crossbars turn about the arms' extensions too.
+    """
+    joints, z = [], np.array([0.0, 0.0, 1.0])
+    for i, (angle, places) in enumerate(zip(np.radians(angles), crossbars, strict=True)):
+        outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+        bar = np.cross(z, outward)
+        axis = np.cos(np.radians(tilt)) * bar + np.sin(np.radians(tilt)) * outward
+        foot = reach * outward
+        joints += [
+            Joint(f"A{i}", "revolute", ("base", f"arm{i}"), at=foot, axis=axis, actuated=True, range=(-0.6, 0.7)),
+            Joint(f"B{i}", "prismatic", (f"arm{i}", f"bar{i}"), axis=z, actuated=True, range=(-30.0, 35.0)),
+        ]
+        carrier = f"bar{i}"
+        if elbows:
+            carrier = f"turned{i}"
+            joints.append(Joint(f"T{i}", "revolute", (f"bar{i}", carrier), at=foot + 80 * z, axis=z, range=(-0.4, 0.4)))
+        for k, place in enumerate(places):
+            at, head = foot + place * bar + 80 * z, 0.45 * foot + 1.3 * place * bar + 170 * z
+            length = float(np.linalg.norm(head - at))
+            joints += [
+                Joint(f"C{i}{k}", "universal", (carrier, f"c{i}{k}"), at=at, cone=Cone(head - at, 0.75, carrier)),
+                Joint(
+                    f"D{i}{k}", "prismatic", (f"c{i}{k}", f"r{i}{k}"), along=(f"C{i}{k}", f"E{i}{k}"), actuated=True,
+                    range=(0.75 * length, 1.4 * length),
+                ),
+                Joint(
+                    f"E{i}{k}", "spherical", (f"r{i}{k}", "platform"), at=head, cone=Cone(at - head, 0.75, "platform")
+                ),
+            ]  # fmt: skip
+    return Mechanism("arms", joints, "platform", (0, 0, 170))
+
+
+ARMS: dict[str, Callable[[], Mechanism]] = {
+    "three arms of other dimensions": lambda: arms((0, 110, 250), ((-25, 20), (-40, 30), (-20, 35)), reach=110),
+    "hinges not parallel to the crossbar": lambda: arms((0, 120, 240), ((-30, 30),) * 3, tilt=35),
+    "three struts on an arm": lambda: arms((0, 180), ((-40, 5, 45), (-45, -5, 40)), tilt=10),
+    "four struts on an arm, and two": lambda: arms((0, 180), ((-45, -15, 15, 45), (-25, 30))),
+    "crossbars that turn": lambda: arms((0, 120, 240), ((-30, 30),) * 3, elbows=True),
+}
+"""Arms whose joints the pose leaves open; struts on intermediate platforms, with cones at either end."""
+
 TRUNKS: dict[str, Callable[[], Mechanism]] = {
     "pivoted": pivoted,
     "trunk with struts": lambda: arm_with_elbow(bar_strut),

@@ -25,6 +25,7 @@ from .platform.forward import assemble
 from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .reaching import plan as P
+from .reaching.accelerated import solve_by_half_spaces
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
 
@@ -46,7 +47,7 @@ _PASSES = (
     P.Plan._make([*(np.zeros(0, record) for record in _PLAN_RECORDS), 0.0]),
     np.zeros((0, 4, 4)),
     P.Seeds(*_values("f3 f3 f2")),
-    P.Settings(*_values("f i i i")),
+    P.Settings(*_values("f i i i i f")),
     P.PassResults(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
@@ -58,6 +59,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer, _ANSWERS),
     (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
+    (solve_by_half_spaces, _PASSES),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (evaluate_poses, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
     (jacobians, tuple(_values("i f3 i f3"))),

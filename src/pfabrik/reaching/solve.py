@@ -1,4 +1,7 @@
-"""The paper's method: passes on joint positions that reach targets, and its projection of those they do not reach."""
+"""The paper's method: passes on joint positions that reach targets, and its projection of those they do not reach.
+
+Plain, as the paper has it, or with exact meetings and half-spaces.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +102,7 @@ class ReachingEngine(InverseEngine):
         begin = start_coordinates(self._model, start)
         begin = np.repeat(begin, len(targets), axis=0) if len(begin) == 1 else begin
         projection = projection_modes(self._model.path_closure, options.hold, options.rotation_length)[0]
-        solutions = self._solve_from(targets, begin, options, projection)
+        solutions = self._solve_from(targets, begin, options, projection, keep_mode)
         if keep_mode:
             has_left_mode = (self._sides(solutions) * self._sides(start) < 0.0).any(axis=1)
             solutions.rows.status[has_left_mode] = FAILED
@@ -115,16 +118,17 @@ class ReachingEngine(InverseEngine):
         return np.where(has_side, sides, 0.0)
 
     def _solve_from(
-        self, targets: Floats, begin: Floats, options: Options, projection: ProjectionMode
+        self, targets: Floats, begin: Floats, options: Options, projection: ProjectionMode, keep_mode: bool
     ) -> Configurations:
         """Solve for poses by passes from joint coordinates (n, columns); FAILED where the loops do not close."""
         closure = self._model.path_closure
-        settings, clipped = settings_of(self._model, options, projection), clip_targets(self.mechanism, targets)
+        settings = settings_of(self._model, options, projection)._replace(keep_sides=int(keep_mode))
+        clipped = clip_targets(self.mechanism, targets)
         if options.exact and not self._is_struts:
-            placed, results = self._move_to_fit(clipped, begin, settings)
+            placed, results = self._move_to_fit(clipped, begin, settings, options)
         else:
             pass_settings = settings._replace(max_iterations=1) if options.exact else settings
-            results = self._run(clipped, begin, pass_settings)
+            results = self._run(clipped, begin, pass_settings, options)
             placed = place(closure, self._compiled, begin, results)
         margin = TOLERANCES.inside
         closed = close(closure, placed.coordinates, placed.poses, platform=projection.held, limits=True, margin=margin)
@@ -140,7 +144,9 @@ class ReachingEngine(InverseEngine):
         solutions.rows.counters[:, ROUNDS] = results.rounds
         return solutions
 
-    def _move_to_fit(self, targets: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.PassResults]:
+    def _move_to_fit(
+        self, targets: Floats, begin: Floats, settings: P.Settings, options: Options
+    ) -> tuple[Closing, P.PassResults]:
         """Move the platform round by round to where all chains reach it, each chain fitted by least squares.
 
         This replaces passes, which can get stuck at the ranges of joints. The remaining gap of a chain is at its end.
@@ -153,7 +159,7 @@ class ReachingEngine(InverseEngine):
         for _ in range(settings.max_rounds):
             start, poses = placed.coordinates[unsolved], placed.poses[unsolved]
             fitted = close(closure, start, poses, platform=self._held, limits=True, max_iterations=STEPS)
-            revised = self._run(fitted.poses.copy(), fitted.coordinates, once)
+            revised = self._run(fitted.poses.copy(), fitted.coordinates, once, options)
             if not self.mechanism.end_effector_is_joint:
                 fitted.poses[:] = revised.poses
             fitted.poses[:, :3, 3] = revised.poses[:, :3, 3]
@@ -174,22 +180,35 @@ class ReachingEngine(InverseEngine):
         branches = self._compiled.plan.branches
         return bool((branches["last"] - branches["first"] <= 1).all() and (branches["carrier"] == 0).all())
 
-    def _run(self, targets: Floats, begin: Floats, settings: P.Settings) -> P.PassResults:
+    def _run(self, targets: Floats, begin: Floats, settings: P.Settings, options: Options) -> P.PassResults:
         """Run the kernel on all rows, on all cores; rotations of targets of a joint end effector are overwritten."""
-        from ..kernels.reaching.solve import solve_by_passes
-
+        solve = _kernel(is_accelerated(options))
         if self.mechanism.end_effector_is_joint:  # a point has no orientation; that of home is used
             targets[:, :3, :3] = np.eye(3)
         seeds = positions_of(self.mechanism, self._compiled, begin)
         results = new_pass_results(self._compiled, len(targets))
 
         def run(block: slice) -> None:
-            block_seeds = take(seeds, block)
-            block_results = take(results, block)
-            solve_by_passes(self._compiled.plan, targets[block], block_seeds, settings, block_results)
+            solve(self._compiled.plan, targets[block], take(seeds, block), settings, take(results, block))
 
         in_blocks(run, len(targets), ROWS_A_BLOCK)
         return results
+
+
+def is_accelerated(options: Options) -> bool:
+    """True if passes are those with exact meetings and half-spaces."""
+    return not options.exact and options.passes == "accelerated"
+
+
+def _kernel(accelerated: bool) -> Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.PassResults], None]:
+    """The kernel of the passes asked for; kernels are loaded where they are needed."""
+    if accelerated:
+        from ..kernels.reaching.accelerated import solve_by_half_spaces
+
+        return solve_by_half_spaces
+    from ..kernels.reaching.solve import solve_by_passes
+
+    return solve_by_passes
 
 
 def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configurations | None:
@@ -202,9 +221,12 @@ def settings_of(model: Model, options: Options, projection: ProjectionMode) -> P
     """Options as the kernel reads them; passes end sooner if exact steps follow."""
     length, free = model.length, [weight != LOCKED and weight > 0.0 for weight in projection.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)
+    turning = max((weight for weight in projection.weights[3:] if weight != LOCKED), default=0.0)
     return P.Settings(
         enough=max(tolerance, NEAR * length) if options.exact else tolerance,
         max_iterations=int(options.max_iterations),
         max_rounds=int(options.max_rounds),
         free=P.TRANSLATES * any(free[:3]) + P.TURNS * any(free[3:]),
+        keep_sides=0,
+        lever=length * float(turning) ** 0.5,
     )

@@ -1,4 +1,4 @@
-"""Least-squares fits: of a trunk to the first nodes of its branches, and of the platform's rotation to chains' ends."""
+"""Least-squares fits: of a trunk to what its branches ask for, and of the platform's rotation to chains' ends."""
 
 from __future__ import annotations
 
@@ -18,20 +18,22 @@ LARGEST_TURN, TURN_DAMPING = 0.5, 1e-9
 
 @routine
 def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
-    """Fit the pose of the common body, within the ranges of its joints, to its branches.
+    """Fit the pose of the common body, within the ranges of its joints, to the wishes of the branches that ask.
 
-    Gauss-Newton on the trunk's joint values; `config.first_nodes` holds the position of each branch's first node.
+    Gauss-Newton on the trunk's joint values; `config.wishes` holds where each branch wants its first node.
     """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    n, first_nodes, system = last - first, config.first_nodes, config.system
+    n, wishes, system = last - first, config.wishes, config.system
     for _step in range(FIT_STEPS):
         for i in range(n):
             for j in range(n + 1):
                 system[i, j] = 0.0
         for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+            if config.asks[b] == 0:
+                continue
             present = move(config.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
-            miss = sub(vec(first_nodes[b]), present)
+            miss = sub(vec(wishes[b]), present)
             for i in range(n):
                 rate = scale(trunk_unit(plan, first + i), point_rate(plan, config, first + i, present))
                 system[i, n] += dot(rate, miss)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from ...arrays import Records
 from .._jit import routine
-from ..vectors import Vec, along, dot, flatten, move, norm, put, sub, turn, vec
+from ..vectors import along, dot, move, norm, put, sub, turn, vec
 from .fit import fit_trunk
 from .moving_frames import move_carriers
-from .plan import PLATFORM_CONE, Configuration, Plan, Settings
-from .restrict import NO_LENGTH, clamp_cone, clamp_stroke, cone_axis, restrict_step
+from .plan import Configuration, Plan, Settings
+from .restrict import NO_LENGTH, clamp_stroke, restrict_step, restrict_step_inward
 
+# A branch whose wish for its first node is nearer than this to where the node is, is content: rounding [L].
+CONTENT = 1e-12
 # A rail that leaves the plane of its branch by more than this sine moves the plane along.
 OBLIQUE = 1e-6
 
@@ -26,8 +27,7 @@ def reach_forward(plan: Plan, b: int, config: Configuration) -> None:
     oblique = branch["rail"] == 1 and abs(dot(normal, vec(branch["rail_axis"]))) > OBLIQUE
     for k in range(last - 1, first - 1, -1):
         d = sub(vec(nodes[k]), vec(nodes[k + 1]))
-        if k + 1 == last:
-            d = restrict_end_step(plan, branch, config, d)
+        d = restrict_step_inward(plan, branch, k, carrier, config.pose, nodes, d)
         length = norm(d)
         if length <= NO_LENGTH:
             d = turn(carrier, sub(vec(plan.nodes[k]["home"]), vec(plan.nodes[k + 1]["home"])))
@@ -37,20 +37,6 @@ def reach_forward(plan: Plan, b: int, config: Configuration) -> None:
         if branch["planar"] > 0 and k - first <= branch["planar"] and not oblique:
             p = along(p, -dot(normal, sub(p, base)), normal)
         put(nodes[k], p)
-
-
-@routine
-def restrict_end_step(plan: Plan, branch: Records, config: Configuration, d: Vec) -> Vec:
-    """Turn the last segment, seen from the platform, until the plane and the cones at the platform allow it."""
-    if branch["end_plane"] == 1:
-        d = flatten(d, turn(config.pose, vec(branch["end_normal"])))
-    carrier = config.carriers[branch["carrier"]]
-    normal = turn(carrier, vec(branch["normal"]))
-    for c in range(branch["cone_first"], branch["cone_last"]):
-        cone = plan.cones[c]
-        if cone["kind"] == PLATFORM_CONE:
-            d = clamp_cone(cone_axis(cone, carrier, config.pose, normal, config.nodes), cone["half_angle"], d)
-    return d
 
 
 @routine
@@ -87,8 +73,12 @@ def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
     """One iteration, forward and backward, of all branches of a chain; the largest end gap it leaves."""
     chain = plan.chains[c]
     for b in range(chain["first"], chain["last"]):
+        first = plan.branches[b]["first"]
+        present = move(config.carriers[plan.branches[b]["carrier"]], vec(plan.nodes[first]["home"]))
         reach_forward(plan, b, config)
-        put(config.first_nodes[b], vec(config.nodes[plan.branches[b]["first"]]))
+        wish = vec(config.nodes[first])
+        put(config.wishes[b], wish)
+        config.asks[b] = 1 if norm(sub(wish, present)) > CONTENT * plan.length else 0
     if chain["trunk"] >= 0:
         fit_trunk(plan, c, config)
     return pass_outward(plan, c, config)

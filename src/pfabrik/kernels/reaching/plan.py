@@ -82,7 +82,8 @@ class Configuration(NamedTuple):
     trunks: Floats  # (n_trunk_joints,): deviation from home
     carriers: Floats  # (n_trunks + 1, 3, 4); the first is the base
     screws: Floats  # (n_trunk_joints, 2, 3): present point and axis
-    first_nodes: Floats  # (n_branches, 3): position of each branch's first node after a forward pass
+    wishes: Floats  # (n_branches, 3): where each branch wants its first node, after a forward pass
+    asks: Ints  # (n_branches,): 1 if that is elsewhere than it is
     system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 
@@ -101,6 +102,8 @@ class Settings(NamedTuple):
     max_iterations: int  # K; 0 for a pass outward alone
     max_rounds: int
     free: int  # motions of a target that is not reached: TRANSLATES, TURNS, or both
+    keep_sides: int  # 1: legs of two parts stay on their sides; with meetings only
+    lever: float  # how a turn counts beside a distance [length per rad]; with half-spaces only
 
 
 class PassResults(NamedTuple):

@@ -12,6 +12,7 @@ from ..vectors import (
     angle_about,
     angle_between,
     cross,
+    dot,
     flatten,
     norm,
     rotate,
@@ -28,8 +29,12 @@ from .plan import CARRIER_CONE, PLATFORM_CONE, Plan
 NO_LENGTH = 1e-150
 # A vector within this angle of a cone's axis, or of its opposite, has no direction across it but rounding.
 NO_SIDE = 1e-12
+# By so much more than a cone's cosine, a vector is inside whatever its angle is rounded to.
+WELL_INSIDE = 1e-9
 # A clamp to a cone keeps at least this share of the length, so that the direction survives.
 LEAST_SHARE = 1e-3
+# Several restrictions on one step are met in turn; so many sweeps settle all but pathological cones.
+SWEEPS = 3
 # Sweeps over the restrictions end when one turns the step by no more than rounding, as a share of its length.
 UNMOVED = 1e-15
 
@@ -51,13 +56,16 @@ def any_normal(a: Vec) -> Vec:
 @routine
 def clamp_cone(axis: Vec, half_angle: float, d: Vec) -> Vec:
     """The nearest vector to `d` within `half_angle` of the unit vector `axis`."""
+    length = norm(d)
+    if dot(axis, d) > (math.cos(half_angle) + WELL_INSIDE) * length:
+        return d
     angle = angle_between(axis, d)
     if angle <= half_angle:
         return d
     radial = flatten(d, axis)
     size = norm(radial)
-    radial = scale(1.0 / size, radial) if size > NO_SIDE * norm(d) else any_normal(axis)
-    kept = norm(d) * max(math.cos(angle - half_angle), LEAST_SHARE)
+    radial = scale(1.0 / size, radial) if size > NO_SIDE * length else any_normal(axis)
+    kept = length * max(math.cos(angle - half_angle), LEAST_SHARE)
     return add(scale(kept * math.cos(half_angle), axis), scale(kept * math.sin(half_angle), radial))
 
 
@@ -92,8 +100,7 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
     normal = turn(carrier, vec(branch["normal"]))
     before = plan.nodes[k - 1]
     at_end = k == branch["last"]
-    # several restrictions on one step are met in turn; three sweeps settle all but pathological cones
-    for _sweep in range(3):
+    for _sweep in range(SWEEPS):
         start = d
         if before["hinge"] == 1:
             d = flatten(d, normal)
@@ -105,6 +112,8 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
                 if inside != angle:
                     kept = max(math.cos(inside - angle), LEAST_SHARE)
                     d = scale(kept, rotate(d, normal, inside - angle))
+        if branch["cone_first"] == branch["cone_last"] and branch["end_plane"] == 0:
+            break
         if at_end and branch["end_plane"] == 1:
             d = flatten(d, turn(pose, vec(branch["end_normal"])))
         for c in range(branch["cone_first"], branch["cone_last"]):
@@ -114,6 +123,34 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
                     axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
                     d = clamp_cone(axis, cone["half_angle"], d)
             elif cone["node"] == k - 1:
+                d = clamp_cone(cone_axis(cone, carrier, pose, normal, nodes), cone["half_angle"], d)
+        if norm(sub(d, start)) <= UNMOVED * norm(start):
+            break
+    return d
+
+
+@routine
+def restrict_step_inward(
+    plan: Plan, branch: Records, k: int, carrier: Floats, pose: Floats, nodes: Floats, d: Vec
+) -> Vec:
+    """Turn the step `d` from node k+1 to node k until the cones at both ends, and a plane of the platform, allow it.
+
+    A cone at node k is fixed to what the pass has not come to, carrier or link: its present axis counts.
+    """
+    normal = turn(carrier, vec(branch["normal"]))
+    at_end = k + 1 == branch["last"]
+    for _sweep in range(SWEEPS):
+        start = d
+        for c in range(branch["cone_first"], branch["cone_last"]):
+            cone = plan.cones[c]
+            if cone["kind"] != PLATFORM_CONE and cone["node"] == k:
+                axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
+                d = clamp_cone(axis, cone["half_angle"], d)
+        if at_end and branch["end_plane"] == 1:
+            d = flatten(d, turn(pose, vec(branch["end_normal"])))
+        for c in range(branch["cone_first"], branch["cone_last"]):
+            cone = plan.cones[c]
+            if cone["kind"] == PLATFORM_CONE and at_end:
                 d = clamp_cone(cone_axis(cone, carrier, pose, normal, nodes), cone["half_angle"], d)
         if norm(sub(d, start)) <= UNMOVED * norm(start):
             break

@@ -63,6 +63,7 @@ def new_configuration(plan: Plan) -> Configuration:
         np.zeros((plan.trunks.shape[0] + 1, 3, 4)),
         np.zeros((plan.trunk_joints.shape[0], 2, 3)),
         np.zeros((plan.branches.shape[0], 3)),
+        np.zeros(plan.branches.shape[0], np.int64),
         np.zeros((unknowns, unknowns + 1)),
     )
 

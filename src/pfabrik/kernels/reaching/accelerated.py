@@ -1,0 +1,296 @@
+"""The kernel of P-FABRIK with exact meetings and half-spaces.
+
+A pass of a chain whose trunk carries several branches: every branch asks for half-spaces, the trunk takes the least
+step that answers all of them, and the branches reach outward again. Where targets are not reached, the target itself is
+the trunk of all chains: it takes the least step, from where it is pulled back towards what was asked for.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...arrays import Floats
+from .._jit import routine, search
+from ..legs.complete_poses import orthonormalise, turn_pose
+from ..quaternions import difference
+from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
+from .fit import turn_to_fit
+from .half_spaces import PLATFORM, Asks, ask_for_branch, ask_for_ranges, dot_of, least_step, new_asks, open_asks
+from .meet import reach_end
+from .moving_frames import move_carriers
+from .plan import SLIDE, TRANSLATES, TURN, TURNS, Configuration, PassResults, Plan, Seeds, Settings
+from .solve import load_seed, move_to_centroid, new_configuration, write_row
+
+# Passes of a trunk from one start; how many in a row may fail to leave this share of the excess, first and, where no
+# start succeeds, again.
+PASSES, HASTY, PATIENT, TAKEN_OFF = 16, 2, 5, 0.7
+# Trunks aim this far inside limits [L], tour by tour, less by this factor from pass to pass, so that passes end; the
+# last tours find what is too small to have an inside.
+MARGINS, SHRINK = (0.04, 0.04, 0.0, 0.0), 0.6
+# Longest step of a trunk or a target [L], for which half-spaces are trusted.
+LONGEST = 0.4
+# Other starts of a trunk, tour by tour: this share of each joint's range from either end; where a range is open, so far
+# from home [rad or L]. Of more than so many joints the last rest.
+INSIDE, OPEN, VARIED = (0.15, 0.15, 0.15, 0.35), 0.5, 3
+# Targets are pulled back by this share of their distance, or by so much [L]; less where steps turn back.
+PULL, FARTHEST, WEAKER = 0.5, 0.3, 0.5
+# Steps of trunks cost less than the target's by the square of this.
+CHEAP = 5.0
+# Limits that are kept by less than this [L] count for the target's step; it settles below this share of its distance.
+WINDOW, SETTLED = 0.5, 1e-3
+# A descent is lost where its excess stays above this [L] and does not fall to this share in so many rounds.
+LOST, LOST_ROUNDS = 1e-3, 10
+# Rounds after which a target that does not settle is pulled no more.
+PULLED = 120
+# Rounds that close what a settled target leaves open; then chains' ends agree on their centroid.
+CLOSING = 12
+
+
+@routine
+def ask_for_chain(plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks) -> float:
+    """Add what the branches of a chain ask for, and the ranges of its trunk; the largest excess."""
+    gap, trunk = 0.0, plan.chains[c]["trunk"]
+    for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
+        gap = max(gap, ask_for_branch(plan, b, config, settings, asks))
+    if trunk >= 0:
+        ask_for_ranges(plan, plan.trunks[trunk]["first"], plan.trunks[trunk]["last"], config, asks)
+    return gap
+
+
+@routine
+def move_trunk(plan: Plan, trunk: int, config: Configuration, asks: Asks, share: float) -> None:
+    """Move the joints of a trunk by a share of the step, within their ranges; carriers do not follow yet."""
+    for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
+        joint = plan.trunk_joints[j]
+        unit = plan.length if joint["kind"] == SLIDE else 1.0
+        value = config.trunks[j] + share * unit * asks.goal[2] * asks.x[asks.frame[2] + j]
+        config.trunks[j] = min(max(value, joint["lo"]), joint["hi"])
+
+
+@routine
+def reach_from_start(
+    plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks, tour: int
+) -> tuple[float, int]:
+    """Passes of a chain from where its trunk is; the largest excess that is left, and how many."""
+    trunk = plan.chains[c]["trunk"]
+    first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
+    best, stalled, margin, patience = math.inf, 0, MARGINS[tour] * plan.length, HASTY if tour == 0 else PATIENT
+    for n in range(PASSES + 1):
+        asks.goal[0] = margin
+        asks.goal[1] = margin
+        asks.goal[2] = 1.0
+        open_asks(asks, last - first, -first, 0)
+        gap = ask_for_chain(plan, c, config, settings, asks)
+        stalled = 0 if gap < TAKEN_OFF * best else stalled + 1
+        best = min(best, gap)
+        if gap <= 0.5 * settings.enough or stalled == patience or n == PASSES:
+            return gap, n
+        for i in range(last - first):
+            asks.x[i] = 0.0
+        least_step(asks)
+        size = math.sqrt(dot_of(asks.x, asks.x, last - first))
+        move_trunk(plan, trunk, config, asks, min(1.0, LONGEST / max(size, 1e-300)))
+        move_carriers(plan, config)
+        margin *= SHRINK
+    return best, PASSES
+
+
+@routine
+def start_trunk(plan: Plan, trunk: int, config: Configuration, start: int, inside: float) -> None:
+    """Put the joints of a trunk near corner `start` of their ranges, by a share of these inside."""
+    first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
+    for j in range(first, min(last, first + VARIED)):
+        joint, end = plan.trunk_joints[j], 1.0 if (start >> (j - first)) & 1 else -1.0
+        step = OPEN if joint["kind"] == TURN else OPEN * plan.length
+        lo, hi = max(joint["lo"], -step), min(joint["hi"], step)
+        if joint["lo"] > -math.inf and joint["hi"] < math.inf:
+            lo, hi = joint["lo"], joint["hi"]
+        config.trunks[j] = 0.5 * (lo + hi) + end * (0.5 - inside) * (hi - lo)
+    move_carriers(plan, config)
+
+
+@routine
+def reach_with_trunk(plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks) -> tuple[float, int]:
+    """Passes of a chain with a trunk, from other starts too where one is caught; the excess left, and how many."""
+    trunk = plan.chains[c]["trunk"]
+    first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
+    gap, passes = reach_from_start(plan, c, config, settings, asks, 0)
+    corners = 1 << min(last - first, VARIED)
+    for start in range(len(INSIDE) * corners):
+        if gap <= 0.5 * settings.enough:
+            break
+        start_trunk(plan, trunk, config, start, INSIDE[start // corners])
+        gap, more = reach_from_start(plan, c, config, settings, asks, start // corners)
+        passes += more
+    return gap, max(passes, 1)
+
+
+@routine
+def reach_ends(plan: Plan, config: Configuration, settings: Settings) -> tuple[float, int]:
+    """Bring the ends of all branches to the present pose; the largest gap, and the most passes."""
+    worst, most = 0.0, 1
+    for b in range(plan.branches.shape[0]):
+        gap, passes = reach_end(plan, b, config, move(config.pose, vec(plan.branches[b]["end"])), settings)
+        worst, most = max(worst, gap), max(most, passes)
+    return worst, most
+
+
+@routine
+def reach_pose(plan: Plan, config: Configuration, settings: Settings, asks: Asks) -> tuple[float, int]:
+    """Passes of all chains towards the present pose; the largest gap of an end, and the most passes of a chain."""
+    passes = 1
+    for c in range(plan.chains.shape[0]):
+        if plan.chains[c]["trunk"] >= 0:
+            gap, more = reach_with_trunk(plan, c, config, settings, asks)
+            passes = max(passes, more)
+            if gap > settings.enough:
+                return gap, passes
+    gap, more = reach_ends(plan, config, settings)
+    return gap, max(passes, more)
+
+
+@routine
+def pull_back(
+    config: Configuration, target: Floats, settings: Settings, asks: Asks, pull: float, length: float
+) -> float:
+    """Set x to the target's way back to what was asked for; the distance [length]."""
+    x, far = asks.x, 0.0
+    for i in range(asks.frame[1]):
+        x[i] = 0.0
+    if settings.free & TRANSLATES:
+        for i in range(3):
+            x[i] = (target[i, 3] - config.pose[i, 3]) / length
+    if settings.free & TURNS:
+        difference(target, config.pose, x[3:6])
+        for i in range(3, 6):
+            x[i] *= settings.lever / length
+    far = math.sqrt(dot_of(x, x, PLATFORM))
+    share = min(pull, FARTHEST / max(far, 1e-300))
+    for i in range(PLATFORM):
+        x[i] *= share
+    return far
+
+
+@routine
+def move_all(plan: Plan, config: Configuration, settings: Settings, asks: Asks, share: float) -> None:
+    """Move the target and all trunks by a share of the step."""
+    if settings.free & TURNS:
+        turn_pose(config.pose, scale(share * plan.length / settings.lever, vec(asks.x[3:6])))
+        orthonormalise(config.pose)
+    if settings.free & TRANSLATES:
+        for i in range(3):
+            config.pose[i, 3] += share * plan.length * asks.x[i]
+    for trunk in range(plan.trunks.shape[0]):
+        move_trunk(plan, trunk, config, asks, share)
+    move_carriers(plan, config)
+
+
+@routine
+def settle(plan: Plan, config: Configuration, target: Floats, settings: Settings, asks: Asks) -> tuple[float, int]:
+    """Move the target, and all trunks, to where all chains reach it, as near as it can be; the gap and the rounds.
+
+    From where they are: every round pulls the target back and answers what branches ask for; once steps are small, the
+    last rounds only answer.
+    """
+    pull, closing, n = PULL, 0, PLATFORM + plan.trunk_joints.shape[0]
+    for b in range(plan.branches.shape[0]):
+        put(asks.normals[b], (0.0, 0.0, 0.0))
+    last_step, least, since, rounds = (0.0, 0.0, 0.0), math.inf, 0, 0
+    while rounds < settings.max_rounds and closing < CLOSING:
+        rounds += 1
+        asks.goal[0] = 0.0
+        asks.goal[1] = WINDOW * plan.length
+        asks.goal[2] = CHEAP
+        asks.goal[3] = settings.lever
+        open_asks(asks, n, PLATFORM, settings.free)
+        gap = 0.0
+        for c in range(plan.chains.shape[0]):
+            gap = max(gap, ask_for_chain(plan, c, config, settings, asks))
+        if closing > 0 and gap <= 0.5 * settings.enough:
+            break
+        since = 0 if gap < TAKEN_OFF * least else since + 1
+        least = min(least, gap)
+        if gap > LOST * plan.length and since > LOST_ROUNDS:
+            break
+        far = pull_back(config, target, settings, asks, 0.0 if closing > 0 else pull, plan.length)
+        least_step(asks)
+        size, step = math.sqrt(dot_of(asks.x, asks.x, PLATFORM)), vec(asks.x)
+        if dot(step, last_step) < -0.25 * dot(last_step, last_step):
+            pull *= WEAKER
+        last_step = step
+        move_all(plan, config, settings, asks, min(1.0, LONGEST / max(size, 1e-300)))
+        if closing > 0 or size <= SETTLED * far or rounds >= PULLED:
+            closing += 1
+    gap, _passes = reach_ends(plan, config, settings)
+    return gap, rounds
+
+
+@routine
+def distance_from(config: Configuration, target: Floats, settings: Settings, asks: Asks, length: float) -> float:
+    """Distance of the pose from what was asked for [L], turns as they count beside it."""
+    return pull_back(config, target, settings, asks, 0.0, length)
+
+
+@routine
+def project_target(
+    plan: Plan, config: Configuration, target: Floats, seeds: Seeds, row: int, settings: Settings, asks: Asks
+) -> tuple[float, int, int]:
+    """Move a target that is not reached to a nearest pose that is; the largest gap, passes and rounds.
+
+    From the target itself; where a trunk moves, or that settles nowhere, from the seed too, and the nearer counts. If
+    neither settles, ends agree on their centroid, as in the paper.
+    """
+    gap, passes = reach_pose(plan, config, settings, asks)
+    if gap <= settings.enough or settings.max_rounds == 0:
+        return gap, passes, 0
+    load_seed(plan, seeds, row, config)
+    copy_table(target, config.pose)
+    gap, rounds = settle(plan, config, target, settings, asks)
+    if gap > settings.enough or plan.trunks.shape[0] > 0:
+        far = distance_from(config, target, settings, asks, plan.length) if gap <= settings.enough else math.inf
+        copy_table(config.pose, asks.pose)
+        copy_row(config.trunks, asks.trunks)
+        load_seed(plan, seeds, row, config)
+        start_at_target(config, target, settings)
+        other_gap, more = settle(plan, config, target, settings, asks)
+        rounds += more
+        other = distance_from(config, target, settings, asks, plan.length)
+        if far <= other or other_gap > settings.enough:
+            copy_table(asks.pose, config.pose)
+            copy_row(asks.trunks, config.trunks)
+            move_carriers(plan, config)
+            other_gap, _passes = reach_ends(plan, config, settings)
+        gap = other_gap
+    while gap > settings.enough and rounds < settings.max_rounds:
+        rounds += 1
+        if settings.free & TRANSLATES:
+            move_to_centroid(plan, config)
+        if settings.free & TURNS:
+            turn_to_fit(plan, config, settings.free == TURNS)
+        gap, _passes = reach_ends(plan, config, settings)
+    return gap, passes + rounds, rounds
+
+
+@routine
+def start_at_target(config: Configuration, target: Floats, settings: Settings) -> None:
+    """Give a pose what its target holds: the orientation, or the position."""
+    for i in range(3):
+        if settings.free & TRANSLATES == 0:
+            config.pose[i, 3] = target[i, 3]
+        if settings.free & TURNS == 0:
+            for j in range(3):
+                config.pose[i, j] = target[i, j]
+
+
+@search
+def solve_by_half_spaces(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, results: PassResults) -> None:
+    """Run passes with exact meetings and half-spaces towards every target, and move targets that are not reached."""
+    config, asks = new_configuration(plan), new_asks(plan)
+    for i in range(targets.shape[0]):
+        load_seed(plan, seeds, i, config)
+        copy_table(targets[i], config.pose)
+        gap, iterations, rounds = project_target(plan, config, targets[i], seeds, i, settings, asks)
+        write_row(plan, i, config, results)
+        results.gaps[i] = gap
+        results.iterations[i] = iterations
+        results.rounds[i] = rounds
