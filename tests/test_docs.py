@@ -128,6 +128,8 @@ def test_the_page_of_python_names_everything_public() -> None:
 @pytest.mark.parametrize("program", sorted(ROOT.glob("examples/tasks/*.py")), ids=lambda program: program.stem)
 def test_the_page_of_a_task_is_what_its_program_prints(program: Path) -> None:
     """Each is run in an empty folder; `python docs/pages.py` writes the pages and their pictures."""
+    if '"cc"' in program.read_text(encoding="utf-8") and shutil.which("cc") is None:
+        pytest.skip("the page shows what compiled C prints, and there is no compiler")
     page = runpy.run_path(str(ROOT / "docs" / "pages.py"))["page_of"](program)
     written = ROOT / "docs" / "tasks" / f"{program.stem}.md"
     assert page.text == written.read_text(encoding="utf-8")
@@ -135,7 +137,7 @@ def test_the_page_of_a_task_is_what_its_program_prints(program: Path) -> None:
 
 
 def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) -> None:
-    (text,) = blocks(FORMAT, "toml")
+    text = blocks(FORMAT, "toml")[0]
     (tmp_path / "hexapod.toml").write_text(text, encoding="utf-8")
     chains = pf.decompose(pf.load(tmp_path / "hexapod.toml"))
     assert [str(chain) for chain in chains] == ["R*-S-S"] * 6
@@ -143,7 +145,7 @@ def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_the_worked_example_prints_what_the_page_shows(folder: Path) -> None:
-    (text,) = blocks(FORMAT, "toml")
+    text = blocks(FORMAT, "toml")[0]
     shown = [block.partition("\n") for block in blocks(FORMAT, "") if block.startswith("$ pfabrik ")]
     assert len(shown) == 4
     for line, _, expected in shown:
@@ -155,6 +157,20 @@ def test_the_worked_example_prints_what_the_page_shows(folder: Path) -> None:
         assert without_noise(found) == without_noise(expected), line
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("folder")
+def test_the_first_five_minutes_print_what_the_page_shows() -> None:
+    """All in one folder, one command after the other."""
+    pytest.importorskip("matplotlib")
+    shown = [
+        block.partition("\n") for block in blocks(ROOT / "docs" / "start.md", "") if block.startswith("$ pfabrik ")
+    ]
+    assert len(shown) > 3
+    for line, _, expected in shown:
+        done = pfabrik(line.removeprefix("$ "))
+        assert without_noise(done.stdout + done.stderr) == without_noise(expected), line
+
+
 def misspelt(text: str) -> str:
     """The example with the two faults that the page describes."""
     return text.replace('name = "TopR"', 'name = "TopL"').replace('["rodR", "platform"]', '["rodR", "platfrom"]')
@@ -164,10 +180,42 @@ def without_noise(text: str) -> list[str]:
     return [line.rstrip() for line in text.splitlines() if not line.startswith(NOISE)]
 
 
+def linked_from(page: Path) -> set[Path]:
+    """The files that a page has links to."""
+    return {(page.parent / link.partition("#")[0]).resolve() for link in LINK.findall(page.read_text(encoding="utf-8"))}
+
+
 def test_the_readme_leads_to_every_page() -> None:
-    readme = ROOT / "README.md"
-    linked = {(ROOT / link).resolve() for link in LINK.findall(readme.read_text(encoding="utf-8"))}
+    """By a link of its own, or by the map that it has a link to."""
+    index = ROOT / "docs" / "index.md"
+    linked = linked_from(ROOT / "README.md")
+    assert index in linked
+    linked |= linked_from(index)
     assert [page.name for page in ROOT.glob("docs/*.md") if page.resolve() not in linked] == []
+
+
+COMING_FROM = ROOT / "docs" / "coming-from.md"
+SECTIONS = COMING_FROM.read_text(encoding="utf-8").split("\n## ")[1:]
+ASKS = re.compile(r"`((?:pf|answer|machine)\.[^`]*)`")
+"""A line of code in a table."""
+OPENS = ("pf.interop.from_urdf(", "pf.view(")
+"""Lines that want a file, or open a window."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", SECTIONS, ids=[section.partition("\n")[0] for section in SECTIONS])
+@pytest.mark.usefixtures("folder")
+def test_lines_for_those_who_come_from_elsewhere_run(section: str) -> None:
+    """Those in the last column, after the block above the table; not those with dots or with arguments left out."""
+    (code,) = re.findall(r"^```python\n(.*?)^```$", section, re.DOTALL | re.MULTILINE)
+    namespace: dict[str, object] = {"__name__": "__main__"}
+    exec(compile(code, "<block>", "exec"), namespace)
+    cells = re.findall(r"^\| .* \| (.*) \|$", section, re.MULTILINE)
+    lines = [line for cell in cells for line in ASKS.findall(cell)]
+    lines = [line for line in lines if "..." not in line and not line.startswith(OPENS)]
+    assert lines
+    for line in lines:
+        eval(line, namespace)
 
 
 @pytest.mark.slow

@@ -1,0 +1,71 @@
+"""The paper's method and the default, side by side.
+
+For readers of the P-FABRIK paper. You learn how to ask for the method as it was published, how its answers differ
+from those of the default, and on which targets.
+"""
+
+# `Options.paper()` is the method with the paper's constants: up to K = 100 passes over all chains, a tolerance E = 0.01
+# mm, and a target that is moved to where the chains' ends agree until all of them reach it. The default solves legs in
+# closed form where one exists, and finds the nearest feasible pose by optimisation where a target is out of reach.
+import numpy as np
+
+import pfabrik as pf
+
+paper = pf.Options.paper()
+print(paper)
+machines = {name: pf.load(name) for name in ("five_bar", "stewart")}
+
+# ## Targets within reach
+#
+# Poses that are reached for certain: those of random actuator values, by forward kinematics. Both methods get the same
+# ones.
+
+
+def reachable(machine: pf.Mechanism, count: int) -> np.ndarray:
+    """Poses of a machine within all of its limits, at random."""
+    random = np.random.default_rng(1)
+    home = pf.solve_ik(machine, machine.home_pose).actuators
+    spread = 0.25 if "p1" in machine.actuator_names else 20.0  # [rad] for the cranks, [mm] for the struts
+    poses = pf.solve_fk(machine, home + random.uniform(-spread, spread, (count, len(home))))
+    return poses.pose[poses.status == pf.Status.REACHED]
+
+
+for name, machine in machines.items():
+    targets = reachable(machine, 200)
+    for label, options in (("paper", paper), ("default", None)):
+        answers = pf.solve_ik(machine, targets, options=options)
+        reached = np.mean(answers.status == pf.Status.REACHED)
+        print(
+            f"{name:8}  {label:7}  reached {reached:4.0%}, passes {np.mean(answers.iterations):.1f}, "
+            f"farthest from its target {answers.position_error.max():.4f} mm"
+        )
+
+# Passes are those of the paper's method. The default made none: the legs of both machines have closed forms.
+
+# ## Targets out of reach
+#
+# Both answers are poses that the machine can take: loops closed, limits kept. The paper's is where the chains' ends
+# agree; the default's is the nearest.
+away = {"five_bar": [0, 40, 300], "stewart": pf.pose([60, 20, 290], rpy=[0, 10, 0], degrees=True)}
+for name, machine in machines.items():
+    for label, options in (("paper", paper), ("default", None)):
+        each = pf.solve_ik(machine, away[name], options=options)
+        print(f"{name:8}  {label:7}  {each.status.name}, {each.position_error:.2f} mm away")
+
+# One target proves nothing. So take 100 of them at random, and compare distances: 1 means as near as the default.
+random = np.random.default_rng(2)
+for name, machine in machines.items():
+    offsets = random.normal(size=(100, 3)) * ([0, 1, 1] if name == "five_bar" else 1)
+    offsets *= 1.5 * machine.characteristic_length / np.linalg.norm(offsets, axis=1, keepdims=True)
+    targets = machine.home_pose[:3, 3] + offsets
+    by_paper, nearest = pf.solve_ik(machine, targets, options=paper), pf.solve_ik(machine, targets)
+    is_out = (nearest.status == pf.Status.PROJECTED) & (by_paper.status == pf.Status.PROJECTED)
+    ratio = (by_paper.position_error / nearest.position_error)[is_out]
+    print(f"{name}: {is_out.sum()} of {len(targets)} out of reach for both; paper's distance / nearest:")
+    print(f"    median {np.median(ratio):.2f}, 95 % below {np.quantile(ratio, 0.95):.2f}")
+
+# ## Which one to use
+#
+# The default, unless you want to study or compare with the paper. `Options(projection="centroid")` combines the
+# default's accuracy with the paper's projection. Times are not shown here, as they differ from computer to computer:
+# `make reproduce` runs all experiments of the paper and measures them ([reproduction](../reproduction.md)).
