@@ -187,7 +187,7 @@ def closed(name: str) -> tuple[Mechanism, np.ndarray]:
 
 def answer(machine: Mechanism, q: np.ndarray, shape: tuple[int, ...]) -> Solution:
     """Joint coordinates as an answer, with nothing measured of them."""
-    return Solution(machine, Configurations(new_rows(machine, len(q)), q), shape)
+    return Solution(machine, Configurations(new_rows(model_of(machine), len(q)), q), shape)
 
 
 def home(machine: Mechanism) -> np.ndarray:
@@ -431,7 +431,10 @@ class TestJacobiansOfLegs:
 
     @pytest.mark.parametrize("name", ["delta", "hexaglide", "rrr", "servo_hexapod"])
     def test_at_dead_points_and_next_to_them_they_are_those_of_joint_coordinates(self, name):
-        """Far targets stretch a leg out; from there inward, its slopes grow until they are lost."""
+        """Far targets stretch a leg out; from there inward, its slopes grow until they are lost.
+
+        A share of 1e-12 from there slopes are a million, and keep ten digits.
+        """
         machine = pf.load(name).without_limits()
         center = machine.home_pose[:3, 3]
         aside = machine.characteristic_length * (X if name == "rrr" else Z)
@@ -442,8 +445,8 @@ class TestJacobiansOfLegs:
         solution = pf.solve_ik(machine, targets)
         forward, inverse = forward_jacobian(solution), inverse_jacobian(solution)
         q = solution._coordinates
-        assert off(machine, forward, forward_map(model_of(machine), q), forward=True).max() < 1e-11
-        assert off(machine, inverse, inverse_map(model_of(machine), q), forward=False).max() < 1e-11
+        assert off(machine, forward, forward_map(model_of(machine), q), forward=True).max() < 1e-10
+        assert off(machine, inverse, inverse_map(model_of(machine), q), forward=False).max() < 1e-10
         assert inverse_map(model_of(machine), q)[-1] == pytest.approx(inverse[-1], abs=0)
 
     def test_a_strut_along_the_outer_hinge_of_its_universal_joint_loses_a_freedom(self):
@@ -636,7 +639,7 @@ class TestSingularity:
         assert np.linalg.norm(inverse) < 10
         assert inverse @ [np.cos(2.4), np.sin(2.4), 0] == pytest.approx([0, 0], abs=1e-9)
         aligned = five_bar(0.4, 0.4 + np.pi, 1.0)
-        forward = forward_map(aligned, home(aligned))[0]
+        forward = forward_map(model_of(aligned), home(aligned))[0]
         assert np.linalg.norm(forward) < 10
         assert forward.T @ [-np.sin(0.4), np.cos(0.4), 0] == pytest.approx([0, 0], abs=1e-9)
 
