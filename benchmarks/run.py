@@ -15,6 +15,7 @@ import numpy as np
 
 import pfabrik as pf
 from calls import calls
+from chains import chain_rows
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from in_c import IS_THERE, InC
@@ -71,7 +72,8 @@ on joint positions; a delta has no other way than exactly. Kernels of passes lea
 accelerated passes have exact meetings and half-spaces (docs/p-fabrik.md). Newton's method in NumPy
 (benchmarks/newton.py) knows the hexapod, solves six equations in the pose for whole batches at a time, and looks at
 no passive joint and no limit; forward kinematics here closes all loops in all joint coordinates, and measures limits.
-Starts are answers up to 0.01 L and 0.01 rad away. PlaCo is a C++ solver of tasks with closed loops
+Starts are answers up to 0.01 L and 0.01 rad away. Targets of chains are those of smooth bends, and the same 1.5 reaches
+farther out; the engine in joint coordinates answers a few of them. PlaCo is a C++ solver of tasks with closed loops
 (benchmarks/in_placo.py); its rows are left out where it is not installed, as are those of the viewer without headless
 Chromium. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes
 are for all of it, not for a pose; first answers count the processor's time. The viewer's motions are timed in a page
@@ -209,6 +211,7 @@ def main() -> None:
         *forward(rng, runs, 200 if given.quick else 2000),
         *joint_coordinates(rng, runs, 200 if given.quick else 2000),
         *closed_chains(rng, runs, 100 if given.quick else 1000),
+        *chain_rows(rng, runs, 100 if given.quick else 1000),
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),
         *viewer(min(runs, 5)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,14 @@ from PIL import Image
 
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
+from pfabrik.chains.serial_chain import is_chain
 from pfabrik.model import model_of
 from pfabrik.view.canvas import new_axes
 from pfabrik.view.plane import plane_of
 
 PAGE = Path(__file__).with_suffix(".md")
 PICTURES = PAGE.parent / "pictures"
+MANY = 12  # joints of a chain from which equal ones are counted
 COLOURS = 64  # of a picture: enough for smooth edges, and a third of the file
 HEAD = """# Mechanisms of the catalogue
 
@@ -62,7 +65,7 @@ def section(name: str) -> str:
         "mobility": mobility(pf.mobility(mechanism)),
         "sub-chains": sub_chains(mechanism),
         "engine": engine(mechanism),
-        "actuators": ", ".join(f"`{actuator}`" for actuator in mechanism.actuator_names),
+        "actuators": actuators(mechanism.actuator_names),
         "task": " ".join(mechanism.task),
     }
     lines = [
@@ -74,6 +77,12 @@ def section(name: str) -> str:
         *[f"| {key} | {fact} |" for key, fact in facts.items()],
     ]
     return "\n".join(lines) + "\n"
+
+
+def actuators(names: Sequence[str]) -> str:
+    """The names of actuators; of many the first, the second and the last."""
+    shown = [f"`{name}`" for name in names]
+    return ", ".join(shown if len(shown) <= 2 * MANY else [*shown[:2], "...", shown[-1]])
 
 
 def header(name: str) -> list[str]:
@@ -91,8 +100,14 @@ def mobility(counted: pf.Mobility) -> str:
 
 def sub_chains(mechanism: pf.Mechanism) -> str:
     """The distinct sub-chains, how often each occurs, and how long the rods of its parallelograms are."""
-    counts = Counter((str(chain), rods(chain, mechanism)) for chain in pf.decompose(mechanism))
+    counts = Counter((short(str(chain)), rods(chain, mechanism)) for chain in pf.decompose(mechanism))
     return ", ".join(f"{count} × `{notation}`{rods}" for (notation, rods), count in counts.items())
+
+
+def short(notation: str) -> str:
+    """A sub-chain's notation; of many equal joints one, and how many."""
+    joints = notation.split("-")
+    return notation if len(joints) <= MANY or len(set(joints)) > 1 else f"{joints[0]}-... ({len(joints)} times)"
 
 
 def rods(chain: pf.SubChain, mechanism: pf.Mechanism) -> str:
@@ -104,8 +119,10 @@ def rods(chain: pf.SubChain, mechanism: pf.Mechanism) -> str:
 
 def engine(mechanism: pf.Mechanism) -> str:
     """The engine that answers first, and why it is not the quick one."""
-    reason = model_of(mechanism).why_no_legs
-    return f"closure, without closed forms: {reason}" if reason else "legs"
+    model = model_of(mechanism)
+    if not model.why_no_legs:
+        return "legs"
+    return "chains" if is_chain(model) else f"closure, without closed forms: {model.why_no_legs}"
 
 
 def picture(name: str) -> Path:

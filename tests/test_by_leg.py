@@ -27,6 +27,7 @@ MODES = {
     "linear_delta": 8,
     "nrpm": None,  # redundant
     "orthoglide": 8,
+    "panda": None,  # one chain, driven seven times
     "prr": 8,
     "prs": 8,
     "psu": 8,
@@ -36,6 +37,7 @@ MODES = {
     "rrr": 8,
     "serial_arm": None,  # one leg, driven four times
     "servo_hexapod": 64,
+    "snake60": None,  # one chain, driven sixty times
     "stewart": 1,
     "tricept": 2,
     "ucu": 1,

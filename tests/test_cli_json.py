@@ -41,7 +41,7 @@ def test_info_gives_what_the_library_knows_with_angles_in_radians(name: str) -> 
     assert found["mobility"]["platform"] == pf.mobility(mechanism).platform
     assert found["mobility"]["redundancy"] == pf.mobility(mechanism).redundancy
     assert [chain["notation"] for chain in found["sub_chains"]] == [str(chain) for chain in pf.decompose(mechanism)]
-    assert {chain["engine"] for chain in found["sub_chains"]} <= {"reaching", "closure", "legs"}
+    assert {chain["engine"] for chain in found["sub_chains"]} <= {"reaching", "closure", "chains", "legs"}
     for shown, joint in zip(found["joints"], mechanism.joints, strict=True):
         assert (shown["name"], shown["type"], shown["actuated"]) == (joint.name, joint.type, joint.actuated)
         assert np.ravel(shown["home"]) == pytest.approx(np.ravel(mechanism.home_coordinate(joint.name)))

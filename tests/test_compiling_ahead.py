@@ -56,6 +56,9 @@ def test_kernels_with_scratch_memory_of_their_caller_cannot_allocate() -> None:
         "close",
         "nearest_configuration",
         "first_order",
+        "walk_chains",
+        "reach_in_chains",
+        "nearest_in_chains",
         "jacobians",
     }
 

@@ -34,7 +34,12 @@ PRECISIONS = {"double": 1e-12, "float": 1e-5}
 ROUNDED = 1e-6
 """How far a pose is off in single precision after some ten roundings [L or rad]."""
 
-REFUSED = {"nrpm": "poses leave joints A1, B1", "H4": "singular at home, where joints Q1, Q2"}
+REFUSED = {
+    "nrpm": "poses leave joints A1, B1",
+    "H4": "singular at home, where joints Q1, Q2",
+    "panda": "a joint between the ends of its rod",
+    "snake60": "a joint between the ends of its rod",
+}
 """Machines that have no code, and what the refusal says."""
 
 CATALOGUE = [name for name in pf.catalog() if name not in REFUSED]

@@ -9,8 +9,10 @@ from click.testing import CliRunner
 
 import pfabrik as pf
 from machines import MACHINES
+from pfabrik.chains.chain_engine import ChainEngine
 from pfabrik.cli import main
 from pfabrik.cli.info import chain_table, clean, vector
+from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.decompose import beyond_positions
 from pfabrik.engine import engine_of as answering_engine
 from pfabrik.platform.legs_engine import LegsEngine
@@ -46,7 +48,8 @@ def test_lengths_are_cleaned_relative_to_the_machine() -> None:
 def test_the_engine_shown_is_the_one_that_answers(name: str) -> None:
     mechanism = pf.load(name)
     engine = answering_engine(mechanism)
-    expected = "legs" if isinstance(engine, LegsEngine) else "closure"
+    kinds = {LegsEngine: "legs", ChainEngine: "chains", ClosureEngine: "closure"}
+    expected = kinds[type(engine)]
     lines = chain_table(mechanism).splitlines()[1:]
     assert {re.split(r" {2,}", line.strip())[2] for line in lines} == {expected}
 
@@ -56,7 +59,7 @@ def test_an_engine_is_told_with_the_reason() -> None:
     whole = MACHINES["tripod_rps"]()
     assert chain_table(whole).endswith("3  R-P*-S     legs    closed forms; closure where they do not reach")
     assert "legs    closed forms; closure where they do not reach" in printed("nrpm")
-    assert "closure  no closed forms: sub-chain R*-R*-R*-R*-R: " in chain_table(MACHINES["serial_planar"]())
+    assert "chains  no loops, no closed form; closure where" in chain_table(MACHINES["serial_planar"]())
     axes = [(0.0, 0.0, 1.0), (0.0, 1.0, 0.2), (1.0, 0.3, 0.1), (0.2, 1.0, 0.4), (1.0, 0.1, 0.6), (0.3, 0.2, 1.0)]
     bodies = ["base", "one", "two", "three", "four", "five", "platform"]
     arm = [

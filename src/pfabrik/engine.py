@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from .chains.chain_engine import ChainEngine
+from .chains.serial_chain import is_chain
 from .closure.closure_engine import ClosureEngine
 from .closure.engine_contract import Engine, InverseEngine
 from .decomposition.decompose import positions_express
@@ -14,7 +16,10 @@ from .reaching.solve import ReachingEngine
 
 
 def engine_of(mechanism: Mechanism) -> Engine:
-    """The engine that solves a mechanism: closed forms if every chain is a leg that has one, else joint coordinates."""
+    """The engine that solves a mechanism: closed forms if every chain is a leg that has one, else joint coordinates.
+
+    Of a mechanism without loops these are solved in time linear in the number of joints.
+    """
     return _engine(model_of(mechanism))
 
 
@@ -30,7 +35,9 @@ def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Inverse
 
 @derived
 def _engine(model: Model) -> Engine:
-    return LegsEngine(model) if model.has_legs else ClosureEngine(model)
+    if model.has_legs:
+        return LegsEngine(model)
+    return ChainEngine(model) if is_chain(model) else ClosureEngine(model)
 
 
 @derived

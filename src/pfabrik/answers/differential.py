@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, shaped
+from ..chains.chain_jacobians import forward_of_chain, inverse_of_chain, is_driven_chain
 from ..closure.configurations import Configurations
 from ..closure.first_order import singularities
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -37,7 +38,10 @@ def forward_jacobian(solution: Solution) -> Floats:
     far as possible. At a type 2 singularity no such map exists: the direction gained is left out (see `singularity`).
     INVALID rows are NaN.
     """
-    forward: Floats = shaped(forward_map(*_of(solution)), solution.shape)
+    model, found = _of(solution)
+    by_chain = is_driven_chain(model)
+    maps = forward_of_chain(model, found.coordinates) if by_chain else forward_map(model, found)
+    forward: Floats = shaped(maps, solution.shape)
     return forward
 
 
@@ -50,7 +54,10 @@ def inverse_jacobian(solution: Solution) -> Floats:
     nearest it can, and of all actuator rates that make a twist, the smallest are given. At a type 1 singularity the
     direction lost is left out (see `singularity`). INVALID rows are NaN.
     """
-    inverse: Floats = shaped(inverse_map(*_of(solution)), solution.shape)
+    model, found = _of(solution)
+    by_chain = is_driven_chain(model)
+    maps = inverse_of_chain(model, found.coordinates) if by_chain else inverse_map(model, found)
+    inverse: Floats = shaped(maps, solution.shape)
     return inverse
 
 

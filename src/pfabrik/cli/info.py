@@ -12,6 +12,7 @@ import click
 import pfabrik as pf
 
 from ..answers.aligned_text import aligned
+from ..chains.serial_chain import is_chain
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
@@ -179,13 +180,18 @@ def chain_table(mechanism: pf.Mechanism) -> str:
 
 def shown_engine(mechanism: pf.Mechanism) -> str:
     """The engine that answers first."""
-    return "legs" if model_of(mechanism).has_legs else "closure"
+    model = model_of(mechanism)
+    return "legs" if model.has_legs else "chains" if is_chain(model) else "closure"
 
 
 def why(mechanism: pf.Mechanism) -> str:
     """The reason why an engine answers for a mechanism."""
-    reason = model_of(mechanism).why_no_legs
-    return f"no closed forms: {reason}" if reason else "closed forms; closure where they do not reach"
+    model = model_of(mechanism)
+    if not model.why_no_legs:
+        return "closed forms; closure where they do not reach"
+    if is_chain(model):
+        return "no loops, no closed form; closure where they do not reach"
+    return f"no closed forms: {model.why_no_legs}"
 
 
 def parallelogram_table(mechanism: pf.Mechanism) -> str:

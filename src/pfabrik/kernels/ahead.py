@@ -10,6 +10,8 @@ import numba
 import numpy as np
 
 from ._pipeline import name_of
+from .chains.answer_chains import nearest_in_chains, reach_in_chains, walk_chains
+from .chains.chain_records import ChainAim, ChainAnswers
 from .closure.close import close
 from .closure.descend import nearest_configuration
 from .closure.first_order import PLAN, first_order
@@ -52,6 +54,7 @@ _PASSES = (
 )
 
 _POSE_OBJECTIVE = PoseObjective(*_values("f3 f1 i f f i"))
+_CHAINS = ChainAim(_POSE_OBJECTIVE, *_values("f2 f3 i i i f f")), ChainAnswers(*_values("f2 f3 f1 f1 i1"))
 _ANSWERS = tuple(_values("i f3 f3 f2 i1 f3 f2 f2"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
@@ -69,6 +72,9 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (nearest_pose, tuple(_values("i i i f3 f2 f3 f2 f2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i f2 i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i f3 f3 f2 i f1 i1"))),
+    (walk_chains, (*_values("i i"), _CHAINS[1], np.zeros((0, 0, 0)))),
+    (reach_in_chains, (*_values("i i"), *_CHAINS)),
+    (nearest_in_chains, (*_values("i i"), *_CHAINS)),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
     (join, tuple(_values("i2 i1"))),
     (second_derivatives, tuple(_values("f1 f2 f2"))),

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
+from ..chains.chain_engine import ChainEngine
 from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows
 from ..kernels.rows import REACHED
@@ -42,7 +43,7 @@ Tell = Callable[[int], None]
 class Explorer:
     """The configurations reached so far, and the search for points near them."""
 
-    def __init__(self, engine: ClosureEngine, start: Configurations, pose: Floats, at: Floats) -> None:
+    def __init__(self, engine: ClosureEngine | ChainEngine, start: Configurations, pose: Floats, at: Floats) -> None:
         """Begin with a configuration, moved to a pose (4, 4) at coordinates (d,) [L or rad]."""
         self._engine, self._start = engine, start
         solution = engine.advance(pose[None], start)

@@ -11,6 +11,7 @@ from ..answers.active_limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
+from ..chains.chain_engine import ChainEngine
 from ..closure.closure_engine import ClosureEngine
 from ..configuration import configuration
 from ..description.mechanism import Mechanism
@@ -72,7 +73,9 @@ class MapQuestion:
     def explorer(self) -> Explorer | None:
         """An explorer that begins at the start, where points are solved one by one by the closure engine; else None."""
         engine = engine_of(self.mechanism)
-        if self.has_margins or self.hold == "position" or len(self.turns) > 1 or not isinstance(engine, ClosureEngine):
+        if self.has_margins or self.hold == "position" or len(self.turns) > 1:
+            return None
+        if not isinstance(engine, ClosureEngine | ChainEngine):
             return None
         home = home_coordinates(self.mechanism)
         start = (

@@ -1,0 +1,121 @@
+"""The configuration of a serial chain, and scratch memory of its kernels.
+
+A ball joint's three freedoms are turns about axes chosen anew at every configuration. The screw of a freedom is the
+twist of the end effector per unit rate: velocity of its point, then angular velocity.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ..closure.loops import BALL
+from ..closure.pose_objective import PoseGradient
+from ..references import opener
+from .chain_records import SEEDS, SerialChain
+
+
+class ChainState(NamedTuple):
+    """One configuration, changed in place."""
+
+    q: Floats  # (n,): turns and slides; nothing for the freedoms of balls
+    balls: Floats  # (m, 4): quaternions of ball joints; no rows if there is none, nor a cone
+
+
+class ChainScratch(NamedTuple):
+    """Scratch memory of one thread."""
+
+    state: ChainState
+    best: ChainState
+    saved: ChainState
+    unpulled: ChainState
+    nearest: ChainState
+    start: ChainState  # of the last row that was walked
+    X: Floats  # (3, 4): pose of the end effector
+    start_X: Floats  # (3, 4)
+    nearest_X: Floats  # (3, 4)
+    pulled: Floats  # (4, 4): a target farther out
+    screws: Floats  # (n, 6)
+    centres: Floats  # (n, 3): a point on the axis of each freedom
+    least: Floats  # (n,): bounds of the step of each freedom
+    most: Floats  # (n,)
+    bend: Floats  # (n,): second derivative of an active cone, times its multiplier
+    cones: Floats  # (cones, 5): how the freedoms of a joint near its cone are turned, as of `frame_cone`
+    step: Floats  # (n,)
+    fixed: Ints  # (n,): 1 where the step of a freedom is that to its bound
+    kept: Ints  # (n,): 1 where a least step leaves a freedom where it is
+    force: Floats  # (n,): gradient of the objective in the freedoms
+    gradient: PoseGradient
+    total: Floats  # (6,): force and moment at the end, of objective and multipliers
+    sums: Floats  # (6, 6): of products of screws
+    A: Floats  # (6, 7): system of the held components, or of the rows to reach
+    wanted: Floats  # (6,): by what the held components are to change
+    multipliers: Floats  # (6,): of the held components
+    P: Floats  # (6, 6): second derivatives of the objective, as of `fill_curvature`
+    M: Floats  # (6, 6): those of the cost of the freedoms further out
+    pivots: Floats  # (n,)
+    couplings: Floats  # (n, 6)
+    rests: Floats  # (n, 7): right-hand sides: of the gradient, then of the held components
+    sides: Floats  # (7, 6): sums of these
+    shifts: Floats  # (7, 6): twists of the freedoms further in
+    distances: Floats  # (SEEDS,): of the seeds from a target
+    responses: Floats  # (n, 7): step, or slope of a fixed freedom; then its changes per unit of each multiplier
+
+
+def new_chain_state(chain: SerialChain) -> ChainState:
+    """Allocate a configuration."""
+    has_balls = (chain.kinds == BALL).any() or len(chain.cone_angles) > 0
+    return ChainState(np.zeros(len(chain.lo)), np.zeros((len(chain.kinds) if has_balls else 0, 4)))
+
+
+def new_chain_scratch(chain: SerialChain) -> ChainScratch:
+    """Allocate the memory of one thread."""
+    n = len(chain.lo)
+    return ChainScratch(
+        state=new_chain_state(chain),
+        best=new_chain_state(chain),
+        saved=new_chain_state(chain),
+        unpulled=new_chain_state(chain),
+        nearest=new_chain_state(chain),
+        start=new_chain_state(chain),
+        X=np.zeros((3, 4)),
+        start_X=np.zeros((3, 4)),
+        nearest_X=np.zeros((3, 4)),
+        pulled=np.zeros((4, 4)),
+        screws=np.zeros((n, 6)),
+        centres=np.zeros((n, 3)),
+        least=np.zeros(n),
+        most=np.zeros(n),
+        bend=np.zeros(n),
+        cones=np.zeros((len(chain.cone_angles), 5)),
+        step=np.zeros(n),
+        fixed=np.zeros(n, np.int64),
+        kept=np.zeros(n, np.int64),
+        force=np.zeros(n),
+        gradient=PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
+        total=np.zeros(6),
+        sums=np.zeros((6, 6)),
+        A=np.zeros((6, 7)),
+        wanted=np.zeros(6),
+        multipliers=np.zeros(6),
+        P=np.zeros((6, 6)),
+        M=np.zeros((6, 6)),
+        pivots=np.zeros(n),
+        couplings=np.zeros((n, 6)),
+        rests=np.zeros((n, 7)),
+        sides=np.zeros((7, 6)),
+        shifts=np.zeros((7, 6)),
+        distances=np.zeros(SEEDS),
+        responses=np.zeros((n, 7)),
+    )
+
+
+_TYPES = "i1 f2 f2 i1 i1 f1 f1 f1 f1 f1 i1 f2 f2 f1"
+
+CHAIN = SerialChain._make(np.zeros((2,) * int(each[1]), f"{each[0]}8") for each in _TYPES.split())
+"""A chain of the types that kernels are compiled for."""
+
+open_chain, open_chain_scratch = opener(CHAIN), opener(new_chain_scratch(CHAIN))
+"""Functions that open the `SerialChain` and the `ChainScratch` at the address of a `Handle`."""

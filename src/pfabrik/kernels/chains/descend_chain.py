@@ -1,0 +1,228 @@
+"""The nearest configuration of a chain to a target: Newton's steps within limits that keep the held components."""
+
+from __future__ import annotations
+
+import math
+
+from ...arrays import Floats, Ints
+from .._jit import routine
+from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..closure.pose_objective import pose_gradient
+from ..linear import solve_spd
+from ..quaternions import difference, exponential, rotate_by
+from .chain_records import SerialChain
+from .chain_state import ChainScratch
+from .curvature import fill_curvature, model_change, plan_newton_step
+from .reach_target import largest, reach_target
+from .walk_chain import bound_steps, copy_chain_state, move_chain, walk_chain
+
+LONGEST_STEP = 1.0
+"""Longest step of a freedom [rad or L]."""
+
+SWEEPS = 12
+"""Most times that freedoms are fixed at their bounds and released in one step."""
+
+PULL, PULLED_TURN = 0.1, 0.5
+"""Distance to which a target that is nearer is pulled outwards [L], and the most that this may turn it [rad]."""
+
+ON_BOUND = 1e-12
+"""Distance from a bound at which a freedom counts as on it [rad or L]."""
+
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-10, 1e4
+"""Damping of the Hessian, relative to the square of the longest screw."""
+
+LEAST_PIVOT = 1e-12
+"""Pivot of a Hessian that counts as positive, relative to the same."""
+
+SUFFICIENT, GOOD, EXACT = 0.1, 0.6, 0.1
+"""Share of its predicted reduction by which a step must reduce the objective; share from which damping falls; and
+relative error of the prediction below which it falls fast."""
+
+CONVERGED, FINE, NOTHING = 1e-14, 1e-12, 1e-26
+"""Change of the objective, relative to it, that ends a descent, and below which rounding hides how much a step reduces
+it; and value that counts as zero [L^2]."""
+
+RESTORING, RESTORED = 8, 1e-10
+"""Most steps that restore the held components after a step, and error that they may have [L or rad]."""
+
+
+@routine
+def descend_chain(
+    chain: SerialChain, target: Floats, objective: PoseObjective, s: ChainScratch, closeness: float, most_steps: int
+) -> float:
+    """Descend from `s.state` to a local minimum, left there with its pose in `s.X`; the objective, or infinity.
+
+    It is infinite where the held components cannot be met from here.
+    """
+    state, best = s.state, s.best
+    reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING)
+    value, held = evaluate(chain, target, objective, s)
+    if largest(s.gradient.errors, held) > RESTORED:
+        return math.inf
+    estimate_multipliers(chain, held, s)
+    damping, predicted, is_kept = FIRST_DAMPING, math.inf, True
+    for _ in range(most_steps):
+        if value <= NOTHING or abs(predicted) <= CONVERGED * value or damping > MOST_DAMPING:
+            break
+        if not is_kept:
+            copy_chain_state(best, state)
+            evaluate(chain, target, objective, s)
+            is_kept = True
+        fill_curvature(objective, target, held, 1.0, s)
+        scale = lay_out_step(chain, s)
+        for k in range(held):
+            s.wanted[k] = s.multipliers[k]
+        is_definite = plan_newton_step(chain, held, damping * scale, LEAST_PIVOT * scale, SWEEPS, s)
+        if not is_definite and damping < FIRST_DAMPING:
+            damping = FIRST_DAMPING
+            continue
+        if not is_definite:
+            fill_curvature(objective, target, held, 0.0, s)
+            lay_out_step(chain, s)
+            is_definite = plan_newton_step(chain, held, damping * scale, LEAST_PIVOT * scale, SWEEPS, s)
+        if not is_definite or longest_step(s) > LONGEST_STEP:
+            for k in range(held):
+                s.multipliers[k] = s.wanted[k]
+            damping = max(10.0 * damping, FIRST_DAMPING)
+            continue
+        predicted = -model_change(chain, s)
+        if predicted < -CONVERGED * value:  # freedoms at their bounds leave too few to keep what is held
+            for k in range(held):
+                s.multipliers[k] = s.wanted[k]
+            damping = max(10.0 * damping, FIRST_DAMPING)
+            continue
+        copy_chain_state(state, best)
+        move_chain(chain, state, s)
+        if held > 0:
+            keep(s, s.fixed)
+            reach_target(chain, target, objective, state, s, closeness, RESTORING)
+            keep_none(s)
+        trial, _ = evaluate(chain, target, objective, s)
+        actual = value - trial
+        enough = max(SUFFICIENT * predicted, 0.0) if predicted > FINE * value else -CONVERGED * value
+        is_kept = largest(s.gradient.errors, held) <= RESTORED and actual >= enough
+        if is_kept:
+            value = trial
+            if abs(actual - predicted) < EXACT * predicted:
+                damping = max(0.05 * damping, LEAST_DAMPING)
+            elif actual > GOOD * predicted:
+                damping *= 0.4
+        else:
+            damping *= 5.0
+    if not is_kept:
+        copy_chain_state(best, state)
+        evaluate(chain, target, objective, s)
+    return value
+
+
+@routine
+def keep(s: ChainScratch, fixed: Ints) -> None:
+    """Keep the freedoms that are fixed where they are."""
+    for d in range(len(fixed)):
+        s.kept[d] = fixed[d]
+
+
+@routine
+def keep_none(s: ChainScratch) -> None:
+    """Keep no freedom where it is."""
+    for d in range(len(s.kept)):
+        s.kept[d] = 0
+
+
+@routine
+def pull(chain: SerialChain, target: Floats, objective: PoseObjective, value: float, s: ChainScratch) -> bool:
+    """Write to `s.pulled` a target farther out than a near one, in the direction of the error; False if it is not near.
+
+    Where the workspace ends next to a target, its pull is as weak as the distance, and bends of many joints change it
+    only to second order. The farther target has the same nearest configuration, and pulls.
+    """
+    X, turn, pulled = s.X, s.gradient.turn, s.pulled
+    distance = math.sqrt(2.0 * value)
+    if not 0.0 < distance < PULL:
+        return False
+    for i in range(4):
+        for j in range(4):
+            pulled[i, j] = target[i, j]
+    share, angle = PULL / distance, 0.0
+    is_turned = objective.frame == BASE_AXES and 0.0 < objective.platform[3] < LOCKED
+    if is_turned:
+        difference(target, X, turn[3:])
+        angle = math.sqrt(turn[3] ** 2 + turn[4] ** 2 + turn[5] ** 2)
+        share = min(share, PULLED_TURN / max(angle, 1e-300))
+    for i in range(3):
+        if 0.0 < objective.platform[i] < LOCKED:
+            pulled[i, 3] = X[i, 3] + share * (target[i, 3] - X[i, 3])
+    if is_turned and angle > 0.0:
+        w, x, y, z = exponential(-share * turn[3], -share * turn[4], -share * turn[5])
+        for i in range(3):  # the transpose of what turns: (R^T exp(-v))^T = exp(v) R
+            for j in range(3):
+                pulled[i, j] = X[j, i]
+        rotate_by(pulled, w, x, y, z)
+        for i in range(3):
+            for j in range(i):
+                pulled[i, j], pulled[j, i] = pulled[j, i], pulled[i, j]
+    return True
+
+
+@routine
+def longest_step(s: ChainScratch) -> float:
+    """The longest step of a freedom."""
+    longest = 0.0
+    for d in range(len(s.step)):
+        longest = max(longest, abs(s.step[d]))
+    return longest
+
+
+@routine
+def evaluate(chain: SerialChain, target: Floats, objective: PoseObjective, s: ChainScratch) -> tuple[float, int]:
+    """The objective at `s.state`, and the number of held components; with screws, force and errors."""
+    walk_chain(chain, s.state, s)
+    bound_steps(chain, s.state, s)
+    return pose_gradient(objective, target, s.X, s.gradient, True)
+
+
+@routine
+def lay_out_step(chain: SerialChain, s: ChainScratch) -> float:
+    """Write the gradient in all freedoms, and fix those that a bound holds; the square of the longest screw."""
+    scale = 0.0
+    for d in range(len(chain.lo)):
+        row, force, square = s.screws[d], 0.0, 0.0
+        for i in range(6):
+            force += s.total[i] * row[i]
+            square += row[i] * row[i]
+        s.force[d], s.fixed[d], s.step[d] = force, 0, 0.0
+        scale = max(scale, square)
+        if (force > 0.0 and s.least[d] > -ON_BOUND) or (force < 0.0 and s.most[d] < ON_BOUND):
+            s.fixed[d] = 1
+    for cone in range(len(chain.cone_angles)):
+        if s.cones[cone, 3] == 1.0:
+            d = chain.freedoms[chain.cone_motions[cone]]
+            s.bend[d + 2] = -s.force[d] * s.cones[cone, 4] if s.fixed[d] == 1 else 0.0
+    return scale
+
+
+@routine
+def estimate_multipliers(chain: SerialChain, held: int, s: ChainScratch) -> None:
+    """Multipliers of the held components that best balance the gradient in freedoms away from their bounds."""
+    if held == 0:
+        return
+    for i in range(held):
+        for k in range(held + 1):
+            s.A[i, k] = 0.0
+    for d in range(len(chain.lo)):
+        if s.least[d] > -ON_BOUND or s.most[d] < ON_BOUND:
+            continue
+        row, force = s.screws[d], 0.0
+        for i in range(6):
+            force += s.gradient.force[i] * row[i]
+        for k in range(held):
+            s.wanted[k] = 0.0
+            for i in range(6):
+                s.wanted[k] += s.gradient.holds[k, i] * row[i]
+        for i in range(held):
+            s.A[i, held] -= s.wanted[i] * force
+            for k in range(i + 1):
+                s.A[i, k] += s.wanted[i] * s.wanted[k]
+    solve_spd(s.A, held, 1e-10)
+    for k in range(held):
+        s.multipliers[k] = s.A[k, held]
