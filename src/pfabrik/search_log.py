@@ -9,6 +9,7 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .closure.attempts import Attempt
 from .description.mechanism import Mechanism
+from .description.mechanism_html import card
 from .engine import inverse_engine_of
 from .errors import InvalidArgument
 from .feasibility import feasibility
@@ -41,19 +42,31 @@ class SearchLog:
         return next((each.phase for each in self.attempts if each.ending in ("reached", "nearest")), "none")
 
     def __str__(self) -> str:
-        unit = self.solution.mechanism.length_unit
-        header = ("phase", "start", "steps", f"distance [{unit}]", "ending")
-        rows = [
+        lines = [aligned(*self._table()), self._blocked()]
+        return "\n".join([*filter(None, lines), f"answer: {self.solution}, by {self.answered_by}"])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """Every attempt, for notebooks."""
+        header, rows = self._table()
+        lines = filter(None, [f"answered by: {self.answered_by}", self._blocked()])
+        return card("Search", lines, header, rows, "")
+
+    def _table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """The header and the cells of the attempts."""
+        header = ("phase", "start", "steps", f"distance [{self.solution.mechanism.length_unit}]", "ending")
+        return header, [
             (each.phase, each.start, str(each.steps), f"{each.distance:.6g}".replace("nan", "-"), each.ending)
             for each in self.attempts
         ]
-        lines = [aligned(header, rows)]
-        if self.blocked_by is not None:
-            joint, bound, beyond = self.blocked_by
-            lines.append(f"in the working mode of the start the target is beyond '{bound}' of {joint}, by {beyond:.4g}")
-        return "\n".join([*lines, f"answer: {self.solution}, by {self.answered_by}"])
 
-    __repr__ = __str__
+    def _blocked(self) -> str:
+        """A sentence on the limit that is in the way; empty if there is none."""
+        if self.blocked_by is None:
+            return ""
+        joint, bound, beyond = self.blocked_by
+        return f"in the working mode of the start the target is beyond '{bound}' of {joint}, by {beyond:.4g}"
 
 
 def search_log(
