@@ -32,7 +32,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
 ]
 
-MACHINES = [*pf.catalog(), *closure.ON_ARMS]
+MACHINES = [*(name for name in pf.catalog() if model_of(pf.load(name)).has_legs), *closure.ON_ARMS]
 STEP = 1e-6
 ON_SPHERES = ["delta", "hexaglide", "linear_delta", "nrpm", "psu", "reachy_mini", "servo_hexapod", "stewart", "ucu"]
 
