@@ -49,7 +49,7 @@ def require_path(name: str, value: Any) -> Path:
 
 
 def require_ending(path: Any, known: Sequence[str]) -> str:
-    """How a file's name ends, in small letters; InvalidArgument where nothing is written that way."""
+    """The ending of a file's name, in small letters; InvalidArgument if no format has it."""
     suffix = require_path("path", path).suffix.lower()
     if suffix not in known:
         raise InvalidArgument("path", f"'{path}'", f"a name that ends in {', '.join(known[:-1])} or {known[-1]}")
@@ -65,7 +65,7 @@ def require_names(name: str, value: Any) -> tuple[str, ...]:
 
 
 def _is_single(value: Any) -> bool:
-    """Whether what seems to be many things is a text, or an array without axes."""
+    """True if what seems to be many things is a text, or an array without axes."""
     return isinstance(value, str | bytes) or getattr(value, "shape", None) == ()
 
 

@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions that name the culprit, what was found and what was expected."""
+"""Exceptions: they name the culprit, what was found and what was expected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is optional: asked for when it is used, and named with the command that installs it where it is missing.
+"""Optional packages: imported when they are used, and named with the command that installs it where it is missing.
 
 The package is on no index: it is installed from its folder.
 """

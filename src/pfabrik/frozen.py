@@ -10,7 +10,7 @@ V = TypeVar("V", covariant=True)
 
 
 class FrozenMapping(Mapping[K, V]):
-    """What was in a mapping when this was made, to be read only."""
+    """A read-only copy of a mapping."""
 
     def __init__(self, given: Mapping[K, V]) -> None:
         self._own = dict(given)

@@ -130,7 +130,7 @@ _ROTATIONS: dict[str, Callable[[str, Floats], Floats]] = {
 
 
 def is_rotation(matrix: Floats) -> bool:
-    """Whether a (3, 3) matrix is a rotation to the tolerance targets are held to."""
+    """True if a (3, 3) matrix is a rotation to the tolerance targets are held to."""
     error = np.abs(matrix.T @ matrix - np.eye(3)).max()
     return bool(error <= TOLERANCES.rotation_matrix and np.linalg.det(matrix) > 0.0)
 

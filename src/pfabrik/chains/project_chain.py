@@ -126,7 +126,7 @@ NO_SEEDS = ChainSeeds(np.zeros((0, 0)), np.zeros((0, 4, 4)))
 def chain_aim(
     model: Model, targets: Floats, platform: Sequence[float], tries: int, *, follows: bool = False
 ) -> ChainAim:
-    """What is asked of kernels: targets (n, 4, 4) [length] with the weights of their components."""
+    """The question for the kernels: targets (n, 4, 4) [length] with the weights of their components."""
     scaled = in_lengths(targets, 1.0 / model.length)
     weights = np.array(platform, float)
     objective = PoseObjective(scaled, weights, model.task.frame, TOLERANCES.inside, TOLERANCES.active, 0)

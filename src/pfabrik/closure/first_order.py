@@ -38,7 +38,7 @@ def inverse_map(model: Model, q: Floats) -> Floats:
 
 
 def singularities(model: Model, q: Floats) -> Singularity:
-    """How near coordinates q, (n, c), are to singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples.
+    """Measures of how near coordinates q, (n, c), are to singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples.
 
     In a singularity, or next to one, what is lost and gained takes all singular vectors: NumPy finds them there.
     """
@@ -52,13 +52,13 @@ def singularities(model: Model, q: Floats) -> Singularity:
 
 
 def are_stretched(model: Model, q: Floats) -> Mask:
-    """Whether links are stretched out or folded at coordinates q (n, c), so that they may bend either way, (n,)."""
+    """Mask of coordinates q (n, c) with links stretched out or folded, so that they may bend either way, (n,)."""
     found = singularities(model, q)
     return np.asarray(np.minimum(found.serial, found.passive) < TOLERANCES.stretched)
 
 
 def _first_order(model: Model, q: Floats, *, whole: bool) -> FirstOrder:
-    """What the kernel tells of coordinates q, (n, c), lengths in L; `whole`: the constraint measure too."""
+    """Jacobians and measures at coordinates q, (n, c), lengths in L; `whole`: the constraint measure too."""
     from ..kernels.closure.first_order import first_order
 
     closure, plan = model.closure, _plan(model, whole)
@@ -109,7 +109,7 @@ def _plan(model: Model, whole: bool) -> FirstOrderPlan:
 
 @derived
 def units_of(model: Model) -> tuple[Floats, Floats]:
-    """What one stands for in a twist, (r,), and in actuator rates, (n_a,): L for a length, 1 for an angle."""
+    """Units of a twist, (r,), and of actuator rates, (n_a,): L for a length, 1 for an angle."""
     mechanism = model.mechanism
     twists = np.ones(3 if mechanism.end_effector_is_joint else 6)
     twists[:3] = mechanism.characteristic_length

@@ -30,7 +30,7 @@ class ChainJoint:
 
     @property
     def centred(self) -> bool:
-        """Whether the joint has a centre."""
+        """True if the joint has a centre."""
         return self.type != "prismatic"
 
 

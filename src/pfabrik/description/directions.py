@@ -65,14 +65,14 @@ def axis_pairs(
 
 
 def is_direction(value: Any) -> bool:
-    """Whether the value is written as one direction, not as several: a word, or numbers."""
+    """True if the value is written as one direction, not as several: a word, or numbers."""
     return isinstance(value, str) or (
         isinstance(value, tuple) and bool(value) and not any(isinstance(part, tuple | str) for part in value)
     )
 
 
 def is_pair(value: Any) -> bool:
-    """Whether the value is written as two directions."""
+    """True if the value is written as two directions."""
     return isinstance(value, tuple) and len(value) == 2 and all(map(is_direction, value))
 
 

@@ -49,7 +49,7 @@ def merged(first: Sequence[Fault], second: Sequence[Fault]) -> list[Fault]:
 
 
 def _same_place(one: str, other: str) -> bool:
-    """Whether one place is the other, or within it."""
+    """True if one place is the other, or within it."""
     short, long = sorted((one, other), key=len)
     return long == short or long.startswith(f"{short}.") or (short != "joint" and long.startswith(f"{short}["))
 
@@ -130,7 +130,7 @@ def _point_faults(mechanism: Structure) -> Iterator[Fault]:
 
 
 def _moves(mechanism: Structure, name: str) -> bool:
-    """Whether the name is that of a body other than the base."""
+    """True if the name is that of a body other than the base."""
     return name != mechanism.base and any(
         isinstance(joint.connects, tuple) and name in joint.connects for joint in mechanism.joints
     )

@@ -60,22 +60,22 @@ def range_text(bounds: tuple[float, float], coordinate: Coordinate) -> str:
 
 
 def is_name(value: object) -> bool:
-    """Whether the value can name something: a text, not blank, that a file can hold (no half of a surrogate pair)."""
+    """True if the value can name something: a text, not blank, that a file can hold (no half of a surrogate pair)."""
     return isinstance(value, str) and value.strip() != "" and value == value.encode(errors="ignore").decode()
 
 
 def is_pair_of_names(value: object) -> bool:
-    """Whether the value is a pair of names."""
+    """True if the value is a pair of names."""
     return isinstance(value, tuple) and len(value) == 2 and all(map(is_name, value))
 
 
 def is_numbers(value: object, count: int) -> bool:
-    """Whether the value is a tuple of that many floats, finite or not."""
+    """True if the value is a tuple of that many floats, finite or not."""
     return isinstance(value, tuple) and len(value) == count and all(isinstance(part, float) for part in value)
 
 
 def is_point(value: object) -> bool:
-    """Whether the value is three finite floats."""
+    """True if the value is three finite floats."""
     return isinstance(value, tuple) and is_numbers(value, 3) and all(map(math.isfinite, value))
 
 

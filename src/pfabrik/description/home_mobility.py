@@ -62,7 +62,7 @@ def end_effector_freedom(mechanism: Structure, locked: frozenset[int]) -> int:
 
 
 def is_held(mechanism: Structure) -> bool:
-    """Whether the loops hold the end effector at home, to second order too.
+    """True if the loops hold the end effector at home, to second order too.
 
     To first order they also do where links are stretched out so that the end effector is at the end of what it
     reaches: it moves as these bend, with the square of what they bend by. On a chain of screws s with rates u the

@@ -33,7 +33,7 @@ class JointCoordinate:
 
     @property
     def kind(self) -> Coordinate:
-        """Whether it is an angle or a length."""
+        """Its kind: an angle or a length."""
         return KINDS[self.joint.type].coordinates[self.place]
 
     @property

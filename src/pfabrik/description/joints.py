@@ -117,7 +117,7 @@ class Joint:
 
     @property
     def is_rigid(self) -> bool:
-        """Whether its two bodies are as one: it is fixed, or a passive R or P whose range is a single value."""
+        """True if its two bodies are as one: it is fixed, or a passive R or P whose range is a single value."""
         if self.type not in ("revolute", "prismatic") or self.actuated or self.range is None:
             return self.type == "fixed"
         low, high = self.range

@@ -164,13 +164,13 @@ class LegMaker:
         return bodies[index], bodies[index + 1]
 
     def _is_strut(self, index: int) -> bool:
-        """Whether the joint is a prismatic one that runs along the line of its neighbours."""
+        """True if the joint is a prismatic one that runs along the line of its neighbours."""
         own_axis = self.said.get(self.steps[index].letter, {}).get("axis")
         around = self.steps[index - 1 : index] + self.steps[index + 1 : index + 2]
         return not self.steps[index].centred and own_axis is None and [each.centred for each in around] == [True, True]
 
     def _takes_axis(self, index: int) -> bool:
-        """Whether the leg's own `axis` holds for the joint."""
+        """True if the leg's own `axis` holds for the joint."""
         step = self.steps[index]
         one = step.type in ("revolute", "prismatic", "cylindrical")
         return one and not self._is_strut(index) and self.said.get(step.letter, {}).get("axis") is None

@@ -119,7 +119,7 @@ class Structure:
 
     @cached_property
     def end_effector_is_joint(self) -> bool:
-        """Whether `end_effector` names a joint rather than a body."""
+        """True if `end_effector` names a joint rather than a body."""
         return self.end_effector not in self.bodies
 
     @cached_property

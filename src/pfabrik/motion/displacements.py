@@ -39,7 +39,7 @@ from ..rotations import angles_and_sines, composed, from_rotvec
 
 @dataclass(frozen=True)
 class _Geometry:
-    """What displacements need of a mechanism, at home, in base coordinates, per joint (j) or per coordinate (c).
+    """The geometry that displacements need, at home, in base coordinates, per joint (j) or per coordinate (c).
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ def stepped(mechanism: Structure, q: Floats, step: Floats) -> Floats:
 
 @derived
 def rate_units(mechanism: Structure) -> Floats:
-    """What the rates of `screws` are counted in, (c,): 1 for an angle [1/s], L for a displacement [L/s]."""
+    """Units of the rates of `screws`, (c,): 1 for an angle [1/s], L for a displacement [L/s]."""
     turning = _geometry(mechanism).screws[:, :3].any(axis=1)
     units = np.where(turning, 1.0, mechanism.characteristic_length)
     units.setflags(write=False)
@@ -208,7 +208,7 @@ def rate_units(mechanism: Structure) -> Floats:
 
 
 def actuator_units(mechanism: Structure) -> Floats:
-    """What the rates of actuators are counted in, (n_a,): 1 for an angle [1/s], L for a displacement [L/s]."""
+    """Units of the rates of actuators, (n_a,): 1 for an angle [1/s], L for a displacement [L/s]."""
     return rate_units(mechanism)[[drive.column for drive in mechanism.drives]]
 
 
@@ -317,7 +317,7 @@ def _frames(geometry: _Geometry, bodies: Floats, turned: Floats) -> Floats:
 
 
 def _openings(mechanism: Structure, q: Floats) -> tuple[Floats, Floats, Floats]:
-    """How far the loops are open at their closing joints, and where, in base coordinates.
+    """Gaps of the loops at their closing joints, and where they are, in base coordinates.
 
     Rotations (n, loops, 3, 3) and distances (n, loops, 3) [length] from where the first body and the coordinates put
     the second body to where it is, and the points (n, loops, 3) [length] at which the distances are measured.

@@ -1,4 +1,4 @@
-"""How a mechanism moves to first order: what joint rates do to its loops and to its end effector.
+"""Motion to first order: loop conditions and twist of the end effector per joint rate.
 
 Here lengths are in units of L and twists are [velocity of the reference point; angular velocity], in the base frame, so
 nothing depends on the mechanism's unit, on where it stands, or on the order of its joints.
@@ -26,7 +26,7 @@ def actuated_columns(mechanism: Mechanism) -> list[int]:
 
 @dataclass(frozen=True)
 class CycleBasis:
-    """How twists and loop conditions sum up the screws, per column of q; locked joints have no part in them.
+    """Sums of screws that make up twists and loop conditions, per column of q; locked joints have no part in them.
 
     Attributes
     ----------
