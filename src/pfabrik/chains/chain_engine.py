@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..batch import put
+from ..batch import put, take
 from ..closure.assemble import forward_answers
 from ..closure.attempts import Attempt
 from ..closure.close import Closing, measure_configurations
@@ -17,11 +17,11 @@ from ..closure.closure_engine import ClosureEngine, to_answers
 from ..closure.configurations import Configurations, coordinates_for, joint_coordinates, new_rows, steps_of
 from ..closure.descend import clip_targets
 from ..closure.engine_contract import Engine
-from ..closure.projection import ProjectionMode, held_parts, projection_modes
+from ..closure.projection import SAME, ProjectionMode, held_parts, projection_modes
 from ..closure.stretched import BentConfiguration
 from ..closure.target_closing import CONTINUATION_STEPS, LONGEST_STEP
 from ..description.home_mobility import column_moves
-from ..kernels.rows import FAILED, HOLD_NOTHING
+from ..kernels.rows import FAILED, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..model import Model
 from ..options import Options
 from ..poses import are_poses, between, made_exact
@@ -97,7 +97,31 @@ class ChainEngine(Engine):
                 targets[failed], self._configurations_at(start[failed]), options, keep_mode=keep_mode
             )
             answers = answers.with_rows(failed, fallback)
+        if keep_mode and has_few_joints(model):
+            answers = self._nearer_of_both(answers, targets, start, options)
         return answers
+
+    def _nearer_of_both(
+        self, answers: Configurations, targets: Floats, start: Floats, options: Options
+    ) -> Configurations:
+        """Answers in the working mode of the start, or those of the fallback where these are nearer.
+
+        There is one search in that mode, from the start; where links are stretched, which minimum it ends in is chance.
+        """
+        projected = np.flatnonzero(answers.rows.status == PROJECTED)
+        if not len(projected):
+            return answers
+        begin = self._configurations_at(start[projected])
+        fallback = self._joint_space.answer(targets[projected], begin, options, keep_mode=True)
+        lever = options.rotation_length or self.model.mechanism.rotation_length
+        ours, theirs = (
+            np.hypot(rows.measures[:, POSITION_ERROR], lever * rows.measures[:, ROTATION_ERROR])
+            for rows in (take(answers.rows, projected), fallback.rows)
+        )
+        is_nearer = (fallback.rows.status == PROJECTED) & (theirs < (1.0 - SAME) * ours)
+        is_nearer &= fallback.rows.holds >= answers.rows.holds[projected]
+        better = np.flatnonzero(is_nearer | (fallback.rows.status == REACHED))
+        return answers.with_rows(projected[better], fallback.at(better)) if len(better) else answers
 
     def _reach(self, targets: Floats, start: Floats, keep_mode: bool) -> tuple[Closing, NDArray[np.bool_]]:
         """Reach targets from joint coordinates (n, columns); True for those that are reached.
@@ -132,12 +156,11 @@ class ChainEngine(Engine):
         if is_near.all() or not tries:
             run_chains(model, reach_in_chains, chain_aim(model, targets, model.task.held, tries), answers)
             return closing_of_chain(model, answers), np.asarray(answers.distances <= MET)
-        closing, is_reached = self._try(targets, start, 0)
-        near = np.flatnonzero(is_near & ~is_reached)
-        if len(near):
-            trial, were_reached = self._try(targets[near], start[near], tries)
-            put(closing, near, trial)
-            is_reached[near] = were_reached
+        closing, is_reached = closing_of_chain(model, answers), np.zeros(len(targets), bool)
+        for rows, n_tries in ((np.flatnonzero(is_near), tries), (np.flatnonzero(~is_near), 0)):
+            if len(rows):
+                trial, is_reached[rows] = self._try(targets[rows], start[rows], n_tries)
+                put(closing, rows, trial)
         return closing, is_reached
 
     def follow(
