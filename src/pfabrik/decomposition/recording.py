@@ -1,4 +1,4 @@
-"""How the records of a table of legs were computed: recorded, so that they can be computed from other numbers."""
+"""The steps by which the records of a table of legs were computed, to be run again with other numbers."""
 
 from __future__ import annotations
 
@@ -52,12 +52,13 @@ class RecordedRecords(NamedTuple):
 
 def _put(records: Records, row: int, fields: Fields) -> Iterator[Write]:
     """Put values into a record; those that are on a tape are noted."""
+    offsets = records.dtype.fields or {}
     for name, field in fields.items():
         if not isinstance(field, Sequence):
             records[name][row] = field.value if isinstance(field, Recorded) else field
         elif len(field):
             records[name][row][: len(field)] = [each.value for each in field]
-        word = records.dtype.fields[name][1] // WORD  # type: ignore[index]
+        word = offsets[name][1] // WORD
         for each in field if isinstance(field, Sequence) else [field]:
             if isinstance(each, Recorded):
                 yield Write(word, each.place, each.size)
@@ -82,7 +83,7 @@ class Recording:
 
     @cached_property
     def writes(self) -> Ints:
-        """Where in `words` values go, in the layout of `kernels.replay`."""
+        """Places of values in `words`, in the layout of `kernels.replay`."""
         writes, start = [], 0
         for records, by_row in self._parts.values():
             for each in by_row:

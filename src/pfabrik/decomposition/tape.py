@@ -68,7 +68,7 @@ class Tape:
 
 
 class Recorded:
-    """What is on a tape."""
+    """A value on a tape."""
 
     __hash__ = None  # type: ignore[assignment]
     size = 1

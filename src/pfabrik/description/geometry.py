@@ -19,7 +19,7 @@ __all__ = ["Geometry", "geometry_of", "home_numbers", "numbers_with", "with_geom
 
 
 class Geometry(NamedTuple):
-    """Where the joints of a mechanism are at home, in base coordinates, in the order of its joints.
+    """Points, axes and values of the joints of a mechanism at home, in base coordinates, in their order.
 
     Values that follow from others are included, but `with_geometry` ignores them: axis and home of a prismatic joint
     that is `along` two others, axes of a universal joint that are left out, a joint end effector's reference point.
