@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -52,7 +52,7 @@ class RecordedRecords(NamedTuple):
 
 def _put(records: Records, row: int, fields: Fields) -> Iterator[Write]:
     """Put values into a record; those that are on a tape are noted."""
-    offsets = records.dtype.fields or {}
+    offsets: Any = records.dtype.fields
     for name, field in fields.items():
         if not isinstance(field, Sequence):
             records[name][row] = field.value if isinstance(field, Recorded) else field
