@@ -18,7 +18,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import allocator, routine
-from ..qp import QP, new_qp, solve_qp
+from ..qp import QP, solve_qp
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
 from .meet import base_of, is_two_part, reach_end
 from .plan import CARRIER_CONE, PLATFORM_CONE, SLIDE, TRANSLATES, TURNS, Configuration, Plan, Settings
@@ -61,7 +61,20 @@ def new_asks(plan: Plan) -> Asks:
     joints, branches = plan.trunk_joints.shape[0], plan.branches.shape[0]
     k, n = 9 * branches + plan.cones.shape[0] + 2 * joints, PLATFORM + joints
     n_x = n + 1
-    problem = new_qp(n_x, k)
+    problem = QP(
+        np.zeros((n_x, n_x)),
+        np.zeros(n_x),
+        np.zeros((k, n_x)),
+        np.zeros(k),
+        np.zeros(n_x),
+        np.zeros(k),
+        np.zeros((n_x, n_x)),
+        np.zeros((n_x + 1, n_x)),
+        np.zeros((n_x + 1, n_x + 1)),
+        np.zeros(n_x),
+        np.zeros(n_x),
+        np.zeros(n_x, np.int64),
+    )
     return Asks(
         problem,
         np.zeros(k, np.int64),
