@@ -28,6 +28,7 @@ MAY_NAME_MACHINES = {
     "cli/demo.toml": "the machines of the demo, with their circles",
     "export/linuxcnc.py": "the kinematics of a firmware, by their names there",
     "export/klipper.py": "the kinematics of a firmware, by their names there",
+    "calibration/printer_settings.py": "the kinematics of a firmware, by their names there",
     "cli/new.py": "other names of kinds to start from",
     "cli/export.py": "the printers that a firmware knows",
 }

@@ -13,6 +13,7 @@ Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residu
 Look over   workspace, singularity_map
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Look into  search_log (every attempt behind an answer)
+Real machines   parameters, sensitivity, Measurements, calibrate
 See        plot, plot_track, plot_travel, animate; view (in the browser)
 Structure  decompose, SubChain; errors
 Exchange   interop (MuJoCo and URDF, in and out)
@@ -47,6 +48,14 @@ _NAMES = {
     "answers.solution": ("Solution",),
     "answers.status": ("Status",),
     "answers.tracked": ("Track",),
+    "calibration.least_squares": ("calibrate",),
+    "calibration.calibration": ("Calibration",),
+    "calibration.csv_measurements": ("read_measurements",),
+    "calibration.printer_settings": ("read_klipper",),
+    "calibration.measurements": ("Measurements",),
+    "calibration.parameters": ("Parameters", "parameters"),
+    "calibration.plot_calibration": ("plot_calibration",),
+    "calibration.sensitivity": ("Sensitivity", "sensitivity"),
     "catalog": ("catalog",),
     "configuration": ("configuration",),
     "decomposition.decompose": ("SubChain", "decompose"),
@@ -103,6 +112,14 @@ if TYPE_CHECKING:
     from .answers.solution import Solution as Solution
     from .answers.status import Status as Status
     from .answers.tracked import Track as Track
+    from .calibration.least_squares import calibrate as calibrate
+    from .calibration.calibration import Calibration as Calibration
+    from .calibration.csv_measurements import read_measurements as read_measurements
+    from .calibration.printer_settings import read_klipper as read_klipper
+    from .calibration.measurements import Measurements as Measurements
+    from .calibration.parameters import Parameters as Parameters, parameters as parameters
+    from .calibration.plot_calibration import plot_calibration as plot_calibration
+    from .calibration.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
     from .catalog import catalog as catalog
     from .configuration import configuration as configuration
     from .decomposition.decompose import SubChain as SubChain, decompose as decompose

@@ -14,6 +14,7 @@ from .home_mobility import universal_axes
 from .joint_types import KINDS
 from .joints import Joint, set_fields
 from .mechanism import Mechanism
+from .structure import Structure
 
 __all__ = ["Geometry", "geometry_of", "home_numbers", "numbers_with", "with_geometry", "with_numbers"]
 
@@ -38,7 +39,7 @@ class Geometry(NamedTuple):
     reference_point: Floats
 
 
-def geometry_of(mechanism: Mechanism) -> Geometry:
+def geometry_of(mechanism: Structure) -> Geometry:
     """The geometry of a mechanism, in arrays of its own."""
     points = np.array([(np.nan,) * 3 if joint.at is None else joint.at for joint in mechanism.joints])
     axes = np.zeros((len(points), 2, 3))

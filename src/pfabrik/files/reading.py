@@ -10,7 +10,7 @@ import dataclasses
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from ..description.chains import ChainJoint, read_chain
 from ..description.coercion import numbers
@@ -21,6 +21,7 @@ from ..description.joints import Cone, Joint, set_fields
 from ..description.leg_joints import LegJoint, count_joints, faults_of_legs, placed_joints
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
 from ..description.mechanism import Mechanism
+from ..description.structure import Structure
 from ..errors import Fault, InvalidMechanism, near_miss
 from .dimensions import dimension_values, with_numbers
 from .units import angle_in_radians, in_radians
@@ -34,6 +35,9 @@ MOST_JOINTS = 1000
 
 Table = dict[str, Any]
 
+Described = TypeVar("Described", bound=Structure)
+"""A mechanism, or its structure, which is not checked."""
+
 
 def read_mechanism(table: Table) -> Mechanism:
     """The mechanism of a parsed file; `InvalidMechanism` with every fault.
@@ -41,17 +45,23 @@ def read_mechanism(table: Table) -> Mechanism:
     Faults of dimensions and expressions come first, then those of tables, then those of the whole.
     """
     if "dimensions" not in table:
-        return _read(table)
+        return _read(table, Mechanism)
+    numbers_in, values = _with_numbers(table)
+    mechanism = _read(numbers_in, Mechanism)
+    set_fields(mechanism, _source=Source(table, values))
+    return mechanism
+
+
+def _with_numbers(table: Table) -> tuple[Table, dict[str, float]]:
+    """The table of a file with numbers in place of its expressions, and the values of its dimensions."""
     faults: list[Fault] = []
     unit = str(_units(table).get("angle", "deg"))
-    numbers_by_name = dimension_values(table["dimensions"], unit, faults)
+    values = dimension_values(table["dimensions"], unit, faults)
     rest = {key: value for key, value in table.items() if key != "dimensions"}
-    numbers_in = with_numbers(rest, numbers_by_name, unit, "", faults)
+    numbers_in = with_numbers(rest, values, unit, "", faults)
     if faults:
         raise InvalidMechanism(faults)
-    mechanism = _read(numbers_in)
-    set_fields(mechanism, _source=Source(table, numbers_by_name))
-    return mechanism
+    return numbers_in, values
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,18 +71,30 @@ class Source:
     table: Table
     dimensions: dict[str, float]
 
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the dimensions that are numbers; the others are computed from them."""
+        return tuple(name for name, said in self.table["dimensions"].items() if not isinstance(said, str))
+
     def read_with(self, values: Mapping[str, float]) -> Mechanism:
         """The mechanism with other values of some dimensions; those that follow from them change with them."""
-        return read_mechanism(self.table | {"dimensions": self.table["dimensions"] | dict(values)})
+        return read_mechanism(self._table_with(values))
+
+    def sketch_with(self, values: Mapping[str, float]) -> Structure:
+        """The description with other values of some dimensions, without the checks of a mechanism."""
+        return _read(_with_numbers(self._table_with(values))[0], Structure)
+
+    def _table_with(self, values: Mapping[str, float]) -> Table:
+        return self.table | {"dimensions": self.table["dimensions"] | dict(values)}
 
 
-def _read(table: Table) -> Mechanism:
+def _read(table: Table, kind: type[Described]) -> Described:
     faults = list(_head_faults(table))
     tables = {kind: _tables(table, kind, faults) for kind in ("joint", "leg")}
     unit = _units(table).get("angle", "deg")
     patterns = [_pattern(each, f"joint[{index}]", unit, faults) for index, each in enumerate(tables["joint"])]
     legs = [_leg(each, f"leg[{index}]", unit, faults) for index, each in enumerate(tables["leg"])]
-    return _expanded(table, patterns, legs, faults)
+    return _expanded(table, patterns, legs, faults, kind)
 
 
 def _head_faults(table: Table) -> Iterator[Fault]:
@@ -182,7 +204,9 @@ def _joint_fields(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
     return fields
 
 
-def _expanded(table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault]) -> Mechanism:
+def _expanded(
+    table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault], kind: type[Described]
+) -> Described:
     """The mechanism of all copies and legs. If it is not clear what is copied, or where legs are, only faults of single
     joints are searched for."""
     is_unclear = any(map(_hides_joints, faults))
@@ -197,7 +221,7 @@ def _expanded(table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], fa
     if is_unclear or leg_faults:
         alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
         raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(patterns), placed)))
-    return _built(table, layout, placed, faults)
+    return _built(table, layout, placed, faults, kind)
 
 
 def _placed(
@@ -227,7 +251,9 @@ def _hides_joints(fault: Fault) -> bool:
     return root in ("base", "end_effector", "units", "joint", "leg") or ".copies" in fault.place
 
 
-def _built(table: Table, layout: Patterns, placed: Sequence[LegJoint], faults: list[Fault]) -> Mechanism:
+def _built(
+    table: Table, layout: Patterns, placed: Sequence[LegJoint], faults: list[Fault], kind: type[Described]
+) -> Described:
     copies = layout.expanded()
     head: Table = {"name": None, "joints": tuple(copy.joint for copy in copies)}
     head |= {key: table[key] for key in ("name", "base", "end_effector", "reference_point", "task") if key in table}
@@ -236,7 +262,7 @@ def _built(table: Table, layout: Patterns, placed: Sequence[LegJoint], faults: l
         with warnings.catch_warnings():
             if faults:
                 warnings.simplefilter("ignore")
-            mechanism = Mechanism(**head)
+            mechanism = kind(**head)
     except InvalidMechanism as error:
         n_joints = len(layout.patterns) - len(placed)
         faults = merged(faults, faults_of_legs(_as_written(error.faults, layout, copies), n_joints, placed))

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +152,71 @@ def screws(mechanism: Structure, q: Floats) -> Floats:
     linear = np.einsum("ncij,cj->nci", frames[..., :3, :3], geometry.screws[:, 3:])
     offset = frames[..., :3, 3] / mechanism.characteristic_length
     return np.concatenate([angular, linear + np.cross(offset, angular)], axis=-1)
+
+
+def geometry_screws(mechanism: Structure, q: Floats, points: Floats, axes: Floats) -> Floats:
+    """Present screws of joints per change of the geometry at home, (n, joints, p, 6), in the units of `screws`.
+
+    Each is the motion of the joint's second body relative to its first while all coordinates rest. With its rotation R,
+    its slide s and its centre c, a joint takes x to y = R (x - c) + c + s; a change of the centre moves y by
+    (I - R) dc, one of the axes turns it by w about c + s, and moves it by the displacement times the change of the
+    slide's axis. For a turn by t about a unit axis a, w = sin(t) da + (1 - cos(t)) a x da.
+
+    Parameters
+    ----------
+    points : changes of the centres per unit of each parameter, (p, joints, 3) [length]; not NaN.
+    axes : changes of the unit axes, (p, joints, 2, 3), each square to its axis.
+    """
+    geometry = _geometry(mechanism)
+    motions, turned = _motions(geometry, q)
+    frames = _bodies(geometry, motions)[:, geometry.firsts]
+    rotations, changes = motions[..., :3, :3], np.swapaxes(points, 0, 1)
+    arms = motions[..., :3, 3] + np.einsum("njab,jb->nja", rotations, geometry.centres)  # c + s
+    present = _axis_values(mechanism, q)
+    angular = np.zeros((len(q), *changes.shape))
+    for axis, frame in ((1, turned), (0, None)):
+        angle, about = present.angles[axis][..., None, None], present.axes[axis][:, None]
+        change = np.swapaxes(axes[:, :, axis], 0, 1)
+        turn = np.sin(angle) * change + (1.0 - np.cos(angle)) * np.cross(about, change)
+        angular += turn if frame is None else turn @ np.swapaxes(frame, -1, -2)
+    velocity = changes - changes @ np.swapaxes(rotations, -1, -2) + np.cross(arms[:, :, None], angular)
+    velocity += present.slides[..., None, None] * np.swapaxes(axes[:, :, 0], 0, 1)
+    present_rotations = np.swapaxes(frames[..., :3, :3], -1, -2)
+    angular, velocity = angular @ present_rotations, velocity @ present_rotations
+    velocity += np.cross(frames[:, :, None, :3, 3], angular)
+    return np.concatenate([angular, velocity / mechanism.characteristic_length], axis=-1)
+
+
+class _AxisValues(NamedTuple):
+    """How far joints are turned about, and slid along, their axes; zero where a joint does not.
+
+    Attributes
+    ----------
+    angles : about the first and the second axis, (2, n, joints) [rad].
+    slides : along the first axis, (n, joints) [length].
+    axes : the unit axes, (2, joints, 3).
+    """
+
+    angles: Floats
+    slides: Floats
+    axes: Floats
+
+
+def _axis_values(mechanism: Structure, q: Floats) -> _AxisValues:
+    joints = mechanism.joints
+    angles, slides = np.zeros((2, len(q), len(joints))), np.zeros((len(q), len(joints)))
+    axes = np.zeros((2, len(joints), 3))
+    for j, joint in enumerate(joints):
+        column = columns(mechanism)[joint.name]
+        if joint.type == "universal":
+            angles[:, :, j], axes[:, j] = q[:, column].T, universal_axes(mechanism, joint)
+        elif joint.type in ("revolute", "prismatic", "cylindrical"):
+            axes[0, j] = mechanism.home_axis(joint.name)
+            if joint.type != "prismatic":
+                angles[0, :, j] = q[:, column.start]
+            if joint.type != "revolute":
+                slides[:, j] = q[:, column.stop - 1]
+    return _AxisValues(angles, slides, axes)
 
 
 def gaps(mechanism: Structure, q: Floats) -> Floats:

@@ -1,0 +1,238 @@
+"""The result of a calibration: values with their deviations, what the data leave open, and what was off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..description.mechanism import Mechanism
+from .linear_fit import LinearFit
+from .measurements import Measurements
+from .parameter_values import ParameterValue, Suspect, as_html, as_numbers, as_text, plain
+from .parameters import Parameters
+from .suggest import suggested
+
+OPEN = 1e-5
+"""Part of a parameter in directions that the data leave open, up to which it counts as determined."""
+
+WEAK = 3e-3
+"""Deviation, in a parameter's scale, above which it counts as undetermined whatever the rank: 3 mm of a rod of 1 m."""
+
+LEAST_NOISE = 1e-5
+"""Error that measurements of unknown quality are taken to have at least [L], to say what they determine: 10 um of 1 m.
+Simulated ones have none, and would seem to determine what no instrument shows."""
+
+MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
+"""Measurements that are named as not fitting: the most, and from how many standard deviations."""
+
+TOGETHER = 0.1
+"""Part of an open direction from which a parameter is named as one of those that change together."""
+
+
+class Calibration:
+    """Parameters of a machine fitted to measurements; made by `calibrate`.
+
+    Attributes
+    ----------
+    values : calibrated, (p,), in the order of `names`.
+    deviations : standard deviations, (p,); infinite where the data leave a parameter open.
+    determined : which parameters the measurements determine, (p,).
+    rank : how many directions of parameters they determine.
+    rms_before, rms : root mean square of the residuals with the machine as described, and calibrated: in standard
+        deviations if `sigma` was given, else as lengths, angles times L.
+    rms_left_out : that of every row as predicted from the others.
+    residuals : measurement by measurement, quantity -> predicted less measured [length or rad].
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        measurements: Measurements,
+        values: Floats,
+        priors: dict[str, tuple[float, float]],
+        data: LinearFit,
+        fitted: LinearFit,
+        before: Floats,
+        residuals: dict[str, Floats],
+    ) -> None:
+        self._parameters, self.measurements, self.values, self._priors = parameters, measurements, values, priors
+        self._data, self._fitted, self._before, self.residuals = data, fitted, before, residuals
+        self.names, self.rank = parameters.names, data.rank
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The machine with the calibrated values."""
+        return self._parameters.apply(self.values)
+
+    @cached_property
+    def rms_before(self) -> float:
+        return float(np.sqrt(np.mean(self._before**2)))
+
+    @cached_property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self._data.residual**2)))
+
+    @cached_property
+    def rms_left_out(self) -> float:
+        _, raw, _ = self._data.left_out()
+        return float(np.sqrt(np.nanmean(raw**2))) if np.isfinite(raw).any() else float("nan")
+
+    @cached_property
+    def deviations(self) -> Floats:
+        fit = self._fitted
+        own = np.sqrt(np.diag(fit.covariance)) * self._parameters.scales
+        own[_parts(fit.open_directions) > OPEN] = np.inf
+        return np.asarray(own)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Covariance (p, p) of the values, in the directions that are determined."""
+        scales = self._parameters.scales
+        return np.asarray(self._fitted.covariance * scales[:, None] * scales)
+
+    @cached_property
+    def determined(self) -> Mask:
+        closed = _parts(self._data.open_directions) <= OPEN
+        spread = np.sqrt(np.diag(self._data.covariance) * self._caution)
+        return np.asarray(closed & ~(spread > WEAK))
+
+    @cached_property
+    def _caution(self) -> float:
+        """Factor on variances, to say what is determined by measurements of unknown quality."""
+        if self.measurements.sigma:
+            return 1.0
+        least = (LEAST_NOISE * self._parameters.mechanism.characteristic_length) ** 2
+        return float(max(1.0, least / max(self._data.variance, 1e-300)))
+
+    @property
+    def parameters(self) -> tuple[ParameterValue, ...]:
+        """All parameters with their deviations."""
+        own = self._parameters
+        rows = zip(own.names, self.values.tolist(), own.values.tolist(), self.deviations.tolist(), strict=True)
+        return tuple(
+            ParameterValue(name, value, drawn, deviation, self._priors.get(name), bool(is_determined), unit)
+            for (name, value, drawn, deviation), is_determined, unit in zip(
+                rows, self.determined, own.units, strict=True
+            )
+        )
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """What the measurements leave open, in words: one sentence for parameters that change together."""
+        return tuple(_sentences(self.names, self._open_directions(), self.determined))
+
+    def _open_directions(self) -> Floats:
+        """Directions that are open, and those in which a parameter's deviation is too large."""
+        _, values, right = self._data._decomposed
+        spread = np.sqrt(self._data.variance * self._caution) / values[: self._data.rank]
+        weak = np.flatnonzero(spread > WEAK)
+        return np.concatenate([right[: self._data.rank][weak], self._data.open_directions])
+
+    @cached_property
+    def worst_rows(self) -> tuple[Suspect, ...]:
+        """Measurements from the worst: how far each is from what the others predict, in standard deviations."""
+        numbers, _, student = self._data.left_out()
+        rows = self.measurements.rows
+        order = [k for k in np.argsort(-np.nan_to_num(student, nan=-1.0)) if np.isfinite(student[k])]
+        return tuple(
+            Suspect(int(n), "row", float(s)) if n < rows else Suspect(int(n) - rows, "distance", float(s))
+            for n, s in ((numbers[k], student[k]) for k in order)
+        )
+
+    @property
+    def sizes(self) -> tuple[Floats, Floats]:
+        """Root mean square of the residuals of every measurement, before and after."""
+        numbers = np.unique(self._data.groups)
+
+        def of_each(residual: Floats) -> Floats:
+            return np.array([np.sqrt(np.mean(residual[self._data.groups == number] ** 2)) for number in numbers])
+
+        return of_each(self._before), of_each(self._data.residual)
+
+    def suggest(self, n: int, criterion: str = "deviation", *, seed: int = 0) -> Floats:
+        """Actuator values (n, n_a) of the next configurations that would determine the parameters best.
+
+        Parameters
+        ----------
+        criterion : "deviation" makes the worst deviation small, "determinant" the volume of the uncertainty.
+        seed : of the feasible configurations that are chosen from.
+        """
+        return suggested(
+            self.mechanism, self._parameters, self.values, self.measurements, self._data, n, criterion, seed
+        )
+
+    def __repr__(self) -> str:
+        open_ = len(self.names) - int(self.determined.sum())
+        left = f", {open_} undetermined" if open_ else ""
+        counts = f"{len(self.names)} parameters{left}, rms {self.rms:.3g}"
+        return f"<Calibration of '{self._parameters.mechanism.name}': {counts}>"
+
+    def _repr_html_(self) -> str:
+        """A table of the parameters, for notebooks."""
+        return as_html(self._parameters.mechanism.name, self.parameters, self._facts)
+
+    def table(self) -> str:
+        """The parameters as text, a line each; then what is left, what is open, and what does not fit."""
+        return as_text(self.parameters, self._facts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers, lists and dicts, ready for JSON."""
+        return {
+            "parameters": as_numbers(self.parameters),
+            "rms_before": plain(self.rms_before),
+            "rms": plain(self.rms),
+            "rms_left_out": plain(self.rms_left_out),
+            "rank": self.rank,
+            "undetermined": list(self.undetermined),
+            "worst_rows": [each._asdict() for each in self.worst_rows[:MOST_SUSPECTS]],
+        }
+
+    @property
+    def _facts(self) -> list[str]:
+        """What is left, what is open, and what does not fit, a sentence each."""
+        unit = self._parameters.mechanism.length_unit
+        if self.measurements.sigma:
+            unit = "standard deviations" if self.measurements.has_deviations else "weighted"
+        left_out = f", {self.rms_left_out:.3g} where the others predict" if self.rms_left_out > 0.0 else ""
+        suspects = [each for each in self.worst_rows[:MOST_SUSPECTS] if each.residual > SUSPICIOUS]
+        return [
+            f"rms {self.rms_before:.3g} before, {self.rms:.3g} after{left_out} [{unit}]",
+            *self.undetermined,
+            *(
+                f"{each.quantity} {each.row + 1} does not fit: off by {each.residual:.1f} standard deviations"
+                for each in suspects
+            ),
+        ]
+
+
+def _parts(directions: Floats) -> Floats:
+    """Part of every parameter in directions (k, p), (p,)."""
+    return np.asarray(np.sqrt((directions**2).sum(axis=0)))
+
+
+def _sentences(names: Sequence[str], directions: Floats, determined: Mask) -> list[str]:
+    if not len(directions):
+        return []
+    shared = directions.T @ directions
+    sizes = np.sqrt(np.diag(shared))
+    remaining = [p for p in range(len(names)) if sizes[p] > TOGETHER or not determined[p]]
+    sentences = []
+    while remaining:
+        group, waiting = [], [remaining.pop(0)]
+        while waiting:
+            p = waiting.pop()
+            group.append(p)
+            near = [k for k in remaining if abs(shared[p, k]) > TOGETHER * max(sizes[p] * sizes[k], 1e-300)]
+            waiting += near
+            remaining = [k for k in remaining if k not in near]
+        group.sort()
+        own = ", ".join(names[p] for p in group[:-1])
+        if len(group) > 1:
+            sentences.append(f"{own} and {names[group[-1]]} change together")
+        else:
+            sentences.append(f"{names[group[0]]} is not determined by these measurements")
+    return sentences

@@ -1,0 +1,153 @@
+"""Measurements from CSV: a header of actuators and quantities, then a configuration a line."""
+
+from __future__ import annotations
+
+import csv
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import Floats
+from ..cells import is_finite, unmarked
+from ..checks import require_path
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..errors import InvalidArgument, near_miss
+from ..poses import pose
+from .measurements import Measurements, Sigma
+
+POSITION, QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
+ANGLES = ("roll", "pitch", "yaw")
+HEIGHT, DISTANCE, DISTANCE_TO = "height", "distance", "distance_to"
+
+LARGEST = 20_000_000
+"""Largest file read [bytes]."""
+
+
+def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma: Sigma = None) -> Measurements:
+    """Measurements of a machine from a CSV file.
+
+    Columns, in any order: every actuator; and of `x`, `y`, `z` with `roll`, `pitch`, `yaw` [deg] (or `qx`, `qy`, `qz`,
+    `qw`), `height`, names of other coordinates that a sensor reads, and `distance` with `distance_to`, the line of
+    another row (the first one below the header is 1). An angle's column is in radians, or degrees if `_deg` is behind
+    its name; roll, pitch and yaw the other way round, with `_rad`. Empty cells were not measured.
+
+    Parameters
+    ----------
+    sigma : as of `Measurements`.
+
+    Raises
+    ------
+    InvalidArgument : a file that is no such table, with its line and column.
+    """
+    checked_mechanism(mechanism)
+    header, rows = _table(Path(require_path("path", path)))
+    columns = dict(zip(header, np.array(rows, float).reshape(len(rows), len(header)).T, strict=True))
+    for name in [name for name in columns if name.endswith("_deg")]:
+        columns[name.removesuffix("_deg")] = np.radians(columns.pop(name))
+    for name in ANGLES:
+        if name in columns and name in header:
+            columns[name] = np.radians(columns[name])
+        if f"{name}_rad" in columns:
+            columns[name] = columns.pop(f"{name}_rad")
+    _check_names(columns, mechanism)
+    sensors = [n for n in mechanism.coordinate_names if n in columns and n not in mechanism.actuator_names]
+    return Measurements(
+        np.stack([columns[name] for name in mechanism.actuator_names], axis=1),
+        position=_position(columns),
+        orientation=_orientation(columns),
+        height=columns.get(HEIGHT),
+        distances=_distances(columns),
+        joints={name: columns[name] for name in sensors},
+        sigma=sigma,
+    )
+
+
+def _table(path: Path) -> tuple[list[str], list[list[float]]]:
+    """Names and numbers of a table; NaN for empty cells."""
+    try:
+        raw = path.read_bytes()[: LARGEST + 1]
+    except OSError as error:
+        raise InvalidArgument("path", f"{path}: {error.strerror}", "a CSV file that can be read") from None
+    if len(raw) > LARGEST or b"\0" in raw:
+        raise InvalidArgument("path", f"{path}, which is no text, or too large", "a CSV file")
+    lines = raw.decode("utf-8-sig", "replace").splitlines()
+    separator = max(",;\t", key=lines[0].count) if lines else ","
+    header: list[str] = []
+    rows: list[list[float]] = []
+    for number, cells in enumerate(csv.reader(lines, delimiter=separator), 1):
+        texts = [unmarked(cell.strip()) for cell in cells]
+        if not any(texts) or texts[0].startswith("#"):
+            continue
+        if not header:
+            header = texts
+            twice = sorted({name for name in header if header.count(name) > 1})
+            if twice:
+                raise InvalidArgument("path", f"line {number}: column '{twice[0]}' twice", "every column once")
+            continue
+        if len(texts) != len(header):
+            raise InvalidArgument("path", f"line {number}: {len(texts)} cells", f"{len(header)}, as the header has")
+        rows.append([_number(text, name, number, separator) for text, name in zip(texts, header, strict=True)])
+    if not rows:
+        raise InvalidArgument("path", f"{path}, without a line of numbers", "a header, then a configuration a line")
+    return header, rows
+
+
+def _number(text: str, name: str, line: int, separator: str) -> float:
+    decimal = text if separator == "," else text.replace(",", ".")
+    if decimal.lower() in ("", "nan"):
+        return float("nan")
+    if not is_finite(decimal):
+        raise InvalidArgument("path", f"line {line}, column '{name}': '{text[:20]}'", "a number, or nothing")
+    return float(decimal)
+
+
+def _check_names(columns: dict[str, Floats], mechanism: Mechanism) -> None:
+    """Refuse a table without all actuators, or with a column that is nothing."""
+    missing = [name for name in mechanism.actuator_names if name not in columns]
+    if missing:
+        raise InvalidArgument("path", f"no column {', '.join(missing)}", "one for each actuator of the machine")
+    known = [*mechanism.coordinate_names, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE, DISTANCE_TO]
+    unknown = [name for name in columns if name not in known]
+    if unknown:
+        expected = "actuators, other coordinates, x, y, z, roll, pitch, yaw, height, distance and distance_to"
+        raise InvalidArgument("path", f"column '{unknown[0]}'{near_miss(unknown[0], known)}", expected)
+
+
+def _position(columns: dict[str, Floats]) -> Floats | None:
+    if not any(name in columns for name in POSITION):
+        return None
+    nothing = np.full(len(next(iter(columns.values()))), np.nan)
+    return np.stack([columns.get(name, nothing) for name in POSITION], axis=1)
+
+
+def _orientation(columns: dict[str, Floats]) -> Floats | None:
+    """Measured orientations (n, 3, 3); NaN in rows without."""
+    for names in (ANGLES, QUATERNION):
+        given = [name for name in names if name in columns]
+        if given and len(given) < len(names):
+            raise InvalidArgument("path", f"columns {', '.join(given)}", f"{', '.join(names)} together")
+        if given:
+            numbers = np.stack([columns[name] for name in names], axis=1)
+            is_whole = np.isfinite(numbers).all(axis=1)
+            made = np.full((len(numbers), 3, 3), np.nan)
+            whole = numbers[is_whole]
+            turned = pose(np.zeros(3), rpy=whole) if names == ANGLES else pose(np.zeros(3), quat_xyzw=whole)
+            made[is_whole] = turned[..., :3, :3]
+            return made
+    return None
+
+
+def _distances(columns: dict[str, Floats]) -> Floats | None:
+    """Rows of (row, row, distance), counted from 0."""
+    lengths, ends = columns.get(DISTANCE), columns.get(DISTANCE_TO)
+    if lengths is None and ends is None:
+        return None
+    if lengths is None or ends is None:
+        raise InvalidArgument("path", "one of the columns distance and distance_to", "both")
+    rows = np.flatnonzero(np.isfinite(lengths))
+    if not np.isfinite(ends[rows]).all():
+        raise InvalidArgument(
+            "path", "a distance without distance_to", "the line that it leads to", rows=rows[:5].tolist()
+        )
+    return np.column_stack([rows, ends[rows] - 1.0, lengths[rows]]) if len(rows) else None

@@ -1,0 +1,201 @@
+"""Calibration: the parameters of a machine from what was measured of it, by least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..answers.solution import Solution
+from ..arrays import Floats
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..errors import InvalidArgument, UnknownName
+from ..extras import require
+from ..poses import as_floats
+from .calibration import Calibration
+from .linear_fit import RANK, LinearFit
+from .measured_residuals import Fit, Residuals, residuals, slopes_of, whitened
+from .measurements import Measurements
+from .parameters import Free, Parameters, parameters
+
+TOLERANCE = 1e-8
+"""Relative step at which least squares end: convergence is quadratic, and the next step is below what doubles show."""
+
+Priors = Mapping[str, float | tuple[float, float]]
+"""Parameter name -> standard deviation about its described value, or (value, standard deviation)."""
+
+
+def calibrate(
+    mechanism: Mechanism,
+    measurements: Measurements,
+    *,
+    free: Free | Parameters = None,
+    priors: Priors | None = None,
+    weights: ArrayLike | None = None,
+    ties: Literal["copies"] | None = None,
+    start: Solution | None = None,
+) -> Calibration:
+    """Parameters of a machine that explain measurements best, by least squares.
+
+    Measured values minus those of the machine with other parameters, over their standard deviations, are made small by
+    SciPy's `least_squares` with exact derivatives. Directions of parameters that change no measurement stay as
+    described, and are reported: a small residual is no proof of a parameter.
+
+    Parameters
+    ----------
+    free, ties : what may vary, as of `parameters`; or parameters.
+    priors : what is known beforehand; asks for `sigma` of the measurements.
+    weights : of the rows, (n,); 0 leaves a row out.
+    start : configurations of the machine as described at the readings, (n,) or one for all, that say which assembly
+        mode it was in. Default: at measured poses, else home.
+
+    Raises
+    ------
+    InvalidArgument, UnknownName : what does not fit the machine.
+    UnsupportedMechanism : parameters that open the loops of an overconstrained machine.
+    MissingLibrary : SciPy is not installed.
+    """
+    checked_mechanism(mechanism)
+    if not isinstance(measurements, Measurements):
+        raise InvalidArgument("measurements", type(measurements).__name__, "Measurements")
+    own = free if isinstance(free, Parameters) else parameters(mechanism, free, ties=ties)
+    if own.mechanism != mechanism:
+        raise InvalidArgument("free", "parameters of another machine", f"parameters of '{mechanism.name}'")
+    require("calibration", "scipy", "calibrate")
+    _check_sigma(measurements)
+    expected = _priors(own, priors, measurements)
+    fit = Fit(own, measurements)
+    row_weights = _weights(weights, measurements.rows)
+    fit.begin(start)
+    problem = _Problem(own, fit, expected, row_weights)
+    values = problem.solved()
+    return problem.result(values)
+
+
+class _Problem:
+    """The least-squares problem in scaled parameters: rows of the data, then those of the priors."""
+
+    def __init__(
+        self, own: Parameters, fit: Fit, priors: dict[str, tuple[float, float]], weights: Floats | None
+    ) -> None:
+        self.own, self.fit, self.priors, self.weights = own, fit, priors, weights
+        self.places = [own.names.index(name) for name in priors]
+        self.prior_values = np.array([value for value, _ in priors.values()])
+        self.prior_sigmas = np.array([sigma for _, sigma in priors.values()])
+        self.before = self._blocks(own.values)
+        self.factors = whitened(self.before, fit.measurements.sigma, fit.length, weights)
+
+    def solved(self) -> Floats:
+        """The values that fit best, (p,); in directions that nothing determines, those as described."""
+        from scipy.optimize import least_squares
+
+        base, values, rank = self.own.values, self.own.values, 0
+        for _ in range(MOST_RANKS):
+            _, sizes, right = np.linalg.svd(self._jacobian(values), full_matrices=False)
+            kept = right[sizes > RANK * sizes.max(initial=0.0)]
+            if len(kept) == rank:
+                break
+            rank, basis = len(kept), self.own.scales[:, None] * kept.T
+
+            def residual(y: Floats, basis: Floats = basis) -> Floats:
+                return self._residual(base + basis @ y)
+
+            def derivative(y: Floats, basis: Floats = basis, kept: Floats = kept) -> Floats:
+                return np.asarray(self._jacobian(base + basis @ y) @ kept.T)
+
+            begin = kept @ ((values - base) / self.own.scales)
+            found = least_squares(
+                residual,
+                begin,
+                derivative,
+                method="trf",
+                xtol=TOLERANCE,
+                ftol=TOLERANCE,
+                gtol=None,
+                max_nfev=MOST_STEPS,
+            )
+            values = base + basis @ found.x
+        return values
+
+    def result(self, values: Floats) -> Calibration:
+        """The calibration at these values."""
+        blocks = self._blocks(values, slopes=True)
+        scaled = self.factors[:, None] * slopes_of(blocks) * self.own.scales
+        groups = np.concatenate([block.groups for block in blocks])
+        has_sigma = self.fit.measurements.has_deviations
+        residual = self.factors * residuals(blocks)
+        data = LinearFit(scaled, residual, groups, has_sigma)
+        fitted = data
+        if self.priors:
+            jacobian = np.concatenate([scaled, self._prior_slopes()])
+            left = np.concatenate([residual, (values[self.places] - self.prior_values) / self.prior_sigmas])
+            numbers = np.concatenate([groups, np.full(len(self.places), -1)])
+            fitted = LinearFit(jacobian, left, numbers, has_sigma)
+        before = self.factors * residuals(self.before)
+        by_quantity = {block.quantity: block.residual for block in blocks}
+        return Calibration(self.own, self.fit.measurements, values, self.priors, data, fitted, before, by_quantity)
+
+    def _blocks(self, values: Floats, *, slopes: bool = False) -> list[Residuals]:
+        return self.fit.blocks(values, slopes=slopes)
+
+    def _residual(self, values: Floats) -> Floats:
+        data = self.factors * residuals(self._blocks(values))
+        return np.concatenate([data, (values[self.places] - self.prior_values) / self.prior_sigmas])
+
+    def _jacobian(self, values: Floats) -> Floats:
+        """Derivatives by scaled parameters."""
+        slopes = slopes_of(self._blocks(values, slopes=True))
+        return np.concatenate([self.factors[:, None] * slopes * self.own.scales, self._prior_slopes()])
+
+    def _prior_slopes(self) -> Floats:
+        rows = np.zeros((len(self.places), len(self.own)))
+        rows[np.arange(len(self.places)), self.places] = self.own.scales[self.places] / self.prior_sigmas
+        return rows
+
+
+MOST_RANKS, MOST_STEPS = 3, 60
+"""How often directions are chosen, and the most steps for each choice: a drawing needs one and five."""
+
+
+def _check_sigma(measurements: Measurements) -> None:
+    given = measurements.sigma
+    measured = {
+        "position": measurements.position,
+        "orientation": measurements.orientation,
+        "height": measurements.height,
+        "distances": measurements.distances if len(measurements.distances) else None,
+        "joints": measurements.joints or None,
+    }
+    missing = [name for name, values in measured.items() if values is not None and name not in given]
+    if given and missing:
+        raise InvalidArgument("sigma", f"none for {', '.join(missing)}", "one for every quantity that is measured")
+
+
+def _priors(own: Parameters, priors: Any, measurements: Measurements) -> dict[str, tuple[float, float]]:
+    if priors is None:
+        return {}
+    if not isinstance(priors, Mapping):
+        raise InvalidArgument("priors", type(priors).__name__, "name -> standard deviation, or (value, deviation)")
+    if priors and not measurements.has_deviations:
+        raise InvalidArgument("priors", "priors beside measurements without sigma", "sigma: how good each is")
+    expected: dict[str, tuple[float, float]] = {}
+    for name, given in priors.items():
+        if name not in own.names:
+            raise UnknownName("parameter", name, own.names)
+        pair = np.atleast_1d(as_floats("priors", given, "a deviation, or (value, deviation)"))
+        value, sigma = (own.values[own.names.index(name)], pair[0]) if len(pair) == 1 else (pair[0], pair[-1])
+        if len(pair) > 2 or not (np.isfinite(value) and 0.0 < sigma < np.inf):
+            raise InvalidArgument("priors", f"'{name}': {given!r}", "a positive deviation, or (value, deviation)")
+        expected[name] = float(value), float(sigma)
+    return expected
+
+
+def _weights(weights: ArrayLike | None, rows: int) -> Floats | None:
+    if weights is None:
+        return None
+    array = as_floats("weights", weights, f"shape ({rows},)")
+    if array.shape != (rows,) or not (np.isfinite(array) & (array >= 0.0)).all():
+        raise InvalidArgument("weights", f"shape {array.shape}", f"shape ({rows},): numbers from 0")
+    return array

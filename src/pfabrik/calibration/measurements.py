@@ -1,0 +1,179 @@
+"""Measurements of a real machine: what its actuators read, and what was measured of its end effector then."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats, Ints
+from ..errors import InvalidArgument, UnknownName
+from ..poses import as_floats, is_rotation
+
+Sigma: TypeAlias = float | Mapping[str, float] | None
+
+QUANTITIES = ("position", "orientation", "height", "distances", "joints")
+"""What is measured, and what `sigma` is of; a pose is a position and an orientation."""
+
+
+class Measurements:
+    """What a machine's actuators read in some configurations, and what was measured there.
+
+    Parameters
+    ----------
+    actuators : readings, (n, n_a), in the order of `mechanism.actuator_names` [length or rad].
+    pose : measured T_base_platform, (n, 4, 4) [length]; NaN where there is none.
+    position : of the reference point in the base frame, (n, 3) [length]; NaN for components that are not measured.
+    orientation : R_base_platform, (n, 3, 3); NaN where there is none.
+    height : z of the reference point, (n,) [length], as a probe finds it.
+    distances : (i, j, distance): between the reference points of rows i and j [length], as on a printed part; (d, 3).
+    joints : coordinate name -> what its sensor reads, (n,) [length or rad].
+    sigma : standard deviation of a measurement [length or rad]: one number for all, or one for each of "position",
+        "orientation", "height", "distances", "joints". By default all are equally good, an angle times L as a length,
+        and how good is estimated from what is left.
+    absolute_sigma : False if `sigma` only says how good quantities are relative to each other, and how good they all
+        are is estimated from what is left.
+
+    Attributes
+    ----------
+    rows : number of configurations.
+    has_deviations : True if it is known how good the measurements are.
+    """
+
+    def __init__(
+        self,
+        actuators: ArrayLike,
+        *,
+        pose: ArrayLike | None = None,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        height: ArrayLike | None = None,
+        distances: ArrayLike | None = None,
+        joints: Mapping[str, ArrayLike] | None = None,
+        sigma: Sigma = None,
+        absolute_sigma: bool = True,
+    ) -> None:
+        self.actuators = _rows("actuators", actuators, 1, None)
+        if not np.isfinite(self.actuators).all():
+            bad = np.flatnonzero(~np.isfinite(self.actuators).all(axis=1))[:5].tolist()
+            raise InvalidArgument("actuators", "a reading that is not finite", "finite readings", rows=bad)
+        n = self.rows = len(self.actuators)
+        if pose is not None and (position is not None or orientation is not None):
+            raise InvalidArgument("pose", "a pose beside a position or an orientation", "either")
+        if pose is not None:
+            poses = _rows("pose", pose, 2, n)
+            if poses.shape[1:] != (4, 4):
+                raise InvalidArgument("pose", f"shape {poses.shape}", f"shape ({n}, 4, 4)")
+            position, orientation = poses[:, :3, 3], poses[:, :3, :3]
+        self.position = None if position is None else _of_shape("position", position, (n, 3))
+        self.orientation = None if orientation is None else _of_shape("orientation", orientation, (n, 3, 3))
+        if self.orientation is not None:
+            _check_rotations(self.orientation)
+        self.height = None if height is None else _of_shape("height", height, (n,))
+        self.distances = _pairs(distances, n)
+        self.joints = {name: _of_shape(f"joints['{name}']", v, (n,)) for name, v in (joints or {}).items()}
+        self.sigma = _sigmas(sigma)
+        self.has_deviations = bool(self.sigma) and absolute_sigma
+        if self.count == 0:
+            raise InvalidArgument("measurements", "none", "a pose, position, orientation, height, distance or joint")
+
+    @property
+    def pairs(self) -> Ints:
+        """The rows (d, 2) that distances are between."""
+        return np.asarray(self.distances[:, :2].astype(np.int64))
+
+    @property
+    def count(self) -> int:
+        """Number of measured values; an orientation counts three."""
+        fields = [self.position, self.height, *self.joints.values()]
+        counts = sum(int(np.isfinite(field).sum()) for field in fields if field is not None) + len(self.distances)
+        if self.orientation is not None:
+            counts += 3 * int(np.isfinite(self.orientation).all(axis=(1, 2)).sum())
+        return counts
+
+    def __len__(self) -> int:
+        return self.rows
+
+    def __repr__(self) -> str:
+        given = [name for name in QUANTITIES[:3] if getattr(self, name) is not None]
+        given += [f"{len(self.distances)} distances"] if len(self.distances) else []
+        given += [f"joints {', '.join(self.joints)}"] if self.joints else []
+        return f"<Measurements: {self.rows} rows, {self.count} values: {', '.join(given)}>"
+
+    def without(self, rows: Sequence[int]) -> Measurements:
+        """The same without what was measured in some rows, and distances to them."""
+        kept = np.setdiff1d(np.arange(self.rows), rows)
+        place = np.full(self.rows, -1)
+        place[kept] = np.arange(len(kept))
+        pairs = place[self.pairs]
+        distances = np.column_stack([pairs, self.distances[:, 2]])[(pairs >= 0).all(axis=1)]
+        fields = {name: getattr(self, name) for name in ("position", "orientation", "height")}
+        return Measurements(
+            self.actuators[kept],
+            **{name: None if value is None else value[kept] for name, value in fields.items()},
+            distances=distances if len(distances) else None,
+            joints={name: value[kept] for name, value in self.joints.items()},
+            sigma=self.sigma or None,
+            absolute_sigma=self.has_deviations,
+        )
+
+    def check_for(self, actuators: Sequence[str], coordinates: Sequence[str]) -> None:
+        """Refuse measurements of another machine."""
+        if self.actuators.shape[1] != len(actuators):
+            expected = f"{len(actuators)} a row: {', '.join(actuators)}"
+            raise InvalidArgument("measurements", f"{self.actuators.shape[1]} actuators a row", expected)
+        for name in self.joints:
+            if name not in coordinates:
+                raise UnknownName("coordinate", name, coordinates)
+
+
+def _rows(name: str, values: ArrayLike, more: int, n: int | None) -> Floats:
+    expected = f"shape ({'n' if n is None else n}, ...), a row for each configuration"
+    array = np.array(as_floats(name, values, expected), float)
+    if array.ndim != 1 + more or len(array) == 0 or (n is not None and len(array) != n):
+        raise InvalidArgument(name, f"shape {array.shape}", expected)
+    return array
+
+
+def _of_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    array = np.array(as_floats(name, values, f"shape {shape}"), float)
+    if array.shape != shape:
+        raise InvalidArgument(name, f"shape {array.shape}", f"shape {shape}")
+    if np.isinf(array).any():
+        raise InvalidArgument(name, "a value that is infinite", "finite values, or NaN for what was not measured")
+    return array
+
+
+def _check_rotations(orientations: Floats) -> None:
+    given = np.flatnonzero(np.isfinite(orientations).all(axis=(1, 2)))
+    bad = [int(row) for row in given if not is_rotation(orientations[row])]
+    if bad:
+        raise InvalidArgument("orientation", "a matrix that is not a rotation", "R^T R = I and det R = 1", rows=bad[:5])
+
+
+def _pairs(distances: ArrayLike | None, n: int) -> Floats:
+    if distances is None:
+        return np.zeros((0, 3))
+    expected = "(row, row, distance), shape (d, 3)"
+    array = np.array(as_floats("distances", distances, expected), float)
+    if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
+        raise InvalidArgument("distances", f"shape {array.shape}" if array.ndim != 2 else "other values", expected)
+    rows = array[:, :2]
+    if (rows != rows.astype(int)).any() or (rows < 0).any() or (rows >= n).any() or (array[:, 2] <= 0.0).any():
+        raise InvalidArgument("distances", "a row that does not exist, or no distance", f"rows 0 to {n - 1}, above 0")
+    return array
+
+
+def _sigmas(sigma: Any) -> dict[str, float]:
+    """Standard deviation of each quantity; empty if none is given."""
+    if sigma is None:
+        return {}
+    given = dict(sigma) if isinstance(sigma, Mapping) else dict.fromkeys(QUANTITIES, sigma)
+    for name, value in given.items():
+        if name not in QUANTITIES:
+            raise UnknownName("quantity", str(name), QUANTITIES)
+        if not isinstance(value, int | float | np.floating) or not 0.0 < value < np.inf:
+            raise InvalidArgument("sigma", f"{name} {value!r}", "positive numbers")
+    return {name: float(value) for name, value in given.items()}

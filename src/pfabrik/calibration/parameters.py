@@ -1,0 +1,236 @@
+"""Parameters: the numbers of a machine that may differ from its drawing, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..derived import derived
+from ..description.geometry import Geometry, geometry_of, with_geometry
+from ..description.mechanism import Joint, Mechanism, checked_mechanism
+from ..errors import InvalidArgument, UnknownName
+from ..poses import as_floats
+from ..rotations import from_rotvec
+from .parameter_kinds import KINDS, Candidates, tied
+from .shifts import Shift, ShiftedGeometry, with_own_axes
+
+Free: TypeAlias = str | Sequence[str] | None
+"""Kinds ("dimensions", "points", "axes", "lengths", "offsets") and names of parameters, dimensions or joints."""
+
+STEP = 1e-5
+"""Step of central differences of a geometry, in a parameter's scale: truncation and rounding both leave 1e-10."""
+
+
+class Parameters:
+    """Numbers of a machine that may vary, by name; made by `parameters`.
+
+    Attributes
+    ----------
+    mechanism : the machine as described.
+    names : of the parameters, (p,).
+    values : of the machine as described, (p,), in `units`.
+    units : the mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
+    scales : changes that would be noticed, (p,): L, 1 rad, or the size of a dimension.
+    """
+
+    def __init__(self, mechanism: Mechanism, dimensions: Sequence[str], candidates: Candidates, shifts: list[Shift]):
+        self.mechanism = mechanism
+        self._dimensions, self._shifted = tuple(dimensions), ShiftedGeometry(mechanism, shifts, candidates.rods)
+        self.names = (*dimensions, *(shift.name for shift in shifts))
+        self.units = (
+            *("" for _ in dimensions),
+            *("rad" if shift.is_angle else mechanism.length_unit for shift in shifts),
+        )
+        own = [mechanism.dimensions[name] for name in dimensions]
+        self.values = _read_only(np.array([*own, *(shift.value for shift in shifts)]))
+        self.scales = _read_only(np.array([*(abs(value) or 1.0 for value in own), *(s.scale for s in shifts)]))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(self.names[:6]) + (", ..." if len(self) > 6 else "")
+        return f"<Parameters of '{self.mechanism.name}': {len(self)}: {shown}>"
+
+    def apply(self, x: ArrayLike) -> Mechanism:
+        """The machine with other values of the parameters, (p,), checked as every machine is.
+
+        A machine that only differs by dimensions keeps its file's expressions; others have numbers.
+
+        Raises
+        ------
+        InvalidMechanism : no machine has these values; with every fault.
+        """
+        values = self.checked(x)
+        n = len(self._dimensions)
+        drawn = self.mechanism
+        if n and not np.array_equal(values[:n], self.values[:n]):
+            drawn = drawn.with_dimensions(dict(zip(self._dimensions, values[:n].tolist(), strict=True)))
+        if np.array_equal(values[n:], self.values[n:]):
+            return drawn
+        explicit = {
+            j
+            for j, joint in enumerate(drawn.joints)
+            if joint.along is not None and self._shifted.like.joints[j].along is None
+        }
+        like = with_own_axes(drawn, explicit) if explicit else drawn
+        before = geometry_of(like)
+        after = self._shifted.at(values[None, n:], _stacked([before]))
+        moved = with_geometry(like, Geometry(*(array[0] for array in after)))
+        joints = [
+            _with_cone(joint, before.axes[j], after.axes[0, j], self._turn(values[n:], j))
+            for j, joint in enumerate(moved.joints)
+        ]
+        return replace(moved, joints=tuple(joints))
+
+    def _turn(self, values: Floats, j: int) -> Floats:
+        changes = values - self.values[len(self._dimensions) :]
+        return np.asarray(
+            sum((c * s.turns[j] for c, s in zip(changes, self._shifted.shifts, strict=True)), np.zeros(3))
+        )
+
+    def checked(self, x: ArrayLike) -> Floats:
+        """Values of all parameters, (p,)."""
+        expected = f"shape ({len(self)},): {', '.join(self.names[:8])}{', ...' if len(self) > 8 else ''}"
+        values = as_floats("x", x, expected)
+        if values.shape != (len(self),):
+            raise InvalidArgument("x", f"shape {values.shape}", expected)
+        if not np.isfinite(values).all():
+            raise InvalidArgument("x", "a value that is not finite", "finite values")
+        return values
+
+    @property
+    def like(self) -> Mechanism:
+        """The machine that geometries are of: some of its joints may be given by axes of their own."""
+        return self._shifted.like
+
+    @cached_property
+    def unlimited(self) -> Mechanism:
+        """The same without limits: what a real machine read, it did reach."""
+        return self.like.without_limits()
+
+    def geometry(self, values: Floats) -> Geometry:
+        """The geometry at values (p,), unchecked."""
+        return Geometry(*(array[0] for array in self._geometries(values[None])))
+
+    def slopes(self, values: Floats) -> Geometry:
+        """Derivatives of the geometry by the parameters at values (p,): every array with the parameters in front."""
+        steps = STEP * self.scales
+        grid = values + np.concatenate([np.diag(steps), -np.diag(steps)])
+        both = self._geometries(grid)
+        n = len(self)
+        return Geometry(*((a[:n] - a[n:]) / (2.0 * steps).reshape(n, *(1,) * (a.ndim - 1)) for a in both))
+
+    def _geometries(self, values: Floats) -> Geometry:
+        """Geometries at values (b, p), every array with the batch in front."""
+        n = len(self._dimensions)
+        source = self.mechanism.__dict__.get("_source")
+        if n == 0 or source is None:
+            return self._shifted.at(values)
+        rows: dict[bytes, Geometry] = {}
+        for row in values[:, :n]:
+            if row.tobytes() not in rows:
+                sketch = source.sketch_with(dict(zip(self._dimensions, row.tolist(), strict=True)))
+                rows[row.tobytes()] = geometry_of(sketch)
+        return self._shifted.at(values[:, n:], _stacked([rows[row.tobytes()] for row in values[:, :n]]))
+
+
+def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies"] | None = None) -> Parameters:
+    """Parameters of a machine that may differ from its drawing.
+
+    Parameters
+    ----------
+    free : kinds, names, or a list of both:
+
+        - "dimensions": the named dimensions of the file that are numbers (`rod = 250`), in the units of the file;
+        - "points": centres of joints, "A1.x" [length]; of a hinge two components, as it may slide along its axis;
+        - "axes": directions of axes, as turns about base axes, "A1.rx" [rad];
+        - "offsets": of the actuators' zeros, "B1.offset", added to a reading [length or rad];
+        - "lengths": of rods on actuated joints of the base, "A1.rod" [length];
+        - the name of a dimension, of a joint (all its points), or of one parameter.
+
+        By default the dimensions, or, of a machine without any, points and offsets.
+    ties : "copies" lets joints that are turned copies of each other (A1, A2, A3) vary as one, "A.x": those of copy 1,
+        and what the turn makes of it for the others.
+
+    Raises
+    ------
+    UnknownName, InvalidArgument : no such parameter, or one that is named twice.
+    """
+    if ties not in (None, "copies"):
+        raise InvalidArgument("ties", repr(ties), "'copies' or None")
+    if free is None:
+        free = ("dimensions",) if checked_mechanism(mechanism).dimensions else ("points", "offsets")
+    chosen = (free,) if isinstance(free, str) else tuple(free)
+    if not chosen or not all(isinstance(name, str) for name in chosen):
+        raise InvalidArgument("free", repr(free), f"kinds (dimensions, {', '.join(KINDS)}) or names of parameters")
+    return _parameters(checked_mechanism(mechanism), chosen, ties)
+
+
+@derived
+def _parameters(mechanism: Mechanism, chosen: tuple[str, ...], ties: str | None) -> Parameters:
+    source = mechanism.__dict__.get("_source")
+    independent: tuple[str, ...] = () if source is None else source.independent
+    candidates = Candidates(mechanism)
+    dimensions: list[str] = []
+    shifts: list[Shift] = []
+    for name in chosen:
+        _choose(mechanism, name, independent, candidates, dimensions, shifts)
+    if ties == "copies":
+        shifts = tied(mechanism, shifts)
+    names = [*dimensions, *(shift.name for shift in shifts)]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InvalidArgument("free", f"{', '.join(twice)} twice", "every parameter once")
+    if not names:
+        raise InvalidArgument("free", "no parameter", "a kind of which the machine has some")
+    return Parameters(mechanism, dimensions, candidates, shifts)
+
+
+def _choose(
+    mechanism: Mechanism,
+    name: str,
+    independent: Sequence[str],
+    candidates: Candidates,
+    dimensions: list[str],
+    shifts: list[Shift],
+) -> None:
+    """Add the parameters that a name stands for."""
+    if name == "dimensions":
+        if not independent:
+            raise InvalidArgument("free", "dimensions of a machine that has none", f"one of {', '.join(KINDS)}")
+        dimensions += independent
+    elif name in independent:
+        dimensions.append(name)
+    elif name in KINDS:
+        shifts += candidates.of_kind(name)
+    else:
+        kind = "lengths" if name.endswith(".rod") else None
+        known = [s for k in KINDS if k != "lengths" or kind for s in candidates.of_kind(k)]
+        own = [s for s in known if s.name == name or (s.name.partition(".")[0] == name and s.points.any())]
+        if not own:
+            raise UnknownName("parameter", name, [*independent, *KINDS, *(s.name for s in known)])
+        shifts += own
+
+
+def _with_cone(joint: Joint, before: Floats, after: Floats, turn: Floats) -> Joint:
+    """A joint whose cone is turned as its axes are."""
+    if joint.cone is None or not turn.any() or np.array_equal(before, after):
+        return joint
+    axis = from_rotvec(turn) @ np.array(joint.cone.axis)
+    return replace(joint, cone=replace(joint.cone, axis=tuple(axis.tolist())))
+
+
+def _stacked(geometries: Sequence[Geometry]) -> Geometry:
+    return Geometry(*(np.stack(arrays) for arrays in zip(*geometries, strict=True)))
+
+
+def _read_only(array: Any) -> Floats:
+    array.setflags(write=False)
+    return np.asarray(array)

@@ -1,0 +1,181 @@
+"""How the pose and the actuators of configurations change with the parameters of their machine, to first order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..answers.solution import Solution, checked_solution
+from ..arrays import Floats, shaped
+from ..description.geometry import Geometry
+from ..description.graph import tree_of
+from ..description.home_mobility import body_twist, column_joints, column_moves, loop_conditions
+from ..description.mechanism import Mechanism
+from ..description.task import task_of
+from ..errors import InvalidArgument, UnsupportedMechanism
+from ..motion.displacements import (
+    displacements,
+    end_effector_pose,
+    geometry_screws,
+    home_coordinates,
+    rate_units,
+    screws,
+)
+from ..tolerances import TOLERANCES
+from .parameters import Parameters
+
+SQUARE_ENOUGH = 1e8
+"""Condition number up to which loop conditions, as many as passive coordinates, are solved as they are."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of configurations by parameters.
+
+    Attributes
+    ----------
+    pose : of the end effector at held actuators, (..., 6, p): velocity of the reference point [length per unit of the
+        parameter], angular velocity [rad per unit], in the base frame; (..., 3, p) for a joint end effector.
+    actuators : of the actuators at a held pose, (..., n_a, p); of the task's coordinates where the machine cannot hold
+        the whole pose. Where actuators are redundant, the least change.
+    names : of the parameters, (p,).
+    """
+
+    pose: Floats
+    actuators: Floats
+    names: tuple[str, ...]
+
+
+def sensitivity(solution: Solution, parameters: Parameters) -> Sensitivity:
+    """Derivatives of the pose and of the actuators of a solution by the parameters of its machine.
+
+    Implicit differentiation of the closed loops: with the present screws S of the coordinates z, and those T of the
+    geometry's changes, loops ask for S dz + T dx = 0 around every loop; pose and actuators follow from dz and dx.
+
+    Raises
+    ------
+    InvalidArgument : a solution of another machine, or one that is INVALID.
+    UnsupportedMechanism : loops that some parameters open: an overconstrained machine moves with some geometries only.
+    """
+    mechanism = checked_solution(solution).mechanism
+    if not isinstance(parameters, Parameters) or parameters.mechanism != mechanism:
+        raise InvalidArgument("parameters", "those of another machine", f"parameters of '{mechanism.name}'")
+    q = np.reshape(solution.q, (-1, len(mechanism.coordinate_names)))
+    if not np.isfinite(q).all():
+        raise InvalidArgument("solution", "a row that is INVALID", "configurations")
+    first = GeometrySlopes(parameters.like, q - home_coordinates(mechanism), parameters.slopes(parameters.values))
+    pose, _ = first.at_held_actuators()
+    require_closed(first.opened, parameters)
+    twists = 3 if mechanism.end_effector_is_joint else 6
+    return Sensitivity(
+        shaped(pose[:, :twists], solution.shape), shaped(first.at_held_pose(), solution.shape), parameters.names
+    )
+
+
+OPENS = 1e-6
+"""Opening of the loops per scaled parameter that counts as one [L or rad]: derivatives are exact to 1e-10, and loops
+of axes that are not quite parallel open by the angle between these."""
+
+
+def require_closed(opened: Floats, parameters: Parameters) -> None:
+    """Refuse parameters whose change opens loops.
+
+    Parameters
+    ----------
+    opened : how far per unit of each parameter, (p,) [L or rad].
+    """
+    opening = np.flatnonzero(opened * parameters.scales > OPENS)
+    if len(opening):
+        names = ", ".join(parameters.names[k] for k in opening[:4]) + (", ..." if len(opening) > 4 else "")
+        reason = (
+            f"its loops do not close with another {names}; free dimensions, or let copies vary as one: ties='copies'"
+        )
+        raise UnsupportedMechanism(parameters.mechanism.name, [reason], "varied so")
+
+
+class GeometrySlopes:
+    """Configurations to first order in their joint coordinates and in the geometry of their machine; lengths in L.
+
+    Parameters
+    ----------
+    q : coordinates as deviations from home, (n, c) [rad or length].
+    slopes : derivatives of the geometry by p parameters.
+    """
+
+    def __init__(self, mechanism: Mechanism, q: Floats, slopes: Geometry) -> None:
+        self.mechanism, self.length = mechanism, mechanism.characteristic_length
+        owners, tree = column_joints(mechanism), tree_of(mechanism)
+        moves = column_moves(mechanism)
+        body = mechanism.end_effector_body
+        present = screws(mechanism, q)
+        changes = geometry_screws(mechanism, q, np.nan_to_num(slopes.points), slopes.axes)
+        self.units = rate_units(mechanism)
+        self.drives = [drive.column for drive in mechanism.drives]
+        self.zeros = slopes.home[:, self.drives] / self.units[self.drives]
+        """Changes of the drives' zeros, (p, n_a) [rad or L]."""
+        self.loops = loop_conditions(tree.loops[:, owners] * moves, present)
+        n, p = len(q), len(slopes.points)
+        self.openings = np.einsum("lj,njpk->nlkp", tree.loops, changes).reshape(n, -1, p)
+        here = end_effector_pose(mechanism, q)[:, :3, 3] / self.length
+        self.twist = _at(body_twist(tree.paths[body][owners] * moves, present), here)
+        rotations = displacements(mechanism, q)[body][:, :3, :3]
+        self.twist_changes = _at(np.einsum("j,njpk->nkp", tree.paths[body], changes), here)
+        self.twist_changes[:, :3] += np.einsum("nab,pb->nap", rotations, slopes.reference_point) / self.length
+        self.rotations = rotations
+        self.opened = np.zeros(p)
+        """How far loops are from closing per unit of a parameter, (p,) [L or rad]; 0 until it is computed."""
+
+    def at_held_actuators(self) -> tuple[Floats, Floats]:
+        """Twists (n, 6, p), and rates of all coordinates (n, c, p), per unit of every parameter [length, rad]."""
+        n, _, columns = self.loops.shape
+        rates = np.zeros((n, columns, len(self.zeros)))
+        rates[:, self.drives] = -self.zeros.T
+        passive = np.setdiff1d(np.arange(columns), self.drives)
+        wanted = -(self.openings + self.loops[:, :, self.drives] @ rates[:, self.drives])
+        rates[:, passive] = solved(self.loops[:, :, passive], wanted)
+        left = self.loops[:, :, passive] @ rates[:, passive] - wanted
+        self.opened = np.abs(left).max(axis=(0, 1), initial=0.0)
+        twists = self.twist @ rates + self.twist_changes
+        twists[:, :3] *= self.length
+        return twists, rates * self.units[:, None]
+
+    def at_held_pose(self) -> Floats:
+        """Rates of the actuators (n, n_a, p) per unit of every parameter, with the task's coordinates held."""
+        held = self._task_rows()
+        rows = np.concatenate([self.loops, held @ self.twist], axis=1)
+        wanted = np.concatenate([self.openings, held @ self.twist_changes], axis=1)
+        rates = -np.linalg.pinv(rows, TOLERANCES.rank) @ wanted
+        return np.asarray((rates[:, self.drives] + self.zeros.T) * self.units[self.drives, None])
+
+    def _task_rows(self) -> Floats:
+        """Rows (n, k, 6) that pick the coordinates of the task from twists."""
+        task = task_of(self.mechanism)
+        position = np.zeros((len(self.twist), sum(task.axes), 6))
+        position[:, :, :3] = np.eye(3)[list(task.axes)]
+        if task.rotations == 0:
+            return position
+        axes = np.swapaxes(self.rotations, 1, 2) if task.rotations == 2 else np.eye(3)
+        turns = np.zeros((len(self.twist), task.rotations, 6))
+        turns[:, :, 3:] = np.broadcast_to(axes, (len(self.twist), 3, 3))[:, list(task.turns)]
+        return np.concatenate([position, turns], axis=1)
+
+
+def _at(twists: Floats, points: Floats) -> Floats:
+    """Twists (n, 6, k) as [velocity at points (n, 3); angular velocity], from [angular; velocity at the origin]."""
+    angular, velocity = twists[:, :3], twists[:, 3:]
+    return np.concatenate([velocity + np.cross(angular, points[:, :, None], axis=1), angular], axis=1)
+
+
+def solved(matrices: Floats, wanted: Floats) -> Floats:
+    """The least rates (n, c, p) that come nearest to what is wanted of conditions, (n, r, c) and (n, r, p)."""
+    if matrices.shape[1] == matrices.shape[2] and matrices.shape[1]:
+        try:
+            inverses = np.linalg.inv(matrices)
+        except np.linalg.LinAlgError:
+            inverses = None
+        if inverses is not None and np.isfinite(inverses).all():
+            sizes = np.linalg.norm(inverses, axis=(1, 2)) * np.linalg.norm(matrices, axis=(1, 2))
+            if sizes.max(initial=0.0) < SQUARE_ENOUGH:
+                return np.asarray(inverses @ wanted)
+    return np.asarray(np.linalg.pinv(matrices, TOLERANCES.rank) @ wanted)

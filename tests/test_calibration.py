@@ -1,0 +1,312 @@
+"""Parameters of real machines: derivatives, values from measurements, and what measurements leave open."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
+from pfabrik.model import model_of
+from pfabrik.rotations import to_rotvec
+
+PRINTER = Path(__file__).parents[1] / "examples" / "data" / "printer.cfg"
+
+FIRMWARE = {
+    "radius": 162.76928,
+    "angle_a": 210.128266,
+    "angle_b": 329.914363,
+    "endstop_a": 418.72172,
+    "endstop_b": 417.979258,
+    "endstop_c": 419.036135,
+    "arm_a": 345.511546,
+    "arm_b": 346.790457,
+    "arm_c": 346.713602,
+}
+"""What the firmware of that printer identified: github.com/phnxdrgn536/FLSun-v400 @e0368ae (CC0-1.0)."""
+
+
+def off_home(mechanism: pf.Mechanism, seed: int) -> pf.Solution:
+    """A configuration near home, without regard to limits."""
+    rng, length = np.random.default_rng(seed), mechanism.characteristic_length
+    home = np.array([drive.home for drive in mechanism.drives])
+    sizes = np.array([0.05 if drive.kind == "angle" else 0.02 * length for drive in mechanism.drives])
+    return pf.solve_fk(mechanism, home + sizes * rng.uniform(-1.0, 1.0, len(home)))
+
+
+# Of overconstrained machines, some changes open the loops: there are no configurations to compare.
+OPENED = {("agile_eye", "points"), ("agile_eye", "axes"), ("five_bar", "axes"), ("orthoglide", "points")}
+OPENED |= {("orthoglide", "axes"), ("prr", "axes"), ("rpr", "axes"), ("rrr", "axes")}
+MACHINES = [name for name in pf.catalog() if name not in ("snake60", "serial_arm")]
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("kind", ["points", "axes", "offsets"])
+def test_sensitivities_are_those_of_machines_made_anew(name: str, kind: str) -> None:
+    mechanism = pf.load(name).without_limits()
+    solution = off_home(mechanism, 1)
+    if (name, kind) == ("stewart", "axes"):
+        pytest.skip("its file has no axes")
+    own = pf.parameters(mechanism, kind)
+    if (name, kind) in OPENED:
+        with pytest.raises(UnsupportedMechanism, match="loops do not close with another"):
+            pf.sensitivity(solution, own)
+        return
+    slopes = pf.sensitivity(solution, own)
+    home, length = np.array([each.home for each in mechanism.coordinates]), mechanism.characteristic_length
+    rng = np.random.default_rng(2)
+    for k in rng.choice(len(own), min(3, len(own)), replace=False):
+        step, poses = 1e-5 * own.scales[k], []
+        for sign in (1.0, -1.0):
+            values = own.values + sign * step * (np.arange(len(own)) == k)
+            other = model_of(own.like).with_geometry(*own.geometry(values)).mechanism
+            start = solution.q - home + np.array([each.home for each in other.coordinates])
+            moved = pf.solve_fk(other, solution.actuators, start=start)
+            assert moved
+            poses.append(moved.pose)
+        turn = to_rotvec((poses[0][:3, :3] @ poses[1][:3, :3].T)[None])[0]
+        expected = np.concatenate([poses[0][:3, 3] - poses[1][:3, 3], turn * length]) / (2.0 * step)
+        found = slopes.pose[:, k] * np.array([1.0] * 3 + [length] * 3)[: len(slopes.pose)]
+        assert np.abs(found - expected[: len(found)]).max() < 1e-6 * length / own.scales[k]
+
+
+def test_actuators_at_a_held_pose() -> None:
+    mechanism = pf.load("stewart").without_limits()
+    solution = pf.solve_ik(mechanism, pf.pose([10, 5, 190], rotvec=[0.1, -0.05, 0.03]))
+    own = pf.parameters(mechanism, ["points", "offsets"])
+    slopes = pf.sensitivity(solution, own).actuators
+    for k in (0, 20, 35, 37):
+        both = []
+        for sign in (1.0, -1.0):
+            other = own.apply(own.values + sign * 1e-4 * (np.arange(len(own)) == k))
+            both.append(pf.solve_ik(other, solution.pose).actuators)
+        np.testing.assert_allclose(slopes[:, k], (both[0] - both[1]) / 2e-4, atol=1e-7)
+
+
+def test_parameters_change_what_they_name(tmp_path: Path) -> None:
+    delta = pf.load("linear_delta")
+    own = pf.parameters(delta, ["lengths", "offsets", "BL1"])
+    assert own.names[:4] == ("A1.rod", "A2.rod", "A3.rod", "A1.offset")
+    changed = own.apply(own.values + np.array([1.0, 2.0, 3.0] + [0.0] * (len(own) - 3)))
+    for number, length in ((1, 274.0), (2, 275.0), (3, 276.0)):
+        ends = [np.array(changed.joint(f"{letter}{number}").at) for letter in ("BL", "CL")]
+        assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(length, abs=1e-9)
+    low = pf.solve_ik(delta, [0.0, 0.0, -5.0]).actuators
+    zeroed = pf.parameters(delta, "offsets").apply([0.5, 0.0, -0.25])
+    np.testing.assert_allclose(pf.solve_ik(zeroed, [0.0, 0.0, -5.0]).actuators, low + [0.5, 0.0, -0.25], atol=1e-9)
+
+
+def test_tied_copies_vary_as_one() -> None:
+    tied = pf.parameters(pf.load("stewart"), ["points", "offsets"], ties="copies")
+    assert len(tied) == 14
+    changed = tied.apply(tied.values + 0.3)
+    radii = [math.hypot(*changed.joint(f"AL{k}").at[:2]) for k in (1, 2, 3)]
+    assert np.ptp(radii) < 1e-9
+    mixed = pf.parameters(pf.load("five_bar"), "points")
+    with pytest.raises(InvalidArgument, match="turned copies"):
+        pf.parameters(mixed.mechanism, "points", ties="copies")
+
+
+def test_dimensions_are_parameters_by_name(tmp_path: Path) -> None:
+    printer = pf.read_klipper(PRINTER).mechanism
+    own = pf.parameters(printer, ["radius", "arm_a"])
+    assert own.apply([164.0, 345.0]).dimensions["radius"] == 164.0
+    solution = pf.solve_ik(printer, [20.0, 10.0, 5.0])
+    slopes = pf.sensitivity(solution, own).pose[:3]
+    for k in (0, 1):
+        ends = [pf.solve_fk(own.apply(own.values + s * np.eye(2)[k]), solution.actuators) for s in (1e-4, -1e-4)]
+        np.testing.assert_allclose(slopes[:, k], (ends[0].pose[:3, 3] - ends[1].pose[:3, 3]) / 2e-4, atol=1e-6)
+
+
+def hexapod_data(tilt: float, n: int = 40) -> tuple[pf.Parameters, np.ndarray, np.ndarray, np.ndarray]:
+    """A Stewart platform that is not as drawn: its parameters, their true values, and readings at exact poses."""
+    rng = np.random.default_rng(3)
+    own = pf.parameters(pf.load("stewart"))
+    true = own.values + 0.5 * rng.standard_normal(len(own))
+    positions = np.array([0.0, 0.0, 180.0]) + rng.uniform(-1.0, 1.0, (n, 3)) * [30.0, 30.0, 20.0]
+    poses = pf.pose(positions, rotvec=tilt * rng.uniform(-1.0, 1.0, (n, 3)))
+    solution = pf.solve_ik(own.apply(true), poses)
+    assert solution
+    return own, true, solution.actuators, poses
+
+
+def test_a_hexapod_without_noise_is_found_exactly() -> None:
+    own, true, readings, poses = hexapod_data(tilt=0.15)
+    found = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses))
+    assert len(own) == found.rank == 42 and found.determined.all() and found.undetermined == ()
+    assert np.abs(found.values - true).max() < 1e-9
+    assert np.abs(pf.solve_ik(found.mechanism, poses).actuators - readings).max() < 1e-9
+
+
+def test_without_tilt_a_hexapod_shows_what_it_leaves_open() -> None:
+    own, true, readings, poses = hexapod_data(tilt=0.0)
+    found = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses))
+    # at one orientation only differences of base and platform points matter: 42 - 18
+    assert found.rank == 24 and found.rms < 1e-9
+    assert list(np.array(own.names)[found.determined]) == [name for name in own.names if name.endswith("offset")]
+    assert "AL1.x and CL1.x change together" in found.undetermined
+    assert np.isinf(found.deviations[:36]).all()
+    assert np.abs(found.values - own.values).max() < 3.0  # what is open stays near the drawing
+    x = dict(zip(found.names, found.values - true, strict=True))
+    assert abs(x["CL1.x"] - x["AL1.x"]) < 1e-9
+
+
+def test_a_printer_gets_the_values_of_its_firmware() -> None:
+    printer = pf.read_klipper(PRINTER)
+    found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
+    assert dict(zip(found.names, found.values, strict=True)) == pytest.approx(FIRMWARE, abs=1e-3)
+    assert found.determined.all() and found.rms < found.rms_before
+
+
+def test_heights_alone_leave_the_arms_open() -> None:
+    printer = pf.read_klipper(PRINTER)
+    heights = printer.measurements.without(range(7, printer.measurements.rows))
+    few = pf.calibrate(printer.mechanism, heights, free=printer.free)
+    assert few.rank == 7 and not few.determined.any() and "arm_c change together" in few.undetermined[0]
+    rng = np.random.default_rng(5)
+    angles, radii = rng.uniform(0.0, 2.0 * math.pi, 30), 100.0 * np.sqrt(rng.uniform(0.0, 1.0, 30))
+    targets = np.stack([radii * np.cos(angles), radii * np.sin(angles), 0.0 * angles], axis=1)
+    readings = pf.solve_ik(printer.mechanism.with_dimensions(arm_a=346.4, endstop_b=417.8), targets).actuators
+    many = pf.Measurements(readings, height=0.01 * rng.standard_normal(30))
+    found = pf.calibrate(printer.mechanism, many, free=printer.free)
+    assert found.rank == 9 and not found.determined[-3:].any() and found.determined[3:6].all()
+
+
+@pytest.mark.parametrize(("repetitions", "within"), [(30, 0.35), pytest.param(200, 0.2, marks=pytest.mark.campaign)])
+def test_deviations_are_those_of_repetitions(repetitions: int, within: float) -> None:
+    mechanism, rng, sigma = pf.load("linear_delta"), np.random.default_rng(6), 0.02
+    own = pf.parameters(mechanism, ["lengths", "offsets"])
+    positions = rng.uniform(-40.0, 40.0, (12, 3))
+    readings = pf.solve_ik(mechanism, positions).actuators
+    repeated = []
+    for _ in range(repetitions):
+        noisy = pf.Measurements(readings, position=positions + sigma * rng.standard_normal((12, 3)), sigma=sigma)
+        found = pf.calibrate(mechanism, noisy, free=own)
+        repeated.append(found.values)
+    np.testing.assert_allclose(np.std(repeated, axis=0), found.deviations, rtol=within)
+
+
+def test_an_outlier_is_named_and_can_be_left_out() -> None:
+    own, true, readings, poses = hexapod_data(tilt=0.15)
+    poses[7, 0, 3] += 0.4
+    data = pf.Measurements(readings, pose=poses, sigma={"position": 0.01, "orientation": 1e-4})
+    found = pf.calibrate(own.mechanism, data)
+    assert found.worst_rows[0].row == 7 and found.worst_rows[0].residual > 3.0 * found.worst_rows[1].residual
+    assert "row 8 does not fit" in found.table()
+    for without in (data.without([7]), None):
+        weights = None if without is not None else 1.0 * (np.arange(40) != 7)
+        again = pf.calibrate(own.mechanism, without or data, weights=weights)
+        assert np.abs(again.values - true).max() < 1e-8
+
+
+def test_priors_hold_what_is_open_and_do_not_bias_the_rest() -> None:
+    own, true, readings, poses = hexapod_data(tilt=0.0)
+    data = pf.Measurements(readings, pose=poses, sigma={"position": 1e-3, "orientation": 1e-5})
+    priors = {name: (value, 1.0) for name, value in zip(own.names[:18], true[:18], strict=True)}
+    found = pf.calibrate(own.mechanism, data, priors=priors)
+    assert np.abs(found.values[:18] - true[:18]).max() < 1e-6  # pulled to themselves
+    assert np.abs(found.values[36:] - true[36:]).max() < 1e-6
+    assert np.isfinite(found.deviations[:18]).all() and not found.determined[:18].any()
+
+
+def test_suggested_poses_beat_random_ones() -> None:
+    own, _, readings, poses = hexapod_data(tilt=0.15)
+    sigma = {"position": 0.01, "orientation": 1e-4}
+    found = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses, sigma=sigma))
+
+    def information(actuators: np.ndarray) -> np.ndarray:
+        slopes = pf.sensitivity(pf.solve_fk(found.mechanism, actuators), pf.parameters(found.mechanism)).pose
+        rows = slopes / np.array([0.01] * 3 + [1e-4] * 3)[:, None] * own.scales
+        return np.einsum("kmp,kmq->kpq", rows, rows)
+
+    def worst(added: np.ndarray) -> float:
+        return float(np.diag(np.linalg.inv(known + added.sum(axis=0))).max())
+
+    rng = np.random.default_rng(8)
+    pool = pf.pose(
+        np.array([0.0, 0.0, 180.0]) + rng.uniform(-1.0, 1.0, (800, 3)) * [60.0, 60.0, 40.0],
+        rotvec=rng.uniform(-0.4, 0.4, (800, 3)),
+    )
+    solved = pf.solve_ik(found.mechanism, pool)
+    known = information(readings).sum(axis=0)
+    random = information(solved.actuators[np.asarray(solved.status) == pf.Status.REACHED])
+    best = min(worst(random[rng.choice(len(random), 20, replace=False)]) for _ in range(200))
+    assert worst(information(found.suggest(20))) < best
+
+
+def test_measurements_from_a_table(tmp_path: Path) -> None:
+    mechanism = pf.load("linear_delta")
+    solution = pf.solve_ik(mechanism, [[0, 0, 0], [10, 5, -3], [0, 20, 1]])
+    lines = ["A1;A2;A3;x;y;z;height;distance;distance_to"]
+    for k, (readings, pose) in enumerate(zip(solution.actuators, solution.pose, strict=True)):
+        cells = [*readings, *pose[:3, 3], pose[2, 3]]
+        between = np.linalg.norm(pose[:3, 3] - solution.pose[0, :3, 3])
+        extra = [f"{between:.15g}", "1"] if k else ["", ""]
+        lines.append(";".join([*(f"{cell:.15g}" for cell in cells), *extra]))
+    file = tmp_path / "data.csv"
+    file.write_text("\n".join(lines))
+    data = pf.read_measurements(file, mechanism)
+    assert data.rows == 3 and data.count == 9 + 3 + 2
+    found = pf.calibrate(mechanism, data, free="offsets")
+    np.testing.assert_allclose(found.values, 0.0, atol=1e-9)
+    lines[1] = lines[1].replace(";", ";x", 1)
+    file.write_text("\n".join(lines))
+    with pytest.raises(InvalidArgument, match="line 2, column 'A2'"):
+        pf.read_measurements(file, mechanism)
+
+
+def test_passive_joints_with_sensors() -> None:
+    mechanism = pf.load("five_bar")
+    own = pf.parameters(mechanism, "offsets")
+    changes = np.random.default_rng(1).uniform(-0.05, 0.05, (8, 2))
+    solution = pf.solve_fk(own.apply([0.02, -0.01]), [each.home for each in mechanism.drives] + changes)
+    passive = [n for n in mechanism.coordinate_names if n not in mechanism.actuator_names][:2]
+    column = [mechanism.coordinate_names.index(name) for name in passive]
+    joints = {name: solution.q[:, c] for name, c in zip(passive, column, strict=True)}
+    found = pf.calibrate(mechanism, pf.Measurements(solution.actuators, joints=joints), free=own)
+    np.testing.assert_allclose(found.values, [0.02, -0.01], atol=1e-7)
+
+
+def test_wrong_calls_say_what_is_wrong() -> None:
+    mechanism, printer = pf.load("stewart"), pf.read_klipper(PRINTER)
+    own, _, readings, poses = hexapod_data(tilt=0.1, n=4)
+    data = pf.Measurements(readings, pose=poses)
+    with pytest.raises(UnknownName, match="no parameter named 'AL9'"):
+        pf.parameters(mechanism, ["AL9"])
+    with pytest.raises(UnsupportedMechanism, match="calibrated by its lengths"):
+        pf.parameters(mechanism, "lengths")
+    with pytest.raises(InvalidArgument, match="dimensions of a machine that has none"):
+        pf.parameters(mechanism, "dimensions")
+    with pytest.raises(InvalidArgument, match="6 actuators a row"):
+        pf.calibrate(printer.mechanism, data)
+    with pytest.raises(InvalidArgument, match="priors beside measurements without sigma"):
+        pf.calibrate(mechanism, data, priors={"AL1.x": 1.0})
+    with pytest.raises(InvalidArgument, match="parameters of another machine"):
+        pf.calibrate(printer.mechanism, data, free=own)
+    with pytest.raises(InvalidArgument, match="cannot be assembled at"):
+        pf.calibrate(mechanism, pf.Measurements(readings / 25.4, pose=poses))
+    with pytest.raises(InvalidArgument, match="not a rotation"):
+        pf.Measurements(readings, pose=2.0 * poses)
+    with pytest.raises(InvalidArgument, match="not finite"):
+        pf.Measurements(readings * np.nan, pose=poses)
+    with pytest.raises(InvalidArgument, match="one for every quantity"):
+        pf.calibrate(mechanism, pf.Measurements(readings, pose=poses, sigma={"position": 1.0}))
+    with pytest.raises(InvalidArgument, match="measurements: found none"):
+        pf.Measurements(readings)
+    legs = pf.load("rrr")
+    with pytest.raises(UnsupportedMechanism, match="loops do not close with another"):
+        pf.calibrate(
+            legs, pf.Measurements(off_home(legs.without_limits(), 1).actuators[None], height=[0.1]), free="axes"
+        )
+
+
+def test_a_calibration_shows_itself() -> None:
+    printer = pf.read_klipper(PRINTER)
+    found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
+    assert "radius" in found._repr_html_() and "arm_a" in found.table()
+    assert found.to_dict()["parameters"][0]["name"] == "radius"
+    figure = pf.plot_calibration(found)
+    assert len(figure.axes) == 2
