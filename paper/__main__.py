@@ -21,7 +21,9 @@ def main(line: list[str] | None = None) -> int:
         "targets, and circles that leave the workspace, for three mechanisms. report.md with its tables, pictures "
         "and CSV files go to a folder. Ends with 0 if all holds that must.",
     )
-    parser.add_argument("--out", type=Path, default=Path("out"), metavar="FOLDER", help="folder to write (out)")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("out"), metavar="FOLDER", help="folder to write (out)"
+    )
     parser.add_argument("--quick", action="store_true", help="fewer steps, targets and searches")
     parser.add_argument(
         "--page",
@@ -37,7 +39,7 @@ def main(line: list[str] | None = None) -> int:
         parser.error(f"this needs {' and '.join(missing)}; install it with: python -m pip install {' '.join(missing)}")
     if given.page is not None and not given.page.is_file():
         parser.error(f"{given.page}: no such file")
-    return reproduce(given.out, given.quick, given.page)
+    return reproduce(given.output, given.quick, given.page)
 
 
 def reproduce(out: Path, quick: bool, page: Path | None) -> int:

@@ -186,11 +186,8 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
     return [tuple(each) for each in json.loads(told)], said
 
 
-COMMANDS = (
-    *("catalog", "new", "info", "check", "ik", "fk", "track", "travel", "workspace", "plot", "view"),
-    *("import", "export", "verify", "demo"),
-)
-HELP = [["--help"], *[[command, "--help"] for command in COMMANDS]]
+HEAVY = "numpy numba scipy matplotlib rich mujoco viser trimesh yaml"
+HELP = [["--help"], *[[command, "--help"] for command in main.subcommands]]
 WRONG = [
     ["chek"],
     ["ik"],
@@ -204,25 +201,54 @@ WRONG = [
 ]
 
 
-def test_the_help_of_all_commands_loads_none_and_says_what_theirs_says() -> None:
-    told, _ = loaded_by("numpy", [["--help"]])
-    assert told == [(None, []), (0, [])]
+def test_help_loads_nothing_heavy() -> None:
+    told, _ = loaded_by(HEAVY, HELP)
+    assert told == [(None, []), *[(0, [])] * len(HELP)]
+
+
+def test_the_help_of_all_commands_says_what_theirs_says() -> None:
     for name, line in main.subcommands.items():
         command = main.get_command(click.Context(main), name)
         assert command is not None and command.help is not None
         assert line == " ".join(command.help.partition("\n\n")[0].split()), name
 
 
-def test_help_and_wrong_input_load_nothing_heavy() -> None:
-    told, said = loaded_by("numba matplotlib scipy", [*HELP, *WRONG])
-    assert told == [(None, []), *[(0, [])] * len(HELP), *[(2, [])] * len(WRONG)]
+def test_wrong_input_loads_no_kernels_and_no_pictures() -> None:
+    told, said = loaded_by("numba matplotlib scipy", WRONG)
+    assert told == [(None, []), *[(2, [])] * len(WRONG)]
     assert "Traceback" not in said
 
 
-def test_a_mechanism_is_shown_and_checked_and_a_wrong_name_told_without_the_kernels() -> None:
-    wrong = [["fk", "stewart", "1", "2"], ["ik", "stewrt", "--rpy", "0", "0", "1"]]
-    told, said = loaded_by("numba", [["info", "stewart"], ["check", "stewart"], *wrong])
-    assert told == [(None, []), (0, []), (0, []), (2, []), (2, [])]
+def test_no_command_loads_what_it_does_not_use(tmp_path: Path) -> None:
+    """In one process, so those that need least come first."""
+    path = tmp_path / "path.csv"
+    height = str(pf.load("delta").reference_point[2])
+    path.write_text(f"x,y,z\n0,0,{height}\n1,0,{height}\n", encoding="utf-8")
+    groups = {
+        "": [["catalog"], ["new"], ["new", "hexapod"]],
+        "numpy": [["info", "stewart"], ["check", "stewart"], ["export", "stewart", "mjcf"]],
+        "numpy numba": [
+            *(["ik", "delta", "--position", "0", "0", height], ["fk", "delta", "0", "0", "0"], ["travel", "delta"]),
+            *(["speed", "delta", "--speed", "5"], ["track", "delta", str(path), "-o", "-"]),
+            ["time", "delta", str(path), "--speed", "5", "--acceleration", "50"],
+            *(["export", "delta", "c"], ["workspace", "five_bar"]),
+        ],
+    }
+    lines = [line for group in groups.values() for line in group]
+    told, _ = loaded_by("numpy numba matplotlib rich mujoco viser trimesh", lines)
+    assert [loaded for _, loaded in told[1:]] == [names.split() for names, group in groups.items() for _ in group]
+    assert [code for code, _ in told[1:]] == [0] * len(lines)
+
+
+def test_pictures_need_no_kernels_and_checks_no_pictures(tmp_path: Path) -> None:
+    lines = [["info", "delta"], ["plot", "delta", "-o", str(tmp_path / "delta.png")]]
+    told, _ = loaded_by("numba matplotlib", lines)
+    assert told == [(None, []), (0, []), (0, ["matplotlib"])]
+
+
+def test_a_wrong_name_is_told_without_the_kernels() -> None:
+    told, said = loaded_by("numba", [["fk", "stewart", "1", "2"], ["ik", "stewrt", "--rpy", "0", "0", "1"]])
+    assert told == [(None, []), (2, []), (2, [])]
     assert "did you mean 'stewart'" in said
 
 

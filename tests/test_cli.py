@@ -29,6 +29,7 @@ from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import template, templates
 from pfabrik.cli import main, outputs
+from pfabrik.cli.fitted import fitted
 from pfabrik.cli.group import exit_code
 from pfabrik.cli.outputs import ignores_case, new_folder
 from pfabrik.cli.report import describe_modes
@@ -1329,6 +1330,16 @@ def test_an_interruption_that_is_swallowed_comes_again(capsys: pytest.CaptureFix
     assert capsys.readouterr().err == "pfabrik: interrupted\n"
 
 
+def test_an_interruption_while_the_command_is_loaded_is_told_as_one() -> None:
+    code = (
+        "import sys\nclass Interrupting:\n    def find_spec(self, name, *_):\n"
+        "        if name == 'click':\n            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupting())\nfrom pfabrik.__main__ import main\nmain()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "pfabrik: interrupted\n")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_what_cleans_up_is_not_disturbed_by_further_signals(number: int) -> None:
     cleaned = []
@@ -1415,3 +1426,29 @@ def test_demo_refuses_a_file_where_its_folder_should_be(run: Callable[..., Resul
     (tmp_path / "out").write_text("precious")
     assert run("demo", "--quick").exit_code == 2
     assert (tmp_path / "out").read_text() == "precious"
+
+
+@pytest.mark.parametrize("columns", [60, 100])
+def test_tables_fit_the_terminal(run: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, columns: int) -> None:
+    """What one line has no room for goes on in the next; no word is lost."""
+    lines = [
+        *(["catalog"], ["new"], ["info", "nrpm"], ["check", "stewart"], ["travel", "five_bar"]),
+        *(["ik", "stewart", "--position", "0", "0", "300"], ["ik", "prr", "--all", "--rpy", *"000"]),
+    ]
+    for line in lines:
+        monkeypatch.delenv("COLUMNS", raising=False)
+        free = run(*line).stdout
+        monkeypatch.setenv("COLUMNS", str(columns))
+        narrow = run(*line).stdout
+        assert max(map(len, narrow.splitlines())) <= columns, line
+        assert narrow.split() == free.split(), line
+        assert all(row in narrow for row in free.splitlines() if len(row) <= columns), line
+
+
+def test_text_that_goes_on_is_below_its_column() -> None:
+    table = "name  what it is\na     short\nb     one two three four five six seven"
+    assert fitted(table, 30) == "name  what it is\na     short\nb     one two three four five\n      six seven"
+    assert fitted(table, 24) == "name  what it is\na     short\nb\n    one two three four\n    five six seven"
+    assert fitted(table, None) == table == fitted(table, 100)
+    assert fitted("one two three four", 10) == "one two\n    three\n    four"
+    assert fitted("https://" + "x" * 30, 10) == "https://" + "x" * 30  # no word is cut

@@ -136,6 +136,14 @@ def test_the_page_of_a_task_is_what_its_program_prints(program: Path) -> None:
     assert all((written.parent / name).exists() for name in page.pictures)
 
 
+def test_every_task_has_a_page_with_a_picture_in_the_navigation() -> None:
+    pages = {f"tasks/{program.stem}.md" for program in ROOT.glob("examples/tasks/*.py")}
+    site = (ROOT / "zensical.toml").read_text(encoding="utf-8")
+    assert pages == set(re.findall(r"tasks/\w+\.md", site))
+    for page in pages:
+        assert "\n![" in (ROOT / "docs" / page).read_text(encoding="utf-8"), page
+
+
 def test_the_worked_example_is_a_mechanism_that_can_be_solved(tmp_path: Path) -> None:
     text = blocks(FORMAT, "toml")[0]
     (tmp_path / "hexapod.toml").write_text(text, encoding="utf-8")

@@ -11,7 +11,7 @@ import pfabrik as pf
 from machines import MACHINES
 from pfabrik.chains.chain_engine import ChainEngine
 from pfabrik.cli import main
-from pfabrik.cli.info import chain_table, clean, vector
+from pfabrik.cli.info_report import chain_table, clean, vector
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.decompose import beyond_positions
 from pfabrik.engine import engine_of as answering_engine

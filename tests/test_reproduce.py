@@ -32,7 +32,7 @@ PAGE = f"# Title\n\nbefore\n\n{BEGIN}\nstale numbers\n{END}\n\nafter\n"
 
 def reproduce(folder: Path) -> subprocess.CompletedProcess[str]:
     (folder / "page.md").write_text(PAGE, encoding="utf-8")
-    line = [sys.executable, "-m", "paper", "--quick", "--out", "out", "--page", "page.md"]
+    line = [sys.executable, "-m", "paper", "--quick", "-o", "out", "--page", "page.md"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(pf.__file__).parents[1])])}
     return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
@@ -193,7 +193,7 @@ def test_a_page_that_is_not_there_is_told_before_anything_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as leaving:
-        command.main(["--out", str(tmp_path / "out"), "--page", str(tmp_path / "none.md")])
+        command.main(["-o", str(tmp_path / "out"), "--page", str(tmp_path / "none.md")])
     assert leaving.value.code == 2
     assert "none.md: no such file" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -13,6 +13,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pfabrik as pf
@@ -90,6 +91,13 @@ for row, target in enumerate(targets):
         raise SystemExit(f"row {row} is out of reach")
     motors[row] = solver.actuators
 print(f"{len(motors)} rows, first motor from {motors[:, 0].min():.4f} to {motors[:, 0].max():.4f} rad")
+
+# What the three motors do on this circle:
+figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
+axes.plot(np.degrees(angle), np.degrees(motors), label=machine.actuator_names)
+axes.set(xlabel="along the circle [deg]", ylabel="motors [deg]")
+axes.legend()
+figure.savefig("motors.png", dpi=110)
 
 # Such a call takes some microseconds ([benchmarks](../benchmarks.md)). More on both: [Your
 # controller](../your-controller.md), [Control loops](../control-loops.md).

@@ -7,6 +7,7 @@ from those of the default, and on which targets.
 # `Options.paper()` is the method with the paper's constants: up to K = 100 passes over all chains, a tolerance E = 0.01
 # mm, and a target that is moved to where the chains' ends agree until all of them reach it. The default solves legs in
 # closed form where one exists, and finds the nearest feasible pose by optimisation where a target is out of reach.
+import matplotlib.pyplot as plt
 import numpy as np
 
 import pfabrik as pf
@@ -63,6 +64,18 @@ for name, machine in machines.items():
     ratio = (by_paper.position_error / nearest.position_error)[is_out]
     print(f"{name}: {is_out.sum()} of {len(targets)} out of reach for both; paper's distance / nearest:")
     print(f"    median {np.median(ratio):.2f}, 95 % below {np.quantile(ratio, 0.95):.2f}")
+
+# For the 5-bar, in its plane: grey lines lead from where the default ends to where the paper's method does.
+away = [0, 40, 0] + np.column_stack([np.zeros(40), np.linspace(-200, 120, 40), np.full(40, 280)])
+both = [pf.solve_ik(machines["five_bar"], away, options=options).pose[:, 1:3, 3].T for options in (None, paper)]
+figure, axes = plt.subplots(figsize=(6.5, 2.8), layout="constrained")
+axes.plot(away[:, 1], away[:, 2], ".", label="target")
+axes.plot(*both[0], ".", label="default: nearest")
+axes.plot(*both[1], ".", label="paper: centroid of the ends")
+axes.plot(*np.stack(both, axis=1), color="0.7", linewidth=0.8, zorder=0)
+axes.set(xlabel="y [mm]", ylabel="z [mm]", aspect="equal")
+figure.legend(loc="outside lower center", ncols=3)
+figure.savefig("answers.png", dpi=110)
 
 # ## Which one to use
 #

@@ -44,7 +44,8 @@ print(travel)
 
 # ## Workspace
 #
-# All positions with this orientation, as a solid with a volume. The colours of its faces are the limits.
-space = pf.workspace(machine)
+# All positions with this orientation, as a solid with a volume. The colours of its faces are the limits. Cells of 3 mm
+# at its border are fine enough for a picture; without `resolution` they are smaller, and it takes longer.
+space = pf.workspace(machine, resolution=3)
 print(space)
 space.plot().figure.savefig("workspace.png", dpi=110)

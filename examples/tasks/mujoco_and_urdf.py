@@ -60,6 +60,8 @@ print(
     answer.status.name, dict(zip(machine.actuator_names, np.degrees(answer.actuators).round(3).tolist(), strict=True))
 )
 
+pf.plot(answer, names=True).figure.savefig("imported.png", dpi=110)
+
 # Save it as a file of its own, to add what the model does not have: cones of ball joints, speeds of motors, a task.
 pf.save(machine, "five_bar.toml")
 

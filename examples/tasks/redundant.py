@@ -54,6 +54,7 @@ print(leaning.status.name, arms(leaning))
 for label, each in (("upright", answer), ("leaning", leaning)):
     struts = [float(each.joints[name].round(1)) for name in machine.actuator_names if name.startswith("D")]
     print(label, struts)
+pf.plot(leaning, names=machine.actuator_names).figure.savefig("leaning.png", dpi=110)
 
 # ## Which is better?
 #

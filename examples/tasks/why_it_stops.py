@@ -19,6 +19,7 @@ print(answer.status.name)
 # which is true for reached targets only.
 print(f"{answer.position_error:.2f} mm and {answer.rotation_error:.3f} rad from the target")
 print("position", answer.pose[:3, 3].round(2))
+pf.plot(answer).figure.savefig("held.png", dpi=110)
 
 # ## What holds it back
 #

@@ -9,10 +9,12 @@ import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from .arrays import Floats
 from .errors import InvalidArgument, UnknownName
+
+if TYPE_CHECKING:
+    from .arrays import Floats
 
 
 def require_positive(name: str, value: Any) -> float:

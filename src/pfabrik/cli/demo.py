@@ -9,17 +9,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 import pfabrik as pf
 
 from ..answers.aligned_text import aligned
-from ..arrays import Floats
 from ..extras import require
 from ..telling import telling
 from .outputs import check_outputs, new_folder, picture, real, whole_folder
+from .printing import print_text
+
+if TYPE_CHECKING:
+    from ..arrays import Floats
 
 QUICK_STEPS = 36
 
@@ -62,7 +65,7 @@ def demo(output: Path, steps: int, quick: bool) -> int:
         for run in runs:
             write(run, folder)
     header = ("mechanism", "reached", "projected", "failed", "farthest", "loop gap", "limit excess", "per step")
-    click.echo(aligned(header, map(row, runs)))
+    print_text(aligned(header, map(row, runs)))
     click.echo(f"\nwrote {', '.join(f'{run.key}.png, {run.key}.csv' for run in runs)} to {output}/")
     return 0 if all(holds(run.solution) for run in runs) else 1
 
@@ -72,6 +75,8 @@ def circles(steps: int) -> Iterator[tuple[str, Floats]]:
 
     The mechanism whose kernels are compiled soonest comes first.
     """
+    import numpy as np
+
     turn = np.linspace(0, 2 * np.pi, steps)
     around = np.stack([np.zeros(steps), np.sin(turn), -np.cos(turn)], axis=-1)
     text = files(__package__).joinpath("demo.toml").read_text(encoding="utf-8")

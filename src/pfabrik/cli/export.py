@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import click
@@ -21,19 +19,21 @@ NAMED = ("c", "c-float")
 
 def text_of(mechanism: pf.Mechanism, form: str, name: str) -> str:
     """The text of a mechanism in a format."""
-    from ..export.export_c import c_source
-    from ..export.klipper import klipper
-    from ..export.linuxcnc import linuxcnc
-    from ..interop import to_mjcf
+    if form == "mjcf":
+        from ..interop import to_mjcf
 
-    writers: dict[str, Callable[[pf.Mechanism], str]] = {
-        "c": partial(c_source, name=name),
-        "c-float": partial(c_source, precision="float", name=name),
-        "mjcf": to_mjcf,
-        "linuxcnc": linuxcnc,
-        "klipper": klipper,
-    }
-    return writers[form](mechanism)
+        return to_mjcf(mechanism)
+    if form == "linuxcnc":
+        from ..export.linuxcnc import linuxcnc
+
+        return linuxcnc(mechanism)
+    if form == "klipper":
+        from ..export.klipper import klipper
+
+        return klipper(mechanism)
+    from ..export.export_c import c_source
+
+    return c_source(mechanism, precision="float" if form == "c-float" else "double", name=name)
 
 
 @click.command()

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
-import numpy as np
 
 import pfabrik as pf
 
-from ..arrays import Floats
 from ..cells import is_finite
-from ..description.readouts import readouts
 from ..errors import counted
 from .arguments import MECH, load
 from .printing import json_option, print_answer
-from .report import describe, pose_cells, pose_header, print_modes
+
+if TYPE_CHECKING:
+    from ..arrays import Floats
 
 
 def finite_numbers(context: click.Context, parameter: click.Parameter, words: tuple[str, ...]) -> tuple[float, ...]:
@@ -40,6 +41,8 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
     found for get the feasible one whose actuators are nearest. With --all the exit code is 0 if some mode keeps all
     limits.
     """
+    from .report import describe, pose_cells, pose_header, print_modes
+
     mechanism = load(mech)
     actuators = coordinates(mechanism, values)
     if list_all:
@@ -52,6 +55,10 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
 
 def coordinates(mechanism: pf.Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
+    import numpy as np
+
+    from ..description.readouts import readouts
+
     shown = readouts(mechanism)
     if len(values) != len(shown):
         expected = ", ".join(f"{readout.name} [{readout.unit}]" for readout in shown)

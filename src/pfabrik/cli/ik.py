@@ -11,7 +11,6 @@ import pfabrik as pf
 
 from .arguments import MECH, TargetOptions, load, note_left_out, note_unused_projection, projecting, targeted
 from .printing import json_option, print_answer
-from .report import describe, in_units, margins_table, pose_cells, pose_header, print_modes
 
 if TYPE_CHECKING:
     from ..targets import Target
@@ -44,6 +43,7 @@ def ik(mech: str, target: TargetOptions, options: pf.Options, with_margins: bool
         note_unused_projection("--all")
         return print_working_modes(mechanism, pose, as_json)
     solution = pf.solve_ik(mechanism, pose, options=options)
+    from .report import describe, margins_table
 
     def in_words() -> str:
         return describe(solution) + (f"\n\n{margins_table(solution)}" if with_margins else "")
@@ -83,6 +83,7 @@ def as_object(solution: pf.Solution, with_margins: bool) -> dict[str, object]:
 def print_working_modes(mechanism: pf.Mechanism, target: Target, as_json: bool) -> int:
     """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
     from ..description.readouts import readouts
+    from .report import in_units, pose_cells, pose_header, print_modes
 
     shown = readouts(mechanism)
     header = [f"{readout.name} [{readout.unit}]" for readout in shown]

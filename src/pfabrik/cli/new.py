@@ -13,7 +13,6 @@ from click.shell_completion import CompletionItem
 from ..answers.aligned_text import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from ..errors import UnknownName
-from ..files import loads
 from .arguments import MECH
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import json_option, print_answer
@@ -101,5 +100,7 @@ def with_dimensions(text: str, options: Sequence[str]) -> str:
             raise click.UsageError(f"{name}: found '{number}'; expected a number") from None
         line = re.compile(rf"^({dimension} *= *)(\"[^\"]*\"|[^ #\n]+)( *)", re.MULTILINE)
         text = line.sub(rf"\g<1>{value:.15g}\g<3>", text, count=1)
+    from ..files import loads
+
     loads(text)
     return text

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .fitted import fitted, line_width
+
 
 def json_option(help: str = "One JSON object on stdout; angles in radians.") -> Callable[..., Any]:
     """The option ``--json``, which a command gets as `as_json`."""
@@ -21,7 +23,12 @@ def print_answer(
     if as_json:
         print_json(to_object())
     else:
-        click.echo(to_text(), err=to_stderr)
+        print_text(to_text(), to_stderr=to_stderr)
+
+
+def print_text(text: str, *, to_stderr: bool = False) -> None:
+    """Print text for people in lines that fit the terminal."""
+    click.echo(fitted(text, line_width()), err=to_stderr)
 
 
 def print_json(answer: object) -> None:

@@ -9,21 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import click
-import numpy as np
 
 import pfabrik as pf
 
-from ..arrays import Mask
 from ..checks import require_ending
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
 from .arguments import FINITE, MECH, load, note_left_out, projecting
 from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, whole_file
-from .printing import json_option, note, print_json
+from .printing import json_option, note, print_json, print_text
 from .speed import own_limits, speed_limits, speed_option
 
 if TYPE_CHECKING:
+    from ..arrays import Mask
     from ..paths import path as paths
     from .track_report import Summary
 
@@ -92,9 +91,9 @@ def track(
     draw(solution, picture_path, film_path)
     if as_json:
         print_json(as_object(solution))
-    click.echo(summary.line(), err=as_json or output == STANDARD)
+    print_text(summary.line(), to_stderr=as_json or output == STANDARD)
     if summary.worst():
-        click.echo(summary.worst(), err=True)
+        print_text(summary.worst(), to_stderr=True)
     return 0 if summary.is_well else 1
 
 
@@ -131,6 +130,8 @@ def blocks_of(
 
 def checked(blocks: Iterable[paths.Path], mechanism: pf.Mechanism, is_timed: bool) -> Iterator[paths.Path]:
     """Blocks of a path, with notes of what it sets to no effect, and an error if it sets nothing of the task."""
+    import numpy as np
+
     from ..paths.csv_table import NUMERIC
 
     is_set = np.zeros((4, 4), bool)

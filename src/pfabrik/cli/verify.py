@@ -12,7 +12,6 @@ import click
 import pfabrik as pf
 
 from ..errors import counted
-from ..interop.verifying import FAR
 from .arguments import MECH, load
 from .printing import json_option, print_answer
 
@@ -69,6 +68,8 @@ def as_object(verification: Verification) -> dict[str, object]:
 
 def describe(mechanism: pf.Mechanism, verification: Verification) -> str:
     """A verification for people."""
+    from ..interop.verifying import FAR
+
     name, unit, original, went = mechanism.name, mechanism.length_unit, verification.original, verification.travelled
     if not verification.poses:
         return f"{name}: no pose was reached"

@@ -18,7 +18,6 @@ from ..cells import is_finite
 from ..checks import require_ending
 from ..extras import require
 from ..view.save_picture import PICTURES
-from ..workspace.saving import ENDINGS
 from .arguments import FINITE, MECH, Triple, load, rpy_option
 from .outputs import check_outputs, picture
 from .printing import complain, json_option, note, print_answer
@@ -83,6 +82,8 @@ def workspace(
         raise click.UsageError("--centre says nothing without --largest")
     if tilt is not None and not 0.0 <= tilt <= 180.0:
         raise click.UsageError(f"--tilt {tilt:g}: expected an angle from 0 to 180 degrees")
+    from ..workspace.saving import ENDINGS
+
     check_outputs([("-o", path) for path in outputs], [Path(mech)], as_json=as_json)
     for path in outputs:
         require_ending(path, (*ENDINGS, *PICTURES))

@@ -123,10 +123,14 @@ class Patterns:
 def _misfit(index: int, pattern: Pattern, body: str, first: Pattern) -> Fault:
     """A joint that shares a copied body and has no copies, or another number of them."""
     if pattern.count is None:
-        found = f"'{body}', which has {first.count} copies; did you mean '{body}1'?"
+        found = f"'{body}', which has {_copies_of(first)}; did you mean '{body}1'?"
         return Fault(f"joint[{index}].connects", found, "bodies without copies, or one of the copies")
-    found = f"{pattern.count}, but '{body}' has {first.count} copies at joint '{first.joint.name}'"
+    found = f"{pattern.count}, but '{body}' has {_copies_of(first)} at joint '{first.joint.name}'"
     return Fault(f"joint[{index}].copies.count", found, str(first.count))
+
+
+def _copies_of(pattern: Pattern) -> str:
+    return "1 copy" if pattern.count == 1 else f"{pattern.count} copies"
 
 
 def _copies(index: int, pattern: Pattern, bodies: frozenset[str], joints: frozenset[str]) -> Iterator[Copy]:

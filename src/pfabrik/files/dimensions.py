@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..description.directions import WORDS
-from ..errors import Fault, near_miss
+from ..errors import Fault, counted, near_miss
 
 TEXTS = ("name", "type", "connects", "along", "chain", "fixed_to", "base", "end_effector", "units", "task", "schema")
 """Keys whose strings are text. Of a leg, `base` has points: there, strings in lists are expressions."""
@@ -166,7 +166,7 @@ def _computed(
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in functions:
             n_arguments, function = functions[name]
             if len(args) != n_arguments:
-                raise NoNumber(f"{name} of {len(args)} arguments in place of {n_arguments}")
+                raise NoNumber(f"{name} of {counted(len(args), 'argument')} in place of {n_arguments}")
             return function(*map(compute, args))
         case ast.Call(func=ast.Name(id=name)):
             raise NoNumber(f"no function '{name}'{near_miss(name, functions)}")

@@ -22,7 +22,7 @@ import numpy as np
 from ..arrays import Floats
 from ..description.coercion import numbers
 from ..description.form_faults import is_numbers, key_faults, shown
-from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
+from ..errors import Fault, InvalidArgument, InvalidMechanism, counted, near_miss
 from ..extras import require
 from .digits import Rounding, digits_of, worst
 from .opened import Loop, LoopType, frame_along
@@ -193,9 +193,13 @@ def _gepetto(table: Mapping[str, Any]) -> LoopsFile:
     names, types = table.get("joint_name", []), table.get("joint_type", [])
     faults = []
     if kinds and len(kinds) != len(pairs):
-        faults.append(Fault("loops.type", f"{len(kinds)} types", f"one for each of {len(pairs)} loops"))
+        faults.append(
+            Fault("loops.type", counted(len(kinds), "type"), f"one for each of {counted(len(pairs), 'loop')}")
+        )
     if len(names) != len(types):
-        faults.append(Fault("loops.joint_type", f"{len(types)} types", f"one for each of {len(names)} joints"))
+        faults.append(
+            Fault("loops.joint_type", counted(len(types), "type"), f"one for each of {counted(len(names), 'joint')}")
+        )
     for kind in types:
         if not (isinstance(kind, str) and re.fullmatch(RETYPED, kind.upper())):
             faults.append(Fault("loops.joint_type", shown(kind), "SPHERICAL, FIXED, or UJOINT_XY and the like"))

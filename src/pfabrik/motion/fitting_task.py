@@ -11,6 +11,7 @@ from ..arrays import Floats, Mask
 from ..derived import derived
 from ..description.joint_types import TASK_TURNS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM, Mechanism
+from ..errors import counted
 from ..tolerances import TOLERANCES
 from .joint_rates import first_order, right_singular
 from .mobility import generic_of
@@ -99,8 +100,9 @@ def task_remark(mechanism: Mechanism) -> str:
     """A sentence that says why hardly any target of a task that asks too much is reachable, and which task fits."""
     tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
     fits = f"a task that fits is {' '.join(tasks[0].words)}" if tasks else "no task fits, for nothing moves"
+    asked = counted(int(_counted(mechanism.task).sum()), "coordinate")
     return (
-        f"the task {' '.join(mechanism.task)} asks for {int(_counted(mechanism.task).sum())} coordinates, of which the "
+        f"the task {' '.join(mechanism.task)} asks for {asked}, of which the "
         f"mechanism can vary {freedoms} independently: {fits}"
     )
 

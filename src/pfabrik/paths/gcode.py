@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..files.units import METRES
-from .path import WrongPath
+from .path import MOST_STEPS, WrongPath
 from .unread import CODES, IN_ONE_PROGRAM, has_offset, refuse_code, refuse_steering
 
 WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -191,7 +191,7 @@ def _move(
 
 
 def _parts(length: float, longest: float, number: int) -> int:
-    if length / longest > FARTHEST:
+    if length / longest > MOST_STEPS:
         raise WrongPath(
             f"line {number}: a move of {length:g}, in steps of {longest:g}: too many steps; expected longer ones"
         )
@@ -221,7 +221,7 @@ def _arc(
     flat = math.pi / 2.0
     if tolerance < radius:  # the cosine of half of it would be 1, rounded, where the tolerance is small
         flat = 4.0 * math.asin(math.sqrt(tolerance) / math.sqrt(2.0 * radius))
-    if turn / flat > FARTHEST:
+    if turn / flat > MOST_STEPS:
         fault = f"an arc of radius {radius:g} in steps that are off by {tolerance:g} at most: too many steps"
         raise WrongPath(f"line {number}: {fault}; expected a larger tolerance")
     count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
