@@ -7,6 +7,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -232,3 +233,89 @@ def test_margins_show_the_nearest_limit_first_and_of_a_batch_the_least() -> None
         assert float(value) == pytest.approx(np.nanmin(batch[joint, bound]), rel=1e-3, abs=1e-4)
     none = pf.margins(pf.solve_ik(machine, [(np.nan, 0, 0)], options=MARKED))
     assert {value for *_, value in cells(none._repr_html_())[1:]} == {"-"}
+
+
+def five_bar_modes() -> pf.WorkingModes:
+    return pf.working_modes(pf.load("five_bar"), (0.0, 0.0, 175.0))
+
+
+def timed_five_bar() -> pf.Timed:
+    machine = pf.load("five_bar")
+    return pf.time_path(pf.track(machine, [(0, y, 175) for y in (0, 5, 10)]), speed=1.0, acceleration=2.0)
+
+
+def five_bar_map() -> pf.SingularityMap:
+    machine = pf.load("five_bar")
+    return pf.singularity_map(machine, pf.workspace(machine, resolution=10.0), resolution=20.0)
+
+
+RESULTS: dict[str, tuple[Callable[[], Any], list[str]]] = {
+    "working modes": (five_bar_modes, ["mode", "status", "p1 [deg]", "p5 [deg]"]),
+    "assembly modes": (
+        lambda: pf.assembly_modes(pf.load("five_bar"), pf.solve_ik(pf.load("five_bar"), (0, 0, 175)).actuators),
+        ["mode", "status", "p1 [deg]", "p5 [deg]"],
+    ),
+    "no mode": (lambda: pf.working_modes(pf.load("five_bar"), (0.0, 0.0, 1e4)), ["mode", "status"]),
+    "timed path": (timed_five_bar, ["held back by", "limit", "share of the time"]),
+    "feasibility": (
+        lambda: pf.feasibility(pf.load("stewart"), (0, 0, 190)),
+        ["joint", "bound", "margin"],
+    ),
+    "feasibility of a batch": (
+        lambda: pf.feasibility(pf.load("stewart"), [(0, 0, 190), (0, 0, 900), (90, 0, 190)]),
+        ["joint", "bound", "rows", "least margin"],
+    ),
+    "singularity map": (five_bar_map, ["singularities", ""]),
+    "singularities of a path": (
+        lambda: pf.singularity_map(pf.load("five_bar"), pf.track(pf.load("five_bar"), [(0, 0, 175), (0, 5, 180)])),
+        ["singularities", ""],
+    ),
+    "singularity": (
+        lambda: pf.singularity(pf.solve_ik(pf.load("five_bar"), (0, 0, 175))),
+        ["kind", "measure", "singular"],
+    ),
+    "mobility": (lambda: pf.mobility(pf.load("five_bar")), ["", "count", "of"]),
+    "margins": (lambda: pf.margins(pf.solve_ik(pf.load("five_bar"), (0, 0, 175))), ["joint", "bound", "margin"]),
+    "workspace": (lambda: pf.workspace(pf.load("five_bar"), resolution=10.0), ["border", "formed by", "joint"]),
+    "largest shape": (
+        lambda: pf.workspace(pf.load("five_bar"), resolution=10.0).inscribed("sphere"),
+        ["coordinate", "centre", "extent"],
+    ),
+    "platform speed": (
+        lambda: pf.platform_speed(pf.solve_ik(pf.load("five_bar"), (0, 0, 175)), speed=1.0)[0],
+        ["direction", "speed", "limited by"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "header"), RESULTS.values(), ids=RESULTS)
+def test_every_result_is_a_small_table(make: Callable[[], Any], header: list[str]) -> None:
+    text = make()._repr_html_()
+    first, *rows = cells(text)
+    assert first == header
+    assert all(len(row) == len(header) for row in rows)
+    assert len(text) < 10_000
+    assert "nan" not in text
+
+
+def test_modes_are_listed_with_their_actuator_values() -> None:
+    modes = five_bar_modes()
+    _, *rows = cells(modes._repr_html_())
+    assert len(rows) == len(modes) == 4
+    for row, mode in zip(rows, modes, strict=True):
+        assert [float(cell) for cell in row[2:]] == pytest.approx(np.degrees(mode.actuators), rel=1e-5)
+
+
+def test_names_in_results_are_escaped() -> None:
+    machine = pf.load("five_bar")
+    name = {joint.name: f"<i>&{joint.name}" for joint in machine.joints}
+    joints = [dataclasses.replace(joint, name=name[joint.name]) for joint in machine.joints]
+    renamed = pf.Mechanism("<script>&", joints, name[machine.end_effector])
+    answer = pf.solve_ik(renamed, (0, 0, 175))
+    modes = pf.working_modes(renamed, (0, 0, 175))
+    shown = (modes, pf.feasibility(renamed, (0, 0, 175)), pf.platform_speed(answer, speed=1.0)[0], pf.margins(answer))
+    for each in shown:
+        text = each._repr_html_()
+        assert "<i>" not in text and "<script>" not in text
+        ET.fromstring(text)
+    assert "<i>&p1 [deg]" in cells(modes._repr_html_())[0]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,9 +17,11 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
+from pfabrik.description.common_centre import common_centre
 from pfabrik.description.places import joint_places, slider_place
 from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName
-from pfabrik.view.skeleton import around, rail_of, skeleton_of
+from pfabrik.skeleton import around, rail_of, skeleton_of
+from pfabrik.viewpoint import viewpoint
 
 pytest.importorskip("matplotlib")
 from matplotlib import pyplot
@@ -191,11 +194,110 @@ def test_all_joints_are_named_where_that_is_asked_for(name: str) -> None:
     assert not pf.plot(pf.load(name), names=False).texts
 
 
-@pytest.mark.parametrize("name", ["stewart", "five_bar", "nrpm", "hexaglide", "serial_arm", "delta"])
+FEW = ("stewart", "five_bar", "nrpm", "hexaglide", "delta", "g1_ankle", "agile_eye", "ankle_rss")
+"""Machines of which pictures are drawn every time: in space and in a plane, flat, thin, small, with many joints."""
+
+
+def some_and_all(few: Sequence[str], *without: str, mark: str) -> list[Any]:
+    """All machines of the catalogue, all but a few of them marked."""
+    names = (name for name in pf.catalog() if name not in without)
+    return [name if name in few else pytest.param(name, marks=getattr(pytest.mark, mark)) for name in names]
+
+
+@pytest.mark.parametrize("name", some_and_all(FEW, mark="slow"))
 def test_no_label_hides_another_or_leaves_the_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = pf.load(name)
-    axes = pf.plot(machine, names=machine.actuator_names)
+    axes = pf.plot(machine, names=machine.actuator_names[:: -(-len(machine.actuator_names) // 12)])
     assert faults(axes.figure, monkeypatch) == []
+
+
+WORKSPACES = ("five_bar", "delta", "ankle_ups", "prr")
+
+
+@pytest.mark.parametrize("name", some_and_all(WORKSPACES, "panda", "serial_arm", "snake60", mark="campaign"))
+def test_no_text_of_a_workspace_hides_another(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load(name)
+    is_turned = not set(machine.task) & set("xyz")
+    space = pf.workspace(machine, resolution=0.04 * (1.0 if is_turned else machine.characteristic_length))
+    assert faults(space.plot().figure, monkeypatch) == []
+
+
+@pytest.mark.parametrize("name", ["five_bar", pytest.param("stewart", marks=pytest.mark.slow)])
+def test_no_text_of_a_map_of_singularities_hides_another(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load(name)
+    length = machine.characteristic_length
+    found = pf.singularity_map(machine, pf.workspace(machine, resolution=0.05 * length), resolution=0.1 * length)
+    assert faults(found.plot().figure, monkeypatch) == []
+
+
+# The shape of a machine, and what is drawn of it.
+
+
+def test_the_links_of_a_spherical_linkage_are_arcs_about_its_centre() -> None:
+    mechanism = pf.load("agile_eye")
+    answer = pf.solve_ik(mechanism, pf.pose(mechanism.reference_point, rpy=[10, -15, 20], degrees=True))
+    for shown in (mechanism, answer):
+        links = [part for part in skeleton_of(shown).parts if len(part.corners) == 2]
+        assert len(links) == 6
+        for link in links:
+            far = np.linalg.norm(link.outline, axis=1)
+            near, end = np.linalg.norm(link.corners, axis=1)
+            assert far == pytest.approx(np.linspace(near, end, len(far)))
+            steps = np.linalg.norm(np.diff(link.outline / far[:, None], axis=0), axis=1)
+            assert steps == pytest.approx(2.0 * np.sin(np.pi / 4.0 / len(steps)))  # links of a quarter turn
+            assert np.linalg.matrix_rank(link.outline, tol=1e-6) == 2  # in a plane through the centre
+
+
+@pytest.mark.parametrize("name", ["five_bar", "delta", "g1_ankle", "panda", "snake60", "canfield"])
+def test_links_between_other_joints_are_straight(name: str) -> None:
+    for part in skeleton_of(pf.load(name)).parts:
+        n = len(part.corners)
+        assert len(part.outline) == (n if n < 3 else n + 1)
+
+
+def test_a_pair_of_hinges_that_cross_is_no_spherical_linkage_unless_it_carries_the_end_effector() -> None:
+    hinges = {"A": ((0, 0, 1), (0, 0, 10)), "B": ((0, 1, 0), (0, 10, 0)), "C": ((1, 0, 0), (10, 0, 0))}
+    bodies = ("base", "one", "two", "tip")
+    joints = [
+        pf.Joint(name, "revolute", bodies[place : place + 2], at=at, axis=axis, actuated=True)
+        for place, (name, (axis, at)) in enumerate(hinges.items())
+    ]
+    wrist = pf.Mechanism("wrist", joints, "tip", (20, 0, 0))
+    assert common_centre(wrist) == pytest.approx(np.zeros(3))
+    moved = [*joints[:2], dataclasses.replace(joints[2], at=(10, 0, 5))]
+    assert common_centre(pf.Mechanism("arm", moved, "tip", (20, 0, 0))) is None
+
+
+def test_a_flat_machine_is_looked_at_from_above_and_a_thin_one_from_the_side() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    flat = np.column_stack([np.cos(angle), np.sin(angle), 0.05 * np.cos(3.0 * angle)])
+    assert viewpoint(flat)[0] > 40.0
+    upright = flat[:, [0, 2, 1]]  # thin along y
+    across = np.array([0.0, 1.0, 0.0])
+    up, turn = np.radians(viewpoint(upright))
+    eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    usual = np.radians([22.0, -58.0])
+    before = np.cos(usual[0]) * np.sin(usual[1])
+    assert abs(eye @ across) >= abs(before)
+    assert viewpoint(1e3 * flat + [5.0, 6.0, 7.0]) == viewpoint(flat)
+    assert viewpoint(np.zeros((4, 3))) == (22.0, -58.0)
+
+
+def test_lines_are_thinner_where_joints_are_close_and_in_small_axes() -> None:
+    def width(machine: pf.Mechanism, size: float) -> float:
+        axes = pf.plot(machine, Figure(figsize=(size, size)).add_subplot(projection="3d"))
+        return max(line.get_linewidth() for line in axes.lines)
+
+    stewart, snake = pf.load("stewart"), pf.load("snake60")
+    assert width(stewart, 2.0) < width(stewart, 5.0)
+    assert width(snake, 5.0) < width(stewart, 5.0)
+
+
+def test_an_axis_that_is_short_has_few_numbers_but_one() -> None:
+    axes = pf.plot(pf.load("delta"))
+    axes.figure.canvas.draw()
+    numbers = [len([tick for tick in axis.get_ticklabels() if tick.get_text()]) for axis in (axes.xaxis, axes.zaxis)]
+    assert 1 <= numbers[1] < numbers[0]
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument
+from pfabrik.workspace.singular import _locus
+from pfabrik.workspace.singular_slices import Field, slices_of
 
 Array = NDArray[np.float64]
 
@@ -88,6 +90,47 @@ def test_a_map_and_a_path_can_be_drawn(free_five_bar: pf.Workspace) -> None:
     assert pf.singularity_map(machine, free_five_bar, resolution=20.0).plot().collections
     along = pf.singularity_map(machine, pf.track(machine, [machine.reference_point] * 3))
     assert along.plot().lines
+    pyplot.close("all")
+
+
+def test_slices_cut_the_locus_where_it_is() -> None:
+    """The unit sphere about the origin: a slice at height h cuts it in a circle of radius sqrt(1 - h^2)."""
+    steps = np.arange(-12, 13)
+    places = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    step = np.full(3, 0.1)
+    values = np.linalg.norm(places * step, axis=1) - 1.0
+    vertices, faces = _locus(places, values)
+    slices = slices_of(Field(places * step, step, np.abs(values)), vertices * step, faces)
+    assert len(slices) == 4
+    for each in slices:
+        radius = np.sqrt(1.0 - each.level**2)
+        assert np.linalg.norm(each.locus, axis=2) == pytest.approx(radius, abs=0.02)
+        lengths = np.linalg.norm(each.locus[:, 1] - each.locus[:, 0], axis=1)
+        assert lengths.sum() == pytest.approx(2.0 * np.pi * radius, rel=0.02)
+        assert each.grid.shape == (25, 25)
+        assert each.grid[12, 12] == pytest.approx(1.0 - abs(each.level))
+
+
+def test_slices_stand_across_the_locus() -> None:
+    """A plane square to z is seen in slices across x or y; across z it would fill one of them, or none."""
+    steps = np.arange(-5, 6)
+    places = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    vertices, faces = _locus(places, places[:, 2] - 0.5)
+    slices = slices_of(Field(places.astype(float), np.ones(3), np.ones(len(places))), vertices, faces)
+    assert {each.axis for each in slices} == {1}
+    assert all(each.locus[..., 1] == pytest.approx(0.5) for each in slices)
+
+
+def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure() -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    machine = pf.load("stewart").without_limits()
+    ends = {"x": (-40.0, 40.0), "y": (-40.0, 40.0), "z": (-60.0, 60.0)}
+    found = pf.singularity_map(machine, pf.workspace(machine, within=ends, resolution=10.0))
+    axes = found.plot()
+    panels = [each for each in axes.figure.axes if each.images]
+    assert len(panels) == 4
+    assert all(panel.get_title().startswith("y = ") for panel in panels)
+    assert found.plot(pyplot.figure().add_subplot(projection="3d")).get_zlabel() == "z [mm]"
     pyplot.close("all")
 
 

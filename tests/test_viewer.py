@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import sys
 import threading
@@ -22,7 +23,9 @@ from machines import tripod_rps
 from pfabrik.answers.margins import nearest_first
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, MissingLibrary
+from pfabrik.view.live import panel_html
 from pfabrik.view.live.newest import Newest
+from pfabrik.view.live.serving import backed_off
 from pfabrik.view.live.session import Session, moved
 from pfabrik.view.live.shapes import SHAPES, cylinder, fan, quaternion, upright_to
 from pfabrik.view.live.watching import Watch
@@ -318,3 +321,73 @@ def test_the_command_writes_a_page_and_refuses_what_it_cannot(tmp_path: Path, mo
         result = CliRunner().invoke(main, words)
         assert result.exit_code == 2
         assert "Traceback" not in result.stderr
+
+
+def test_a_panel_does_not_jump_while_values_change() -> None:
+    """Status and bars have a height of their own, whatever they say, and names of limits have one line."""
+    session = Session(pf.load("stewart"))
+    heights, rows = set(), set()
+    for target in ((0, 0, 190), (0, 0, 400), (60, 40, 260), (-90, 20, 100)):
+        session.go_to(pf.pose(target))
+        heights.add(re.findall(r"height:[0-9.]+em;overflow:auto", panel_html.status_html(session))[0])
+        rows.add(panel_html.margins_html(session).count("white-space:nowrap"))
+    assert len(heights) == 1
+    assert rows == {panel_html.BARS}
+
+
+def test_a_camera_moves_back_until_the_target_is_in_view() -> None:
+    middle, place, angle = np.zeros(3), np.array([3.0, -1.0, 0.5]), 0.9
+    along = -place / np.linalg.norm(place)
+    rng = np.random.default_rng(5)
+    for point in rng.normal(0.0, 3.0, (50, 3)):
+        moved_to = backed_off(place, middle, angle, point)
+        away = point - moved_to
+        seen = np.arccos(np.clip(away @ along / np.linalg.norm(away), -1.0, 1.0))
+        assert seen <= 0.5 * angle
+        step = place - moved_to
+        assert np.linalg.norm(np.cross(step, along)) < 1e-9
+        assert step @ along >= -1e-12
+    assert backed_off(place, middle, angle, middle) == pytest.approx(place)
+
+
+def test_a_target_is_kept_where_the_file_is_read_again(shown: Callable[..., pf.Viewer], tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    pf.save(pf.load("stewart"), path)
+    viewer = shown(path)
+    viewer._change_target("z", 200.0)
+    until(lambda: viewer.target[2, 3] == pytest.approx(200.0))
+    changed = pf.load("stewart").with_limits({"BL1": (140.0, 240.0)})
+    pf.save(changed, path)
+    until(lambda: viewer.mechanism == changed)
+    until(lambda: viewer.target[2, 3] == pytest.approx(200.0))
+    assert viewer.solution.status == pf.Status.REACHED
+
+
+def test_a_handle_in_the_hand_of_a_page_that_went_follows_again(shown: Callable[..., pf.Viewer]) -> None:
+    viewer = shown(pf.load("stewart"))
+    handles = viewer._stage._handles
+    handles._held = handle = handles._all[0]
+    viewer.show(pf.solve_ik(viewer.mechanism, (0, 0, 200)))
+    before = handle.position[2]
+    viewer._stage.release()
+    viewer.show(pf.solve_ik(viewer.mechanism, (0, 0, 210)))
+    assert handle.position[2] * viewer.mechanism.characteristic_length == pytest.approx(210.0)
+    assert handle.position[2] != before
+
+
+def test_a_taken_port_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        monkeypatch.setattr(pf.Viewer, "wait", lambda _: None)
+        told = CliRunner().invoke(main, ["view", "stewart", "--no-browser", "--port", str(port)])
+    (served,) = re.findall(rf"port {port} is taken: served at (\d+) instead", told.output)
+    assert int(served) != port
+    assert f"localhost:{served} " in told.output or f"127.0.0.1:{served} " in told.output
+
+
+def test_the_page_says_when_the_program_is_gone() -> None:
+    text = panel_html.watch_html()
+    assert "has ended" in text and "/pfabrik-alive" in text
+    assert "//" not in text  # it asks the server of the page alone

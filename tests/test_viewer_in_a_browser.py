@@ -110,6 +110,18 @@ def test_a_target_dragged_beyond_a_stroke_names_the_limit_and_nothing_leaves_thi
         page.context.close()
 
 
+def test_a_page_says_when_the_program_behind_it_has_ended(browser: Any) -> None:
+    viewer = pf.view(pf.load("stewart"), port=18182)
+    page, _ = opened(browser, viewer.url)
+    gone = page.locator("[data-pfabrik=gone]")
+    gone.wait_for(state="attached")
+    assert not gone.is_visible()
+    viewer.close()
+    gone.wait_for(state="visible")
+    assert "has ended" in gone.inner_text()
+    page.context.close()
+
+
 def test_a_saved_page_shows_the_machine_without_a_network(browser: Any, tmp_path: Path) -> None:
     with pf.view("five_bar", port=18180) as viewer:
         viewer.save(tmp_path / "five_bar.html")

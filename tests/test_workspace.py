@@ -22,7 +22,8 @@ import pfabrik as pf
 from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument
-from pfabrik.workspace.border import groups_of
+from pfabrik.workspace.border import MOTOR_COLOURS, group_of_limits, groups_of
+from pfabrik.workspace.patches import patches_of
 from pfabrik.workspace.verdicts import MapQuestion
 
 Array = NDArray[np.float64]
@@ -405,6 +406,9 @@ def test_stops_of_motors_and_of_elbows_differ_in_colour_and_are_named_where_they
         *(f"{joint} {bound}, actuated" for joint in ("p1", "p5") for bound in ("min", "max")),
         *(f"{joint} {bound}" for joint in ("p2", "p4") for bound in ("min", "max")),
     }
+    assert {group.label for group in groups if group.colour in MOTOR_COLOURS} == {
+        group.label for group in groups if group.is_motors
+    }
     axes = found.plot()
     assert sorted(text.get_text() for text in axes.texts) == sorted(" ".join(limit) for limit in found.shares)
     for text in axes.texts:
@@ -414,9 +418,9 @@ def test_stops_of_motors_and_of_elbows_differ_in_colour_and_are_named_where_they
 
 
 def test_motors_and_elbows_share_no_colour_where_there_are_too_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        sys.modules["pfabrik.workspace.border"], "COLOURS", ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
-    )
+    border = sys.modules["pfabrik.workspace.border"]
+    monkeypatch.setattr(border, "MOTOR_COLOURS", ("#0072b2", "#56b4e9"))
+    monkeypatch.setattr(border, "JOINT_COLOURS", ("#e69f00", "#cc79a7"))
     found = pf.workspace(pf.load("five_bar"), resolution=8.0)
     assert {group.label for group in groups_of(found)} == {
         "p1, 5 min, actuated",
@@ -424,6 +428,63 @@ def test_motors_and_elbows_share_no_colour_where_there_are_too_few(monkeypatch: 
         "p2, 4 min",
         "p2, 4 max",
     }
+
+
+def test_limits_that_are_met_together_do_not_alternate() -> None:
+    found = pf.workspace(pf.load("delta"), resolution=6.0)
+    cones = {joint for joint, bound in found.shares if bound == "cone"}
+    assert cones == {"BL1", "BL2", "BL3"}  # both rods of a parallelogram have the same direction
+    rows = np.linspace(0, len(found.vertices) - 1, 200).astype(int)
+    margins = pf.margins(pf.solve_ik(found.mechanism, found.poses(found.vertices[rows])))
+    for leg in "123":
+        assert margins[f"BL{leg}", "cone"] == pytest.approx(margins[f"BR{leg}", "cone"], abs=1e-6)
+
+
+def test_the_border_is_divided_where_one_motor_takes_over_from_another() -> None:
+    """At the dividing points two limits have no room left; at the vertices beside them only one of the two has none."""
+    found = pf.workspace(pf.load("five_bar"), resolution=8.0)
+    groups = groups_of(found)
+    place = group_of_limits(found, groups)
+    patches = patches_of(found, found.vertices, found.faces, place[found.vertex_limit], place)
+    assert len(patches.faces) == len(found.faces) + len(groups)  # each stretch has one end that divides a face
+    new = patches.vertices[len(found.vertices) : len(found.vertices) + len(groups)]
+    margins = pf.margins(pf.solve_ik(found.mechanism, found.poses(new)))
+    second = np.sort(np.stack([np.abs(values) for values in margins.values()]), axis=0)[1]
+    changing = np.unique(found.faces[(found.vertex_limit[found.faces[:, 0]] != found.vertex_limit[found.faces[:, 1]])])
+    beside = pf.margins(pf.solve_ik(found.mechanism, found.poses(found.vertices[changing])))
+    assert second.max() < 0.5 * np.sort(np.stack(list(beside.values())), axis=0)[1].max()
+
+
+@pytest.mark.parametrize("name", ["delta", "stewart"])
+def test_patches_are_the_border_and_no_more(name: str) -> None:
+    found = pf.workspace(pf.load(name), resolution=12.0)
+    groups = groups_of(found)
+    place = group_of_limits(found, groups)
+    patches = patches_of(found, found.vertices, found.faces, place[found.vertex_limit], place)
+    areas = []
+    for vertices, faces in ((found.vertices, found.faces), (patches.vertices, patches.faces)):
+        corners = vertices[faces]
+        areas.append(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    for normals in areas:
+        assert np.linalg.norm(normals.sum(axis=0)) < 1e-9 * np.linalg.norm(normals, axis=1).sum()  # closed
+    whole, divided = (np.linalg.norm(normals, axis=1).sum() for normals in areas)
+    assert divided == pytest.approx(whole, rel=1e-12)
+    sides = np.sort(np.concatenate([patches.faces[:, (k, (k + 1) % 3)] for k in range(3)]), axis=1)
+    edges = Counter(map(tuple, sides.tolist()))
+    assert set(edges.values()) == {2}
+
+
+def test_a_machine_is_drawn_in_its_workspace_where_that_has_a_place_beside_it() -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    machine = pf.load("five_bar")
+    tip = pf.solve_ik(machine, (0.0, 40.0, 160.0))
+    axes = pf.workspace(machine, resolution=8.0, start=tip).plot()
+    ends = np.concatenate([line.get_xydata() for line in axes.lines if line.get_color() == "#404040"])
+    for point in tip.points.values():
+        assert np.linalg.norm(ends - point[1:], axis=1).min() < 1e-9
+    angles = pf.workspace(pf.load("ankle_ups")).plot()
+    assert not [line for line in angles.lines if line.get_color() == "#404040"]
+    pyplot.close("all")
 
 
 def test_where_nothing_is_within_reach_the_workspace_is_empty() -> None:

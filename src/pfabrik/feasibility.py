@@ -13,7 +13,8 @@ from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable
 from .derived import derived
 from .description.mechanism import Mechanism, checked_mechanism
-from .errors import UnsupportedMechanism
+from .description.mechanism_html import card
+from .errors import UnsupportedMechanism, counted
 from .kernels.threads import in_blocks
 from .model import Model, model_of
 from .platform.answers import sides_at
@@ -43,6 +44,22 @@ class Feasibility(NamedTuple):
     margin: Any
     binding: Any
     limits: tuple[tuple[str, str], ...]
+
+    def _repr_html_(self) -> str:
+        """The margin and its limit, for notebooks; of a batch, the rows and the least margin of each limit."""
+        margins, bindings = np.ravel(self.margin), np.ravel(self.binding)
+        if not np.ndim(self.margin):
+            limit = self.limits[int(bindings[0])] if bindings[0] >= 0 else ("-", "-")
+            words = "feasible" if margins[0] >= 0.0 else "not feasible"
+            return card("Feasibility", [words], ("joint", "bound", "margin"), [(*limit, f"{margins[0]:.4g}")], "")
+        n_feasible = int(np.count_nonzero(margins >= 0.0))
+        lines = [f"batch of shape {np.shape(self.margin)}", f"{n_feasible} of {counted(len(margins), 'row')} feasible"]
+        places, counts = np.unique(bindings[bindings >= 0], return_counts=True)
+        rows = [
+            (*self.limits[place], str(count), f"{float(np.nanmin(margins[bindings == place])):.4g}")
+            for count, place in sorted(zip(counts.tolist(), places.tolist(), strict=True), reverse=True)
+        ]
+        return card("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows, "")
 
 
 def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = None) -> Feasibility:

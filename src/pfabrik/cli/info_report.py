@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import pfabrik as pf
 
@@ -16,6 +16,7 @@ from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
 from ..model import model_of
 from ..tolerances import TOLERANCES
+from .fitted import line_width
 
 NOT_COUNTED = f"not counted with more than {MOST_JOINTS_FOR_FREEDOM} joints"
 
@@ -73,11 +74,22 @@ def summary(mechanism: pf.Mechanism) -> str:
             mechanism.name,
             f"end effector           {kind} {mechanism.end_effector}, reference point ({point})",
             f"task                   {' '.join(mechanism.task)}",
-            f"actuators              {' '.join(mechanism.actuator_names)}",
+            *in_columns("actuators              ", mechanism.actuator_names),
             *freedom(counted_mobility(mechanism)),
             f"characteristic length  {length:.6g} {mechanism.length_unit}",
         ]
     )
+
+
+def in_columns(title: str, names: Sequence[str]) -> list[str]:
+    """Names behind a title; where a line of the terminal is too short, in aligned columns below each other."""
+    room = (line_width() or 10_000) - len(title)
+    if len(line := " ".join(names)) <= room:
+        return [title + line]
+    width = max(map(len, names)) + 1
+    n = max(room // width, 1)
+    rows = ["".join(name.ljust(width) for name in names[place : place + n]) for place in range(0, len(names), n)]
+    return [(" " * len(title) if place else title) + row.rstrip() for place, row in enumerate(rows)]
 
 
 def counted_mobility(mechanism: pf.Mechanism) -> pf.Mobility | None:

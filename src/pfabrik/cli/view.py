@@ -14,6 +14,7 @@ from ..errors import counted
 from ..telling import telling
 from .arguments import MECH, STANDARD_INPUT, load
 from .outputs import check_outputs
+from .printing import note
 
 
 @click.command()
@@ -46,6 +47,8 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
             viewer.save(html)
             click.echo(f"wrote {html}")
             return 0
+        if viewer.port != port:
+            note(f"port {port} is taken: served at {viewer.port} instead")
         click.echo(f"{viewer.mechanism.name} at {viewer.url} (Ctrl-C ends it)")
         if not no_browser:
             webbrowser.open(viewer.url)

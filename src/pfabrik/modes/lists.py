@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from ..answers.solution import Solution
 from ..arrays import Floats
 from ..description.form_faults import shown
-from ..errors import InvalidArgument
+from ..description.mechanism_html import card
+from ..description.readouts import Readout, readouts
+from ..errors import InvalidArgument, counted
 from ..tolerances import TOLERANCES
 
 BATCH = 512
@@ -27,6 +29,9 @@ HITS = 10
 
 STEPS = 80
 """Newton steps a start may take; most need fewer than 20."""
+
+SHOWN = 24
+"""Modes that a notebook shows, at most."""
 
 ALONG = 1e-3
 """Step that tests whether a solution is one of a continuum [L or rad]: large enough to distinguish it from a double
@@ -82,6 +87,28 @@ class Modes(Sequence[Solution]):
 
     def __len__(self) -> int:
         return len(self.modes)
+
+    def _repr_html_(self) -> str:
+        """Every mode with its status and actuator values, for notebooks; of many, the nearest to home."""
+        kind = type(self).__name__.removesuffix("Modes").lower()
+        lines = [f"{counted(self.total, f'{kind} mode')} in {counted(self.starts, 'start')}"]
+        if self.total > SHOWN:
+            lines.append(f"the {SHOWN} nearest to home:")
+        if not self.modes:
+            return card("No mode", lines, ("mode", "status"), [], "")
+        mechanism = self.modes[0].mechanism
+        columns = readouts(mechanism)
+        rows = [
+            (str(place), str(mode.status).lower(), *_values(columns, mode))
+            for place, mode in enumerate(self.modes[:SHOWN], 1)
+        ]
+        header = ("mode", "status", *(f"{each.name} [{each.unit}]" for each in columns))
+        return card(mechanism.name, lines, header, rows, "")
+
+
+def _values(columns: Sequence[Readout], mode: Solution) -> list[str]:
+    """The actuators of a mode in the units that people read."""
+    return [f"{float(each.display(value)):.6g}" for each, value in zip(columns, mode.actuators, strict=True)]
 
 
 class Clusters:

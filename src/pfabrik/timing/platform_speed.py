@@ -11,6 +11,7 @@ import numpy as np
 from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
+from ..description.mechanism_html import card
 from ..description.task import task_of
 from ..errors import InvalidArgument
 from ..motion.displacements import rate_units
@@ -39,6 +40,14 @@ class PlatformSpeed(NamedTuple):
     direction: tuple[float, float, float]
     speed: float
     limited_by: str
+
+    def _repr_html_(self) -> str:
+        """Direction, speed and the actuator that limits it, for notebooks."""
+        unit = "length/s" if self.kind == "along" else "deg/s"
+        speed = self.speed if self.kind == "along" else float(np.degrees(self.speed))
+        direction = ", ".join(f"{part:.4g}" for part in self.direction)
+        row = (f"{self.kind} ({direction})", f"{speed:.6g} {unit}", self.limited_by or "-")
+        return card("Platform speed", [], ("direction", "speed", "limited by"), [row], "")
 
 
 def platform_speed(

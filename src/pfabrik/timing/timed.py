@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
+from ..description.mechanism_html import card
 from ..description.readouts import readouts
 from ..errors import counted
 from ..extras import require
@@ -71,6 +72,12 @@ class Timed:
         name = self.mechanism.name
         return f"<Timed path of '{name}': {self.duration:.6g} s, {counted(len(self.times), 'sample')}>"
 
+    def _repr_html_(self) -> str:
+        """Duration, and the limits that hold the path back, for notebooks."""
+        lines = [f"{self.duration:.6g} s, {counted(len(self.times), 'sample')}"]
+        rows = [(name, what, f"{share:.1%}") for (name, what), share in self.held_back.items()]
+        return card(self.mechanism.name, lines, ("held back by", "limit", "share of the time"), rows, "")
+
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write times, poses, actuators, their rates and accelerations; angles in degrees.
 
@@ -128,6 +135,7 @@ class Timed:
                 axes.plot(self.times, column, label=f"{each.name} [{each.unit}]")
             axes.set_ylabel(label)
         axes.set_xlabel("time [s]")
-        axes.legend(ncols=3, fontsize="small")
+        handles, names = axes.get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
         drawn: Figure = figure
         return drawn

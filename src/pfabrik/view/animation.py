@@ -17,6 +17,7 @@ from ..checks import require_ending, require_positive
 from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
+from ..skeleton import Skeleton, skeleton_of
 from ..telling import OnProgress, telling
 from ..whole_files import whole_path
 from .canvas import canvas_on, new_axes
@@ -25,7 +26,6 @@ from .machine import draw_key, draw_machine
 from .plane import plane_of
 from .plot_track import checked_track, places_along
 from .save_picture import FILMS
-from .skeleton import Skeleton, skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

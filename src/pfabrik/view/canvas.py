@@ -9,7 +9,18 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_method
-from ..drawing import SMALL, is_spatial, new_figure, require_spatial
+from ..drawing import (
+    NAME_STEP,
+    SMALL,
+    axes_of,
+    hidden_names,
+    is_spatial,
+    new_figure,
+    numbers_at,
+    part_ticks,
+    require_spatial,
+)
+from ..viewpoint import viewpoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +29,7 @@ if TYPE_CHECKING:
 MARGIN = 1.1
 """Extent of the axes, as a multiple of the drawing's."""
 
-THINNEST = 0.15
+THINNEST = 0.3
 """The least that the axes of a flat machine in space span across it, as a share of its largest extent."""
 
 TICKS, ROOM_ACROSS, ROOM_UP = 6, 24.0, 18.0
@@ -27,17 +38,17 @@ TICKS, ROOM_ACROSS, ROOM_UP = 6, 24.0, 18.0
 OFF_CORNERS = 0.06
 """Distance of ticks from the corners of a box, where those of two axes would meet, as a share of its side."""
 
+TICKS_OFF, TICKS_OFF_THIN = 2.0, 12.0
+"""Distance of the numbers at ticks beyond matplotlib's own, in a cube, and what it grows to where the box is thin."""
+
 ZOOMS = (1.1, 1.05, 1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
 """Sizes of a box in space, tried until all that belongs to it is within the figure."""
 
-MOST_ADJUSTMENTS = 16
+MOST_ADJUSTMENTS = 30
 """Largest number of adjustments of a picture in space."""
 
 FREE_EDGE = 2.0
 """Least distance of all that belongs to a box from the edge of the figure [points]."""
-
-ELEVATION, AZIMUTH = 22.0, -58.0
-"""Direction from which a machine in space is viewed [deg]."""
 
 LABEL_OFF = 4.0
 """Distance of the names of axes in space from their ticks, beyond matplotlib's own [points]."""
@@ -104,27 +115,31 @@ class Canvas:
         else:
             self.axes.set_box_aspect(spans)
             self.axes.computed_zorder = False
-            self.axes.view_init(elev=ELEVATION, azim=AZIMUTH)
+            elevation, azimuth = viewpoint(points)
+            self.axes.view_init(elev=elevation, azim=azimuth)
+            for place, name in enumerate("xyz"):  # matplotlib's own distance shrinks with the other two sides
+                others = float(np.delete(spans, place).mean() / spans.max())
+                self.axes.tick_params(axis=name, pad=TICKS_OFF + TICKS_OFF_THIN * (1.0 - others))
         for place, name in enumerate("xyz"[: len(spans)]):
             low_end, high_end = ends[:, place].tolist()
             ticks = _ticks(low_end, high_end, self._most_ticks(place, ends))
             self.axes.set(**{f"{name}ticks": ticks, f"{name}label": f"{self._direction(place)} [{unit}]"})
-
         if self.plane is None:
             self._fit(spans)
+            part_ticks(self.axes)
 
     def _fit(self, spans: Floats) -> None:
         """Move the names of axes in space off their ticks, and shrink the box until all of them are in the figure."""
         root = self.axes.get_figure(root=True)
-        zooms, axes = iter(ZOOMS), self._axes
+        zooms = iter(ZOOMS)
         self.axes.set_box_aspect(spans, zoom=next(zooms))
         for _ in range(MOST_ADJUSTMENTS):
             root.draw_without_rendering()
-            edge = root.bbox.padded(-FREE_EDGE * root.dpi / 72.0)
+            edge = self.axes.figure.bbox.padded(-FREE_EDGE * root.dpi / 72.0)
             boxes = [text.get_window_extent() for text in self.axis_words]
-            hidden = [axis for axis in axes if any(axis.label.get_window_extent().overlaps(box) for box in boxes[3:])]
+            hidden = hidden_names(self.axes)
             for axis in hidden:
-                axis.labelpad += LABEL_OFF / 2.0
+                axis.labelpad += NAME_STEP
             if hidden:
                 continue
             if all(edge.x0 <= box.x0 and box.x1 <= edge.x1 and edge.y0 <= box.y0 for box in boxes):
@@ -132,14 +147,10 @@ class Canvas:
             self.axes.set_box_aspect(spans, zoom=next(zooms, ZOOMS[-1]))
 
     @property
-    def _axes(self) -> list[Any]:
-        return [getattr(self.axes, f"{name}axis") for name in "xyz"[: 2 if self.plane is not None else 3]]
-
-    @property
     def axis_words(self) -> list[Any]:
         """The names of all axes, then the numbers at their ticks, where they were drawn last."""
-        ticks = [tick.label1 for axis in self._axes for tick in axis.majorTicks if tick.label1.get_text()]
-        return [axis.label for axis in self._axes] + ticks
+        axes = axes_of(self.axes)
+        return [axis.label for axis in axes] + [text for axis in axes for _, text in numbers_at(axis)]
 
     def on_screen(self, places: Floats) -> Floats:
         """Points (n, 3), or points of the axes themselves, in pixels, (n, 2)."""
@@ -162,7 +173,7 @@ class Canvas:
             box = self.axes.get_window_extent()
             length, upright = (box.width, box.height)[place], place == 1
         points = length * 72.0 / self.axes.get_figure(root=True).dpi
-        return int(np.clip(points / (ROOM_UP if upright else ROOM_ACROSS), 3, TICKS))
+        return int(np.clip(points / (ROOM_UP if upright else ROOM_ACROSS), 2, TICKS))
 
     def _direction(self, place: int) -> str:
         """The name of an axis: "x" if it is one of the base frame, else its direction."""
@@ -221,5 +232,9 @@ def _ticks(low: float, high: float, most: int) -> list[float]:
     from matplotlib.ticker import MaxNLocator
 
     off = OFF_CORNERS * (high - low)
-    ticks = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
-    return [float(tick) for tick in ticks if low + off <= tick <= high - off]
+    for number in (most, TICKS):  # an axis with room for few has one at least
+        ticks = MaxNLocator(number, steps=[1, 2, 5, 10]).tick_values(low, high)
+        within = [float(tick) for tick in ticks if low + off <= tick <= high - off]
+        if within:
+            return within if number == most else within[len(within) // 2 :][:1]
+    return []

@@ -12,11 +12,12 @@ from ..checks import require_names
 from ..description.joint_types import JointType
 from ..description.mechanism import Mechanism
 from ..drawing import SMALL
+from ..skeleton import BodyShape, Mark, Skeleton, checked_shown, skeleton_of
+from ..tolerances import TOLERANCES
 from .canvas import Canvas, canvas_on
 from .labels import place_names
 from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, PLATFORM, of_a_body
 from .plane import plane_of
-from .skeleton import BodyShape, Mark, Skeleton, checked_shown, skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -24,6 +25,15 @@ if TYPE_CHECKING:
 
 SIZE, SLIDE_SIZE = 20.0, 44.0
 """Areas of markers [points²]: that of a slide is larger, so that it shows behind a joint in the same place."""
+
+USUAL_SIDE = 290.0
+"""Shorter side of axes in which lines and markers have their usual size [points]."""
+
+MARKS_APART = 16.0
+"""Distance between neighbouring joints from which on markers have their usual size [points]."""
+
+PENS = (0.45, 1.5)
+"""Least and greatest size of lines and markers, against the usual."""
 
 RAIL_DASHES = (0, (4, 2))
 
@@ -70,31 +80,48 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
 def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
     """Bodies, rails, reference point and joints, as artists that can be removed again."""
     held = {body for mark in skeleton.marks if mark.held_by for body in mark.joint.connects}
-    artists: list[Artist] = [each for part in skeleton.parts for each in _body(canvas, part, part.body in held)]
+    pen = pen_of(canvas, skeleton.mechanism)
+    artists: list[Artist] = [each for part in skeleton.parts for each in _body(canvas, part, part.body in held, pen)]
     for rail in skeleton.rails:
         artists.append(canvas.line(rail, color=EDGE, linewidth=0.9, linestyle=RAIL_DASHES, zorder=1))
     if skeleton.stem is not None:
-        artists.append(canvas.line(skeleton.stem, color=PLATFORM, linewidth=1.6, zorder=1))
+        artists.append(canvas.line(skeleton.stem, color=PLATFORM, linewidth=1.6 * pen, zorder=1))
     artists.append(canvas.line(skeleton.reference[None], marker="+", color=EDGE, markersize=9, zorder=4))
-    return artists + _joints(canvas, skeleton.marks)
+    return artists + _joints(canvas, skeleton.marks, pen)
 
 
-def _body(canvas: Canvas, part: BodyShape, is_held: bool) -> list[Artist]:
+def pen_of(canvas: Canvas, mechanism: Mechanism) -> float:
+    """The thickness of lines and size of markers, against that of a picture of usual size with few joints.
+
+    It grows with the axes, and shrinks where joints at home are so close together that their markers would meet.
+    """
+    home = skeleton_of(mechanism)
+    places = np.array([mark.place for mark in home.marks])
+    extent = float(np.ptp(home.points, axis=0).max())
+    box = canvas.axes.get_window_extent()
+    side = min(box.width, box.height) * 72.0 / canvas.axes.get_figure(root=True).dpi
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    nearest = np.where(apart > TOLERANCES.alignment * extent, apart, np.inf).min(axis=1)
+    nearest = nearest[np.isfinite(nearest)]
+    between = side * float(np.median(nearest)) / extent if len(nearest) and extent > 0.0 else side
+    return float(np.clip(min(side / USUAL_SIDE, between / MARKS_APART), *PENS))
+
+
+def _body(canvas: Canvas, part: BodyShape, is_held: bool, pen: float) -> list[Artist]:
     """A body: base and end effector light and broad, links dark and narrow; links of a joint at its limit orange."""
     is_link = part.role == "link"
     colour = HELD if is_link and is_held else of_a_body(part.role)
-    width = 1.6 if is_link or len(part.corners) > 2 else 4.0
+    width = pen * (1.6 if is_link or len(part.corners) > 2 else 4.0)
     artists: list[Artist] = []
-    corners = part.corners
-    if len(corners) >= 3:
-        artists.append(canvas.face(corners, facecolor=colour, alpha=0.25 if is_link else 0.55, zorder=0))
-        corners = np.vstack([corners, corners[:1]])
-    if len(corners) >= 2:
-        artists.append(canvas.line(corners, color=colour, linewidth=width, solid_capstyle="round", zorder=1))
+    if len(part.corners) >= 3:
+        alpha = 0.25 if is_link else 0.55
+        artists.append(canvas.face(part.outline[:-1], facecolor=colour, alpha=alpha, zorder=0))
+    if len(part.corners) >= 2:
+        artists.append(canvas.line(part.outline, color=colour, linewidth=width, solid_capstyle="round", zorder=1))
     return artists
 
 
-def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
+def _joints(canvas: Canvas, marks: Sequence[Mark], pen: float) -> list[Artist]:
     """A marker for every joint, those of a kind together, slides behind the others."""
     kinds: dict[tuple[JointType, bool, bool], list[Mark]] = {}
     for mark in marks:
@@ -103,18 +130,18 @@ def _joints(canvas: Canvas, marks: Sequence[Mark]) -> list[Artist]:
         canvas.marks(
             np.array([mark.place for mark in marks_of_kind]),
             zorder=2 if kind == "prismatic" else 3,
-            **marker_style(*key),
+            **marker_style(*key, pen),
         )
         for key, marks_of_kind in sorted(kinds.items())
         for kind in key[:1]
     ]
 
 
-def marker_style(kind: JointType, actuated: bool, held: bool) -> dict[str, Any]:
+def marker_style(kind: JointType, actuated: bool, held: bool, pen: float = 1.0) -> dict[str, Any]:
     """The style of a joint's marker: shape by type, filled if it is actuated, orange at a limit."""
     return {
         "marker": MARKERS[kind],
-        "s": SLIDE_SIZE if kind == "prismatic" else SIZE,
+        "s": pen**2 * (SLIDE_SIZE if kind == "prismatic" else SIZE),
         "facecolor": (HELD if held else ACTUATED) if actuated else PASSIVE,
         "edgecolor": HELD if held else EDGE,
         "linewidths": 1.8 if held else 0.8,

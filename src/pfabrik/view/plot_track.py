@@ -16,11 +16,11 @@ from ..checks import require_method
 from ..description.readouts import Readout, readouts
 from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument, counted
+from ..skeleton import skeleton_of
 from .canvas import Canvas, canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE
 from .machine import draw_machine, key_of
 from .plane import plane_of
-from .skeleton import skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -74,6 +74,7 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
     for index, (strip, readout) in enumerate(zip(strips, readouts(mechanism), strict=True)):
         draw_actuator(strip, readout, np.asarray(readout.display(track.actuators[:, index])), track)
         axes[readout.name] = strip
+    right.align_ylabels(strips)
     if has_margins:
         draw_margins(below, track)
         axes["margins"] = below

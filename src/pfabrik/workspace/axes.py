@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 SIZE = (6.4, 4.8)
 """Of a new figure [inches]."""
 
+FREE_EDGE = 0.1
+"""Around axes [inches]: those of one scale are shrunk after their place was found."""
+
 ELEVATION, AZIMUTH = 24.0, -58.0
 """Where the eye is [deg]."""
 
@@ -27,6 +30,7 @@ def axes_for(ax: Axes | None, d: int) -> Axes:
     """
     if ax is None:
         figure = new_figure(*SIZE)
+        figure.set_layout_engine("constrained", w_pad=FREE_EDGE, h_pad=FREE_EDGE)
         space: dict[str, Any] = {"projection": "3d", "elev": ELEVATION, "azim": AZIMUTH}
         ax = figure.add_subplot(**(space if d == 3 else {}))
     require_method("ax", ax, "tick_params", "matplotlib axes, or None")

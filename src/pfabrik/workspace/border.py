@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from ..arrays import Ints
+
 if TYPE_CHECKING:
     from .region import Region
 
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#f0e442", "#332288", "#882255")
-"""Colours of the limits that form most of the border, distinct for colour-blind people (Okabe and Ito; two by Tol)."""
+MOTOR_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#332288", "#7fbf3f")
+"""Cold colours: stops of motors. These and the warm ones are distinct for colour-blind people (Okabe and Ito; Tol)."""
+
+JOINT_COLOURS = ("#e69f00", "#cc79a7", "#882255", "#f0e442", "#a6761d")
+"""Warm colours: limits of passive joints, ends of reach and of the map."""
 
 REST = "#b0b0b0"
 """Colour of all other limits together."""
@@ -21,31 +28,41 @@ class Group(NamedTuple):
     ----------
     limits : their indices among all limits.
     share : of the border that they form.
+    is_motors : True if they are stops of driven joints.
     """
 
-    label: str
+    name: str
     colour: str
     limits: list[int]
     share: float
+    is_motors: bool
+
+    @property
+    def label(self) -> str:
+        """The name, with a word for motors."""
+        return self.name + ", actuated" * self.is_motors
 
 
 def groups_of(region: Region) -> list[Group]:
     """Limits grouped by colour: each has its own if there are colours enough; else joints that are copies share one.
 
-    Stops of motors and of passive joints are never one group, whatever their names: they are changed in other ways.
+    Motors have cold colours, all else warm ones: these stops are changed in other ways.
     """
-    together: dict[tuple[str, str, bool], list[tuple[str, str]]] = {}
-    for joint, bound in region.shares:
-        stem = joint if len(region.shares) <= len(COLOURS) else joint.rstrip("0123456789")
-        together.setdefault((stem, bound, is_actuated(region, joint)), []).append((joint, bound))
-    order = sorted(together.items(), key=lambda item: -sum(region.shares[limit] for limit in item[1]))
     groups: list[Group] = []
-    for colour, ((stem, bound, actuated), limits) in zip(COLOURS, order, strict=False):
-        copies = sorted(joint[len(stem) :] for joint, _ in limits)
-        label = f"{stem}{', '.join(copies)} {bound}".strip() + ", actuated" * actuated
-        groups.append(_group(region, label, colour, limits))
-    others = [limit for _, limits in order[len(COLOURS) :] for limit in limits]
-    return [*groups, _group(region, f"{len(others)} other limits", REST, others)] if others else groups
+    others: list[tuple[str, str]] = []
+    for is_motors, colours in ((True, MOTOR_COLOURS), (False, JOINT_COLOURS)):
+        limits = [limit for limit in region.shares if is_actuated(region, limit[0]) == is_motors]
+        together: dict[tuple[str, str], list[tuple[str, str]]] = {}
+        for joint, bound in limits:
+            stem = joint if len(limits) <= len(colours) else joint.rstrip("0123456789")
+            together.setdefault((stem, bound), []).append((joint, bound))
+        order = sorted(together.items(), key=lambda item: -sum(region.shares[limit] for limit in item[1]))
+        for colour, ((stem, bound), alike) in zip(colours, order, strict=False):
+            copies = sorted(joint[len(stem) :] for joint, _ in alike)
+            groups.append(_group(region, f"{stem}{', '.join(copies)} {bound}".strip(), colour, alike, is_motors))
+        others += [limit for _, alike in order[len(colours) :] for limit in alike]
+    groups.sort(key=lambda group: -group.share)
+    return [*groups, _group(region, f"{len(others)} other limits", REST, others, False)] if others else groups
 
 
 def is_actuated(region: Region, joint: str) -> bool:
@@ -53,6 +70,15 @@ def is_actuated(region: Region, joint: str) -> bool:
     return any(each.name == joint and bool(each.actuated) for each in region.mechanism.joints)
 
 
-def _group(region: Region, label: str, colour: str, limits: list[tuple[str, str]]) -> Group:
+def _group(region: Region, name: str, colour: str, limits: list[tuple[str, str]], is_motors: bool) -> Group:
     share = sum(region.shares[limit] for limit in limits)
-    return Group(label, colour, [place for place, limit in enumerate(region.limits) if limit in limits], share)
+    places = [place for place, limit in enumerate(region.limits) if limit in limits]
+    return Group(name, colour, places, share, is_motors)
+
+
+def group_of_limits(region: Region, groups: list[Group]) -> Ints:
+    """The place of each limit's group among groups, (n,); that of the last for a limit that forms no face."""
+    places = np.full(len(region.limits), max(len(groups) - 1, 0))
+    for place, group in enumerate(groups):
+        places[group.limits] = place
+    return places

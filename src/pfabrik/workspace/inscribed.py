@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
+from ..description.mechanism_html import card
 from ..errors import InvalidArgument, UnknownName
 from ..poses import as_floats
 
@@ -53,6 +54,13 @@ class Inscribed:
         """Its area or volume [product of the units of the coordinates]."""
         share = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / (4.0 if len(self.extents) == 2 else 6.0)}
         return float(share[self.kind] * np.prod(self.extents))
+
+    def _repr_html_(self) -> str:
+        """Centre and extents, for notebooks, in the units of the workspace: lengths, or radians."""
+        numbers = zip(self.centre.tolist(), self.extents.tolist(), strict=True)
+        rows = [(str(place), f"{middle:.6g}", f"{extent:.6g}") for place, (middle, extent) in enumerate(numbers, 1)]
+        lines = [f"size {self.size:.6g}"]
+        return card(f"Largest {self.kind}", lines, ("coordinate", "centre", "extent"), rows, "")
 
 
 def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..drawing import SMALL
+from ..drawing import SMALL, keep_apart
+from ..skeleton import skeleton_of
 from .axes import axes_for
-from .border import REST, Group, groups_of
+from .border import Group, group_of_limits, groups_of
+from .patches import patches_of, vertex_normals
 from .sizes import in_words
+from .space import POSITIONS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +36,27 @@ WITHIN = "#eef3f7"
 SHORTEST_NAMED = 0.08
 """Shortest stretch of a border that its limit is written beside, as a share of the picture's diagonal."""
 
+DASHES = (0, (3.0, 0.7))
+"""Of a border in a plane that no motor's stop forms."""
+
+BORDER = 2.2
+"""Width of a border in a plane [points]."""
+
+MACHINE = "#404040"
+"""Colour of the machine in its workspace."""
+
+SMALLEST_WITH_MACHINE = 0.1
+"""Least size of a workspace that its machine is drawn with, as a share of the machine's: else it would be a dot."""
+
+NEAR_SIDE = 0.62
+"""Opacity of the near side of a workspace, through which the machine is seen."""
+
+THINNEST, MANY_TICKS = 0.2, 0.6
+"""Least side of a box in space, and the side from which on it has more than three ticks, as shares of its longest."""
+
+MOST_WIDENINGS, EDGE_FREE = 12, 12.0
+"""How often axes are widened for names, at most, and the distance of names from their edge [pixels]."""
+
 OFF, SIDEWAYS = 5.0, 0.2
 """Distance of a name from the border [points]; component of a direction from which on it stands to that side."""
 
@@ -41,108 +67,184 @@ def plot(region: Region, ax: Axes | None = None) -> Axes:
     """Draw a workspace on matplotlib axes, or on those of a new figure, which is `ax.figure`."""
     d = len(region.names)
     axes = axes_for(ax, d)
-    from matplotlib.lines import Line2D
-
     groups = groups_of(region)
     (_draw_solid if d == 3 else _draw_plane)(axes, region, groups)
-    handles = [Line2D([], [], color=colour, linewidth=4, label=label) for label, colour, *_ in groups]
-    if handles:
-        anchor = (1.12 if d == 3 else 1.02, 0.5)
-        legend = axes.legend(
-            handles=handles,
-            loc="center left",
-            bbox_to_anchor=anchor,
-            frameon=False,
-            fontsize=SMALL,
-            title_fontsize=SMALL,
-        )
-        legend.set_title("border formed by")
+    if groups:
+        _draw_key(axes, groups, d)
     axes.set_title(f"{region.mechanism.name}: {in_words(region)}", fontsize=SMALL + 1)
+    (_make_room if d == 2 else keep_apart)(axes)
     return axes
 
 
-def _face_colours(region: Region, groups: list[Group]) -> Strings:
-    colours = np.full(len(region.limits), REST)
-    for group in groups:
-        colours[group.limits] = group.colour
-    return colours
+def _draw_key(axes: Any, groups: list[Group], d: int) -> None:
+    """The limits beside the axes: first stops of motors, then what else forms the border, each with its line."""
+    from matplotlib.lines import Line2D
+
+    handles: list[Line2D] = []
+    for is_motors, title in ((True, "stops of motors"), (False, "passive joints, reach")):
+        of_kind = [group for group in groups if group.is_motors == is_motors]
+        if of_kind:
+            handles.append(Line2D([], [], linestyle="", label=title))
+        for group in of_kind:
+            style: Any = "-" if is_motors or d == 3 else DASHES
+            handles.append(Line2D([], [], color=group.colour, linewidth=4, linestyle=style, label=group.name))
+    anchor = (1.12 if d == 3 else 1.02, 0.5)
+    letters: dict[str, Any] = {"fontsize": SMALL, "title_fontsize": SMALL}
+    legend = axes.legend(handles=handles, loc="center left", bbox_to_anchor=anchor, frameon=False, **letters)
+    legend.set_title("border formed by")
 
 
 def _draw_plane(axes: Any, region: Region, groups: list[Group]) -> None:
-    from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
     points = shown(region, region.vertices)
-    segments = points[region.faces]
+    if groups:
+        place = group_of_limits(region, groups)
+        patches = patches_of(region, region.vertices, region.faces, place[region.vertex_limit], place)
+        points = shown(region, patches.vertices)
+        group_of = dict(zip(map(tuple, patches.faces.tolist()), patches.groups.tolist(), strict=True))
+        for loop in _loops(patches.faces):
+            for group, corners in _stretches(loop, group_of):
+                drawn = groups[group]
+                style: Any = "-" if drawn.is_motors else DASHES
+                axes.plot(*points[corners].T, color=drawn.colour, linewidth=BORDER, linestyle=style, zorder=4)
     loops = _loops(region.faces)
+    places = shown(region, region.vertices)
+    machine = draw_machine(axes, region)
     for loop in loops:
-        _name_stretches(axes, region, points, loop)
+        _name_stretches(axes, region, places, loop)
     if loops:
-        ends = [np.vstack([points[loop], points[loop[:1]]]) for loop in loops]
+        ends = [np.vstack([places[loop], places[loop[:1]]]) for loop in loops]
         codes = [[Path.MOVETO, *[Path.LINETO] * (len(end) - 2), Path.CLOSEPOLY] for end in ends]
-        axes.add_patch(PathPatch(Path(np.concatenate(ends), np.concatenate(codes)), facecolor=WITHIN, edgecolor="none"))
-    axes.add_collection(
-        LineCollection(
-            list(segments),
-            colors=_face_colours(region, groups)[region.face_limit].tolist(),
-            linewidths=1.8,
-            capstyle="round",
-        )
-    )
+        filled = Path(np.concatenate(ends), np.concatenate(codes))
+        axes.add_patch(PathPatch(filled, facecolor=WITHIN, edgecolor="none", zorder=0))
     axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
     axes.autoscale_view()
-    axes.margins(0.1)  # for the names beside the border
-    if len(set(region.units)) == 1:
+    axes.margins(0.05)
+    if machine or len(set(region.units)) == 1:
         axes.set_aspect("equal")
+
+
+def _make_room(axes: Any) -> None:
+    """Widen the ends of axes in a plane until the names beside the border are within them."""
+    root = axes.get_figure(root=True)
+    for _ in range(MOST_WIDENINGS):
+        root.draw_without_rendering()
+        box = axes.get_window_extent()
+        names = np.array([text.get_window_extent().extents for text in axes.texts]).reshape(-1, 4)
+        over = np.array([*(box.extents[:2] - names[:, :2].min(axis=0, initial=np.inf)),
+                         *(names[:, 2:].max(axis=0, initial=-np.inf) - box.extents[2:])])  # fmt: skip
+        over = np.maximum(np.where(np.isfinite(over), over, 0.0) + EDGE_FREE, 0.0)
+        if (over <= 0.5 * EDGE_FREE).all():
+            return
+        for name, size, low, high in (("x", box.width, over[0], over[2]), ("y", box.height, over[1], over[3])):
+            start, end = getattr(axes, f"get_{name}lim")()
+            unit = (end - start) / size
+            axes.set(**{f"{name}lim": (start - unit * low, end + unit * high)})
+
+
+def _stretches(loop: list[int], group_of: dict[tuple[int, ...], int]) -> Iterator[tuple[int, list[int]]]:
+    """The stretches of a loop that are of one group, each with the places that it passes, its end included."""
+    ends = [*loop[1:], loop[0]]
+    groups = [group_of[pair] for pair in zip(loop, ends, strict=True)]
+    first = next((k for k in range(len(loop)) if groups[k] != groups[k - 1]), 0)
+    order = [(first + k) % len(loop) for k in range(len(loop))]
+    for group, members in groupby(order, key=groups.__getitem__):
+        places = list(members)
+        yield group, [*(loop[place] for place in places), ends[places[-1]]]
 
 
 def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int]) -> None:
     """Write the limit that forms each stretch of a border beside its middle, outside; short stretches have no room."""
     limit_of = dict(zip(map(tuple, region.faces.tolist()), region.face_limit.tolist(), strict=True))
-    limits = np.array([limit_of[pair] for pair in zip(loop, [*loop[1:], loop[0]], strict=True)])
-    changes = np.flatnonzero(limits != np.roll(limits, 1))
-    first = int(changes[0]) if len(changes) else 0
-    corners, limits = points[np.roll(loop, -first)], np.roll(limits, -first)
-    steps = np.roll(corners, -1, axis=0) - corners
-    lengths = np.linalg.norm(steps, axis=1)
-    for stretch in np.split(np.arange(len(loop)), np.flatnonzero(np.diff(limits)) + 1):
-        along = np.cumsum(lengths[stretch])
+    for limit, corners in _stretches(loop, limit_of):
+        steps = np.diff(points[corners], axis=0)
+        along = np.cumsum(np.linalg.norm(steps, axis=1))
         if along[-1] < SHORTEST_NAMED * np.linalg.norm(np.ptp(points, axis=0)):
             continue
-        middle = stretch[int(np.searchsorted(along, 0.5 * along[-1]))]
-        outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(lengths[middle], 1e-300)
+        middle = int(np.searchsorted(along, 0.5 * along[-1]))
+        outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(np.linalg.norm(steps[middle]), 1e-300)
         axes.annotate(
-            " ".join(region.limits[limits[middle]]).strip(),
-            corners[middle] + 0.5 * steps[middle],
+            " ".join(region.limits[limit]).strip(),
+            points[corners[middle]] + 0.5 * steps[middle],
             xytext=OFF * outward,
             textcoords="offset points",
             ha="left" if outward[0] > SIDEWAYS else "right" if outward[0] < -SIDEWAYS else "center",
             va="bottom" if outward[1] > SIDEWAYS else "top" if outward[1] < -SIDEWAYS else "center",
             fontsize=SMALL,
+            zorder=5,
         )
 
 
 def _draw_solid(axes: Any, region: Region, groups: list[Group]) -> None:
+    vertices, faces, limits = thinned(region.vertices, region.faces, region.vertex_limit)
+    machine = draw_machine(axes, region)
+    if groups and len(faces):
+        place = group_of_limits(region, groups)
+        patches = patches_of(region, vertices, faces, place[limits], place)
+        colours = np.array([group.colour for group in groups])[patches.groups]
+        add_surface(axes, shown(region, patches.vertices), patches.faces, colours, see_through=bool(machine))
+    frame_solid(axes, region, [shown(region, vertices), *machine])
+
+
+def frame_solid(axes: Any, region: Region, drawn: list[Floats], *, zoom: float = 0.86) -> None:
+    """Show all that is drawn, points (n, 3) each, at one scale where all coordinates have one unit, with axes named."""
+    points = np.concatenate(drawn)
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.ones(3))
+    spans = np.maximum(high - low, THINNEST * float((high - low).max()))
+    ends = 0.5 * (low + high) + 0.5 * spans * np.array([[-1.0], [1.0]])
+    axes.set(**{f"{name}lim": tuple(pair) for name, pair in zip("xyz", ends.T, strict=True)})
+    box = spans if len(set(region.units)) == 1 else np.ones(3)
+    axes.set_box_aspect(tuple(box / box.max()), zoom=zoom)
+    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(region), strict=True)))
+    for name, side in zip("xyz", box / box.max(), strict=True):
+        axes.locator_params(axis=name, nbins=5 if side > MANY_TICKS else 3)
+
+
+def add_surface(axes: Any, vertices: Floats, faces: Ints, colours: Strings, *, see_through: bool) -> None:
+    """Add a mesh in the light; where it is seen through, its far side first, then its near side, half transparent."""
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    vertices, faces, limits = _thinned(shown(region, region.vertices), region.faces, region.face_limit)
-    spans = np.ptp(vertices, axis=0) if len(vertices) else np.ones(3)
-    box = spans if len(set(region.units)) == 1 else np.ones(3)
-    corners = vertices[faces]
-    scaled = corners / spans * box
-    normals = _smooth(np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0]), faces, len(vertices))
+    spans = np.ptp(vertices, axis=0)
+    scaled = vertices / np.where(spans > 0.0, spans, 1.0)
+    corners = scaled[faces]
+    normals = _smooth(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), faces, len(vertices))
     bright = DARKEST + (1.0 - DARKEST) * 0.5 * (1.0 + normals @ LIGHT)
-    palette = np.array([to_rgb(colour) for colour in _face_colours(region, groups).tolist()])
-    colours = palette[limits] * bright[:, None]
-    axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.2))
-    if len(vertices):
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(tuple(box / box.max()), zoom=0.86)
-    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(region), strict=True)))
-    axes.locator_params(nbins=5)
+    names, of_faces = np.unique(colours, return_inverse=True)
+    shaded = np.array([to_rgb(name) for name in names.tolist()])[of_faces] * bright[:, None]
+    up, turn = np.radians([axes.elev, axes.azim])
+    is_near = normals @ [np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)] > 0.0
+    axes.computed_zorder = False
+    for rows, alpha, zorder in ((~is_near, 1.0, 1), (is_near, NEAR_SIDE if see_through else 1.0, 3)):
+        if rows.any():
+            edges: Any = "none" if alpha < 1.0 else shaded[rows]
+            looks: dict[str, Any] = {"facecolors": shaded[rows], "edgecolors": edges, "alpha": alpha}
+            axes.add_collection3d(Poly3DCollection(vertices[faces[rows]], linewidths=0.2, zorder=zorder, **looks))
+
+
+def draw_machine(axes: Any, region: Region) -> list[Floats]:
+    """Draw the machine where the workspace starts, in thin lines; returns their points, (n, d) each.
+
+    Nothing is drawn, and the list is empty, where a coordinate is an angle, and where the workspace is far smaller.
+    """
+    if not set(region.names) <= set(POSITIONS) or not len(region.faces):
+        return []
+    start = region._question.start
+    skeleton = skeleton_of(region.mechanism if start is None else start)
+    if np.ptp(region.bounds, axis=0).max() < SMALLEST_WITH_MACHINE * np.ptp(skeleton.points, axis=0).max():
+        return []
+    columns = [POSITIONS.index(name) for name in region.names]
+    lines = [part.outline for part in skeleton.parts if len(part.outline) > 1] + list(skeleton.rails)
+    lines += [] if skeleton.stem is None else [skeleton.stem]
+    drawn = [line[:, columns] for line in lines]
+    for line in drawn:
+        axes.plot(*line.T, color=MACHINE, linewidth=1.1, solid_capstyle="round", zorder=2)
+    places = np.array([mark.place for mark in skeleton.marks])[:, columns]
+    axes.plot(*places.T, color=MACHINE, linestyle="", marker="o", markersize=2.2, zorder=2)
+    axes.plot(*skeleton.reference[columns][:, None], color=MACHINE, marker="+", markersize=8, zorder=2)
+    return [*drawn, places]
 
 
 def shown(region: Region, points: Floats) -> Floats:
@@ -185,18 +287,26 @@ def _loops(segments: Ints) -> list[list[int]]:
     return loops
 
 
-def _thinned(vertices: Floats, faces: Ints, limits: Ints) -> tuple[Floats, Ints, Ints]:
-    """A mesh with no more faces than are worth drawing: vertices in the same small box become their middle."""
+def thinned(vertices: Floats, faces: Ints, limits: Ints) -> tuple[Floats, Ints, Ints]:
+    """A mesh with no more faces than are worth drawing: vertices in the same small box become their middle.
+
+    Two sheets of the border that pass through one box stay apart: their normals point to different sides.
+
+    Parameters
+    ----------
+    limits : of the vertices, (v,); the first in each box counts.
+    """
     cells = 2.0 * np.cbrt(max(len(vertices), 1))
     while len(faces) > MOST_FACES:
         span = np.ptp(vertices, axis=0)
         low = vertices.min(axis=0)
         boxes = np.floor((vertices - low) / np.where(span > 0.0, span, 1.0) * cells).astype(np.int64)
-        _, group = np.unique(boxes @ np.array([1, 1 << 20, 1 << 40]), return_inverse=True)
+        sides = (vertex_normals(vertices, faces) > 0.0) @ np.array([1, 2, 4])
+        keys = boxes @ np.array([8, 1 << 22, 1 << 41]) + sides
+        _, first, group = np.unique(keys, return_index=True, return_inverse=True)
         counts = np.bincount(group)
         vertices = np.stack([np.bincount(group, column) / counts for column in vertices.T], axis=1)
-        faces = group[faces]
-        whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-        faces, limits = faces[whole], limits[whole]
+        faces, limits = group[faces], limits[first]
+        faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
         cells *= 0.8
     return vertices, faces, limits

@@ -132,4 +132,4 @@ class Workspace(Region):
 
     def __repr__(self) -> str:
         over = ", ".join(self.names)
-        return f"<Workspace of '{self.mechanism.name}' over {over}: {in_words(self)}>"
+        return f"<Workspace of '{self.mechanism.name}' over {over}: {in_words(self, degrees=False)}>"

@@ -15,9 +15,10 @@ from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
+from ..description.mechanism_html import card
 from ..errors import InvalidArgument, counted
 from ..ik import solve_ik
-from ..motion.singularities import NUMBERS, Singularity, parallel_signs
+from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
 from .numbering import Numbering
@@ -73,8 +74,22 @@ class SingularityMap:
         return np.bincount(self.parts) / max(len(self.parts), 1)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the parallel measure and the locus of parallel singularities. Needs the extra `plot`."""
-        return plot_map(self.workspace, self.points, self.measures, self.locus_vertices, self.locus_faces, ax)
+        """Draw the parallel measure and the locus of parallel singularities. Needs the extra `plot`.
+
+        Over three coordinates, the locus in space stands beside slices that show the measure and where they cut the
+        locus; on axes that are given, the slices are drawn in space too.
+        """
+        locus = self.locus_vertices, self.locus_faces
+        return plot_map(self.workspace, self.step, self.points, self.measures, *locus, ax)
+
+    def _repr_html_(self) -> str:
+        """The parts between parallel singularities, and the least of each measure, for notebooks."""
+        sizes = [size for size in self.sizes.tolist() if size > LEAST_SHARE]
+        lines = [counted(len(self.points), "point")]
+        lines += [] if len(self.locus_faces) else ["no parallel singularity"]
+        rows = [(f"part {place}", f"{size:.1%} of the points") for place, size in enumerate(sizes)]
+        rows += least_measures(self.measures)
+        return card(self.workspace.mechanism.name, lines, ("singularities", ""), rows, "")
 
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
@@ -98,9 +113,25 @@ class SingularityTrack:
     signs: Floats
     crossings: Ints
 
+    def _repr_html_(self) -> str:
+        """The rows before which the path leads through a singularity, and the least of each measure, for notebooks."""
+        crossings = ", ".join(map(str, self.crossings.tolist())) or "none"
+        rows = [("crossings before rows", crossings), *least_measures(self.measures)]
+        return card("Singularities along a path", [counted(len(self.signs), "row")], ("singularities", ""), rows, "")
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
         return plot_track(self.measures, self.crossings, ax)
+
+
+def least_measures(measures: Singularity) -> list[tuple[str, str]]:
+    """The least of each measure, in words; "-" where there is none."""
+    rows = []
+    for kind in KINDS:
+        values = np.ravel(getattr(measures, kind))
+        known = values[~np.isnan(values)]
+        rows.append((f"least {kind} measure", f"{known.min():.3g}" if len(known) else "-"))
+    return rows
 
 
 @overload

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from ..motion.singularities import Singularity
 from .axes import axes_for
 from .picture import labels, shown
 from .region import Region
+from .singular_slices import LOCUS, MAP, MEASURE, Field, plot_in_space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LOCUS = "#d55e00"
-MARK, FINE, FAINT = 9.0, 6.0, 0.5
+MARK = 9.0
 LINES = {
     "serial": ("#0072b2", "-"),
     "parallel": ("#e69f00", "--"),
@@ -27,32 +27,31 @@ LINES = {
 
 
 def plot_map(
-    space: Region, points: Floats, measures: Singularity, vertices: Floats, faces: Ints, ax: Axes | None = None
+    space: Region,
+    step: Floats,
+    points: Floats,
+    measures: Singularity,
+    vertices: Floats,
+    faces: Ints,
+    ax: Axes | None = None,
 ) -> Axes:
-    """Draw the parallel measure at points (n, d) of a plane, or of space, and the locus: vertices (v, d), faces."""
-    d = len(space.names)
-    axes = axes_for(ax, d)
+    """Draw the parallel measure at points (n, d) of a plane, or in slices of space, and the locus: vertices, faces."""
+    parallel = np.asarray(measures.parallel)
+    what = "parallel singularities" if len(faces) else "no parallel singularity"
+    title = f"{space.mechanism.name}: {what}"
+    if len(space.names) == 3:
+        return plot_in_space(space, Field(points, step, parallel), vertices, faces, title, ax)
+    axes = axes_for(ax, 2)
     from matplotlib.collections import LineCollection
 
-    points, parallel = shown(space, points), np.asarray(measures.parallel)
-    locus = list(shown(space, vertices)[faces])
-    if d == 2:
-        drawn = axes.scatter(
-            points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap="cividis", vmin=0.0
-        )
-        axes.add_collection(LineCollection(locus, colors=LOCUS, linewidths=2.0))
-        if len(set(space.units)) == 1:
-            axes.set_aspect("equal")
-    else:
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-        solid: Any = axes
-        drawn = solid.scatter(*points.T, c=parallel, s=FINE, linewidths=0, cmap="cividis", vmin=0.0, alpha=FAINT)
-        solid.add_collection3d(Poly3DCollection(locus, facecolors=LOCUS, edgecolors="none", alpha=0.8))
-    axes.figure.colorbar(drawn, ax=axes, label="parallel measure", shrink=0.8, pad=0.12 if d == 3 else 0.03)
-    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(space), strict=False)))
-    what = "parallel singularities" if locus else "no parallel singularity"
-    axes.set_title(f"{space.mechanism.name}: {what}", fontsize=SMALL + 1)
+    points = shown(space, points)
+    drawn = axes.scatter(points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap=MAP, vmin=0.0)
+    axes.add_collection(LineCollection(list(shown(space, vertices)[faces]), colors=LOCUS, linewidths=2.0))
+    if len(set(space.units)) == 1:
+        axes.set_aspect("equal")
+    axes.figure.colorbar(drawn, ax=axes, label=MEASURE, shrink=0.8, pad=0.03)
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels(space), strict=True)))
+    axes.set_title(title, fontsize=SMALL + 1)
     return axes
 
 

@@ -9,10 +9,18 @@ if TYPE_CHECKING:
     from .region import Region
 
 
-def in_words(region: Region) -> str:
-    """The size of a workspace, to the digit that is uncertain: "4,970,000 ± 2,000 mm³"."""
-    size, uncertainty = region.size, region.uncertainty
-    return f"{rounded(size, uncertainty)} ± {rounded(uncertainty, uncertainty)} {region.size_unit}"
+def in_words(region: Region, *, degrees: bool = True) -> str:
+    """The size of a workspace, to the digit that is uncertain: "4,970,000 ± 2,000 mm³".
+
+    Parameters
+    ----------
+    degrees : True for people, who read angles in degrees; else in radians, as `size` has them.
+    """
+    size, uncertainty, unit = region.size, region.uncertainty, region.size_unit
+    if degrees:
+        factor = math.degrees(1.0) ** region.units.count("rad")
+        size, uncertainty, unit = factor * size, factor * uncertainty, unit.replace("rad", "deg")
+    return f"{rounded(size, uncertainty)} ± {rounded(uncertainty, uncertainty)} {unit}"
 
 
 def kind_of(region: Region, name: str) -> str:

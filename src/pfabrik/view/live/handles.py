@@ -48,6 +48,10 @@ class Handles:
             if handle is not self._held:
                 handle.position, handle.wxyz = target[:3, 3] / self._length, quaternion(target[:3, :3])
 
+    def release(self) -> None:
+        """Let all handles follow the answers again: a page that goes in the middle of a motion does not say so."""
+        self._held = None
+
     def show_all(self, visible: bool) -> None:
         """Show or hide them."""
         for handle in self._all:

@@ -12,8 +12,8 @@ from ...answers.status import Status
 from ...answers.tracked import Track
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
+from ...skeleton import checked_shown, skeleton_of
 from ..plot_track import checked_track
-from ..skeleton import checked_shown, skeleton_of
 from .handles import Handles
 from .panel import Actions, Panel
 from .player import due_after
@@ -72,6 +72,11 @@ class LiveMachine:
             self._handles.show(session.target)
             self.panel.show(session)
         self._server.flush()
+
+    def release(self) -> None:
+        """Let handles and sliders follow the answers again."""
+        self._handles.release()
+        self.panel.release()
 
     def page(self) -> str:
         """The scene as a page of its own, HTML: the machine as it is, or moving along its path."""

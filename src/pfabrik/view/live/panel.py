@@ -10,24 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...answers.margins import nearest_first
 from ...answers.solution import Solution
-from ...answers.status import Status
 from ...description.mechanism import Mechanism
 from ...description.readouts import Readout, readouts
 from ...description.task import task_of
 from ...errors import counted
 from ...rotations import to_rpy
 from ..looks import ACHIEVED, HELD
+from .panel_html import BOX, NOTE, margins_html, pose_html, status_html, watch_html
 from .session import DIGITS, Session
 
 if TYPE_CHECKING:
     import viser
 
     from .border_patches import Patch
-
-BARS = 8
-"""Margins that have a bar; further ones are only counted."""
 
 FAR = 2.0
 """Range of sliders on each side of home where there is no limit [L or half turns]."""
@@ -80,6 +76,8 @@ class Panel:
         self._workspace.on_update(_of_users(lambda event: actions.show_workspace(event.target.value)))
         self._border = gui.add_html("")
         self._note = gui.add_html("")
+        self.tell("")
+        gui.add_html(watch_html())
         gui.add_button("Save as a page").on_click(lambda event: actions.save(event.client))
 
     def show(self, session: Session) -> None:
@@ -98,7 +96,7 @@ class Panel:
         """Show a note on progress, or on an error."""
         colour = HELD if alarming else ACHIEVED
         lines = "<br>".join(escape(line) for line in words.splitlines())
-        self._note.content = f'<div data-pfabrik="note" style="{BOX};color:{colour}">{lines}</div>' if words else ""
+        self._note.content = f'<div data-pfabrik="note" style="{BOX};{NOTE};color:{colour}">{lines}</div>'
 
     @property
     def wants_workspace(self) -> bool:
@@ -212,57 +210,3 @@ def rounded(low: float, high: float) -> tuple[float, float]:
 def _slider(gui: viser.GuiApi, label: str, low: float, high: float, value: float) -> Any:
     step = 10.0 ** np.floor(np.log10(max(high - low, 1e-9) / STEPS))
     return gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high)))
-
-
-BOX = "margin:0.3em 0.8em;font-size:0.85em;line-height:1.35"
-
-
-def status_html(session: Session) -> str:
-    """The status of the answer, with the limits that block its target, as HTML."""
-    reached = session.solution.status == Status.REACHED
-    status, *reasons = session.sentence.split("; ")
-    lines = "".join(f"<div>{escape(reason)}</div>" for reason in reasons)
-    colour = ACHIEVED if reached else HELD
-    return (
-        f'<div style="{BOX};color:{colour}"><b data-pfabrik="status">{escape(status)}</b>'
-        f'<div data-pfabrik="held">{lines}</div></div>'
-    )
-
-
-def margins_html(session: Session) -> str:
-    """The nearest limits as bars, 1 in the middle of a range and 0 on the limit."""
-    margins = nearest_first(session.solution)
-    if not margins:
-        return ""
-    rows = "".join(_bar(f"{joint} {bound}", margin) for joint, bound, margin in margins[:BARS])
-    more = f"<div>and {len(margins) - BARS} others, farther off</div>" if len(margins) > BARS else ""
-    return f'<div data-pfabrik="margins" style="{BOX}">{rows}{more}</div>'
-
-
-def _bar(name: str, value: float) -> str:
-    share, colour = 100.0 * float(np.clip(value, 0.0, 1.0)), HELD if value <= 1e-6 else ACHIEVED
-    return (
-        f'<div style="display:flex;gap:0.5em;align-items:center"><span style="width:8em;overflow:hidden">{escape(name)}'
-        f'</span><span style="flex:1;background:#e8e8e8;height:0.6em"><span style="display:block;height:100%;'
-        f'width:{share:.1f}%;background:{colour}"></span></span><span style="width:3em;text-align:right">'
-        f"{value:.2f}</span></div>"
-    )
-
-
-COPY = (
-    "const t=this.previousElementSibling;t.select();"
-    "(navigator.clipboard?navigator.clipboard.writeText(t.value):Promise.reject()).catch(()=>document.execCommand('copy'));"
-    "this.textContent='Copied';setTimeout(()=>this.textContent='Copy pose',900)"
-)
-"""Script of the button: copies by the clipboard if the browser allows it, else by a command of the document."""
-
-
-def pose_html(session: Session) -> str:
-    """The target as Python, to copy."""
-    text = escape(session.pose_as_python, quote=True)
-    return (
-        f'<div style="{BOX};display:flex;gap:0.4em"><input readonly data-pfabrik="pose" value="{text}" '
-        f'style="flex:1;min-width:0;border:1px solid #ccc;font:0.9em monospace;padding:0.2em">'
-        f'<button data-pfabrik="copy" onclick="{escape(COPY, quote=True)}" '
-        f'style="border:1px solid #ccc;padding:0 0.6em;cursor:pointer">Copy pose</button></div>'
-    )

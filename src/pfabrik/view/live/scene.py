@@ -10,8 +10,8 @@ import numpy as np
 from ...answers.tracked import Track
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
+from ...skeleton import BodyShape, Mark, Skeleton
 from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, PLATFORM, of_a_body, rgb
-from ..skeleton import BodyShape, Mark, Skeleton
 from .shapes import SHAPES, cylinder, fan, quaternion, upright_to
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Scene:
         self._faces = [
             self._scene.add_mesh_simple(
                 f"{MACHINE}/bodies/{place}",
-                *fan(part.corners / self._length),
+                *fan(part.outline[:-1] / self._length),
                 color=_colour_of(part),
                 opacity=0.45,
                 side="double",
@@ -78,7 +78,7 @@ class Scene:
         positions, turns, scales, colours = self._cylinders(skeleton)
         self._lines.batched_positions, self._lines.batched_wxyzs = positions, turns
         self._lines.batched_scales, self._lines.batched_colors = scales, colours
-        corners = (part.corners for part in skeleton.parts if len(part.corners) >= 3)
+        corners = (part.outline[:-1] for part in skeleton.parts if len(part.corners) >= 3)
         for face, face_corners in zip(self._faces, corners, strict=True):
             face.vertices = fan(face_corners / self._length)[0]
         for kind, joints in self._joints.items():
@@ -151,11 +151,10 @@ class Scene:
         ends, radii, colours = [], [], []
         for part in skeleton.parts:
             colour = rgb(HELD) if part.role == "link" and part.body in held else _colour_of(part)
-            count = len(part.corners) if len(part.corners) > 2 else len(part.corners) - 1
-            edges = np.stack([part.corners, np.roll(part.corners, -1, axis=0)], axis=1)[:count]
+            edges = np.stack([part.outline[:-1], part.outline[1:]], axis=1)
             ends += list(edges)
-            radii += [LINK_RADIUS if part.role == "link" else RADIUS] * count
-            colours += [colour] * count
+            radii += [LINK_RADIUS if part.role == "link" else RADIUS] * len(edges)
+            colours += [colour] * len(edges)
         if skeleton.stem is not None:
             ends, radii, colours = [*ends, skeleton.stem], [*radii, LINK_RADIUS], [*colours, rgb(PLATFORM)]
         lines = np.reshape(ends, (-1, 2, 3)) / self._length

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 DISTANCE = 2.1
 """Distance of the camera from the middle of the machine, in radii of the machine."""
 
+IN_VIEW = 0.8
+"""Share of the camera's angle within which the target is kept: its handles need room around it."""
+
 SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
 
 
@@ -48,6 +51,26 @@ def serve(host: str, port: int) -> viser.ViserServer:
 
     with quietly():
         return Local(host=host, port=port, verbose=False)
+
+
+def keep_in_view(server: viser.ViserServer, point: Floats) -> None:
+    """Move the camera of each page back, if need be, until a point (3,) of the scene is in view, its handles too."""
+    for client in server.get_clients().values():
+        camera = client.camera
+        try:
+            position, middle, angle = np.array(camera.position), np.array(camera.look_at), float(camera.fov)
+        except (AssertionError, AttributeError):  # the page has not yet told where its camera is
+            continue
+        camera.position = backed_off(position, middle, angle, point)
+
+
+def backed_off(position: Floats, middle: Floats, angle: float, point: Floats) -> Floats:
+    """The place (3,) of a camera that looks at a middle (3,), moved back until a point is within its angle [rad]."""
+    along = (middle - position) / max(float(np.linalg.norm(middle - position)), 1e-12)
+    away = point - position
+    across = float(np.linalg.norm(away - (away @ along) * along))
+    missing = across / np.tan(0.5 * IN_VIEW * angle) - float(away @ along)
+    return np.asarray(position - max(missing, 0.0) * along)
 
 
 def aim_camera(server: viser.ViserServer, mechanism: Mechanism, points: Floats) -> None:

@@ -24,7 +24,7 @@ from .newest import Newest
 from .panel import Actions
 from .player import Player
 from .searching import Searches
-from .serving import quietly, serve
+from .serving import keep_in_view, quietly, serve
 from .session import Session, moved
 from .watching import Watch
 
@@ -66,6 +66,7 @@ class Viewer:
     Attributes
     ----------
     url : where it is.
+    port : where it is served: another than was asked for, if that one was taken.
     """
 
     def __init__(self, shown: Mechanism | Solution | str | os.PathLike[str], port: int, host: str) -> None:
@@ -75,7 +76,8 @@ class Viewer:
         self._closed = threading.Event()
         self._server = serve(host, port)
         shown_host = "localhost" if host in ("0.0.0.0", "::") else host
-        self.url = f"http://{shown_host}:{self._server.get_port()}"
+        self.port = self._server.get_port()
+        self.url = f"http://{shown_host}:{self.port}"
         self._newest = Newest(self._complain)
         self._searches = Searches(lambda: self._stage, self._lock, self._complain)
         self._player: Player | None = None
@@ -84,6 +86,7 @@ class Viewer:
         try:
             self._build(what)
             self._server.on_client_connect(lambda _: self._newest.post(self._prepare))
+            self._server.on_client_disconnect(lambda _: self._stage.release())
             atexit.register(self.close)
             self._watch = Watch(path, self._changed) if path is not None and path.is_file() else None
         except BaseException:  # an interruption too: nobody else knows of it yet
@@ -166,6 +169,7 @@ class Viewer:
 
     def _change_target(self, name: str, value: float) -> None:
         self._stage.wanted = target = moved(self._stage.wanted, name, value)
+        keep_in_view(self._server, target[:3, 3] / self.mechanism.characteristic_length)
         self._ask(lambda stage: stage.session.go_to(target))
 
     def _change_actuator(self, place: int, value: float) -> None:
@@ -238,6 +242,8 @@ class Viewer:
             warm_up(mechanism)
             self._ready = mechanism
             panel.tell("")
+        with self._lock:
+            self._stage.refresh()  # a page that comes back shows the target as it is
 
     def _changed(self, path: Path) -> None:
         """Show the new content of the watched file, or its fault."""
@@ -246,7 +252,14 @@ class Viewer:
         except (PfabrikError, OSError) as error:
             self._stage.panel.tell(str(error), alarming=True)
             return
-        self._newest.post(lambda: self._build(checked(mechanism)))
+        self._newest.post(lambda: self._rebuild(mechanism))
+
+    def _rebuild(self, mechanism: Mechanism) -> None:
+        """Show another version of the machine, with the target that the user gave the one before."""
+        before = self._stage.session
+        self._build(checked(mechanism))
+        if before.asked == "pose":
+            self._answer(lambda stage: stage.session.go_to(before.target))
 
     def _complain(self, error: Exception) -> None:
         self._stage.panel.tell(str(error), alarming=True)

@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ..answers.solution import Solution
-from ..arrays import Floats
-from ..description.mechanism import Joint, Mechanism
-from ..description.places import Places, joint_places, joints_on, middle
-from ..errors import InvalidArgument
+from .answers.solution import Solution
+from .arrays import Floats
+from .description.common_centre import arc, common_centre, is_around
+from .description.mechanism import Joint, Mechanism
+from .description.places import Places, joint_places, joints_on, middle
+from .errors import InvalidArgument
 
 Role: TypeAlias = Literal["base", "platform", "link"]
 
 SAME_ANGLE = 6
 """Digits to which angles about a body's middle count [rad]: equal ones keep the order of the description."""
 
+ARC_STEPS = 12
+"""Straight pieces that an arc is drawn with."""
+
 
 @dataclass(frozen=True)
 class BodyShape:
-    """A body through its joints: a line between two corners, a face of three and more, (k, 3) [length], in order."""
+    """A body through its joints.
+
+    Attributes
+    ----------
+    corners : where its joints are, (k, 3) [length], in order.
+    outline : points (n, 3) [length] of a line between two corners, or around a face of three and more, back to the
+        first. Of a spherical linkage, arcs about its centre.
+    """
 
     body: str
     role: Role
     corners: Floats
+    outline: Floats
 
 
 @dataclass(frozen=True)
@@ -57,7 +70,9 @@ class Skeleton:
     @property
     def points(self) -> Floats:
         """Every point that is drawn, (n, 3) [length]."""
-        return np.concatenate([[mark.place for mark in self.marks], self.rails.reshape(-1, 3), [self.reference]])
+        outlines = [part.outline for part in self.parts]
+        places = [mark.place for mark in self.marks]
+        return np.concatenate([places, *outlines, self.rails.reshape(-1, 3), [self.reference]])
 
     @property
     def is_held(self) -> bool:
@@ -67,7 +82,7 @@ class Skeleton:
     @property
     def lines(self) -> Floats:
         """Both ends of every line that is drawn, (k, 2, 3) [length]."""
-        edges = [np.stack([part.corners, np.roll(part.corners, -1, axis=0)], axis=1) for part in self.parts]
+        edges = [np.stack([part.outline[:-1], part.outline[1:]], axis=1) for part in self.parts]
         return np.concatenate([*edges, self.rails])
 
 
@@ -88,12 +103,10 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
     for limit in () if solution is None else solution._limits[0]:
         held.setdefault(limit.joint, []).append(limit.bound)
     ends = [places[name] for name in joints_on(mechanism, mechanism.end_effector)]
+    centre = common_centre(mechanism)
     return Skeleton(
         mechanism,
-        tuple(
-            BodyShape(body, _role(mechanism, body), _corners(mechanism, body, places, rails))
-            for body in mechanism.bodies
-        ),
+        tuple(_shape(mechanism, body, places, rails, centre) for body in mechanism.bodies),
         tuple(Mark(joint, places[joint.name], tuple(held.get(joint.name, ()))) for joint in mechanism.joints),
         np.reshape(list(rails.values()), (-1, 2, 3)),
         np.array(reference),
@@ -136,12 +149,25 @@ def around(points: list[Floats]) -> list[Floats]:
     return [points[index] for index in np.argsort(angles.round(SAME_ANGLE), kind="stable")]
 
 
-def _corners(mechanism: Mechanism, body: str, places: Places, rails: dict[str, Floats]) -> Floats:
-    """Where a body is held: at its joints; the base at the middle of its rails, so that it rests where they move."""
+def _shape(
+    mechanism: Mechanism, body: str, places: Places, rails: dict[str, Floats], centre: Floats | None
+) -> BodyShape:
+    """A body between its joints; the base is held at the middle of its rails, so that it rests where they move."""
     is_base = body == mechanism.base
     names = joints_on(mechanism, body)
     points = [rails[name].mean(axis=0) if is_base and name in rails else places[name] for name in names]
-    return np.array(around(points) if len(points) >= 3 else points)
+    corners = np.array(around(points) if len(points) >= 3 else points)
+    turns = centre if centre is not None and is_around(mechanism, names, centre) else None
+    return BodyShape(body, _role(mechanism, body), corners, _outline(corners, turns))
+
+
+def _outline(corners: Floats, centre: Floats | None) -> Floats:
+    """Lines from corner to corner (k, 3), or arcs about a centre; back to the first where there are three and more."""
+    ends = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
+    if centre is None:
+        return ends
+    arcs = [arc(start, end, centre, ARC_STEPS) for start, end in pairwise(ends)]
+    return np.vstack([ends[:1], *[points[1:] for points in arcs]])
 
 
 def _role(mechanism: Mechanism, body: str) -> Role:
