@@ -16,6 +16,7 @@ from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels.legs.answer import answer
 from pfabrik.kernels.reaching.accelerated import solve_by_half_spaces
 from pfabrik.kernels.reaching.solve import solve_by_passes
+from pfabrik.model import model_of
 from pfabrik.platform.table import table_handle
 from pfabrik.reaching.joint_positions import new_pass_results
 from pfabrik.reaching.solve import settings_of
@@ -51,8 +52,8 @@ def passes(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
 
 def kernel_call(mechanism: pf.Mechanism, targets: Array, options: pf.Options) -> Solve:
     """One call of the kernel of passes for all targets, from home."""
-    compiled = compile_plan(mechanism)
-    settings = settings_of(mechanism, options, projection_modes(mechanism, options.hold, None)[0])
+    compiled, model = compile_plan(mechanism), model_of(mechanism)
+    settings = settings_of(model, options, projection_modes(model.path_closure, options.hold, None)[0])
     kernel = solve_by_half_spaces if options.passes == "accelerated" else solve_by_passes
     settings, results = settings._replace(max_rounds=0), new_pass_results(compiled, len(targets))
     return partial(kernel, compiled.plan, targets, compiled.home_seed, settings, results)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 
 import numpy as np
@@ -10,14 +11,23 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
+from checks import excess_of_joints, gap_of_joints
+from machines.trunks import arms
+from oracles.arms import redundant_margin
 from pfabrik.closure.closure_engine import ClosureEngine
+from pfabrik.closure.configurations import new_rows
 from pfabrik.decomposition.leg_forms import RedundantJoint
 from pfabrik.engine import engine_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.files import loads
+from pfabrik.kernels.legs.answer import answer
 from pfabrik.model import model_of
 from pfabrik.options import Options
 from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.platform.redundant_joints import step_redundant_joints
+from pfabrik.platform.table import table_handle
+
+slow_interpreted = pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"), reason="minutes")
 
 RAILS = """
 schema = 1
@@ -198,3 +208,86 @@ def test_arms_that_limits_hold_where_a_start_has_them_are_looked_for_from_home()
     begun = pf.solve_ik(mechanism, starts[places])
     answer = pf.solve_ik(mechanism, targets[places], start=begun, options=Options(working_mode="any"))
     assert (answer.status == pf.Status.REACHED).all()
+
+
+VARIANTS = {
+    "steep": {"angles": (5, 120, 250), "crossbars": ((-20, 35), (-45, 15), (-30, 30)), "tilt": 50.0, "reach": 100.0},
+    "wide": {"angles": (0, 90, 180, 270), "crossbars": ((-10, 55), (-30, 20), (-50, 5), (-25, 25)), "reach": 150.0},
+    "four on one": {"angles": (0, 170), "crossbars": ((-60, -25, 20, 50), (-40, 10, 45)), "tilt": 20.0},
+    "crossbars that turn": {"angles": (0, 130, 240), "crossbars": ((-30, 30),) * 3, "tilt": 15.0, "elbows": True},
+}
+
+
+@slow_interpreted
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize("name", VARIANTS)
+def test_arms_of_any_dimensions_reach_what_a_search_of_their_own_says_they_can(name: str) -> None:
+    """From home and from far away; the search knows crossbars that do not turn, and these lead to a part of it all."""
+    mechanism = arms(**VARIANTS[name])
+    wanted = targets(mechanism, 80, 0.35, 0.35)
+    known = arms(**VARIANTS[name] | {"elbows": False})
+    margin = redundant_margin(known, wanted)
+    reachable = wanted[margin > 1e-3]
+    assert len(reachable) >= 20 and pf.solve_ik(known, wanted[margin < -1e-3]).status.min(initial=1) != 0
+    for start in (None, pf.solve_ik(mechanism, reachable[::-1].copy())):
+        answers = pf.solve_ik(mechanism, reachable, start=start, options=Options(working_mode="any"))
+        np.testing.assert_array_equal(answers.status, pf.Status.REACHED)
+        assert gap_of_joints(mechanism, answers).max() <= 1e-9
+        assert excess_of_joints(mechanism, answers).max() <= 1e-9
+
+
+def within_limits(name: str, leg: int, wanted: np.ndarray, slide: np.ndarray) -> np.ndarray:
+    """True where a leg of the hexapod on rails keeps its limits with its slide at some values, (n, values)."""
+    mechanism = machine(name)
+    foot, head = (np.array(mechanism.joint(f"{end}{leg}").at) for end in ("foot", "head"))
+    axis = foot / np.linalg.norm(foot)
+    feet, heads = (
+        foot + (name == "rails") * np.multiply.outer(slide, axis),
+        head - (name != "rails") * np.multiply.outer(slide, axis),
+    )
+    placed = np.einsum("nij,vj->nvi", wanted[:, :3, :3], np.atleast_2d(heads) - mechanism.reference_point)
+    lines = feet - (placed + wanted[:, None, :3, 3])
+    length = np.linalg.norm(lines, axis=-1)
+    cosine = np.einsum("nvi,ni->nv", lines, -wanted[:, :3, 2]) / length
+    return (length >= 170) & (length <= 250) & (cosine >= np.cos(np.radians(45)))
+
+
+@slow_interpreted
+@pytest.mark.parametrize("name", ["rails", "rails_above"])
+def test_each_slide_moves_hardly_farther_than_the_least_that_its_leg_asks_for(name: str) -> None:
+    """Against all places of each slide, one by one: at the least where what blocks is straight, nearly so elsewhere."""
+    mechanism, slide = machine(name), np.linspace(-40, 40, 3201)
+    wanted = targets(mechanism, 150, 0.25, 0.3)
+    answers = pf.solve_ik(mechanism, wanted)
+    reached = answers.status == pf.Status.REACHED
+    is_reachable, off = np.ones(len(wanted), bool), []
+    for leg in range(6):
+        is_inside = within_limits(name, leg, wanted, slide)
+        is_reachable &= is_inside.any(axis=1)
+        least = np.where(is_inside, np.abs(slide), np.inf).min(axis=1)
+        own = np.abs(answers.actuators[:, mechanism.actuator_names.index(f"rail{leg}")])
+        off.append((own - least)[reached & (least > 0.0)])
+        assert (own[reached & (least == 0.0)] <= 1e-9).all()
+    np.testing.assert_array_equal(reached, is_reachable)
+    off = np.concatenate(off)
+    assert len(off) > 50 and off.min() >= -0.026  # the grid's step
+    assert np.median(off) <= 0.0 and np.quantile(off, 0.95) <= 1.0 and off.max() <= 10.0
+
+
+@slow_interpreted
+@pytest.mark.parametrize("name", NAMES)
+def test_few_steps_solve_almost_all_that_arms_can_reach(name: str) -> None:
+    """Without the search behind them; started from other arms, of another answer, as well as from home."""
+    mechanism = machine(name)
+    model, wanted = model_of(mechanism), targets(mechanism, 200, 0.25, 0.3)
+    answers = pf.solve_ik(mechanism, wanted)
+    wanted = wanted[answers.status == pf.Status.REACHED]
+    places, home = np.arange(len(wanted)), mechanism.home_pose[None].copy()
+    sides = np.repeat(model.legs.home_sides, len(wanted), axis=0)
+    for _ in range(2):
+        step_redundant_joints(model, wanted, home, sides, places)
+        rows = new_rows(model, len(wanted))
+        handle = table_handle(model.legs)
+        n_unsolved = answer(handle.address, wanted, home, sides, rows.status, rows.poses, rows.actuators, rows.measures)
+        assert n_unsolved <= 0.02 * len(wanted)
+        sides = sides[::-1].copy()

@@ -35,7 +35,8 @@ def arms(solution: pf.Solution) -> str:
 
 print(answer.status.name, arms(answer))
 
-# Higher up, the struts alone do not reach. Now the arms extend and lean, as little as the limits of the struts ask for.
+# Higher up, the struts alone do not reach. Now the arms extend and lean, by hardly more than the limits of the struts
+# ask for: the steps that lead there are the least to first order.
 high = pf.solve_ik(machine, [0, 0, 270])
 print(high.status.name, arms(high))
 

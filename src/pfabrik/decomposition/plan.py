@@ -9,10 +9,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Records
 from ..derived import derived
+from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.reaching import plan as P
-from .decompose import beyond_positions, decompose
+from .decompose import beyond_positions, decompose, express_on
 from .positions import BranchForm, express_trunk
 
 
@@ -53,17 +54,32 @@ def compile_plan(mechanism: Mechanism) -> CompiledPlan:
     reasons = beyond_positions(mechanism)
     if reasons:
         raise UnsupportedMechanism(mechanism.name, reasons)
-    chains = decompose(mechanism)
-    has_trunk = np.array([bool(chain.trunk) for chain in chains])
+    return _compiled(mechanism, [(chain.trunk, chain.branch_forms) for chain in decompose(mechanism)])
+
+
+@derived
+def compile_trunks(mechanism: Mechanism, joints: frozenset[str], from_platform: bool) -> CompiledPlan | None:
+    """Compile the sub-chains that some joints begin, these as their trunks; None if positions express none of them.
+
+    Seen from the platform, base and platform change places: poses are then those of the base relative to the platform,
+    at the reference point of home.
+    """
+    chains = list(express_on(mechanism, joints, from_platform))
+    return _compiled(mechanism, chains) if chains else None
+
+
+def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Sequence[BranchForm]]]) -> CompiledPlan:
+    """Arrays of chains, each with the joints of its trunk, if it has one, and its branches."""
+    has_trunk = np.array([bool(trunk) for trunk, _ in chains])
     carriers = np.cumsum(has_trunk) * has_trunk
-    forms = [form for chain in chains for form in chain.branch_forms]
-    carried_by = np.repeat(carriers, [len(chain.branch_forms) for chain in chains])
-    trunks = [chain.trunk for chain in chains if chain.trunk]
+    forms = [form for _, branches in chains for form in branches]
+    carried_by = np.repeat(carriers, [len(branches) for _, branches in chains])
+    trunks = [trunk for trunk, _ in chains if trunk]
     steps = [step for trunk in trunks for step in trunk]
     plan = P.Plan(
         nodes=_nodes(forms),
         branches=_branches(forms, carried_by),
-        chains=_spans([chain.branch_forms for chain in chains], P.CHAIN),
+        chains=_spans([branches for _, branches in chains], P.CHAIN),
         cones=_cones(forms),
         trunks=_spans(trunks, P.TRUNK_SPAN),
         trunk_joints=express_trunk(mechanism, steps),

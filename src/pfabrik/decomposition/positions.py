@@ -258,11 +258,12 @@ def _angle_about(normal: Floats, a: Floats, b: Floats) -> float:
     return math.atan2(float(normal @ np.cross(a, b)), float(a @ b))
 
 
-def _cone(draft: _Draft, k: int, step: Step, tolerance: float) -> tuple[int, int, Floats, float]:
+def _cone(draft: _Draft, k: int, step: Step, tolerance: float) -> tuple[int, int, Floats, float, float, float]:
     """The cone of the joint at node k, a record of `CONE`."""
     cone, name, places = step.joint.cone, step.joint.name, draft.nodes["home"]
     assert cone is not None
     axis, last = np.array(cone.axis), len(places) - 1
+    opening = cone.half_angle, math.cos(cone.half_angle), math.sin(cone.half_angle)
     line_end = k - 1 if cone.fixed_to != step.inward else k + 1
     if 0 <= line_end <= last and abs(draft.shifts[line_end]) > tolerance:
         raise NotExpressible(
@@ -271,20 +272,20 @@ def _cone(draft: _Draft, k: int, step: Step, tolerance: float) -> tuple[int, int
     outward = places[k + 1] - places[k] if k < last else None
     if cone.fixed_to != step.inward:
         if k == last and k > 0:
-            return P.PLATFORM_CONE, k, axis, cone.half_angle
+            return P.PLATFORM_CONE, k, axis, *opening
         if outward is not None and k > 0 and _is_parallel(axis, outward / np.linalg.norm(outward)):
             sign = math.copysign(1.0, float(axis @ outward))
-            return P.LINK_CONE, k, np.array([-sign, 0.0, 0.0]), cone.half_angle
+            return P.LINK_CONE, k, np.array([-sign, 0.0, 0.0]), *opening
         raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")
     if outward is None:
         raise NotExpressible(f"the cone of joint {name} limits a line of the end effector")
     if k == 0:
-        return P.CARRIER_CONE, k, axis, cone.half_angle
+        return P.CARRIER_CONE, k, axis, *opening
     link = places[k] - places[k - 1]
     link = link / np.linalg.norm(link)
     if k <= draft.planar:
         across = np.cross(draft.normal, link)
-        return P.LINK_CONE, k, np.array([axis @ link, axis @ across, axis @ draft.normal]), cone.half_angle
+        return P.LINK_CONE, k, np.array([axis @ link, axis @ across, axis @ draft.normal]), *opening
     if _is_parallel(axis, link):
-        return P.LINK_CONE, k, np.array([math.copysign(1.0, float(axis @ link)), 0.0, 0.0]), cone.half_angle
+        return P.LINK_CONE, k, np.array([math.copysign(1.0, float(axis @ link)), 0.0, 0.0]), *opening
     raise NotExpressible(f"the cone of joint {name} turns with a link whose twist positions do not show")

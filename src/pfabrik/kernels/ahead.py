@@ -28,6 +28,7 @@ from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .reaching import plan as P
 from .reaching.accelerated import solve_by_half_spaces
+from .reaching.move_trunks import move_trunks
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
 
@@ -63,6 +64,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (*_values("i i i"), ClosureProblem(*_values("f1 i f3 i f i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (solve_by_half_spaces, _PASSES),
+    (move_trunks, (_PASSES[0], *_values("f3 f2"), _PASSES[3], 0.0)),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("f1 f2")), _CLOSED, _F2)),
     (evaluate_poses, tuple(_values("i i f3 f2 f2 f2 f2 f3"))),
     (jacobians, tuple(_values("i f3 i f3"))),

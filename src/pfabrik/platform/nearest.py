@@ -1,30 +1,26 @@
-"""The nearest feasible configurations: projections of targets, nearest actuators, nearest redundant joints."""
+"""The nearest feasible configurations: projections of targets, nearest actuators."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import hypot
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats, Records
+from ..arrays import Floats
 from ..batch import put, take, take_each
 from ..closure.close import in_lengths
 from ..closure.projection import SAME, ProjectionMode, projection_modes
-from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..description.home_mobility import column_joints
 from ..kernels.closure.loops import BASE_AXES
-from ..kernels.legs import records as K
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION, PROJECTED, REACHED
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .nearest_pose import NearestPose, new_solution, no_starts, starts_at
+from .nearest_pose import NearestPose, no_starts
 from .seeds import seeds_of
 
 MOST_STEPS = 200
@@ -224,95 +220,3 @@ def _actuator_search(model: Model, seeds: bool) -> NearestPose:
     seed_starts = seeds_of(model) if seeds else no_starts(table)
     settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
     return NearestPose(model, table, (0.0,) * 6, settings, seed_starts, table.driven)
-
-
-def move_redundant_joints(
-    model: Model,
-    targets: Floats,
-    start_poses: Floats,
-    sides: Floats,
-    places: NDArray[np.intp],
-) -> tuple[NDArray[np.intp], Floats]:
-    """Move the redundant joints of some rows, as little as possible, until legs reach their targets within all limits.
-
-    Parameters
-    ----------
-    targets, start_poses : (n, 4, 4) and (n or 1, 4, 4) [length].
-    sides : coordinates of the redundant joints, (n, legs), before and after.
-    places : the rows to solve.
-
-    Returns
-    -------
-    The rows solved, and the poses at which their searches ended, (rows, 4, 4) [length].
-    """
-    starts = starts_at(model, start_poses if len(start_poses) == 1 else start_poses[places], sides[places])
-    solution = _nearest_redundant(model, targets[places], starts)
-    is_solved = np.isfinite(solution.distances)
-    sides[places[is_solved]] = solution.sides[is_solved]
-    return places[is_solved], solution.poses[is_solved]
-
-
-def _nearest_redundant(model: Model, targets: Floats, starts: Starts) -> PoseSolutions:
-    """Feasible configurations at targets (n, 4, 4) [length] whose redundant joints are nearest to those of starts (n,).
-
-    Searches start there alone; what they miss, projections from seeds find. A row without a solution for one set of
-    redundant joints is not searched for the next.
-
-    Parameters
-    ----------
-    starts : poses (n or 1, 4, 4), sides (n, legs), and no coordinates.
-    """
-    best = new_solution(len(targets), model.legs)
-    best.distances[:], best.sides[:] = 0.0, starts.sides
-    unsolved = np.arange(len(targets))
-    for redundant, legs, nearest_pose in _redundant_searches(model):
-        poses = starts.poses if len(starts.poses) == 1 else starts.poses[unsolved]
-        block_starts = Starts(
-            poses, np.ascontiguousarray(starts.q[:, legs]), np.ascontiguousarray(starts.sides[unsolved][:, legs])
-        )
-        values = np.ascontiguousarray(redundant["sense"] * block_starts.sides[:, redundant["leg"]])
-        solution = nearest_pose.find(targets[unsolved], block_starts, values)
-        best.distances[unsolved] = np.maximum(best.distances[unsolved], solution.distances)
-        best.poses[unsolved], best.sides[unsolved, legs] = solution.poses, solution.sides
-        unsolved = unsolved[np.isfinite(solution.distances)]
-    return best
-
-
-@derived
-def _redundant_searches(model: Model) -> tuple[tuple[Records, slice, NearestPose], ...]:
-    """A search for each independent set of redundant joints, at a held pose: their coordinates, and their legs."""
-    held = model.task.held
-    return tuple(
-        (
-            part_table.redundant,
-            legs,
-            NearestPose(model, part_table, held, {"steps": MOST_STEPS}, no_starts(part_table), part_table.redundant),
-        )
-        for part_table, legs in _split_by_redundant(model.legs)
-    )
-
-
-def _split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
-    """Tables of the legs on each independent set of redundant joints, with the slices of these legs.
-
-    A pose separates the sets. Where the task leaves some of it open, or legs constrain it, all legs stay together.
-    """
-    if table.task["unset"][0] > 0 or table.task["rows"][0] > 0:
-        return ((table, slice(None)),)
-    legs, parts = table.legs, []
-    starts = np.flatnonzero((legs["kind"] == K.REDUNDANT) & (legs["redundant"] < 0)).tolist()
-    for k, next_start in zip(starts, [*starts[1:], len(legs)], strict=True):
-        end = k + 1
-        while end < next_start and legs[end]["redundant"] >= k:
-            end += 1
-        part_legs, n_before = legs[k:end].copy(), legs[k]["makes"] - 2
-        part_legs["redundant"] -= np.where(part_legs["redundant"] >= 0, k, 0)
-        part_legs["makes"] -= n_before
-        part_legs["frame"] -= np.where(part_legs["frame"] >= 2, n_before, 0)
-        records = {name: getattr(table, name) for name in ("limited", "cones", "known")}
-        records = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in records.items()}
-        for array in records.values():
-            array["leg"] -= k
-        part = replace(table, forms=table.forms[k:end], legs=part_legs, recording=None, **records)
-        parts.append((part, slice(k, end)))
-    return tuple(parts)

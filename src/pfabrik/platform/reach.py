@@ -12,7 +12,7 @@ from ..derived import derived
 from ..kernels.rows import OPEN, PENDING, REACHED, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from .nearest import move_redundant_joints
+from .redundant_joints import search_redundant_joints, step_redundant_joints
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -70,17 +70,24 @@ def _reach_at_start(
 def _reach_by_redundant(
     model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
 ) -> int:
-    """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved."""
-    sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
-    moved, poses = move_redundant_joints(model, targets, start_poses, sides, unsolved)
-    if not len(moved):
-        return 0
-    block, start_poses = take(rows, moved), poses
-    n_unsolved = _run(False, legs, targets[moved], start_poses, sides[moved], block)
-    put(rows, moved, block)
-    missed = moved[block.status != REACHED]
-    sides[missed] = sides_before[missed]
-    return len(moved) - n_unsolved
+    """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved.
+
+    Half-spaces first: they take a tenth of the time of a search, which solves what they miss.
+    """
+    n_unsolved = n_before = int(np.count_nonzero(rows.status != REACHED))
+    for move in (step_redundant_joints, search_redundant_joints):
+        sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
+        moved, poses = move(model, targets, start_poses, sides, unsolved)
+        if not len(moved):
+            continue
+        block = take(rows, moved)
+        n_unsolved += _run(False, legs, targets[moved], poses, sides[moved], block) - len(moved)
+        put(rows, moved, block)
+        missed = moved[block.status != REACHED]
+        sides[missed] = sides_before[missed]
+        if not n_unsolved:
+            break
+    return n_before - n_unsolved
 
 
 def _reach_from_home(model: Model, legs: TableHandle, targets: Floats, sides: Floats, rows: Rows) -> int:

@@ -27,8 +27,8 @@ PASSES, HASTY, PATIENT, TAKEN_OFF = 16, 2, 5, 0.7
 # Trunks aim this far inside limits [L], tour by tour, less by this factor from pass to pass, so that passes end; the
 # last tours find what is too small to have an inside.
 MARGINS, SHRINK = (0.04, 0.04, 0.0, 0.0), 0.6
-# Longest step of a trunk or a target [L], for which half-spaces are trusted.
-LONGEST = 0.4
+# Longest steps for which half-spaces are trusted: of a trunk towards a target, of a target with all trunks [rad or L].
+LONGEST, LONGEST_OF_ALL = 0.8, 0.4
 # Other starts of a trunk, tour by tour: this share of each joint's range from either end; where a range is open, so far
 # from home [rad or L]. Of more than so many joints the last rest.
 INSIDE, OPEN, VARIED = (0.15, 0.15, 0.15, 0.35), 0.5, 3
@@ -69,12 +69,15 @@ def move_trunk(plan: Plan, trunk: int, config: Configuration, asks: Asks, share:
 
 @routine
 def reach_from_start(
-    plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks, tour: int
+    plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks, margin: float, patience: int
 ) -> tuple[float, int]:
-    """Passes of a chain from where its trunk is; the largest excess that is left, and how many."""
+    """Passes of a chain from where its trunk is; the largest excess that is left, and how many.
+
+    Steps aim inside limits by a margin [length]; passes end after so many in a row that gain little.
+    """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    best, stalled, margin, patience = math.inf, 0, MARGINS[tour] * plan.length, HASTY if tour == 0 else PATIENT
+    best, stalled = math.inf, 0
     for n in range(PASSES + 1):
         asks.goal[0] = margin
         asks.goal[1] = margin
@@ -114,13 +117,15 @@ def reach_with_trunk(plan: Plan, c: int, config: Configuration, settings: Settin
     """Passes of a chain with a trunk, from other starts too where one is caught; the excess left, and how many."""
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    gap, passes = reach_from_start(plan, c, config, settings, asks, 0)
+    gap, passes = reach_from_start(plan, c, config, settings, asks, MARGINS[0] * plan.length, HASTY)
     corners = 1 << min(last - first, VARIED)
     for start in range(len(INSIDE) * corners):
         if gap <= 0.5 * settings.enough:
             break
         start_trunk(plan, trunk, config, start, INSIDE[start // corners])
-        gap, more = reach_from_start(plan, c, config, settings, asks, start // corners)
+        tour = start // corners
+        patience = HASTY if tour == 0 else PATIENT
+        gap, more = reach_from_start(plan, c, config, settings, asks, MARGINS[tour] * plan.length, patience)
         passes += more
     return gap, max(passes, 1)
 
@@ -218,7 +223,7 @@ def settle(plan: Plan, config: Configuration, target: Floats, settings: Settings
         if dot(step, last_step) < -0.25 * dot(last_step, last_step):
             pull *= WEAKER
         last_step = step
-        move_all(plan, config, settings, asks, min(1.0, LONGEST / max(size, 1e-300)))
+        move_all(plan, config, settings, asks, min(1.0, LONGEST_OF_ALL / max(size, 1e-300)))
         if closing > 0 or size <= SETTLED * far or rounds >= PULLED:
             closing += 1
     gap, _passes = reach_ends(plan, config, settings)

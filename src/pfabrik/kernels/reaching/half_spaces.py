@@ -178,6 +178,8 @@ def ask_for_branch(plan: Plan, b: int, config: Configuration, settings: Settings
 def ask_for_planes(plan: Plan, b: int, config: Configuration, asks: Asks, parts: int) -> float:
     """Add equations: the end in the plane of the hinges, and the platform's hinge parallel to them."""
     branch, gap, zero = plan.branches[b], 0.0, (0.0, 0.0, 0.0)
+    if branch["planar"] == 0:
+        return gap
     normal = turn(config.carriers[branch["carrier"]], vec(branch["normal"]))
     if parts > 0 and branch["planar"] >= parts:
         off = dot(normal, sub(move(config.pose, vec(branch["end"])), base_of(plan, branch, config)))
@@ -204,9 +206,9 @@ def ask_for_strut(plan: Plan, b: int, config: Configuration, asks: Asks) -> floa
     else:
         gap = ask(plan, b, config, asks, length - node["hi"], 0, u, zero)
         gap = max(gap, ask(plan, b, config, asks, node["lo"] - length, 0, scale(-1.0, u), zero))
-    normal = turn(carrier, vec(branch["normal"]))
     foot = plan.nodes[branch["first"]]
     if foot["ranged"] == 1:
+        normal = turn(carrier, vec(branch["normal"]))
         flat = flatten(d, normal)
         rho = max(norm(flat), NO_LENGTH)
         angle = hinge_angle(plan, branch, branch["first"], carrier, normal, config.nodes, flat)
@@ -221,20 +223,22 @@ def ask_for_strut(plan: Plan, b: int, config: Configuration, asks: Asks) -> floa
         cone = plan.cones[c]
         a = vec(cone["axis"])
         a = turn(carrier, a) if cone["kind"] == CARRIER_CONE else scale(-1.0, turn(config.pose, a))
-        excess, g = cone_excess(a, cone["half_angle"], d)
+        excess, g = cone_excess(a, cone["cosine"], cone["sine"], d)
         w = cross(g, d) if cone["kind"] == PLATFORM_CONE else zero
         gap = max(gap, ask(plan, b, config, asks, excess, 0, g, w))
     return gap
 
 
 @routine
-def cone_excess(axis: Vec, half_angle: float, d: Vec) -> tuple[float, Vec]:
-    """Distance of the tip of `d` from the surface of a cone, positive outside; and its gradient."""
+def cone_excess(axis: Vec, c: float, s: float, d: Vec) -> tuple[float, Vec]:
+    """Distance of the tip of `d` from the surface of a cone, positive outside; and its gradient.
+
+    c and s : cosine and sine of the cone's half angle.
+    """
     x = dot(axis, d)
     radial = along(d, -x, axis)
     r = norm(radial)
     across = scale(1.0 / r, radial) if r > NO_SIDE * norm(d) else any_normal(axis)
-    c, s = math.cos(half_angle), math.sin(half_angle)
     return r * c - x * s, along(scale(c, across), -s, axis)
 
 

@@ -53,7 +53,16 @@ BRANCH = np.dtype(
     ]
 )
 CHAIN = np.dtype([("first", "i8"), ("last", "i8"), ("trunk", "i8")])  # branches first ... last - 1; trunk or -1
-CONE = np.dtype([("kind", "i8"), ("node", "i8"), ("axis", *_vector), ("half_angle", "f8")])
+CONE = np.dtype(
+    [
+        ("kind", "i8"),
+        ("node", "i8"),
+        ("axis", *_vector),
+        ("half_angle", "f8"),
+        ("cosine", "f8"),  # of the half angle
+        ("sine", "f8"),
+    ]
+)
 TRUNK_SPAN = np.dtype([("first", "i8"), ("last", "i8")])
 TRUNK_JOINT = np.dtype([("kind", "i8"), ("point", *_vector), ("axis", *_vector), ("lo", "f8"), ("hi", "f8")])
 

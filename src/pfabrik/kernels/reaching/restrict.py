@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Records
+from ...arrays import Floats, Record, Records
 from .._jit import inlined, routine
 from ..vectors import (
     Vec,
@@ -56,17 +56,22 @@ def any_normal(a: Vec) -> Vec:
 @routine
 def clamp_cone(axis: Vec, half_angle: float, d: Vec) -> Vec:
     """The nearest vector to `d` within `half_angle` of the unit vector `axis`."""
-    length = norm(d)
-    if dot(axis, d) > (math.cos(half_angle) + WELL_INSIDE) * length:
-        return d
     angle = angle_between(axis, d)
     if angle <= half_angle:
         return d
-    radial = flatten(d, axis)
+    length, radial = norm(d), flatten(d, axis)
     size = norm(radial)
     radial = scale(1.0 / size, radial) if size > NO_SIDE * length else any_normal(axis)
     kept = length * max(math.cos(angle - half_angle), LEAST_SHARE)
     return add(scale(kept * math.cos(half_angle), axis), scale(kept * math.sin(half_angle), radial))
+
+
+@routine
+def keep_in_cone(cone: Record, axis: Vec, d: Vec) -> Vec:
+    """`clamp_cone` to a cone about its present axis; most vectors are well inside."""
+    if dot(axis, d) > (cone["cosine"] + WELL_INSIDE) * norm(d):
+        return d
+    return clamp_cone(axis, cone["half_angle"], d)
 
 
 @inlined
@@ -121,9 +126,9 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
             if cone["kind"] == PLATFORM_CONE:
                 if at_end:
                     axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
-                    d = clamp_cone(axis, cone["half_angle"], d)
+                    d = keep_in_cone(cone, axis, d)
             elif cone["node"] == k - 1:
-                d = clamp_cone(cone_axis(cone, carrier, pose, normal, nodes), cone["half_angle"], d)
+                d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d)
         if norm(sub(d, start)) <= UNMOVED * norm(start):
             break
     return d
@@ -145,13 +150,13 @@ def restrict_step_inward(
             cone = plan.cones[c]
             if cone["kind"] != PLATFORM_CONE and cone["node"] == k:
                 axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
-                d = clamp_cone(axis, cone["half_angle"], d)
+                d = keep_in_cone(cone, axis, d)
         if at_end and branch["end_plane"] == 1:
             d = flatten(d, turn(pose, vec(branch["end_normal"])))
         for c in range(branch["cone_first"], branch["cone_last"]):
             cone = plan.cones[c]
             if cone["kind"] == PLATFORM_CONE and at_end:
-                d = clamp_cone(cone_axis(cone, carrier, pose, normal, nodes), cone["half_angle"], d)
+                d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d)
         if norm(sub(d, start)) <= UNMOVED * norm(start):
             break
     return d

@@ -1,0 +1,42 @@
+"""The kernel that moves trunks, from where they are, by the least steps that let the branches on them reach."""
+
+from __future__ import annotations
+
+from ...arrays import Floats
+from .._jit import routine, search
+from ..vectors import copy_row, copy_table, move, put, vec
+from .accelerated import PATIENT, reach_from_start
+from .half_spaces import new_asks
+from .moving_frames import move_carriers
+from .plan import Configuration, Plan, Settings
+from .solve import new_configuration
+
+
+@routine
+def stand_as_at_home(plan: Plan, config: Configuration) -> None:
+    """Place the nodes of all branches as their carriers have them at home: legs of two parts on the sides of home."""
+    for b in range(plan.branches.shape[0]):
+        branch = plan.branches[b]
+        for k in range(branch["first"], branch["last"] + 1):
+            put(config.nodes[k], move(config.carriers[branch["carrier"]], vec(plan.nodes[k]["home"])))
+
+
+@search
+def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings, margin: float) -> None:
+    """Move trunks (n, n_trunk_joints), deviations from home, until their branches reach targets (n, 4, 4), if they can.
+
+    Every chain has a trunk. Where its branches reach already it stays; where it is caught, it is left there.
+
+    Parameters
+    ----------
+    margin : how far inside limits steps aim [length].
+    """
+    config, asks = new_configuration(plan), new_asks(plan)
+    for i in range(targets.shape[0]):
+        copy_table(targets[i], config.pose)
+        copy_row(trunks[i], config.trunks)
+        move_carriers(plan, config)
+        stand_as_at_home(plan, config)
+        for c in range(plan.chains.shape[0]):
+            reach_from_start(plan, c, config, settings, asks, margin, PATIENT)
+        copy_row(config.trunks, trunks[i])
