@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 import pfabrik as pf
+from actuation_maps import actuation_rows
 from calls import calls
 from chains import chain_rows
 from closed_forms import Array, FiveBar, Struts
@@ -211,6 +212,7 @@ def main() -> None:
         *forward(rng, runs, 200 if given.quick else 2000),
         *joint_coordinates(rng, runs, 200 if given.quick else 2000),
         *closed_chains(rng, runs, 100 if given.quick else 1000),
+        *actuation_rows(rng, runs, 4096),
         *chain_rows(rng, runs, 100 if given.quick else 1000),
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),

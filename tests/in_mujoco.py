@@ -32,6 +32,15 @@ class Model:
         count = self.data.ne
         return self.data.efc_pos[:count].copy(), self.data.efc_J.reshape(-1, self.model.nv)[:count].copy()
 
+    def mass(self) -> np.ndarray:
+        """The mass matrix, (nv, nv), armature included."""
+        full = np.zeros((self.model.nv, self.model.nv))
+        if hasattr(self.data, "qM"):  # before MuJoCo 4
+            mujoco.mj_fullM(self.model, full, self.data.qM)
+        else:
+            mujoco.mj_fullM(self.model, self.data, full)
+        return full
+
     def rank(self) -> int:
         rows, slopes = self.rows()
         return int(np.linalg.matrix_rank(slopes, 1e-9)) if len(rows) else 0

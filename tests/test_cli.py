@@ -544,6 +544,12 @@ def test_ik_takes_the_coordinates_of_the_joint_that_carries_the_end_effector(run
     assert (result.exit_code, json.loads(result.stdout)) == (0, json.loads(json.dumps(expected.to_dict())))
 
 
+def test_ik_takes_the_coordinates_of_joints_in_series(run: Callable[..., Result]) -> None:
+    result = run("ik", "g1_ankle", "--joint", "roll_joint=4", "--joint", "pitch_joint=-8", "--json")
+    expected = pf.solve_ik(pf.load("g1_ankle"), {"pitch_joint": np.radians(-8), "roll_joint": np.radians(4)})
+    assert (result.exit_code, json.loads(result.stdout)) == (0, json.loads(json.dumps(expected.to_dict())))
+
+
 def test_angles_are_degrees_for_people(run: Callable[..., Result]) -> None:
     solution = pf.solve_ik(pf.load("five_bar"), pf.pose([0, 10, 200]))
     text = run("ik", "five_bar", "--position", 0, 10, 200).stdout
@@ -1183,7 +1189,8 @@ def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> 
         (["ik", "ankle_ups", "--joint", "pivot=5,nan"], "expected NAME=VALUE[,VALUE...] with finite numbers"),
         (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 value; expected 2"),
         (["ik", "ankle_ups", "--joint", "pivt=5,10"], "did you mean 'pivot'"),
-        (["ik", "ankle_ups", "--joint", "BL=100"], "expected those of 'pivot'"),
+        (["ik", "ankle_ups", "--joint", "BL=100"], "expected a pose, or those of joints in series"),
+        (["ik", "ankle_ups", "--joint", "pivot=5,10", "--joint", "pivot=5,10"], "found 'pivot' twice"),
         (["ik", "ankle_ups", "--joint", "pivot=5,10", "--rpy", "0", "0", "0"], "--joint says it all"),
         (["travel", "stewart", "--position", "0", "0", "900"], "cannot start there: projected"),
         (["travel", "stewart", "--along", "0", "0", "0"], "along"),

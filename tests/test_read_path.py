@@ -308,6 +308,37 @@ def test_tables_that_are_no_path_are_one_sentence(text: str, said: str, tmp_path
     assert "\n" not in str(caught.value)
 
 
+def test_a_table_gives_targets_by_joints_in_series(tmp_path: Path) -> None:
+    """In degrees, as roll and pitch are, or as a name says; further columns are handed on."""
+    text = "t,roll_joint_rad,pitch_joint,note\n0,0.1,-10,a\n1,-0.05,5,b\n"
+    (tmp_path / "joints.csv").write_text(text)
+    machine = pf.load("g1_ankle")
+    path = pf.read_path(tmp_path / "joints.csv", machine)
+    answers = pf.track(machine, path.targets)
+    np.testing.assert_allclose(answers.joints["pitch_joint"], np.radians([-10.0, 5.0]), atol=1e-9)
+    np.testing.assert_allclose(answers.joints["roll_joint"], [0.1, -0.05], atol=1e-9)
+    assert path.times is not None and path.times.tolist() == [0.0, 1.0] and path.others["note"] == ["a", "b"]
+    (tmp_path / "joints.csv").write_text("pivot[1],pivot[0]\n5,10\n")
+    ankle = pf.load("ankle_ups")
+    found = pf.solve_ik(ankle, pf.read_path(tmp_path / "joints.csv", ankle).targets)
+    np.testing.assert_allclose(np.degrees(found.joints["pivot"]), [[10.0, 5.0]], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("pitch_joint\n1\n", "no column of a pose; expected .*, or pitch_joint, roll_joint"),
+        ("pitch_joint,roll_joint\n1,x\n", "line 2: column 'roll_joint': found 'x'; expected a finite number"),
+        ("pitch_joint,roll_joint,roll_joint_rad\n1,2,3\n", "no column of a pose"),
+        ("pitch_joint,pitch_joint,roll_joint\n1,2,3\n", "column 'pitch_joint' appears twice"),
+    ],
+)
+def test_tables_of_joints_that_make_no_target_are_refused(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "joints.csv").write_text(text)
+    with pytest.raises(InvalidArgument, match=said):
+        pf.read_path(tmp_path / "joints.csv", pf.load("g1_ankle"))
+
+
 def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "binary.nc").write_bytes(bytes(range(256)) * 1000)
     with pytest.raises(InvalidArgument, match="no text"):

@@ -1,4 +1,4 @@
-"""Targets given as coordinates of the joint that carries the end effector on the base."""
+"""Targets given as coordinates of joints that stand in series between base and end effector."""
 
 from __future__ import annotations
 
@@ -49,6 +49,28 @@ def test_a_path_of_coordinates_is_followed() -> None:
     np.testing.assert_allclose(pf.track(mechanism, {"pivot": path}).joints["pivot"], path, atol=1e-8)
     (kept,) = (mode for mode in pf.working_modes(mechanism, {"pivot": path[3]}) if mode)
     np.testing.assert_allclose(kept.joints["pivot"], path[3], atol=1e-6)
+
+
+def test_hinges_in_series_take_the_coordinates_that_were_asked_for() -> None:
+    """Two hinges whose axes miss each other: named in any order, in shapes that broadcast."""
+    mechanism, pitch, roll = pf.load("g1_ankle"), np.linspace(-0.4, 0.3, 5)[:, None], np.array([-0.1, 0.0, 0.15])
+    found = pf.solve_ik(mechanism, {"roll_joint": roll, "pitch_joint": pitch})
+    assert found and found.shape == (5, 3)
+    np.testing.assert_allclose(found.joints["pitch_joint"], np.broadcast_to(pitch, (5, 3)), atol=1e-8)
+    np.testing.assert_allclose(found.joints["roll_joint"], np.broadcast_to(roll, (5, 3)), atol=1e-8)
+    path = {"pitch_joint": pitch[:, 0], "roll_joint": 0.1}
+    np.testing.assert_allclose(pf.track(mechanism, path).joints["pitch_joint"], pitch[:, 0], atol=1e-8)
+    with pytest.raises(InvalidArgument, match=r"batch shapes .*; expected shapes that agree"):
+        pf.solve_ik(mechanism, {"roll_joint": np.zeros(3), "pitch_joint": np.zeros(4)})
+
+
+def test_coordinates_of_joints_that_are_driven_are_a_target_too() -> None:
+    arm = pf.load("panda")
+    q = pf.solve_ik(arm, arm.home_pose).q + 0.1
+    names = [joint.name for joint in arm.joints if joint.type != "fixed"]
+    found = pf.solve_ik(arm, dict(zip(names, q, strict=True)))
+    assert found
+    np.testing.assert_allclose(found.pose, pf.configuration(arm, q).pose, atol=1e-9)
 
 
 def test_coordinates_that_are_not_finite_are_no_pose() -> None:

@@ -226,6 +226,20 @@ def test_motions_of_the_mouse_reach_the_answer(shown: Callable[..., pf.Viewer]) 
     until(lambda: viewer.solution.pose == pytest.approx(machine.home_pose))
 
 
+def test_joints_in_series_are_targets_with_sliders_of_their_own(shown: Callable[..., pf.Viewer]) -> None:
+    """Both run ahead of the answers; what is beyond reach stays what was asked, and the limit is named."""
+    viewer = shown("g1_ankle")
+    viewer._change_joint(0, np.radians(-10.0))
+    viewer._change_joint(1, np.radians(5.0))
+    until(lambda: np.degrees(viewer.solution.joints["roll_joint"]) == pytest.approx(5.0))
+    assert np.degrees(viewer.solution.joints["pitch_joint"]) == pytest.approx(-10.0)
+    until(lambda: [slider.value for slider in viewer._stage.panel._joints] == pytest.approx([-10.0, 5.0]))
+    viewer._change_joint(1, np.radians(20.0))
+    until(lambda: "roll_joint" in viewer._stage.panel._status.content)
+    assert np.degrees(viewer._stage.session.joints) == pytest.approx([-10.0, 20.0])
+    assert not shown("stewart")._stage.panel._joints
+
+
 def test_modes_are_listed_and_taken(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("five_bar")
     viewer._searches.find_modes("working")

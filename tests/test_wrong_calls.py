@@ -48,9 +48,9 @@ TABLE: list[Case] = [
     # targets
     *((partial(pf.solve_ik, STEWART, target), "target") for target in NO_TARGETS),
     *((partial(pf.working_modes, FIVE_BAR, target), "target") for target in NO_SINGLE_TARGETS),
-    (partial(pf.solve_ik, STEWART, {"BL1": 200.0}), "coordinates of BL1; expected a pose or position: no single joint"),
-    (partial(pf.solve_ik, ANKLE, {"pivt": (0.1, 0)}), "found coordinates of pivt; expected those of 'pivot'"),
-    (partial(pf.solve_ik, ANKLE, {"pivot": (0.1, 0), "BL": 9.0}), "coordinates of pivot, BL; expected those"),
+    (partial(pf.solve_ik, STEWART, {"BL1": 200.0}), "coordinates of BL1; expected a pose, or those of joints in"),
+    (partial(pf.solve_ik, ANKLE, {"pivt": (0.1, 0)}), "no joint named 'pivt'; did you mean 'pivot'"),
+    (partial(pf.solve_ik, ANKLE, {"pivot": (0.1, 0), "BL": 9.0}), "pivot, BL; expected .* in series .*, such as pivot"),
     (partial(pf.solve_ik, ANKLE, {}), "found coordinates of no joint"),
     (partial(pf.solve_ik, ANKLE, {"pivot": 0.1}), r"target\['pivot'\]: found shape \(\); expected finite"),
     (partial(pf.solve_ik, ANKLE, {"pivot": (0.1, 0, 0)}), r"target\['pivot'\]: found shape \(3,\)"),

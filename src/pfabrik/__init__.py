@@ -14,6 +14,7 @@ Look over   workspace, singularity_map
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Look into  search_log (every attempt behind an answer)
 Real machines   parameters, sensitivity, Measurements, calibrate
+Drive      actuation (a serial model's joints to motors, and back: torques, inertia, limits)
 See        plot, plot_track, plot_travel, animate; view (in the browser)
 Structure  decompose, SubChain; errors
 Exchange   interop (MuJoCo and URDF, in and out)
@@ -33,6 +34,7 @@ __version__ = "0.1.0"
 
 # The public names of each module. Modules are imported when a name is first used, so that `import pfabrik` is quick.
 _NAMES = {
+    "actuation.actuation": ("Actuation", "actuation"),
     "answers.differential": (
         "Mobility",
         "NearlyFree",
@@ -97,6 +99,7 @@ __all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
     from . import errors as errors, interop as interop
+    from .actuation.actuation import Actuation as Actuation, actuation as actuation
     from .answers.differential import (
         Mobility as Mobility,
         NearlyFree as NearlyFree,

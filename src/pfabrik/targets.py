@@ -13,7 +13,8 @@ from .description.mechanism import Mechanism, checked_mechanism
 from .description.task import task_of
 from .errors import InvalidArgument
 from .kernels.rows import INVALID
-from .motion.displacements import columns, home_coordinates, joint_displacements
+from .motion.displacements import columns
+from .motion.joint_path import path_of
 from .options import Options
 from .poses import DOUBLE, SupportsMatrix, as_floats, as_poses, what_is_wrong
 
@@ -26,13 +27,14 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
 
     Raises
     ------
-    InvalidArgument : a wrong shape; joint coordinates of another joint than the one between base and end effector.
+    InvalidArgument : a wrong shape; joints that do not lead in series from the base to the end effector.
+    UnknownName : no joint of that name.
     """
     checked_mechanism(mechanism)
     if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE and target.flags.carray:
         return target[None], ()
     if isinstance(target, Mapping):
-        return _from_joint(mechanism, target)
+        return _from_joints(mechanism, target)
     poses, shape = as_poses(target)
     if not any(task_of(mechanism).axes) and np.shape(cast(Any, target)) == (*shape, 3):
         raise InvalidArgument("target", "positions", f"poses: the task of '{mechanism.name}' has no position")
@@ -46,30 +48,36 @@ def carrying_joint(mechanism: Mechanism) -> str | None:
     return joints[0] if len(joints) == 1 else None
 
 
-def _from_joint(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats, tuple[int, ...]]:
-    """Poses that have given coordinates at the one joint that connects base and end effector."""
-    name = carrying_joint(mechanism)
-    given = ", ".join(map(str, target)) or "no joint"
-    if name is None:
-        expected = "a pose or position: no single joint connects base and end effector here"
-        raise InvalidArgument("target", f"joint coordinates of {given}", expected)
-    if list(target) != [name]:
-        raise InvalidArgument("target", f"coordinates of {given}", f"those of '{name}'")
-    span = columns(mechanism)[name]
+def _from_joints(mechanism: Mechanism, target: Mapping[str, Any]) -> tuple[Floats, tuple[int, ...]]:
+    """Poses at given coordinates of joints that stand in series between base and end effector."""
+    try:
+        path = path_of(mechanism, tuple(target))
+    except InvalidArgument as error:
+        raise InvalidArgument(
+            "target", f"coordinates of {error.found}", f"a pose, or those of {error.expected}"
+        ) from None
+    names = tuple(target)
+    values = [_joint_values(mechanism, name, target[name]) for name in names]
+    try:
+        shape = np.broadcast_shapes(*(array.shape[:-1] for array in values))
+    except ValueError:
+        shapes = ", ".join(str(array.shape[:-1]) for array in values)
+        raise InvalidArgument("target", f"coordinates of batch shapes {shapes}", "shapes that agree") from None
+    q = np.concatenate([np.broadcast_to(array, (*shape, array.shape[-1])) for array in values], axis=-1)
+    return path.poses(q.reshape(-1, q.shape[-1])), shape
+
+
+def _joint_values(mechanism: Mechanism, name: str, given: Any) -> Floats:
+    """The coordinates (..., n) of a joint, or one of them (..., 1)."""
+    joints = {joint.name for joint in mechanism.joints}
+    span = columns(mechanism)[name] if name in joints else slice(0, 1)
     n = span.stop - span.start
     expected = f"finite coordinates of shape (..., {n})" if n > 1 else "finite coordinates of shape (...)"
-    values = as_floats(f"target['{name}']", target[name], expected)
+    values = as_floats(f"target['{name}']", given, expected)
     values = values if n > 1 else values[..., None]
     if values.shape[-1:] != (n,):
         raise InvalidArgument(f"target['{name}']", f"shape {values.shape}", expected)
-    deviations = values.reshape(-1, n) - home_coordinates(mechanism)[span]
-    known = np.isfinite(deviations).all(axis=1)
-    moved = joint_displacements(mechanism, name, deviations[known])
-    if mechanism.joint(name).connects[0] != mechanism.base:
-        moved = np.asarray(np.linalg.inv(moved), np.float64)
-    poses = np.full((len(deviations), 4, 4), np.nan)
-    poses[known] = moved @ mechanism.home_pose
-    return poses, values.shape[:-1]
+    return values
 
 
 def refuse_invalid(targets: Floats, shape: tuple[int, ...], status: Ints, options: Options) -> None:

@@ -66,25 +66,25 @@ FINITE = Finite()
 
 @dataclass(frozen=True)
 class TargetOptions:
-    """The values of ``--position`` [length], ``--rpy`` [deg] and ``--joint``; None where an option is not given."""
+    """The values of ``--position`` [length], ``--rpy`` [deg] and ``--joint``; None or empty where one is not given."""
 
     position: Triple | None
     rpy: Triple | None
-    joint: str | None
+    joints: tuple[str, ...]
 
     @property
     def is_given(self) -> bool:
         """True if any of the options is given."""
-        return (self.position, self.rpy, self.joint) != (None, None, None)
+        return (self.position, self.rpy, self.joints) != (None, None, ())
 
     def of(self, mechanism: pf.Mechanism) -> Target:
         """The target that the options give; home's pose where they give none."""
-        if self.joint is None:
+        if not self.joints:
             position = self.position or mechanism.reference_point
             return pf.pose(position, rpy=self.rpy or (0, 0, 0), degrees=True)
         if self.position is not None or self.rpy is not None:
             raise click.UsageError("--joint says it all: it does not go with --position or --rpy")
-        return joint_target(mechanism, self.joint)
+        return joint_target(mechanism, self.joints)
 
 
 rpy_option = click.option(
@@ -99,18 +99,30 @@ def targeted(command: Callable[..., Any]) -> Callable[..., Any]:
     @rpy_option
     @click.option(
         "--joint",
+        multiple=True,
         metavar="NAME=VALUE[,VALUE...]",
-        help="Coordinates [deg or length] of the joint between base and end effector, in place of the others.",
+        help="Coordinates [deg or length] of each joint from base to end effector, in place of the others.",
     )
     @functools.wraps(command)
-    def with_target(*, position: Triple | None, rpy: Triple | None, joint: str | None, **parameters: Any) -> Any:
+    def with_target(*, position: Triple | None, rpy: Triple | None, joint: tuple[str, ...], **parameters: Any) -> Any:
         return command(target=TargetOptions(position, rpy, joint), **parameters)
 
     return with_target
 
 
-def joint_target(mechanism: pf.Mechanism, words: str) -> dict[str, float | list[float]]:
-    """Joint name -> coordinates [rad or length], from words such as ``pivot=5,10``."""
+def joint_target(mechanism: pf.Mechanism, options: tuple[str, ...]) -> dict[str, float | list[float]]:
+    """Joint name -> coordinates [rad or length], from options such as ``pivot=5,10``."""
+    target: dict[str, float | list[float]] = {}
+    for words in options:
+        name, coordinates = joint_coordinates(mechanism, words)
+        if name in target:
+            raise click.UsageError(f"--joint {words}: found '{name}' twice; expected each joint once")
+        target[name] = coordinates
+    return target
+
+
+def joint_coordinates(mechanism: pf.Mechanism, words: str) -> tuple[str, float | list[float]]:
+    """A joint's name and coordinates [rad or length], from words such as ``pivot=5,10``."""
     from ..description.joint_types import KINDS
 
     name, equals, listed = words.partition("=")
@@ -122,7 +134,7 @@ def joint_target(mechanism: pf.Mechanism, words: str) -> dict[str, float | list[
         raise click.UsageError(f"--joint {words}: found {counted(len(values), 'value')}; expected {len(kinds)}")
     numbers = zip(map(float, values), kinds, strict=True)
     coordinates = [math.radians(number) if kind == "angle" else number for number, kind in numbers]
-    return {name: coordinates if len(coordinates) > 1 else coordinates[0]}
+    return name, coordinates if len(coordinates) > 1 else coordinates[0]
 
 
 def projecting(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,6 +6,7 @@ pf.interop.verify(m)                         # with MuJoCo as the referee
 """
 
 from .assembling import Imported, assemble
+from .mjcf_qpos import mjcf_qpos
 from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
 from .notes import Note
@@ -25,6 +26,7 @@ __all__ = [
     "from_mjcf",
     "from_urdf",
     "kind_of",
+    "mjcf_qpos",
     "to_mjcf",
     "verify",
 ]

@@ -10,11 +10,10 @@ from ..description.home_mobility import end_effector_freedom
 from ..description.mechanism import Mechanism
 from ..extras import require
 from ..files.units import metres_of
-from ..motion.displacements import columns
-from ..rotations import to_quaternion
 from .compiled_model import CompiledModel
 from .cuts import cut_tree
 from .mjcf_bodies import names_of
+from .mjcf_qpos import qpos_of
 from .mjcf_writing import to_mjcf
 
 NEWTON_STEPS = 30
@@ -40,7 +39,6 @@ class Referee:
         self.compiled = CompiledModel(to_mjcf(mechanism))
         self.model, self.data = self.compiled.model, self.compiled.data
         tree = cut_tree(mechanism)
-        self._forward = {branch.joint.name: branch.forward for branch in tree.branches}
         self._reference = names_of(mechanism, tree).reference
         self._held = [int(self.model.joint(name).dofadr[0]) for name in mechanism.actuator_names]
         self._is_determined = end_effector_freedom(mechanism, frozenset(each.column for each in mechanism.drives)) == 0
@@ -59,14 +57,7 @@ class Referee:
 
     def put(self, q: Floats) -> None:
         """Take joint coordinates (nq,), as the mechanism counts them [rad or length]."""
-        for index, name in enumerate(self.compiled.joint_names):
-            address = int(self.model.jnt_qposadr[index])
-            if name in self._forward and self.mechanism.joint(name).type == "spherical":
-                turn = q[columns(self.mechanism)[name]] * (1.0 if self._forward[name] else -1.0)
-                self.data.qpos[address : address + 4] = np.roll(to_quaternion(turn), 1)
-            else:
-                value = q[self.mechanism.coordinate_names.index(name)]
-                self.data.qpos[address] = value * (self.metres if self.compiled.is_slide[index] else 1.0)
+        self.data.qpos[:] = qpos_of(self.mechanism, q)
         self.compiled.update()
 
     def gap(self) -> float:

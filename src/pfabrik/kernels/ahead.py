@@ -31,6 +31,7 @@ from .reaching.accelerated import solve_by_half_spaces
 from .reaching.move_trunks import move_trunks
 from .reaching.solve import solve_by_passes
 from .timing import fastest, second_derivatives
+from .walk_path import walk_path
 
 _config: Any = numba.config
 _typeof: Any = numba.typeof
@@ -79,6 +80,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (nearest_in_chains, (*_values("i i"), *_CHAINS)),
     (number_points, (*_values("i1 i1 i1 i"), True, *_values("i1"))),
     (join, tuple(_values("i2 i1"))),
+    (walk_path, tuple(_values("f2 f1 f2 f3 f3"))),
     (second_derivatives, tuple(_values("f1 f2 f2"))),
     (fastest, (*_values("f1 f2 f2 f1 f1"), True, np.zeros(0))),
 )

@@ -15,9 +15,11 @@ from ..cells import is_finite, unmarked
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import counted, near_miss
+from ..motion.joint_series import passive_series
 from ..motion.mobility import generic_of
 from ..poses import pose
 from ..tolerances import TOLERANCES
+from .joint_columns import JointColumns, joint_columns
 from .path import BLOCK, AngleUnit, Path, WrongPath
 
 POSITION = ("x", "y", "z")
@@ -62,7 +64,12 @@ class CsvTable:
         if not header:
             raise WrongPath("empty; expected a header with x, y, z")
         self._header = [name.lower() if name.lower() in OF_POSES else unmarked(name) for name in header]
-        _check_header(number, self._header, mechanism)
+        by_joints = not any(name in OF_POSES for name in self._header)
+        self._joints = joint_columns(mechanism, self._header) if by_joints else None
+        _require_once(number, self._header)
+        if self._joints is None:
+            _check_header(number, self._header, mechanism)
+        self._numeric = {*NUMERIC, *(self._joints.columns if self._joints is not None else ())}
         self.has_times = "t" in self._header or "feed" in self._header
 
     def blocks(self) -> Iterator[Path]:
@@ -88,14 +95,14 @@ class CsvTable:
         texts_by_name = dict(zip(self._header, zip(*(cells for _, cells in rows), strict=True), strict=True))
         others: dict[str, Sequence[str]] = {}
         for name, texts in texts_by_name.items():
-            if name not in NUMERIC:
+            if name not in self._numeric:
                 others[name] = [unmarked(cell) for cell in texts]
                 continue
             numbers = self._with_points(name, texts, lines)
             columns[name] = _numbers(name, numbers, lines)
-            if name not in OF_POSES:
+            if name in ("t", "feed"):
                 others[name] = numbers
-        return _path(columns, others, lines, self._mechanism)
+        return _path(columns, others, lines, self._mechanism, self._joints)
 
     def _with_points(self, name: str, cells: Sequence[str], lines: Sequence[int]) -> Sequence[str]:
         """Numbers with decimal points; WrongPath where some have commas, and others points."""
@@ -141,11 +148,15 @@ def _numbered(lines: Iterable[str], separator: str) -> Iterator[tuple[int, list[
         raise WrongPath(f"line {reader.line_num}: not a CSV text file: {error}") from error
 
 
-def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> None:
-    """Refuse a header without the columns of a target, or with one of them twice, or an angle in two units."""
+def _require_once(line: int, header: Sequence[str]) -> None:
+    """Refuse a header that has a column twice."""
     twice = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if twice:
         raise WrongPath(f"line {line}: column '{twice[0]}' appears twice")
+
+
+def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> None:
+    """Refuse a header without the columns of a target, or with an angle in two units."""
     moves = np.abs(generic_of(mechanism).directions[:3]).max(axis=1, initial=0.0) > TOLERANCES.alignment
     missing = [
         name
@@ -168,7 +179,8 @@ def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> Non
     if unread and not turning and task_of(mechanism).rotations:
         raise WrongPath(f"line {line}: found columns {', '.join(unread)} for turns; {EXPECTED}")
     if not any(name in OF_POSES for name in header):
-        raise WrongPath(f"line {line}: no column of a pose; {EXPECTED}")
+        series = ", ".join(passive_series(mechanism))
+        raise WrongPath(f"line {line}: no column of a pose; {EXPECTED}{', or ' if series else ''}{series}")
 
 
 def _numbers(name: str, cells: Sequence[str], lines: Sequence[int]) -> Floats:
@@ -179,7 +191,11 @@ def _numbers(name: str, cells: Sequence[str], lines: Sequence[int]) -> Floats:
 
 
 def _path(
-    columns: Mapping[str, Floats], others: Mapping[str, Sequence[str]], lines: list[int], mechanism: Mechanism
+    columns: Mapping[str, Floats],
+    others: Mapping[str, Sequence[str]],
+    lines: list[int],
+    mechanism: Mechanism,
+    joints: JointColumns | None,
 ) -> Path:
     count, home = len(lines), mechanism.reference_point
     positions = [columns.get(name, np.full(count, at)) for name, at in zip(POSITION, home, strict=True)]
@@ -194,7 +210,9 @@ def _path(
     if (feeds <= 0.0).any():
         place = int(np.flatnonzero(feeds <= 0.0)[0])
         raise WrongPath(f"line {lines[place]}: column 'feed': found {feeds[place]:g}; expected a feed above zero")
-    if QUATERNION[0] in columns:
+    if joints is not None:
+        targets = joints.poses(columns)
+    elif QUATERNION[0] in columns:
         targets = pose(np.array(positions).T, quat_xyzw=_quaternions(columns, lines))
     else:
         targets = pose(np.array(positions).T, rpy=np.array(turned).T)

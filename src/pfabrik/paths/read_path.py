@@ -54,7 +54,9 @@ def read_path(
     A CSV file, separated by commas, semicolons or tabs (with the last two also decimal commas), in UTF-8, UTF-16 or
     Latin-1, has a header with columns in any order: x, y, z, and roll, pitch, yaw (in degrees, or in the unit that
     their names end in; or a_deg, b_rad and the like) or the quaternion qx, qy, qz, qw, then t [s] and feed [length/s];
-    others are handed on, and coordinates that the machine cannot change may be missing. G-code, by its file's ending or
+    others are handed on, and coordinates that the machine cannot change may be missing. In place of a pose there may be
+    the coordinates of joints in series from base to end effector (pitch_joint, roll_joint; pivot[0], pivot[1]), angles
+    in degrees or with _deg or _rad behind their names. G-code, by its file's ending or
     if the first line is no header, begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B,
     C are roll, pitch, yaw [deg]. Its moves come in steps.
 

@@ -49,6 +49,30 @@ def inverse_map(model: Model, found: Configurations) -> Floats:
     return _map(model, found, inverse_by_joints, is_forward=0)
 
 
+def actuator_slopes(model: Model, poses: Floats) -> Floats | None:
+    """Actuator rates per twist at poses (n, 4, 4) of home's working mode, (n, n_a, 6) [length, rad], by legs alone.
+
+    Nothing is searched for, and no limit is asked. NaN near dead points, and where legs do not close. None if the legs
+    have no closed form, or the pose does not determine them.
+    """
+    from ..kernels.platform.evaluate import evaluate_poses
+
+    if not model.has_legs or len(model.legs.redundant):
+        return None
+    table, n, (twists, actuators) = model.legs, len(poses), units_of(model)
+    rows = int(table.task["rows"][0])
+    constraints, slopes = np.empty((n, rows)), np.empty((n, rows + len(actuators), 6))
+    handle, scratch = reading_table(table).address, reading_scratch(table)
+
+    def run(block: slice) -> None:
+        sides, given, rows_block = table.home_sides, NO_ROWS, constraints[block]
+        with np.errstate(divide="ignore", invalid="ignore"):  # at dead points, if interpreted
+            evaluate_poses(handle, scratch.address, poses[block], sides, given, NO_ROWS, rows_block, slopes[block])
+
+    in_blocks(run, n, ROWS_A_BLOCK)
+    return np.asarray(slopes[:, rows:, : len(twists)] * (actuators[:, None] / twists))
+
+
 def _map(
     model: Model,
     found: Configurations,
@@ -89,7 +113,8 @@ def _put_maps(own: ByLegs, poses: Floats, sides: Floats, q_proximal: Floats, is_
     n, actuators = len(poses), len(own.units[0])
     rows, slopes = np.empty((n, own.rows)), np.empty((n, own.rows + actuators, 6))
     poses = np.require(poses, requirements=["C", "W"])
-    evaluate_poses(own.legs.address, own.reading.address, poses, sides, q_proximal, NO_ROWS, rows, slopes)
+    with np.errstate(divide="ignore", invalid="ignore"):  # at dead points, if interpreted
+        evaluate_poses(own.legs.address, own.reading.address, poses, sides, q_proximal, NO_ROWS, rows, slopes)
     return jacobians(own.scratch.address, slopes, is_forward, maps)
 
 

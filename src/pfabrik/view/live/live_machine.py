@@ -36,8 +36,8 @@ class LiveMachine:
     session : its target and its answer.
     track : the path that can be played, or None.
     modes : those that were found last.
-    wanted, actuators : targets of the user, which run ahead of the answers: a pose (4, 4) [length], and values (n_a,)
-        [length or rad].
+    wanted, actuators, joints : targets of the user, which run ahead of the answers: a pose (4, 4) [length], and values
+        of actuators, and of joints in series (k,) [length or rad].
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class LiveMachine:
     def refresh(self) -> None:
         """Show the answer of the session."""
         session = self.session
-        self.wanted, self.actuators = session.target.copy(), session.actuators.copy()
+        self.wanted, self.actuators, self.joints = session.target.copy(), session.actuators.copy(), session.joints
         with self._server.atomic():
             if session.solution.status < Status.INVALID:
                 self.scene.show(skeleton_of(session.solution), session.solution.pose)

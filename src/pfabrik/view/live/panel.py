@@ -12,7 +12,7 @@ import numpy as np
 
 from ...answers.solution import Solution
 from ...description.mechanism import Mechanism
-from ...description.readouts import Readout, readouts
+from ...description.readouts import Readout, readout, readouts
 from ...description.task import task_of
 from ...errors import counted
 from ...rotations import to_rpy
@@ -38,6 +38,7 @@ class Actions:
 
     change_target: Callable[[str, float], None]
     change_actuator: Callable[[int, float], None]
+    change_joint: Callable[[int, float], None]
     go_home: Callable[[], None]
     find_modes: Callable[[str], None]
     take_mode: Callable[[int], None]
@@ -63,12 +64,13 @@ class Panel:
             self._target = {name: self._target_slider(gui, mechanism, name) for name in coordinates_of(mechanism)}
             self._pose = gui.add_html("")
             gui.add_button("Home").on_click(lambda _: actions.go_home())
+        self._add_joints(gui, mechanism, session)
         with gui.add_folder("Actuators"):
             self._readouts = readouts(mechanism)
             values = zip(self._readouts, session.actuators, strict=True)
             self._actuators = [
-                self._actuator_slider(gui, mechanism, place, readout, float(readout.display(value)))
-                for place, (readout, value) in enumerate(values)
+                self._actuator_slider(gui, mechanism, place, shown, float(shown.display(value)))
+                for place, (shown, value) in enumerate(values)
             ]
         self._add_path(gui, steps)
         self._add_modes(gui)
@@ -89,8 +91,10 @@ class Panel:
         named = dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), (*position, *angles), strict=True))
         for name, slider in self._target.items():
             self._set(slider, named[name])
-        for slider, readout, value in zip(self._actuators, self._readouts, session.actuators, strict=True):
-            self._set(slider, float(readout.display(value)))
+        for slider, shown, value in zip(self._actuators, self._readouts, session.actuators, strict=True):
+            self._set(slider, float(shown.display(value)))
+        for slider, shown, value in zip(self._joints, self._joint_readouts, session.joints, strict=True):
+            self._set(slider, float(shown.display(value)))
 
     def tell(self, words: str, *, alarming: bool = False) -> None:
         """Show a note on progress, or on an error."""
@@ -139,14 +143,25 @@ class Panel:
         return self._heard(slider, lambda value: self._actions.change_target(name, value))
 
     def _actuator_slider(
-        self, gui: viser.GuiApi, mechanism: Mechanism, place: int, readout: Readout, value: float
+        self, gui: viser.GuiApi, mechanism: Mechanism, place: int, shown: Readout, value: float
     ) -> Any:
-        far = 180.0 if readout.is_angle else FAR * mechanism.characteristic_length
-        low, high = readout.limits
-        free_low, free_high = rounded(value - far, value + far)
-        low, high = (low if np.isfinite(low) else free_low), (high if np.isfinite(high) else free_high)
-        slider = _slider(gui, f"{readout.name} [{readout.unit}]", low, max(high, low), value)
-        return self._heard(slider, lambda shown: self._actions.change_actuator(place, readout.coordinate(shown)))
+        slider = _coordinate_slider(gui, mechanism, shown, value)
+        return self._heard(slider, lambda moved_to: self._actions.change_actuator(place, shown.coordinate(moved_to)))
+
+    def _add_joints(self, gui: viser.GuiApi, mechanism: Mechanism, session: Session) -> None:
+        """Sliders of the passive joints in series that carry the end effector, if there are such joints."""
+        self._joints: list[Any] = []
+        named = () if session.path is None else session.path.coordinates
+        self._joint_readouts = [readout(each, mechanism.length_unit) for each in named]
+        if not named:
+            return
+        with gui.add_folder("Joints"):
+            for place, (shown, value) in enumerate(zip(self._joint_readouts, session.joints, strict=True)):
+                self._joints.append(self._joint_slider(gui, mechanism, place, shown, float(shown.display(value))))
+
+    def _joint_slider(self, gui: viser.GuiApi, mechanism: Mechanism, place: int, shown: Readout, value: float) -> Any:
+        slider = _coordinate_slider(gui, mechanism, shown, value)
+        return self._heard(slider, lambda moved_to: self._actions.change_joint(place, shown.coordinate(moved_to)))
 
     def _heard(self, slider: Any, tell: Callable[[float], None]) -> Any:
         """Report the values that the user gives a slider; returns the slider."""
@@ -210,3 +225,12 @@ def rounded(low: float, high: float) -> tuple[float, float]:
 def _slider(gui: viser.GuiApi, label: str, low: float, high: float, value: float) -> Any:
     step = 10.0 ** np.floor(np.log10(max(high - low, 1e-9) / STEPS))
     return gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high)))
+
+
+def _coordinate_slider(gui: viser.GuiApi, mechanism: Mechanism, shown: Readout, value: float) -> Any:
+    """A slider over the range of a coordinate, or far enough where there is none."""
+    far = 180.0 if shown.is_angle else FAR * mechanism.characteristic_length
+    free_low, free_high = rounded(value - far, value + far)
+    low, high = shown.limits
+    low, high = (low if np.isfinite(low) else free_low), (high if np.isfinite(high) else free_high)
+    return _slider(gui, f"{shown.name} [{shown.unit}]", low, max(high, low), value)

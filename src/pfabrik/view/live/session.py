@@ -15,6 +15,8 @@ from ...description.mechanism import Mechanism
 from ...fk import solve_fk
 from ...ik import solve_ik
 from ...motion.displacements import home_coordinates
+from ...motion.joint_path import JointPath, joint_path
+from ...motion.joint_series import passive_series
 from ...poses import pose
 from ...rotations import to_rpy
 
@@ -34,10 +36,12 @@ class Session:
     solution : the answer.
     start : the last feasible answer, which the next one starts from.
     asked : what was given last: a "pose", "actuators", or a "configuration".
+    path : the passive joints in series that carry the end effector, whose coordinates can be given too; None without.
     """
 
     def __init__(self, mechanism: Mechanism, solution: Solution | None = None) -> None:
-        self.mechanism = mechanism
+        self.mechanism, series = mechanism, passive_series(mechanism)
+        self.path: JointPath | None = joint_path(mechanism, series) if series else None
         home = configuration(mechanism, home_coordinates(mechanism))
         self.solution = home
         self.start = home
@@ -62,6 +66,15 @@ class Session:
         self.target, self.actuators = np.array(solution.pose), np.array(solution.actuators)
         if solution.status <= Status.PROJECTED:
             self.start = solution
+
+    @property
+    def joints(self) -> Floats:
+        """Coordinates of `path` at the target, (k,) [rad or length]; of the answer, where the target is not on it."""
+        if self.path is None:
+            return np.empty(0)
+        of_answer = self.solution.q[self.path.columns]
+        of_target = self.path.coordinates_at(self.target[None], of_answer)[0]
+        return np.asarray(of_answer if np.isnan(of_target).any() else of_target)
 
     @property
     def sentence(self) -> str:

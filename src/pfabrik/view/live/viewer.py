@@ -177,6 +177,13 @@ class Viewer:
         values = self._stage.actuators.copy()
         self._ask(lambda stage: stage.session.drive(values))
 
+    def _change_joint(self, place: int, value: float) -> None:
+        stage = self._stage
+        stage.joints[place] = value
+        assert stage.session.path is not None
+        stage.wanted = target = stage.session.path.poses(stage.joints[None])[0]
+        self._ask(lambda stage: stage.session.go_to(target))
+
     def _go_home(self) -> None:
         self._stage.panel.release()
         home = Session(self.mechanism).solution
@@ -219,6 +226,7 @@ class Viewer:
         actions = Actions(
             self._change_target,
             self._change_actuator,
+            self._change_joint,
             self._go_home,
             self._searches.find_modes,
             self._take_mode,

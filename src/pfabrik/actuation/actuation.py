@@ -1,0 +1,281 @@
+"""The map between named joints, or task coordinates, of a parallel mechanism and its actuators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..answers.solution import Solution
+from ..answers.start_configuration import Start
+from ..arrays import Floats, shaped
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..errors import InvalidArgument
+from ..fk import solve_fk
+from ..motion.displacements import actuator_units
+from ..motion.joint_path import JointPath, joint_path
+from ..poses import as_floats
+from .capacity import HalfSpaces, image_of_box, preimage_of_box
+from .determined import require_determined
+from .hull import Hull, feasible_hull
+from .inverses import inverses
+from .mapped import Mapped
+from .named_values import per_actuator, rows_of, speeds_of, vectors_of
+from .placed import Coordinates, Placer
+from .sample import Sample, sample_feasible
+from .task_path import TaskPath
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TASK = "task"
+
+
+class Gains(NamedTuple):
+    """Gains of joints as matrices, (..., k, k): torque by joint error, and by joint speed."""
+
+    kp: Floats
+    kd: Floats
+
+
+class LimitMargin(NamedTuple):
+    """The least margin at joint coordinates, and the limit that has it.
+
+    Attributes
+    ----------
+    margin : as of `margins` a share of the range, (...,): 1 in the middle, 0 on a limit, negative beyond it or where
+        loops do not close. Near a dead point, how near it is, as of `Singularity.serial`. inf where nothing limits.
+    joint, bound : the limit, (...,): "min", "max", "cone"; "reach" or "closed" where a leg does not reach; "dead point"
+        of an actuator.
+    """
+
+    margin: float | Floats
+    joint: str | np.ndarray
+    bound: str | np.ndarray
+
+
+def actuation(mechanism: Mechanism, joints: str | Sequence[str]) -> Actuation:
+    """The map between joints that a serial model has and the actuators.
+
+    Parameters
+    ----------
+    joints : names of joints in series from base to end effector, in the order that coordinates are to have (a universal
+        joint has two); or "task" for the coordinates that the mechanism's task sets.
+
+    Raises
+    ------
+    UnknownName : no joint of that name.
+    InvalidArgument : joints that are not in series from the base to the end effector.
+    UnsupportedMechanism : the joints do not determine the actuators, or these not the joints; with the reason.
+    """
+    checked_mechanism(mechanism)
+    if joints == TASK and TASK not in {joint.name for joint in mechanism.joints}:
+        task = TaskPath(mechanism)
+        require_determined(mechanism, task.names, task)
+        return Actuation(task)
+    path = joint_path(mechanism, joints)
+    require_determined(mechanism, path.names, path.columns.tolist())
+    return Actuation(path)
+
+
+class Actuation:
+    """A map between k named coordinates q and n_a actuators x, in home's working and assembly mode.
+
+    Arrays have any leading shape (...,), whose rows are independent. Coordinates q (..., k) are in the order of
+    `names`, x (..., n_a) in that of `mechanism.actuator_names` [rad or length]. Torques belong to them: a torque times
+    a rate is a power, so that it is a force where the coordinate is a length. With J = dx/dq:
+
+        dx/dt = J dq/dt,    torque of joints = J^T torque of actuators,    inertia of joints = J^T I J
+
+    Where q is out of reach, J and all that follows from it are those of the nearest feasible configuration: ask
+    `margin`, or the status of `to_actuators`.
+
+    Attributes
+    ----------
+    mechanism : the machine.
+    names : names of the coordinates.
+    low, high : their ranges, (k,) [rad or length]; infinite without one.
+    home : their values at home, (k,).
+    """
+
+    def __init__(self, coordinates: Coordinates) -> None:
+        self.mechanism, self.names = coordinates.mechanism, coordinates.names
+        self.low, self.high, self.home = coordinates.low, coordinates.high, coordinates.home
+        self._coordinates, self._placer = coordinates, Placer(coordinates)
+
+    def __repr__(self) -> str:
+        actuators = ", ".join(self.mechanism.actuator_names)
+        return f"<Actuation of '{self.mechanism.name}': {', '.join(self.names)} <-> {actuators}>"
+
+    @property
+    def is_redundant(self) -> bool:
+        """True if there are more actuators than coordinates: torques of actuators are then one choice of many."""
+        return len(self.mechanism.actuator_names) > len(self.names)
+
+    def to_actuators(self, q: ArrayLike) -> Mapped:
+        """Actuator values at coordinates q (..., k), each row REACHED, or PROJECTED to the nearest feasible pose."""
+        rows, shape = rows_of(self.names, q)
+        placed = self._placer.place(rows)
+        values = placed.actuators.reshape(*shape, placed.actuators.shape[1])
+        return Mapped(values, shaped(placed.status, shape), lambda: self._placer.solution_of(rows, shape))
+
+    def to_joints(self, x: ArrayLike, *, start: Start | None = None) -> Mapped:
+        """Coordinates (..., k) at actuator values x (..., n_a): as of `solve_fk`.
+
+        Parameters
+        ----------
+        start : a Solution; coordinates (..., k), or all joint coordinates (..., nq), single or one for each row.
+            Default: home.
+        """
+        solution = solve_fk(self.mechanism, vectors_of("x", x, self.mechanism.actuator_names), start=self._start(start))
+        values = self._placer.values(solution).reshape(*solution.shape, len(self.names))
+        return Mapped(values, solution.status, lambda: solution)
+
+    def jacobian(self, q: ArrayLike) -> Floats:
+        """J = dx/dq at coordinates q (..., k): actuator rates by joint rates, (..., n_a, k)."""
+        rows, shape = rows_of(self.names, q)
+        J = self._placer.jacobian(rows)
+        return J.reshape(*shape, *J.shape[1:])
+
+    def velocities(self, q: ArrayLike, rates: ArrayLike) -> Floats:
+        """Actuator rates J dq/dt (..., n_a) at joint rates (..., k)."""
+        return _times(self.jacobian(q), vectors_of("rates", rates, self.names))
+
+    def joint_velocities(self, q: ArrayLike, rates: ArrayLike) -> Floats:
+        """Joint rates (..., k) at actuator rates (..., n_a).
+
+        Rates that redundant actuators cannot have together are replaced by the nearest ones that they can.
+        """
+        return _times(self._inverse(q), vectors_of("rates", rates, self.mechanism.actuator_names))
+
+    def torques_to_joints(self, q: ArrayLike, torques: ArrayLike) -> Floats:
+        """Torques of joints J^T tau (..., k) that torques of actuators (..., n_a) make."""
+        torques = vectors_of("torques", torques, self.mechanism.actuator_names)
+        return _times(np.swapaxes(self.jacobian(q), -1, -2), torques)
+
+    def torques_to_actuators(self, q: ArrayLike, torques: ArrayLike) -> Floats:
+        """Torques of actuators (..., n_a) that make torques of joints (..., k).
+
+        Of redundant actuators (see `is_redundant`) those of the least norm; forces count as torques with the lever L.
+        At a parallel singularity, where actuators cannot make all of them, those that make the nearest.
+        """
+        return _times(np.swapaxes(self._inverse(q), -1, -2), vectors_of("torques", torques, self.names))
+
+    def armature(self, q: ArrayLike, rotor_inertia: ArrayLike) -> Floats:
+        """Inertia of the rotors as joints feel it, J^T I J, (..., k, k).
+
+        Parameters
+        ----------
+        rotor_inertia : of the actuators behind their gears, one or (n_a,): gear ratio squared times the rotor's.
+        """
+        return self._congruent(
+            self.jacobian(q), per_actuator(self.mechanism.actuator_names, "rotor_inertia", rotor_inertia)
+        )
+
+    def gains(self, q: ArrayLike, kp: ArrayLike, kd: ArrayLike = 0.0) -> Gains:
+        """Gains of joints that gains of actuators, each one or (n_a,), make: J^T Kp J and J^T Kd J, (..., k, k) each.
+
+        Of a servo that holds actuators where q is; where it also bears a torque, its stiffness has a further part,
+        dJ^T/dq times this torque.
+        """
+        J = self.jacobian(q)
+        return Gains(
+            self._congruent(J, per_actuator(self.mechanism.actuator_names, "kp", kp)),
+            self._congruent(J, per_actuator(self.mechanism.actuator_names, "kd", kd)),
+        )
+
+    def torque_limits(self, q: ArrayLike, torque_max: ArrayLike) -> HalfSpaces:
+        """The torques of joints that actuators can make, each within +-torque_max, one or (n_a,)."""
+        J = self.jacobian(q)
+        limits = np.broadcast_to(per_actuator(self.mechanism.actuator_names, "torque_max", torque_max), J.shape[:-1])
+        return image_of_box(J, limits)
+
+    def speed_limits(self, q: ArrayLike, speed_max: ArrayLike | None = None) -> HalfSpaces:
+        """The rates of joints at which no actuator is faster than +-speed_max, one or (n_a,).
+
+        Parameters
+        ----------
+        speed_max : [rad/s or length/s]; default `max_speed` of the mechanism's joints.
+        """
+        J = self.jacobian(q)
+        limits = np.broadcast_to(speeds_of(self.mechanism, speed_max), J.shape[:-1])
+        return preimage_of_box(J, limits)
+
+    def margin(self, q: ArrayLike) -> LimitMargin:
+        """How far coordinates q (..., k) are from what limits them, with the limit's name; nothing is projected."""
+        rows, shape = rows_of(self.names, q)
+        margin, limits = self._placer.margins(rows)
+        return LimitMargin(shaped(margin, shape), shaped(limits[:, 0], shape), shaped(limits[:, 1], shape))
+
+    def hull(self, box: ArrayLike | None = None, *, seed: int = 0) -> Hull:
+        """The feasible part of the box of joint ranges: half-spaces within it, and the share that is lost.
+
+        Parameters
+        ----------
+        box : lowest and highest coordinates, (2, k); default the joints' ranges.
+        """
+        return feasible_hull(self._placer, box, seed)
+
+    def sample(self, n: int, seed: int = 0, *, box: ArrayLike | None = None) -> Sample:
+        """Feasible configurations, uniform in the joint coordinates: coordinates, Solution, and MuJoCo's `qpos`.
+
+        Parameters
+        ----------
+        box : as of `hull`.
+        """
+        return sample_feasible(self._placer, n, seed, box)
+
+    def plot_torques(
+        self, torque_max: ArrayLike = 1.0, *, box: ArrayLike | None = None, ax: Axes | None = None
+    ) -> Axes:
+        """Draw the torques of two joints over their range: polygons, and the weakest direction as colours.
+
+        Parameters
+        ----------
+        torque_max : as of `torque_limits`; by default what one unit of each actuator makes.
+        box : as of `hull`.
+        """
+        from .torque_map import plot_torque_map
+
+        return plot_torque_map(self._placer, torque_max, box, ax)
+
+    def _start(self, start: Start | None) -> Start | None:
+        """A start for `solve_fk`: coordinates (..., k) as all joint coordinates."""
+        if start is None or isinstance(start, Solution):
+            return start
+        values = as_floats("start", start, f"a Solution, or coordinates (..., {len(self.names)})")
+        if values.shape[-1:] != (len(self.names),) or len(self.names) == len(self.mechanism.coordinate_names):
+            return values
+        rows, shape = rows_of(self.names, values)
+        return self._placer.solution_of(rows, shape)
+
+    def _inverse(self, q: ArrayLike) -> Floats:
+        """The Moore-Penrose inverse of J, (..., k, n_a), lengths of actuators in units of L."""
+        units = actuator_units(self.mechanism)
+        return inverses(self.jacobian(q) / units[:, None]) / units
+
+    @staticmethod
+    def _congruent(J: Floats, values: Floats) -> Floats:
+        return np.asarray(np.swapaxes(J, -1, -2) @ (values[:, None] * J))
+
+    @property
+    def path(self) -> JointPath:
+        """The joints in series, with their axes.
+
+        Raises
+        ------
+        InvalidArgument : the coordinates are those of the task.
+        """
+        if isinstance(self._coordinates, TaskPath):
+            raise InvalidArgument("path", "coordinates of the task", "an actuation of named joints")
+        return self._coordinates
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    try:
+        return np.asarray((matrices @ vectors[..., None])[..., 0])
+    except ValueError:
+        found = f"batch shapes {matrices.shape[:-2]} and {vectors.shape[:-1]}"
+        raise InvalidArgument("q", found, "shapes that agree") from None

@@ -1,0 +1,87 @@
+"""Whether named coordinates and actuators determine each other, at configurations around home."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..description.mechanism import Mechanism
+from ..errors import UnsupportedMechanism, counted
+from ..motion.joint_rates import actuated_columns, first_order, right_singular
+from ..motion.mobility import generic_of
+from ..motion.walks import around_home
+from ..tolerances import TOLERANCES
+from .task_path import TaskPath
+
+PURPOSE = "mapped between joints and actuators"
+
+MOST_NAMED = 6
+"""Most coordinates that are named."""
+
+CONFIGURATIONS = 4
+"""Configurations around home that are looked at: home itself may be singular, and others hardly all are."""
+
+
+def require_determined(mechanism: Mechanism, names: tuple[str, ...], columns: list[int] | TaskPath) -> None:
+    """Refuse coordinates that do not determine the actuators, or that these do not determine.
+
+    The motions that the loops allow are the null space N of their conditions. With Q the rates of the named
+    coordinates and A those of the actuators on N, joints determine actuators if Q n = 0 implies A n = 0, and the other
+    way round: rank Q = rank [Q; A] = rank A, which is the number of coordinates.
+
+    Parameters
+    ----------
+    columns : those of named joints; or the coordinates of the task.
+
+    Raises
+    ------
+    UnsupportedMechanism : with the reason.
+    """
+    closure, twists = first_order(mechanism, around_home(mechanism)[:CONFIGURATIONS])
+    rank = generic_of(mechanism).rank
+    values, right = right_singular(closure)
+    regular = np.count_nonzero(values > TOLERANCES.alignment, axis=1) == rank
+    motions = np.swapaxes(right[regular, rank:], 1, 2)
+    if isinstance(columns, TaskPath):
+        poses = np.repeat(mechanism.home_pose[None], len(motions), axis=0)
+        named = columns.rates(poses) @ twists[regular] @ motions
+    else:
+        named = motions[:, columns]
+    actuators = motions[:, actuated_columns(mechanism)]
+    reason = _reason(mechanism, names, named, actuators)
+    if reason:
+        raise UnsupportedMechanism(mechanism.name, [reason], PURPOSE)
+
+
+def _reason(mechanism: Mechanism, names: tuple[str, ...], named: Floats, actuators: Floats) -> str:
+    """Why coordinates and actuators do not determine each other; empty if they do."""
+    listed, k = ", ".join(names), len(names)
+    n_named, n_driven = _rank(named), _rank(actuators)
+    together = _rank(np.concatenate([named, actuators], axis=1))
+    if together > n_named:
+        moving = _moving(mechanism.actuator_names, named, actuators)
+        return f"{listed} do not determine the actuators: with them at rest, {moving} can still move"
+    if together > n_driven:
+        moving = _moving(names, actuators, named)
+        return f"the actuators do not determine the joints: with them locked, {moving} can still move"
+    if n_named < k:
+        return f"the loops leave {listed} {counted(n_named, 'freedom')}, not {k}: name as many as are independent"
+    return ""
+
+
+def _rank(matrices: Floats) -> int:
+    if 0 in matrices.shape:
+        return 0
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return int(np.count_nonzero(values > TOLERANCES.alignment, axis=1).max())
+
+
+def _moving(names: tuple[str, ...], held: Floats, watched: Floats) -> str:
+    """Names of the coordinates that move while others are held, at the first of some configurations."""
+    _, values, right = np.linalg.svd(held[0])
+    free = right[np.count_nonzero(values > TOLERANCES.alignment) :].T
+    speeds = np.linalg.norm(watched[0] @ free, axis=1)
+    moves: Mask = speeds > TOLERANCES.alignment
+    moving = [name for name, does in zip(names, moves, strict=True) if does]
+    more = f" and {len(moving) - MOST_NAMED} others" if len(moving) > MOST_NAMED else ""
+    return ", ".join(moving[:MOST_NAMED]) + more

@@ -1,0 +1,60 @@
+"""Feasible configurations at random, uniform in joint coordinates."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..answers.solution import Solution
+from ..answers.status import Status
+from ..arrays import Floats
+from ..errors import InvalidArgument
+from ..interop.mjcf_qpos import mjcf_qpos
+from .named_values import box_of
+from .placed import Placer
+
+MOST_DRAWS = 1000
+"""Most draws of as many configurations as are wanted: where fewer than one in a thousand is feasible, none is found."""
+
+
+class Sample(NamedTuple):
+    """Closed configurations within all limits.
+
+    Attributes
+    ----------
+    q : the named coordinates, (n, k).
+    solution : the configurations, with actuators, poses and all joints.
+    """
+
+    q: Floats
+    solution: Solution
+
+    @property
+    def qpos(self) -> Floats:
+        """MuJoCo's joint positions of the model that `to_mjcf` writes, (n, nq) [rad, m]."""
+        return mjcf_qpos(self.solution)
+
+
+def sample_feasible(placer: Placer, n: int, seed: int, box: Any) -> Sample:
+    """Draw coordinates within a box until n are reached.
+
+    Raises
+    ------
+    InvalidArgument : hardly any are.
+    """
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise InvalidArgument("n", repr(n), "a number of configurations, at least 1")
+    low, high = box_of(placer.coordinates, box)
+    random = np.random.default_rng(seed)
+    kept = np.empty((0, len(low)))
+    for _ in range(MOST_DRAWS):
+        drawn = random.uniform(low, high, (n, len(low)))
+        kept = np.concatenate([kept, drawn[placer.feasible_margins(drawn) >= 0.0]])
+        if len(kept) >= n:
+            solution = placer.solution(kept)
+            reached = np.flatnonzero(np.asarray(solution.status) == Status.REACHED)
+            kept = kept[reached]
+            if len(kept) >= n:
+                return Sample(kept[:n], solution[reached[:n]])
+    raise InvalidArgument("box", f"{len(kept)} feasible of {MOST_DRAWS * n} draws", "a box of which more is reachable")
