@@ -21,6 +21,7 @@ from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from in_c import IS_THERE, InC
 from in_placo import peer
+from maps import maps
 from passes import passes
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
@@ -216,6 +217,7 @@ def main() -> None:
         *chain_rows(rng, runs, 100 if given.quick else 1000),
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),
+        *maps(rng, min(runs, 5), 2000 if given.quick else 10_000),
         *viewer(min(runs, 5)),
         *([] if given.quick else start_up(5)),
     ]

@@ -498,6 +498,18 @@ def test_margins_are_listed_the_nearest_limit_first(run: Callable[..., Result]) 
     assert len(rows) == 24  # of six strokes, both ends, and twelve cones
 
 
+def test_forces_that_hold_a_load_are_listed(run: Callable[..., Result]) -> None:
+    expected = pf.forces(pf.solve_ik(pf.load("stewart"), [0, 0, 190]), [0, 0, -200, 0, 500, 0]).actuators
+    line = ["ik", "stewart", "--position", 0, 0, 190, "--force", 0, 0, -200, "--moment", 0, 500, 0]
+    table = run(*line).stdout.split("\n\n")[-1].splitlines()
+    assert table[0].split() == ["actuator", "exerts", "unit"]
+    assert [float(row.split()[1]) for row in table[1:]] == pytest.approx(expected, rel=1e-5)
+    forces = json.loads(run(*line, "--json").stdout)["forces"]
+    assert (forces["actuators"], forces["reason"]) == (pytest.approx(expected), "")
+    torques = run("ik", "five_bar", "--position", 0, 0, 190, "--force", 0, 0, -20).stdout
+    assert torques.rstrip().endswith("force mm")
+
+
 # Travel
 
 
@@ -1185,6 +1197,9 @@ def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> 
         (["ik", "stewart", *WITHIN_REACH, "--hold", "both"], "orientation"),
         (["ik", "stewart", *WITHIN_REACH, "--projection", "best"], "centroid"),
         (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
+        (["ik", "stewart", *WITHIN_REACH, "--all", "--force", "0", "0", "1"], "--force and --moment are of one answer"),
+        (["ik", "stewart", *WITHIN_REACH, "--force", "0", "0", "nan"], "numbers that are not finite"),
+        (["ik", "five_bar", "--position", "0", "0", "190", "--moment", "0", "0", "1"], "the end effector is a joint"),
         (["ik", "ankle_ups", "--joint", "pivot"], "found 'pivot'; expected NAME=VALUE"),
         (["ik", "ankle_ups", "--joint", "pivot=5,nan"], "expected NAME=VALUE[,VALUE...] with finite numbers"),
         (["ik", "ankle_ups", "--joint", "pivot=5"], "found 1 value; expected 2"),

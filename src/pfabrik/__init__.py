@@ -12,6 +12,7 @@ Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, wor
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 Look over   workspace, singularity_map
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
+Load        forces, wrench_capacity, transmission, stiffness, accuracy
 Look into  search_log (every attempt behind an answer)
 Real machines   parameters, sensitivity, Measurements, calibrate
 Drive      actuation (a serial model's joints to motors, and back: torques, inertia, limits)
@@ -75,6 +76,11 @@ _NAMES = {
     "poses": ("pose",),
     "search_log": ("SearchLog", "search_log"),
     "solver": ("Solver",),
+    "statics.accuracy": ("PoseAccuracy", "accuracy"),
+    "statics.capacity": ("WrenchCapacity", "wrench_capacity"),
+    "statics.forces": ("Forces", "forces"),
+    "statics.stiffness": ("Stiffness", "stiffness"),
+    "statics.transmission": ("Factors", "Transmission", "transmission"),
     "timing.platform_speed": ("PlatformSpeed", "platform_speed"),
     "timing.time_path": ("time_path",),
     "timing.timed": ("Timed",),
@@ -140,6 +146,15 @@ if TYPE_CHECKING:
     from .poses import pose as pose
     from .search_log import SearchLog as SearchLog, search_log as search_log
     from .solver import Solver as Solver
+    from .statics.accuracy import PoseAccuracy as PoseAccuracy, accuracy as accuracy
+    from .statics.capacity import WrenchCapacity as WrenchCapacity, wrench_capacity as wrench_capacity
+    from .statics.forces import Forces as Forces, forces as forces
+    from .statics.stiffness import Stiffness as Stiffness, stiffness as stiffness
+    from .statics.transmission import (
+        Factors as Factors,
+        Transmission as Transmission,
+        transmission as transmission,
+    )
     from .timing.platform_speed import PlatformSpeed as PlatformSpeed, platform_speed as platform_speed
     from .timing.time_path import time_path as time_path
     from .timing.timed import Timed as Timed

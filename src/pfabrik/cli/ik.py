@@ -9,10 +9,13 @@ import click
 
 import pfabrik as pf
 
+from ..answers.aligned_text import aligned
+from ..answers.aligned_text import plain as plain_number
 from .arguments import MECH, TargetOptions, load, note_left_out, note_unused_projection, projecting, targeted
 from .printing import json_option, print_answer
 
 if TYPE_CHECKING:
+    from ..description.joints import Vector
     from ..targets import Target
 
 
@@ -21,19 +24,34 @@ if TYPE_CHECKING:
 @targeted
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
+@click.option("--force", "force", type=float, nargs=3, help="A force on the end effector: what do actuators exert?")
+@click.option("--moment", "moment", type=float, nargs=3, help="A moment beside it, in units of force times length.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
 @json_option()
-def ik(mech: str, target: TargetOptions, options: pf.Options, with_margins: bool, list_all: bool, as_json: bool) -> int:
+def ik(
+    mech: str,
+    target: TargetOptions,
+    options: pf.Options,
+    with_margins: bool,
+    force: Vector | None,
+    moment: Vector | None,
+    list_all: bool,
+    as_json: bool,
+) -> int:
     """Solve for one target.
 
     A target out of reach gets the feasible answer nearest to it, with the limits that hold it back, the hardest first.
 
     A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit.
 
+    With --force, or --moment, it also says what the actuators exert to hold it: positive drives a coordinate up.
+
     With --all only what reaches the target is listed, and the exit code is 0 if some mode keeps all limits.
     """
     if list_all and with_margins:
         raise click.UsageError("--margins is of one answer: it does not go with --all")
+    if list_all and (force or moment):
+        raise click.UsageError("--force and --moment are of one answer: they do not go with --all")
     if not target.is_given:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
     mechanism = load(mech)
@@ -45,10 +63,14 @@ def ik(mech: str, target: TargetOptions, options: pf.Options, with_margins: bool
     solution = pf.solve_ik(mechanism, pose, options=options)
     from .report import describe, margins_table
 
-    def in_words() -> str:
-        return describe(solution) + (f"\n\n{margins_table(solution)}" if with_margins else "")
+    wrench = (force or (0.0, 0.0, 0.0)) + (moment or ()) if force or moment else None
+    held = None if wrench is None else pf.forces(solution, wrench)
 
-    print_answer(as_json, lambda: as_object(solution, with_margins), in_words)
+    def in_words() -> str:
+        tables = [describe(solution), *([] if held is None else [forces_table(solution, held)])]
+        return "\n\n".join(tables + ([margins_table(solution)] if with_margins else []))
+
+    print_answer(as_json, lambda: as_object(solution, with_margins, held), in_words)
     return 0 if solution else 1
 
 
@@ -69,15 +91,30 @@ def ignored(mechanism: pf.Mechanism, target: TargetOptions) -> Iterator[str]:
         yield "the yaw of --rpy"
 
 
-def as_object(solution: pf.Solution, with_margins: bool) -> dict[str, object]:
+def as_object(solution: pf.Solution, with_margins: bool, held: pf.Forces | None) -> dict[str, object]:
     """An answer as plain numbers, lists and dicts, with the reason where it is not reached."""
     plain = solution.to_dict() | ({} if solution else {"reason": solution.reason})
+    if held is not None:
+        from ..answers.solution import as_plain
+
+        plain["forces"] = {"actuators": as_plain(held.actuators), "reason": held.reason}
     if with_margins:
         from ..answers.margins import nearest_first
 
         names = ("joint", "bound", "margin")
         plain["margins"] = [dict(zip(names, limit, strict=True)) for limit in nearest_first(solution)]
     return plain
+
+
+def forces_table(solution: pf.Solution, held: pf.Forces) -> str:
+    """What each actuator exerts, or why no forces hold the load."""
+    if held.reason:
+        return f"no forces: {held.reason}"
+    mechanism = solution.mechanism
+    units = ["force" if drive.kind == "length" else f"force {mechanism.length_unit}" for drive in mechanism.drives]
+    least = 1e-9 * max(map(abs, held.actuators.tolist()))
+    values = [plain_number(float(value), least) for value in held.actuators]
+    return aligned(["actuator", "exerts", "unit"], zip(mechanism.actuator_names, values, units, strict=True))
 
 
 def print_working_modes(mechanism: pf.Mechanism, target: Target, as_json: bool) -> int:

@@ -73,6 +73,12 @@ def actuator_slopes(model: Model, poses: Floats) -> Floats | None:
     return np.asarray(slopes[:, rows:, : len(twists)] * (actuators[:, None] / twists))
 
 
+def regular_forward_map(model: Model, found: Configurations) -> Floats | None:
+    """`forward_map` away from all singularities, NaN elsewhere; None if it does not follow from the legs' slopes."""
+    maps = _from_slopes(model, found, is_forward=1)
+    return None if maps is None else maps[0]
+
+
 def _map(
     model: Model,
     found: Configurations,
@@ -81,9 +87,21 @@ def _map(
     is_forward: int,
 ) -> Floats:
     """Jacobians from the legs' slopes where they exist, from all joint coordinates elsewhere."""
+    from_slopes = _from_slopes(model, found, is_forward=is_forward)
+    if from_slopes is None:
+        return by_joints(model, found.coordinates)
+    maps, n_unsolved = from_slopes
+    if n_unsolved:
+        rest = np.flatnonzero(np.isnan(maps[:, 0, 0]))
+        maps[rest] = by_joints(model, found.coordinates_at(rest))
+    return maps
+
+
+def _from_slopes(model: Model, found: Configurations, *, is_forward: int) -> tuple[Floats, int] | None:
+    """Jacobians from the legs' slopes, NaN near singularities, and how many are; None if legs do not tell them."""
     by_legs = _by_legs(model) if isinstance(found, LegAnswers) else None
     if by_legs is None:
-        return by_joints(model, found.coordinates)
+        return None
     assert isinstance(found, LegAnswers)
     units = by_legs.units[is_forward]
     maps = np.zeros((len(found), *units.shape))
@@ -92,12 +110,9 @@ def _map(
     def run(block: slice) -> int:
         return _put_maps(by_legs, found.rows.poses[block], found.sides[block], given[block], is_forward, maps[block])
 
-    left = in_blocks(run, len(found), ROWS_A_BLOCK)
+    unsolved = in_blocks(run, len(found), ROWS_A_BLOCK)
     maps *= units
-    if any(left):
-        rest = np.flatnonzero(np.isnan(maps[:, 0, 0]))
-        maps[rest] = by_joints(model, found.coordinates_at(rest))
-    return maps
+    return maps, sum(unsolved)
 
 
 def _put_maps(own: ByLegs, poses: Floats, sides: Floats, q_proximal: Floats, is_forward: int, maps: Floats) -> int:

@@ -1,0 +1,65 @@
+"""Values for actuators: one for all, or one for each by name; single numbers, or pairs of a lowest and a highest."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..checks import require_positive
+from ..errors import InvalidArgument, UnknownName
+from ..poses import as_floats
+
+Bounds: TypeAlias = float | tuple[float, float] | ArrayLike | Mapping[str, float | tuple[float, float]]
+"""Limits of actuators: a number for both ways, a pair (lowest, highest), or an array (n_a, 2), or either by name."""
+
+BOUND = "a positive number, or (lowest, highest)"
+
+
+def bounds_of(argument: str, given: Bounds, names: Sequence[str]) -> Floats:
+    """The lowest and the highest value of each actuator, (n_a, 2); infinite where there is none."""
+    if isinstance(given, Mapping):
+        by_name = checked_names(argument, given, names)
+        return np.array([_pair(f"{argument}['{name}']", by_name[name]) for name in names])
+    array = as_floats(argument, given, f"{BOUND}, for all {len(names)} actuators or each")
+    if array.shape == (len(names), 2):
+        return np.array([_pair(f"{argument}[{place}]", row) for place, row in enumerate(array)])
+    return np.tile(_pair(argument, array), (len(names), 1))
+
+
+def checked_names(argument: str, given: Mapping[str, Any], names: Sequence[str]) -> Mapping[str, Any]:
+    """Values by name, one for every actuator."""
+    for name in given:
+        if name not in names:
+            raise UnknownName("actuator", name, names)
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise InvalidArgument(argument, f"nothing for {', '.join(missing)}", "a value for every actuator")
+    return given
+
+
+def _pair(argument: str, given: Any) -> tuple[float, float]:
+    value = as_floats(argument, given, BOUND)
+    if value.shape == () and value > 0.0:
+        return -float(value), float(value)
+    if value.shape == (2,) and value[0] <= value[1]:
+        return float(value[0]), float(value[1])
+    raise InvalidArgument(argument, reprlib.repr(given if value.shape else float(value)), BOUND)
+
+
+def positive_values(argument: str, given: ArrayLike | Mapping[str, float], names: Sequence[str]) -> Floats:
+    """A positive number for each actuator, (n_a,), of one for all, an array (n_a,), or a mapping by name."""
+    if isinstance(given, Mapping):
+        by_name = checked_names(argument, given, names)
+        return np.array([require_positive(f"{argument}['{name}']", by_name[name]) for name in names])
+    expected = f"a positive number, one for each of {len(names)} actuators, or a mapping by name"
+    array = as_floats(argument, given, expected)
+    if array.shape not in ((), (len(names),)):
+        raise InvalidArgument(argument, f"shape {array.shape}", expected)
+    if not (np.isfinite(array) & (array > 0.0)).all():
+        raise InvalidArgument(argument, reprlib.repr(array.tolist()), expected)
+    return np.broadcast_to(array, len(names)).copy()

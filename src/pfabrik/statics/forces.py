@@ -1,0 +1,200 @@
+"""Actuator forces and joint reactions in static equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..answers.solution import Solution, checked_solution
+from ..arrays import Floats, Mask, shaped
+from ..description.mechanism import Mechanism
+from ..frozen import FrozenMapping
+from ..motion.displacements import actuator_units, end_effector_pose, placed
+from ..tolerances import TOLERANCES
+from .first_order_maps import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
+from .joint_balance import Balance, about_centres, balance
+from .loads import Asked, BodyLoads, asked_of, carried_of, checked_gravity, checked_loads
+from .reasons import Reasons, add_reason, has_reason, in_shape, no_reasons
+from .rod_forces import rods_of, tensions
+
+GRAVITY = (0.0, 0.0, -9.81)
+COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+FREE_PART = "the loads move a part that neither the end effector nor an actuator holds"
+OPEN = "equilibrium does not determine all reactions, for joints work against each other (overconstraint): {}"
+
+
+class _Question(NamedTuple):
+    """What forces are asked for."""
+
+    solution: Solution
+    asked: Asked
+    loads: BodyLoads
+    gravity: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces in static equilibrium, as `forces` returns them.
+
+    Attributes
+    ----------
+    actuators : force or torque that each actuator exerts, (..., n_a): positive drives its coordinate up. A strut that
+        is pressed has a positive one, a cable under tension a negative one. NaN where `reason` says why.
+    is_least_norm : True if there are more actuators than motions that they control: of all forces that hold the load,
+        those with the least sum of squares are given, torques compared with forces times L.
+    reason : why there are no such forces, (...); empty where there are. A text for a single answer.
+    """
+
+    actuators: Floats
+    is_least_norm: bool
+    reason: str | Reasons
+    _question: _Question = field(repr=False)
+
+    @cached_property
+    def reactions(self) -> Mapping[str, Floats]:
+        """Joint -> force and moment that its first body exerts on its second, (..., 6), in the base frame.
+
+        The moment is about the joint's centre; of a slide about that of the first joint of its `along`, or, without
+        these, about the reference point. NaN where `reason` says why, and where `undetermined` does.
+        """
+        wrenches = np.where(self._is_open, np.nan, self._transmitted)
+        names = (joint.name for joint in self._mechanism.joints)
+        return FrozenMapping({name: self._shaped(wrenches[:, place]) for place, name in enumerate(names)})
+
+    @cached_property
+    def undetermined(self) -> str:
+        """Which of the reactions equilibrium does not determine, in words; empty if it determines all.
+
+        Of a batch, those of any row.
+        """
+        is_open = np.asarray(self._is_open.any(axis=0))
+        parts = [
+            f"{joint.name} {' '.join(name for name, left in zip(COMPONENTS, row, strict=True) if left)}"
+            for joint, row in zip(self._mechanism.joints, is_open, strict=True)
+            if row.any()
+        ]
+        sentences = [OPEN.format(", ".join(parts))] if parts else []
+        return "; ".join(sentences + [GAINS_MOTION] * bool(self._balance.is_singular.any()))
+
+    @cached_property
+    def rods(self) -> Mapping[str, Floats]:
+        """Rod -> force along it, positive if it is pulled, (...): of links between two joints that are not driven.
+
+        NaN where `reason` says why, or where equilibrium does not determine it.
+        """
+        rods, (centres, _) = rods_of(self._mechanism), self._places
+        pulls = tensions(rods, self._balance.wrenches, centres)[..., 0] / self._mechanism.characteristic_length
+        open_pulls = np.abs(tensions(rods, self._balance.open, centres)).max(axis=-1, initial=0.0)
+        pulls = np.where((open_pulls > TOLERANCES.alignment) | self._is_unknown[:, None], np.nan, pulls)
+        return FrozenMapping({name: self._shaped(pulls[:, place]) for place, name in enumerate(rods.names)})
+
+    @property
+    def _mechanism(self) -> Mechanism:
+        return self._question.solution.mechanism
+
+    def _shaped(self, rows: Floats) -> Floats:
+        of_batch: Floats = shaped(rows, self._question.asked.shape)
+        return of_batch
+
+    @cached_property
+    def _coordinates(self) -> Floats:
+        """Joint coordinates of every row; home in place of INVALID ones, (n, c)."""
+        q = self._question.solution._coordinates[self._question.asked.places]
+        return np.where(np.isnan(q), 0.0, q)
+
+    @cached_property
+    def _balance(self) -> Balance:
+        return _balanced(self._question, self._coordinates, slice(None))
+
+    @cached_property
+    def _places(self) -> tuple[Floats, Floats]:
+        """Joint centres (n, joints, 3) and reference points (n, 3) [length]."""
+        mechanism, q = self._mechanism, self._coordinates
+        return placed(mechanism, q)[1], end_effector_pose(mechanism, q)[:, :3, 3]
+
+    @cached_property
+    def _is_unknown(self) -> Mask:
+        return np.isnan(self.actuators).any(axis=-1).ravel() | self._balance.is_singular
+
+    @cached_property
+    def _transmitted(self) -> Floats:
+        """Wrenches (n, joints, 6): force, and moment about the joints' centres."""
+        found = about_centres(self._mechanism, self._balance.wrenches, *self._places)[..., 0]
+        return np.where(self._is_unknown[:, None, None], np.nan, found)
+
+    @cached_property
+    def _is_open(self) -> Mask:
+        """True where a component of a reaction is not determined, (n, joints, 6)."""
+        left = about_centres(self._mechanism, self._balance.open, *self._places)
+        units = np.repeat([1.0, self._mechanism.characteristic_length], 3) / self._mechanism.characteristic_length
+        return np.asarray(np.abs(left / units[:, None]).max(axis=-1, initial=0.0) > TOLERANCES.alignment)
+
+
+def forces(
+    solution: Solution,
+    wrench: ArrayLike | None = None,
+    *,
+    at: ArrayLike | None = None,
+    loads: BodyLoads | None = None,
+    gravity: ArrayLike = GRAVITY,
+) -> Forces:
+    """Forces that the actuators exert to hold a load, and what the joints transmit, in static equilibrium.
+
+    Without friction, for all motions that the loops allow: t . dq + w . V = 0, so that t = -F' w with the forward
+    Jacobian F. Forces are in any unit, moments and torques in that unit times the machine's length.
+
+    Parameters
+    ----------
+    solution : one configuration or a batch.
+    wrench : what acts on the end effector from outside, in the base frame: (..., 6), force and moment, or (..., 3), a
+        force alone (the only choice where the end effector is a joint). Its batch goes with that of the solution, as
+        NumPy broadcasts.
+    at : the point that the force acts at, and the moment is about, (..., 3) [length], in the base frame; the reference
+        point by default.
+    loads : body -> (mass, centre), for its weight; (force, point) or (wrench, point) for what else acts on it, in the
+        base frame. Points are those of the body at home, in base coordinates [length].
+    gravity : of masses, (3,), in units of force per mass.
+
+    Raises
+    ------
+    InvalidArgument, UnknownName : a wrong shape, numbers that are not finite, no such body.
+    """
+    mechanism = checked_solution(solution).mechanism
+    question = _Question(
+        solution, asked_of(solution, wrench, at), checked_loads(mechanism, loads), checked_gravity(gravity)
+    )
+    asked, maps = question.asked, maps_of(solution)
+    places = asked.places
+    reasons = no_reasons(len(places))
+    add_reason(reasons, ~maps.is_valid[places], NO_CONFIGURATION)
+    actuators = np.full((len(places), len(mechanism.actuator_names)), np.nan)
+    is_quick = maps.is_regular[places] & (not question.loads)
+    forward = maps.forward[places[is_quick]]
+    actuators[is_quick] = -np.einsum("nra,nr->na", forward, asked.wrenches[is_quick, : forward.shape[1]])
+    rest = np.flatnonzero(maps.is_valid[places] & ~is_quick)
+    if len(rest):
+        q = solution._configurations.coordinates_at(places[rest])
+        found = _balanced(question, q, rest)
+        actuators[rest] = found.actuators[..., 0] / actuator_units(mechanism)
+        add_reason(reasons, rest[found.is_singular], GAINS_MOTION)
+        add_reason(reasons, rest[found.is_idle[:, 0]], FREE_PART)
+        add_reason(reasons, rest[~found.is_held[:, 0]], gives_way_in_words(mechanism))
+        actuators[has_reason(reasons)] = np.nan
+    return Forces(
+        shaped(actuators, asked.shape),
+        is_redundantly_actuated(mechanism),
+        in_shape(reasons, asked.shape),
+        question,
+    )
+
+
+def _balanced(question: _Question, q: Floats, rows: slice | NDArray[np.intp]) -> Balance:
+    """The equilibrium of some rows at their coordinates q, (n, c)."""
+    mechanism = question.solution.mechanism
+    wrenches = question.asked.wrenches[rows]
+    return balance(mechanism, q, carried_of(mechanism, q, wrenches, question.loads, question.gravity)[..., None])

@@ -1,0 +1,123 @@
+"""Velocity and force factors: from the actuators to the end effector, or to a joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..answers.solution import Solution, checked_solution
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+from ..motion.displacements import columns, rate_units
+from ..motion.joint_rates import graph_of
+from ..motion.mobility import generic_of
+from ..tolerances import TOLERANCES
+from .first_order_maps import Maps, maps_of
+from .joint_balance import pairs_of
+from .reasons import Reasons, has_reason, in_shape
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """Speeds in k directions that are square to each other, the fastest first, per speed of the actuators.
+
+    Attributes
+    ----------
+    velocity : factors: the speed when the actuators' rates have a sum of squares of 1, (..., k). 0 where what moves is
+        at rest in that direction.
+    directions : unit vectors of these, (..., 3, k), in the base frame; of a joint's coordinates, (..., coordinates, k).
+    actuators : the actuators' rates that make them, (..., n_a, k).
+    """
+
+    velocity: Floats
+    directions: Floats
+    actuators: Floats
+
+    @property
+    def force(self) -> Floats:
+        """The force in each direction that actuator forces with a sum of squares of 1 hold, (..., k): 1 / velocity."""
+        return np.divide(1.0, self.velocity, out=np.full_like(self.velocity, np.inf), where=self.velocity != 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Transmission:
+    """Factors of translation and rotation, as `transmission` returns them.
+
+    Attributes
+    ----------
+    rates : velocities per actuator rate, (..., r, n_a): of the end effector [length/s, then rad/s], as of
+        `forward_jacobian`; of a joint, of its coordinates.
+    translation, rotation : the factors of each apart. Whatever the other does: a translation is that of the reference
+        point, which may turn as well. Their forces are those without a moment, or moments without a force.
+    reason : why nothing is known, (...), with NaN in the numbers; empty elsewhere. A text for a single answer.
+    """
+
+    rates: Floats
+    translation: Factors
+    rotation: Factors
+    reason: str | Reasons
+
+
+def transmission(solution: Solution, joint: str | None = None) -> Transmission:
+    """Velocity and force factors of the end effector, or of a passive joint, at a configuration or a batch.
+
+    The singular values s of V = F dq, with the forward Jacobian F, translation and rotation apart; forces have the
+    factors 1 / s in the same directions, since t = -F' w.
+
+    Parameters
+    ----------
+    joint : a joint's name, for the rates of its coordinates; of a spherical one, the angular velocity of its second
+        body relative to its first, in the base frame.
+
+    Raises
+    ------
+    UnknownName : no joint of that name.
+    """
+    mechanism = checked_solution(solution).mechanism
+    maps = maps_of(solution)
+    rates, turns = maps.forward.copy(), np.arange(maps.forward.shape[1]) >= 3
+    if joint is not None:
+        mechanism.joint(joint)
+        turns = np.array([each.kind == "angle" for each in mechanism.coordinates])[columns(mechanism)[joint]]
+        rates = _of_joint(solution, maps, joint)
+    reasons = maps.reasons
+    rates[has_reason(reasons)] = np.nan
+    shape, most = solution.shape, _ranks(mechanism) if joint is None else (3, 3)
+    return Transmission(
+        rates.reshape(shape + rates.shape[1:]),
+        _factors(rates[:, ~turns], most[0], shape),
+        _factors(rates[:, turns], most[1], shape),
+        in_shape(reasons, shape),
+    )
+
+
+def _of_joint(solution: Solution, maps: Maps, joint: str) -> Floats:
+    """Rates of a joint's coordinates per actuator rate, (n, own, n_a)."""
+    mechanism = solution.mechanism
+    q, column = np.where(maps.is_valid[:, None], solution._coordinates, 0.0), columns(mechanism)[joint]
+    pairs, units = pairs_of(mechanism, q), rate_units(mechanism)
+    of_joints = graph_of(mechanism).rates.T[column] @ pairs.of_joints
+    rates = of_joints @ np.linalg.pinv(pairs.rates, rcond=TOLERANCES.singular)
+    actuators = units[[drive.column for drive in mechanism.drives]]
+    return np.asarray(rates * units[column][:, None] / actuators)
+
+
+def _ranks(mechanism: Mechanism) -> tuple[int, int]:
+    """In how many directions the end effector translates and turns, in general."""
+    generic = generic_of(mechanism)
+    parts = generic.directions[:3], generic.directions[3:]
+    ranks = [int(np.linalg.matrix_rank(part, tol=TOLERANCES.alignment)) if part.size else 0 for part in parts]
+    return min(ranks[0], generic.mobility.platform), min(ranks[1], generic.mobility.platform)
+
+
+def _factors(rates: Floats, most: int, shape: tuple[int, ...]) -> Factors:
+    """The factors of maps (n, r, n_a), at most so many, in the shape of a batch."""
+    rows, actuators = rates.shape[1:]
+    k = min(rows, actuators, most)
+    is_known = np.asarray(~np.isnan(rates).any(axis=(1, 2)))
+    left, values, right = np.linalg.svd(np.where(is_known[:, None, None], rates, 0.0), full_matrices=False)
+    found = values[:, :k], left[..., :k], np.swapaxes(right[:, :k], -1, -2)
+    for array in found:
+        array[~is_known] = np.nan
+    return Factors(*(array.reshape(shape + array.shape[1:]) for array in found))

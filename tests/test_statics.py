@@ -1,0 +1,643 @@
+"""Forces hold what they say they hold; factors, stiffness and accuracy follow from them, by oracles of their own."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import warnings
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from in_mujoco import Model
+from machines import closure
+from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
+from pfabrik.files.units import metres_of
+from pfabrik.interop import to_mjcf
+from pfabrik.interop.referee_configurations import reached_at_random
+
+Array = NDArray[np.float64]
+QUICK = ("stewart", "five_bar", "orthoglide", "tricept", "rps")
+FEW, ALL = 4, 50
+POSES = [FEW, pytest.param(ALL, marks=pytest.mark.campaign)]
+
+
+def named(*names: str) -> list[object]:
+    """Names of machines as parameters: those that take their time as plain Python are marked as slow."""
+    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in names]
+
+
+class Weighed:
+    """A machine of bodies with masses in MuJoCo, which says what its actuators have to exert at rest."""
+
+    def __init__(self, mechanism: pf.Mechanism) -> None:
+        self.mechanism, self.metres = mechanism, metres_of(mechanism.length_unit)
+        moving = [body for body in mechanism.bodies if body != mechanism.base]
+        self.masses = {body: 0.5 + 0.25 * place for place, body in enumerate(moving)}
+        self.model = Model.of(to_mjcf(mechanism, masses=self.masses, gravity=(0, 0, -9.81)))
+        doubles = [i for i in range(1, self.model.model.nbody) if self.model.model.body(i).name not in self.masses]
+        self.model.model.body_mass[doubles] = 0.0
+        self.model.update()
+        self.centres = {body: np.array(self.model.data.body(body).xipos) / self.metres for body in moving}
+
+    @property
+    def loads(self) -> dict[str, tuple[float, Array]]:
+        return {body: (mass, self.centres[body]) for body, mass in self.masses.items()}
+
+    def actuators(self, solution: pf.Solution, wrench: Array) -> Array:
+        """Forces [N] and torques [N mm or the like] at rest: those that MuJoCo's loops leave to actuators."""
+        names, model, data = self.mechanism.actuator_names, self.model.model, self.model.data
+        turning = np.array([self.mechanism.joint(name).type == "revolute" for name in names])
+        gap = self.model.lead(names, solution.actuators * np.where(turning, 1.0, self.metres))
+        assert gap < 1e-12
+        position, _ = self.model.pose("reference_point", "site")
+        np.testing.assert_allclose(position, solution.pose[:3, 3] * self.metres, atol=1e-9)
+        mujoco.mj_forward(model, data)
+        _, loops = self.model.rows()
+        linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jacSite(model, data, linear, angular, model.site("reference_point").id)
+        needed = data.qfrc_bias - linear.T @ wrench[:3] - angular.T @ wrench[3:] * self.metres
+        driven = [int(model.joint(name).dofadr[0]) for name in names]
+        passive = np.setdiff1d(np.arange(model.nv), driven)
+        multipliers = np.linalg.lstsq(loops[:, passive].T, needed[passive], rcond=1e-10)[0]
+        assert np.abs(loops[:, passive].T @ multipliers - needed[passive]).max() < 1e-7
+        exerted = needed[driven] - loops[:, driven].T @ multipliers
+        return exerted / np.where(turning, self.metres, 1.0)
+
+
+@pytest.mark.parametrize("name", named("stewart", "delta", "rps", "hexaglide", "tricept", "five_bar", "orthoglide"))
+@pytest.mark.parametrize("poses", POSES)
+def test_actuators_exert_what_mujoco_needs_to_rest(name: str, poses: int) -> None:
+    mechanism = pf.load(name)
+    weighed, rng = Weighed(mechanism), np.random.default_rng(2)
+    for solution in reached_at_random(mechanism, poses, rng):
+        wrench = rng.uniform(-50, 50, 6) * np.repeat([1.0, mechanism.characteristic_length], 3)
+        given = wrench
+        if mechanism.end_effector_is_joint:
+            wrench[3:], given = 0.0, wrench[:3]
+        expected = weighed.actuators(solution, wrench)
+        found = pf.forces(solution, given, loads=weighed.loads)
+        assert found.reason == ""
+        np.testing.assert_allclose(found.actuators, expected, atol=1e-5 * np.abs(expected).max())
+
+
+def rows_of(machine: pf.Mechanism, count: int = 4) -> list[pf.Solution]:
+    return reached_at_random(machine, count, np.random.default_rng(5))
+
+
+def cabled(count: int = 2) -> list[pf.Solution]:
+    """Configurations of `cables`."""
+    machine, rng = cables(), np.random.default_rng(5)
+    shifts, turns = rng.uniform(-90, 90, (count, 3)), rng.uniform(-0.2, 0.2, (count, 3))
+    targets = pf.pose(machine.reference_point + shifts, rotvec=turns)
+    return list(pf.solve_ik(machine, targets))
+
+
+@cache
+def cables() -> pf.Mechanism:
+    """A body on eight cables in a frame."""
+    corners = np.array(list(itertools.product((-500.0, 500.0), (-400.0, 400.0), (0.0, 600.0))))
+    shares = np.where(corners[:, 2:] == 0.0, [0.12, 0.05, 0.0], [0.04, 0.15, 0.0])
+    ends = corners * shares + [0.0, 0.0, 300.0] + (300.0 - corners) * [0.0, 0.0, 0.15]
+    return pf.Mechanism.from_legs("U-P*-S", base=corners, platform=ends, stroke=(10, 2000), reference_point=(0, 0, 300))
+
+
+def struts_jacobian(solution: pf.Solution) -> Array:
+    """Rates of strut lengths per twist, from the points of a machine of struts alone, (n_a, 6)."""
+    machine, rows = solution.mechanism, []
+    for name in machine.actuator_names:
+        start, end = (solution.points[joint.name] for joint in machine.ends_along(machine.joint(name)))
+        along = (end - start) / np.linalg.norm(end - start)
+        rows.append(np.r_[along, np.cross(end - solution.pose[:3, 3], along)])
+    return np.array(rows)
+
+
+def test_forces_of_struts_are_those_of_their_lines() -> None:
+    machine = pf.load("stewart")
+    for solution in rows_of(machine):
+        wrench = np.array([10.0, -20.0, 30.0, 400.0, 500.0, -600.0])
+        expected = -np.linalg.solve(struts_jacobian(solution).T, wrench)
+        np.testing.assert_allclose(pf.forces(solution, wrench).actuators, expected, rtol=1e-9)
+        point = solution.pose[:3, 3] + [3.0, -40.0, 20.0]
+        moved = np.r_[wrench[:3], wrench[3:] + np.cross(solution.pose[:3, 3] - point, wrench[:3])]
+        np.testing.assert_allclose(pf.forces(solution, moved, at=point).actuators, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", named(*(name for name in pf.catalog() if name != "snake60")))
+def test_power_in_is_power_out(name: str) -> None:
+    """What is done by the wrench, for any rates of the actuators: the two ways to forces do the same."""
+    machine, rng = pf.load(name), np.random.default_rng(1)
+    for solution in rows_of(machine, 2):
+        wrench = rng.uniform(-1, 1, 3 if machine.end_effector_is_joint else 6)
+        forward = pf.forward_jacobian(solution)
+        rates = rng.uniform(-1, 1, forward.shape[1])
+        both = (
+            pf.forces(solution, wrench),
+            pf.forces(solution, wrench, loads={machine.end_effector_body: (0.0, machine.reference_point)}),
+        )
+        scale = np.abs(forward * wrench[:, None] * rates).sum()
+        for found, most in zip(both, (1e-12, 1e-9), strict=True):
+            assert abs(found.actuators @ rates + wrench @ forward @ rates) <= most * scale
+
+
+@pytest.mark.parametrize(
+    "name", named("stewart", "delta", "tricept", "psu", "canfield", "g1_ankle", "reachy_mini", "panda")
+)
+def test_reactions_hold_every_body_and_no_free_motion(name: str) -> None:
+    machine = pf.load(name)
+    body = next(body for body in machine.bodies if body not in (machine.base, machine.end_effector_body))
+    pin = next(joint for joint in machine.joints if body in joint.connects and joint.at is not None)
+    for solution in rows_of(machine, 2):
+        wrench, force = np.array([10.0, -20.0, 30.0, 400.0, 500.0, -600.0]), np.array([1.0, 2.0, -50.0])
+        found = pf.forces(solution, wrench, loads={body: (force, pin.at)})
+        assert (found.reason, found.undetermined) == ("", "")
+        left = {each: np.zeros(6) for each in machine.bodies}
+        left[machine.end_effector_body] += wrench
+        left[body] += np.r_[force, np.cross(solution.points[pin.name] - solution.pose[:3, 3], force)]
+        size = np.abs(np.array(list(found.reactions.values()))).max()
+        for joint in machine.joints:
+            reaction, at = found.reactions[joint.name], centre(solution, joint)
+            about = reaction + np.r_[np.zeros(3), np.cross(at - solution.pose[:3, 3], reaction[:3])]
+            left[joint.connects[0]] -= about
+            left[joint.connects[1]] += about
+            if joint.type == "spherical":
+                assert np.abs(reaction[3:]).max() <= 1e-9 * size
+            if joint.type == "prismatic" and joint.driven and joint.along:
+                ends = [solution.points[each.name] for each in machine.ends_along(joint)]
+                along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+                exerted = found.actuators[machine.actuator_names.index(joint.name)]
+                assert reaction[:3] @ along == pytest.approx(exerted, abs=1e-9 * size)
+        del left[machine.base]
+        assert max(np.abs(wrench).max() for wrench in left.values()) <= 1e-9 * size
+
+
+def centre(solution: pf.Solution, joint: pf.Joint) -> Array:
+    """What the moment of a joint's reaction is about."""
+    if joint.at is not None:
+        return np.asarray(solution.points[joint.name])
+    return np.asarray(solution.points[joint.along[0]] if joint.along else solution.pose[:3, 3])
+
+
+def test_a_five_bar_pulls_along_its_forearms_and_says_what_it_does_not_know() -> None:
+    machine = pf.load("five_bar")
+    for solution in rows_of(machine):
+        force = np.array([0.0, 7.0, -20.0])
+        tip, elbows = solution.points["p3"], [solution.points["p2"], solution.points["p4"]]
+        along = np.array([(tip - elbow) / np.linalg.norm(tip - elbow) for elbow in elbows])
+        pulls = np.linalg.solve(along[:, 1:].T, force[1:])
+        found = pf.forces(solution, force)
+        np.testing.assert_allclose([found.rods["link2"], found.rods["link3"]], pulls, rtol=1e-9)
+        cranks = [solution.points["p1"], solution.points["p5"]]
+        torques = [-np.cross(e - c, p * a)[0] for e, c, p, a in zip(elbows, cranks, pulls, along, strict=True)]
+        np.testing.assert_allclose(found.actuators, torques, rtol=1e-9)
+        reaction = found.reactions["p2"]
+        np.testing.assert_allclose(reaction[1:3], -pulls[0] * along[0][1:], rtol=1e-9)
+        assert np.isnan(reaction[[0, 4, 5]]).all()
+        assert "p2 fx" in found.undetermined
+
+
+def test_at_a_parallel_singularity_only_what_does_no_work_is_held() -> None:
+    """Forearms of 145 mm in line, cranks of 110 mm at 50 mm either side: the tip is as high as the elbows."""
+    machine = pf.load("five_bar").without_limits()
+    height = np.sqrt(110.0**2 - 95.0**2)
+    flat = pf.solve_ik(machine, [0, 0, height])
+    assert flat
+    assert pf.singularity(flat).kinds == ("parallel",)
+    lifted = pf.forces(flat, [0, 0, 5.0])
+    assert np.isnan(lifted.actuators).all()
+    assert "parallel singularity" in str(lifted.reason)
+    assert np.isnan(lifted.reactions["p2"]).all()
+    along = pf.forces(flat, [0, 5.0, 0])
+    assert along.reason == ""
+    np.testing.assert_allclose(along.actuators, [5.0 * height / 2, 5.0 * height / 2], rtol=1e-6)
+    for other in (
+        pf.wrench_capacity(flat, 5.0),
+        pf.transmission(flat),
+        pf.stiffness(flat, 5.0),
+        pf.accuracy(flat, 0.1),
+    ):
+        assert "parallel singularity" in str(other.reason)
+    both = pf.solve_ik(machine, [[0, 0, height], [0, 0, 200]])
+    stiff = pf.stiffness(both, 5.0)
+    assert list(np.isnan(stiff.matrix).any(axis=(1, 2))) == [True, False]
+    np.testing.assert_allclose(stiff.matrix[1], pf.stiffness(both[1], 5.0).matrix, rtol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_at_a_constraint_singularity_nothing_is_said() -> None:
+    machine = closure.h4()
+    home = pf.solve_ik(machine, machine.home_pose)
+    assert pf.singularity(home).kinds == ("constraint",)
+    for found in (pf.forces(home, [0, 0, -5.0]), pf.transmission(home), pf.stiffness(home, 5.0, rods=5.0)):
+        assert "constraint singularity" in str(found.reason)
+    assert np.isnan(pf.forces(home, [0, 0, -5.0]).actuators).all()
+
+
+def test_a_stretched_leg_holds_without_its_motor() -> None:
+    """At the border of what a 5-bar reaches, its forearms are in line with their cranks: no motor moves the tip."""
+    machine = pf.load("five_bar").without_limits()
+    top = pf.solve_ik(machine, [0, 0, np.sqrt(255.0**2 - 50.0**2)])
+    assert top
+    assert "serial" in pf.singularity(top).kinds
+    np.testing.assert_allclose(pf.forces(top, [0, 0, -20.0]).actuators, 0.0, atol=1e-3)
+    lifted = pf.stiffness(top, 100.0)
+    assert (lifted.reason, lifted.rigid) == ("", 3)
+    assert float(pf.wrench_capacity(top, 5.0).radius) > 1e4
+
+
+def test_redundant_actuators_share_with_the_least_norm() -> None:
+    for solution in cabled():
+        jacobian, wrench = struts_jacobian(solution), np.array([10.0, -20.0, 0.0, 0.0, 0.0, 300.0])
+        found = pf.forces(solution, wrench)
+        assert found.is_least_norm
+        assert found.undetermined == ""
+        np.testing.assert_allclose(found.actuators, -np.linalg.lstsq(jacobian.T, wrench, rcond=1e-9)[0], atol=1e-9)
+    planar = pf.solve_ik(closure.planar_4rpr(), pf.pose([10, -5, 0], rotvec=[0, 0, 0.1]))
+    points = [(planar.points[f"R{leg}.1"], planar.points[f"R{leg}.3"]) for leg in (1, 2, 3, 4)]
+    along = np.array([(end - start) / np.linalg.norm(end - start) for start, end in points])
+    arms = np.array([end for _, end in points]) - planar.pose[:3, 3]
+    rows = np.c_[along[:, :2], np.cross(arms, along)[:, 2]]
+    found = pf.forces(planar, [10.0, -20.0, 0.0, 0.0, 0.0, 300.0])
+    np.testing.assert_allclose(found.actuators, -np.linalg.lstsq(rows.T, [10.0, -20.0, 300.0])[0], atol=1e-9)
+    assert "overconstraint" in found.undetermined
+    plane = pf.wrench_capacity(planar, 50.0)
+    assert reach(rows, np.asarray(plane.weakest)[:2], 50.0) == pytest.approx(plane.radius, rel=1e-9)
+    ways = np.linspace(0.0, 2.0 * np.pi, 30)
+    assert min(reach(rows, np.array([np.cos(way), np.sin(way)]), 50.0) for way in ways) >= plane.radius
+
+
+def reach(rows: Array, way: Array, limit: float) -> float:
+    """The force without a moment that planar struts hold in a direction: a linear programme."""
+    held, bounds = np.hstack([np.r_[way, 0.0][:, None], rows.T]), [(0.0, None)] + [(-limit, limit)] * 4
+    return -float(linprog(np.r_[-1.0, np.zeros(4)], A_eq=held, b_eq=np.zeros(3), bounds=bounds).fun)
+
+
+def most(normal: Array, jacobian: Array, low: float, high: float) -> float:
+    """The largest normal . f of forces f, without a moment, that actuators hold within limits: a linear programme."""
+    n = len(jacobian)
+    cost, held = np.r_[-normal, np.zeros(n)], np.hstack([np.vstack([np.eye(3), np.zeros((3, 3))]), jacobian.T])
+    answer = linprog(cost, A_eq=held, b_eq=np.zeros(6), bounds=[(None, None)] * 3 + [(low, high)] * n)
+    assert answer.status == 0
+    return -float(answer.fun)
+
+
+@pytest.mark.parametrize(("name", "low", "high"), [("stewart", -40.0, 90.0), ("cables", -300.0, -10.0)])
+def test_what_can_be_held_is_what_linear_programmes_find(name: str, low: float, high: float) -> None:
+    rng = np.random.default_rng(3)
+    for solution in cabled() if name == "cables" else rows_of(pf.load(name), 2):
+        found, jacobian = pf.wrench_capacity(solution, (low, high)), struts_jacobian(solution)
+        vertices = found.vertices
+        assert isinstance(vertices, np.ndarray)
+        for normal in rng.standard_normal((10, 3)):
+            assert (vertices @ normal).max() == pytest.approx(most(normal, jacobian, low, high), rel=1e-7)
+        weakest = np.asarray(found.weakest)
+        assert found.radius == pytest.approx(most(weakest, jacobian, low, high), rel=1e-7)
+        assert all(found.holds(vertices))
+        assert not found.holds(1.001 * float(found.radius) * weakest)
+
+
+def test_capacity_beside_a_load_is_what_is_left_of_it() -> None:
+    machine = pf.load("stewart")
+    solution, weight = pf.solve_ik(machine, [10, 5, 195]), np.array([0.0, 0.0, -60.0])
+    point = solution.pose[:3, 3] + [0.0, 0.0, 50.0]
+    limits = {name: (-40.0, 80.0 + place) for place, name in enumerate(machine.actuator_names)}
+    for of in ("force", "moment", "wrench"):
+        found = pf.wrench_capacity(solution, limits, of=of, wrench=weight, at=point)
+        rng, width = np.random.default_rng(0), found.normals.shape[-1]
+        for x in rng.standard_normal((200, width)) * (60.0 if of == "force" else 3000.0):
+            load = np.r_[weight, np.zeros(3)]
+            load[{"force": slice(0, 3), "moment": slice(3, 6), "wrench": slice(0, 6)}[of]] += x
+            exerted = pf.forces(solution, load, at=point).actuators
+            low, high = np.array(list(limits.values())).T
+            assert found.holds(x) == bool(((exerted >= low) & (exerted <= high)).all())
+    heavy = pf.wrench_capacity(solution, 20.0, of="moment", wrench=[0, 0, -1000])
+    assert float(heavy.radius) < 0.0
+    assert len(heavy.vertices) == 0
+
+
+def test_pycapacity_has_the_same_vertices() -> None:
+    robot = pytest.importorskip("pycapacity.robot")
+    for solution in rows_of(pf.load("stewart"), 2):
+        own = pf.wrench_capacity(solution, (-40.0, 90.0)).vertices
+        moved = -pf.forward_jacobian(solution)[:3]
+        theirs = robot.force_polytope(moved, np.full(6, 90.0), np.full(6, -40.0)).vertices.T
+        assert isinstance(own, np.ndarray)
+        distances = np.linalg.norm(own[:, None] - theirs, axis=-1)
+        assert max(distances.min(axis=0).max(), distances.min(axis=1).max()) < 1e-6
+
+
+def test_one_sided_limits_leave_polytopes_open() -> None:
+    machine = pf.load("orthoglide")
+    found = pf.wrench_capacity(pf.solve_ik(machine, [0, 0, 0]), (-np.inf, 50.0))
+    assert found.radius == pytest.approx(50.0)
+    np.testing.assert_allclose(found.vertices, [[-50.0, -50.0, -50.0]], atol=1e-9)
+    assert pf.wrench_capacity(pf.solve_ik(machine, [0, 0, 0]), np.inf).radius == np.inf
+
+
+def test_the_orthoglide_has_its_published_factors() -> None:
+    """Chablat and Wenger, 2003: between 1/2 and 2 in a cube of 200 mm, 1 where the legs are square to each other."""
+    machine, ends = pf.load("orthoglide"), (-126.79491924, 73.20508076)
+    cube = np.stack(np.meshgrid(*[np.linspace(*ends, 7)] * 3), axis=-1)
+    found = pf.transmission(pf.solve_ik(machine, cube)).translation
+    assert found.velocity.shape == (7, 7, 7, 3)
+    assert found.velocity.min() == pytest.approx(0.5, abs=1e-6)
+    assert found.velocity.max() == pytest.approx(2.0, abs=1e-6)
+    np.testing.assert_allclose(found.force, 1.0 / found.velocity)
+    here = pf.transmission(pf.solve_ik(machine, [0, 0, 0]))
+    np.testing.assert_allclose(here.translation.velocity, 1.0, rtol=1e-9)
+    assert here.rotation.velocity.shape == (0,)
+
+
+def skewed() -> pf.Mechanism:
+    """A hexapod on universal joints whose axes are not square to each other."""
+    base = np.array([[c * 150.0, s * 150.0, 0.0] for c, s in map(circle, (0.1, 2.0, 2.2, 4.1, 4.3, 6.2))])
+    top = np.array([[c * 70.0, s * 70.0, 200.0] for c, s in map(circle, (0.8, 1.3, 2.9, 3.4, 5.0, 5.5))])
+    axes = {"axes": [[1, 0, 0], [0.6, 1, 0.2]]}
+    return pf.Mechanism.from_legs("U-P*-S", base=base, platform=top, reference_point=(0, 0, 200), A=axes)
+
+
+@pytest.mark.parametrize("name", named("delta", "five_bar", "stewart", "orthoglide", "skewed"))
+def test_rates_of_joints_are_those_of_answers_side_by_side(name: str) -> None:
+    machine = skewed() if name == "skewed" else pf.load(name).without_limits()
+    small = 1e-5
+    for solution in rows_of(machine, 2):
+        steps = np.concatenate([np.eye(len(solution.actuators)), -np.eye(len(solution.actuators))]) * small
+        near = pf.solve_fk(machine, solution.actuators + steps, start=solution)
+        for joint in machine.joints:
+            if joint.type == "spherical":
+                continue
+            values = np.reshape(near.joints[joint.name], (2, len(solution.actuators), -1))
+            found = pf.transmission(solution, joint.name)
+            expected = (values[0] - values[1]).T / (2.0 * small)
+            np.testing.assert_allclose(found.rates, expected, atol=1e-5 * max(1.0, np.abs(expected).max()))
+
+
+def test_stiffness_of_struts_is_that_of_their_springs() -> None:
+    machine, k = pf.load("stewart"), np.array([100.0, 120.0, 90.0, 200.0, 50.0, 70.0])
+    for solution in rows_of(machine):
+        jacobian, found = struts_jacobian(solution), pf.stiffness(solution, k)
+        np.testing.assert_allclose(found.matrix, jacobian.T @ np.diag(k) @ jacobian, rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(found.matrix @ found.compliance, np.eye(6), atol=1e-7)
+        assert found.rigid == 0
+
+
+def test_slack_cables_have_no_stiffness() -> None:
+    machine = cables()
+    for solution in cabled():
+        jacobian, forces = struts_jacobian(solution), np.array([-5.0, -5, -5, -5, -5, -5, 1.0, 0.0])
+        springs = np.diag(np.where(forces < 0.0, 50.0, 0.0))
+        found = pf.stiffness(solution, 50.0, cables=machine.actuator_names, forces=forces)
+        np.testing.assert_allclose(found.matrix, jacobian.T @ springs @ jacobian, rtol=1e-7, atol=1e-3)
+        whole = pf.stiffness(solution, 50.0)
+        np.testing.assert_allclose(whole.matrix, 50.0 * jacobian.T @ jacobian, rtol=1e-7, atol=1e-3)
+        forces[:3] = 2.0
+        slack = pf.stiffness(solution, 50.0, cables=machine.actuator_names, forces=forces)
+        assert "slack" in str(slack.reason)
+        assert np.isnan(slack.compliance).all()
+        springs = np.diag(np.where(forces < 0.0, 50.0, 0.0))
+        np.testing.assert_allclose(slack.matrix, jacobian.T @ springs @ jacobian, rtol=1e-7, atol=1e-3)
+
+
+def test_rods_that_stretch_are_as_soft_as_slides_in_them() -> None:
+    """The same machine with a spring in each rod, as a twelfth actuator, has stiffness from actuators alone."""
+    base = np.array([[c * 150.0, s * 150.0, 0.0] for c, s in map(circle, (0.1, 2.0, 2.2, 4.1, 4.3, 6.2))])
+    top = np.array([[c * 70.0, s * 70.0, 200.0] for c, s in map(circle, (0.8, 1.3, 2.9, 3.4, 5.0, 5.5))])
+    via = base + [30.0, -10.0, 60.0] + 0.5 * (top - base) * [1, 1, 0]
+    made = {"base": base, "platform": top, "via": via, "axis": [0.2, 1.0, 0.1], "reference_point": (0, 0, 200)}
+    rigid, sprung = (pf.Mechanism.from_legs(chain, **made) for chain in ("R*-U-S", "R*-U-P*-S"))
+    here, same = (pf.solve_ik(machine, machine.home_pose) for machine in (rigid, sprung))
+    k = {name: 300.0 if sprung.joint(name).type == "prismatic" else 4e4 for name in sprung.actuator_names}
+    expected, found = pf.stiffness(same, k), pf.stiffness(here, 4e4, rods=300.0)
+    np.testing.assert_allclose(found.compliance, expected.compliance, atol=1e-9 * np.abs(expected.compliance).max())
+    assert np.abs(pf.stiffness(here, 4e4).matrix).max() > 1.1 * np.abs(found.matrix).max()
+
+
+def circle(angle: float) -> tuple[float, float]:
+    return float(np.cos(angle)), float(np.sin(angle))
+
+
+def test_rods_of_an_overconstrained_machine_share_what_equilibrium_does_not_tell() -> None:
+    orthoglide = pf.load("orthoglide")
+    found = pf.stiffness(pf.solve_ik(orthoglide, [[0, 0, 0], [5, 0, 0]]), 5.0, rods=5.0)
+    assert all("does not determine" in reason for reason in found.reason)
+    assert np.isnan(found.matrix).all()
+    flat = pf.stiffness(pf.solve_ik(pf.load("five_bar"), [0, 0, 190]), 5e5, rods=20.0)
+    assert (flat.reason, flat.rigid) == ("", 1)
+
+
+def test_the_worst_error_is_that_of_forward_kinematics_at_the_worst_corner() -> None:
+    machine = pf.load("stewart").without_limits()
+    errors = dict(zip(machine.actuator_names, [2e-4, 1e-4, 3e-4, 1e-4, 2e-4, 4e-4], strict=True))
+    bounds = np.array(list(errors.values()))
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6))) * bounds
+    for solution in rows_of(machine, 2):
+        found = pf.accuracy(solution, errors)
+        exact = pf.solve_fk(machine, solution.actuators + corners, start=solution)
+        shifts = np.linalg.norm(exact.pose[:, :3, 3] - solution.pose[:3, 3], axis=1)
+        turns = Rotation.from_matrix(exact.pose[:, :3, :3] @ solution.pose[:3, :3].T).magnitude()
+        assert shifts.max() == pytest.approx(found.position, rel=1e-4)
+        assert turns.max() == pytest.approx(found.rotation, rel=1e-4)
+        assert found.actuators is not None
+        for pattern, sizes in zip(found.actuators, (shifts, turns), strict=True):
+            row = np.argmin(np.abs(corners - pattern).sum(axis=1))
+            assert sizes[row] == pytest.approx(sizes.max(), rel=1e-4)
+        chance = pf.accuracy(solution, errors, "rms")
+        inverse = np.linalg.inv(struts_jacobian(solution)) * bounds
+        np.testing.assert_allclose(chance.covariance, inverse @ inverse.T, rtol=1e-9, atol=1e-18)
+        assert chance.position == pytest.approx(np.sqrt((inverse[:3] ** 2).sum()))
+        assert float(chance.position) < float(found.position)
+
+
+def with_slides(machine: pf.Mechanism, name: str, side: int, axes: Array) -> pf.Mechanism:
+    """The machine with driven slides between one body of a joint and the joint: how far its centre is off."""
+    joints: list[pf.Joint] = []
+    for joint in machine.joints:
+        if joint.name != name:
+            joints.append(joint)
+            continue
+        bodies = [joint.connects[side], *(f"off{place}" for place in range(len(axes)))]
+        joints += [
+            pf.Joint(f"slide{place}", "prismatic", pair, axis=axis, actuated=True)
+            for place, (pair, axis) in enumerate(zip(itertools.pairwise(bodies), axes, strict=True))
+        ]
+        ends = (bodies[-1], joint.connects[1]) if side == 0 else (joint.connects[0], bodies[-1])
+        joints.append(dataclasses.replace(joint, connects=ends))
+    point = None if machine.end_effector_is_joint else machine.reference_point
+    return pf.Mechanism(machine.name, joints, machine.end_effector, point, task=machine.task)
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "side"),
+    [
+        ("stewart", "AR2", 0),
+        ("stewart", "CL3", 1),
+        pytest.param("delta", "BL1", 0, marks=pytest.mark.slow),
+        ("five_bar", "p2", 0),
+    ],
+)
+def test_play_of_a_joint_moves_the_machine_as_far_as_slides_in_it_do(name: str, joint: str, side: int) -> None:
+    machine, play = pf.load(name).without_limits(), 1e-3
+    axes = np.eye(3)[1:] if name == "five_bar" else np.eye(3)
+    moving = with_slides(machine, joint, side, axes)
+    found = pf.accuracy(pf.solve_ik(machine, machine.home_pose), {joint: play})
+    ways = np.random.default_rng(0).standard_normal((400, len(axes)))
+    ways *= play / np.linalg.norm(ways, axis=1, keepdims=True)
+    home = {drive.name: np.full(len(ways), drive.home) for drive in machine.drives}
+    moved = pf.solve_fk(moving, home | {f"slide{place}": way for place, way in enumerate(ways.T)})
+    assert moved
+    shifts = np.linalg.norm(moved.pose[:, :3, 3] - machine.reference_point, axis=1)
+    assert 0.98 * float(found.position) <= shifts.max() <= 1.001 * float(found.position)
+    if name == "five_bar":  # across its plane the loops hold it, however much play there is
+        assert np.asarray(found.components)[0] == pytest.approx(0.0, abs=1e-15)
+    both = pf.accuracy(pf.solve_ik(machine, machine.home_pose), {joint: play, machine.actuator_names[0]: 1e-3})
+    alone = pf.accuracy(pf.solve_ik(machine, machine.home_pose), {machine.actuator_names[0]: 1e-3})
+    assert max(found.position, alone.position) < float(both.position) <= found.position + alone.position + 1e-15
+
+
+def test_the_worst_of_many_actuators_is_at_a_corner() -> None:
+    """Of a chain with sixty hinges in a plane, all errors of one sign turn it most."""
+    snake = pf.load("snake60")
+    here = pf.solve_ik(snake, snake.home_pose)
+    found = pf.accuracy(here, 1e-3)
+    forward = pf.forward_jacobian(here)
+    assert found.actuators is not None
+    assert np.linalg.norm(forward[:3] @ found.actuators[0]) == pytest.approx(found.position)
+    for pattern in np.random.default_rng(0).choice([-1e-3, 1e-3], (500, 60)):
+        assert np.linalg.norm(forward[:3] @ pattern) <= found.position
+
+
+@pytest.mark.slow
+def test_answers_of_batches_are_those_of_their_rows() -> None:
+    machine = pf.load("delta")
+    targets = np.random.default_rng(0).uniform([-20, -20, -120], [20, 20, -90], (2, 3, 3))
+    targets[1, 2] = np.nan
+    batch = pf.solve_ik(machine, targets, options=pf.Options(on_invalid="mark"))
+    wrench = [1.0, 2.0, -30.0, 0.0, 0.0, 100.0]
+    together = (
+        pf.forces(batch, wrench),
+        pf.wrench_capacity(batch, 500.0),
+        pf.transmission(batch),
+        pf.transmission(batch, "BL1"),
+        pf.stiffness(batch, 1e5, rods=400.0),
+        pf.accuracy(batch, {"A1": 1e-3, "BL2": 0.1}),
+        pf.accuracy(batch, 1e-3, "rms"),
+    )
+    assert [answer.reason[1, 2] for answer in together] == ["the row is INVALID: it has no configuration"] * 7
+    assert np.isnan(together[0].reactions["BL1"][1, 2]).all()
+    assert np.isnan(together[0].actuators[1, 2]).all()
+    assert np.isnan(together[1].radius[1, 2])
+    assert len(together[1].vertices) == 6
+    one = batch[1, 0]
+    alone = (
+        pf.forces(one, wrench).actuators,
+        pf.wrench_capacity(one, 500.0).radius,
+        pf.transmission(one).translation.velocity,
+        pf.transmission(one, "BL1").rates,
+        pf.stiffness(one, 1e5, rods=400.0).matrix,
+        pf.accuracy(one, {"A1": 1e-3, "BL2": 0.1}).position,
+        pf.accuracy(one, 1e-3, "rms").components,
+    )
+    rows = (
+        together[0].actuators,
+        together[1].radius,
+        together[2].translation.velocity,
+        together[3].rates,
+        together[4].matrix,
+        together[5].position,
+        together[6].components,
+    )
+    for row, single in zip(rows, alone, strict=True):
+        np.testing.assert_allclose(row[1, 0], single, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(together[0].reactions["BL1"][1, 0], pf.forces(one, wrench).reactions["BL1"], rtol=1e-9)
+
+
+def test_no_rows_have_no_answers() -> None:
+    machine = pf.load("delta")
+    none = pf.solve_ik(machine, np.zeros((0, 3)))
+    assert pf.forces(none, [0, 0, 1.0]).reactions["BL1"].shape == (0, 6)
+    assert np.shape(pf.wrench_capacity(none, 1.0).radius) == (0,)
+    assert pf.transmission(none, "BL1").rates.shape == (0, 3, 3)
+    assert pf.stiffness(none, 1.0, rods=1.0).matrix.shape == (0, 6, 6)
+    assert np.shape(pf.accuracy(none, {"A1": 1.0, "BL1": 1.0}).position) == (0,)
+
+
+def test_many_wrenches_on_one_configuration() -> None:
+    here = pf.solve_ik(pf.load("stewart"), [0, 0, 190])
+    wrenches = np.random.default_rng(0).standard_normal((4, 1, 6))
+    found = pf.forces(here, wrenches, at=np.zeros((5, 3)))
+    assert found.actuators.shape == (4, 5, 6)
+    np.testing.assert_allclose(found.actuators[2, 3], pf.forces(here, wrenches[2, 0], at=np.zeros(3)).actuators)
+    assert found.reactions["AL1"].shape == (4, 5, 6)
+
+
+def test_too_few_actuators_and_parts_that_nothing_holds_are_said() -> None:
+    rods = pf.load("linear_delta")
+    here = pf.solve_ik(rods, rods.home_pose)
+    spun = pf.forces(here, [0, 0, -5], loads={"rodL1": ([0.0, 0, 0, 50, 60, 70], rods.joint("BL1").at)})
+    assert "neither the end effector nor an actuator holds" in str(spun.reason)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pf.errors.MobilityWarning)
+        joints = [dataclasses.replace(j, actuated=False) if j.name == "A1" else j for j in pf.load("delta").joints]
+        loose = pf.Mechanism("loose", joints, "platform", pf.load("delta").reference_point, task=("x", "y", "z"))
+    answer = pf.forces(pf.solve_ik(loose, loose.home_pose), [0, 0, -5.0])
+    assert "keeps 1 freedom" in str(answer.reason)
+
+
+WRONG = {
+    "solution: found Mechanism": lambda m, s: pf.forces(m, [0, 0, 1]),
+    "wrench: found shape (4,)": lambda m, s: pf.forces(s, [0, 0, 1, 2]),
+    "wrench: found numbers that are not finite": lambda m, s: pf.forces(s, [0, 0, np.nan]),
+    "wrench: found str of dtype": lambda m, s: pf.forces(s, "down"),
+    "wrench: found a batch of (2,)": lambda m, s: pf.forces(pf.solve_ik(m, [[0, 0, 190]] * 3), [[0, 0, 1]] * 2),
+    "at: found shape (2,)": lambda m, s: pf.forces(s, [0, 0, 1], at=[0, 0]),
+    "no body that moves named 'base'": lambda m, s: pf.forces(s, loads={"base": (1.0, [0, 0, 0])}),
+    "did you mean 'platform'": lambda m, s: pf.forces(s, loads={"platfrom": (1.0, [0, 0, 0])}),
+    "loads['platform']: found a mass of -1.0": lambda m, s: pf.forces(s, loads={"platform": (-1.0, [0, 0, 0])}),
+    "loads['platform']: found 5": lambda m, s: pf.forces(s, loads={"platform": 5}),
+    "loads['platform']: found a point of shape (2,)": lambda m, s: pf.forces(s, loads={"platform": (5, [0, 0])}),
+    "gravity: found shape ()": lambda m, s: pf.forces(s, [0, 0, 1], gravity=9.81),
+    "limits: found -5": lambda m, s: pf.wrench_capacity(s, -5.0),
+    "limits: found array([5., 1.]); expected a positive number": lambda m, s: pf.wrench_capacity(s, (5.0, 1.0)),
+    "limits: found nothing for BL2, BL3, BR1, BR2, BR3": lambda m, s: pf.wrench_capacity(s, {"BL1": 5.0}),
+    "no actuator named 'X1'": lambda m, s: pf.wrench_capacity(s, {"X1": 5.0}),
+    "of: found 'torque'": lambda m, s: pf.wrench_capacity(s, 5.0, of="torque"),
+    "of: found 'wrench'": lambda m, s: pf.wrench_capacity(s, 5.0, of="wrench").vertices,
+    "load: found shape (2,)": lambda m, s: pf.wrench_capacity(s, 5.0).holds([1.0, 2.0]),
+    "no joint named 'Z9'": lambda m, s: pf.transmission(s, "Z9"),
+    "k: found shape (2,)": lambda m, s: pf.stiffness(s, [1.0, 2.0]),
+    "k: found [0.0, 1.0": lambda m, s: pf.stiffness(s, [0.0, 1, 1, 1, 1, 1]),
+    "rods: found a stiffness": lambda m, s: pf.stiffness(s, 1.0, rods=5.0),
+    "forces: found None": lambda m, s: pf.stiffness(s, 1.0, cables=["BL1"]),
+    "cables: found 'B1'": lambda m, s: pf.stiffness(s, 1.0, cables="B1"),
+    "errors: found -0.1": lambda m, s: pf.accuracy(s, -0.1),
+    "errors['BL1']: found 0": lambda m, s: pf.accuracy(s, {"BL1": 0}),
+    "no actuator or joint named 'D1'": lambda m, s: pf.accuracy(s, {"D1": 1.0}),
+    "kind: found 'mean'": lambda m, s: pf.accuracy(s, 1.0, "mean"),
+}
+
+
+@pytest.mark.parametrize("sentence", WRONG)
+def test_a_wrong_call_says_so_in_one_sentence(sentence: str) -> None:
+    machine = pf.load("stewart")
+    with pytest.raises((InvalidArgument, UnknownName)) as caught:
+        WRONG[sentence](machine, pf.solve_ik(machine, [0, 0, 190]))
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_redundant_actuators_leave_open_is_refused() -> None:
+    here = pf.solve_ik(closure.planar_4rpr(), [0, 0, 0])
+    with pytest.raises(UnsupportedMechanism, match="more actuators than motions"):
+        pf.accuracy(here, {"R1.1": 0.1})
+    tip = pf.solve_ik(pf.load("five_bar"), [0, 0, 190])
+    with pytest.raises(InvalidArgument, match="the end effector is a joint"):
+        pf.forces(tip, np.zeros(6))
+    with pytest.raises(InvalidArgument, match="act on the centre of p3"):
+        pf.forces(tip, np.zeros(3), at=[0, 0, 0])
