@@ -6,7 +6,7 @@ READY := .venv/.ready
 STAMP := .venv/.installed
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
-.PHONY: demo reproduce docs test test-fast test-interpreted campaign check bench clean
+.PHONY: demo reproduce docs test test-tensors test-fast test-interpreted campaign check bench clean
 
 demo: $(READY)
 	@$(BIN)/pfabrik demo
@@ -30,6 +30,12 @@ test: $(STAMP)
 
 test-fast: $(STAMP)
 	@$(BIN)/python -m pytest -m "not slow and not campaign"
+
+# Files of tensors in PyTorch and JAX, which are large: in an environment of their own.
+test-tensors: $(STAMP)
+	@$(BIN)/python -m venv .venv/tensors
+	@.venv/tensors/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[tensors]' hypothesis pytest scipy
+	@.venv/tensors/bin/python -m pytest tests/test_tensors.py
 
 # The same tests with the kernels as plain Python: this run sees every line, so it measures coverage.
 test-interpreted: $(STAMP)

@@ -65,6 +65,8 @@ _NAMES = {
     "description.legs": ("Leg",),
     "description.mechanism": ("Cone", "Joint", "Mechanism"),
     "export.export_c": ("export_c",),
+    "export.ros2_control": ("export_ros2_control",),
+    "export.tensors": ("export_jax", "export_numpy", "export_tensors", "export_torch"),
     "feasibility": ("Feasibility", "feasibility"),
     "files": ("load", "save"),
     "fk": ("solve_fk",),
@@ -135,6 +137,13 @@ if TYPE_CHECKING:
     from .description.legs import Leg as Leg
     from .description.mechanism import Cone as Cone, Joint as Joint, Mechanism as Mechanism
     from .export.export_c import export_c as export_c
+    from .export.ros2_control import export_ros2_control as export_ros2_control
+    from .export.tensors import (
+        export_jax as export_jax,
+        export_numpy as export_numpy,
+        export_tensors as export_tensors,
+        export_torch as export_torch,
+    )
     from .feasibility import Feasibility as Feasibility, feasibility as feasibility
     from .files import load as load, save as save
     from .fk import solve_fk as solve_fk

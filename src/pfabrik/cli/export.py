@@ -14,10 +14,14 @@ from .printing import note
 
 FORMATS = ("c", "c-float", "mjcf", "linuxcnc", "klipper")
 NAMED = ("c", "c-float")
-"""Formats whose names begin with one that can be chosen."""
+"""Formats whose names begin with one that can be chosen, and that take joints."""
+
+BACKENDS = ("torch", "jax", "numpy")
 
 
-def text_of(mechanism: pf.Mechanism, form: str, name: str) -> str:
+def text_of(
+    mechanism: pf.Mechanism, form: str, name: str, joints: tuple[str, ...] | None = None, file: str = "FILE"
+) -> str:
     """The text of a mechanism in a format."""
     if form == "mjcf":
         from ..interop import to_mjcf
@@ -31,38 +35,120 @@ def text_of(mechanism: pf.Mechanism, form: str, name: str) -> str:
         from ..export.klipper import klipper
 
         return klipper(mechanism)
+    if form in BACKENDS:
+        from ..export.tensors import TASK, tensor_source
+
+        return tensor_source(mechanism, backend=form, joints=joints or TASK)
     from ..export.export_c import c_source
 
-    return c_source(mechanism, precision="float" if form == "c-float" else "double", name=name)
+    precision = "float" if form == "c-float" else "double"
+    return c_source(mechanism, precision=precision, name=name, joints=joints, file=file)
 
 
 @click.command()
 @click.argument("mech", type=MECH)
-@click.argument("form", metavar="FORMAT", type=click.Choice(FORMATS))
-@click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
-@click.option("--name", metavar="NAME", help="Of c, c-float: what every name in the file begins with.  [default: pfk]")
+@click.argument("words", metavar="[FORMAT]", nargs=-1)
+@click.option("-o", "--output", default="-", help="File to write a FORMAT to. Default: print it.", **OUTPUT)
+@click.option("--torch", help="Write a file of PyTorch tensors, with gradients.", **OUTPUT)
+@click.option("--jax", help="The same in JAX.", **OUTPUT)
+@click.option("--numpy", help="The same in NumPy, without gradients.", **OUTPUT)
+@click.option(
+    "--ros2-control",
+    "folder",
+    metavar="FOLDER",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Write a package with a transmission for ros2_control.",
+)
+@click.option(
+    "--joints",
+    metavar="NAME...",
+    multiple=True,
+    help="Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.",
+)
+@click.option(
+    "--name", metavar="NAME", help="Of c, c-float, --ros2-control: what names begin with.  [default: pfk, or FOLDER's]"
+)
 @force_option
-def export(mech: str, form: str, output: Path, name: str | None, force: bool) -> int:
+def export(
+    mech: str,
+    words: tuple[str, ...],
+    output: Path,
+    folder: Path | None,
+    joints: tuple[str, ...],
+    name: str | None,
+    force: bool,
+    **files: Path | None,
+) -> int:
     """Write a mechanism for another program.
 
     FORMAT is one of:
 
     \b
-    c         one file of C99: inverse and forward kinematics with every limit
+    c         one file of C99: inverse and forward kinematics, Jacobians and torques, with every limit
     c-float   the same in single precision
     mjcf      a MuJoCo model, which starts closed; what weighs and drives it is made up
     linuxcnc  HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile
     klipper   [printer] and [stepper_*] of a delta printer
+
+    In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --ros2-control.
     """
-    if name is not None and form not in NAMED:
-        raise click.UsageError(f"--name is of {' and '.join(NAMED)}: {form} has none")
-    refuse_existing(output, force)
-    check_outputs([("-o", output)], [Path(mech)])
-    text = text_of(load(mech), form, "pfk" if name is None else name)
-    with whole_file(output) as handle:
+    outputs = {backend: path for backend in BACKENDS if (path := files[backend]) is not None}
+    if words and not (outputs or folder):
+        form, words = words[0], words[1:]
+        if form not in FORMATS:
+            raise click.UsageError(f"'{form}' is no FORMAT: choose from {', '.join(FORMATS)}")
+        outputs = {form: output}
+    elif output != STANDARD:
+        raise click.UsageError("-o is of a FORMAT: give one")
+    if words and not joints:
+        raise click.UsageError(f"found {' '.join(words)}; expected one FORMAT, or names after --joints")
+    if not outputs and folder is None:
+        raise click.UsageError(f"expected a FORMAT ({', '.join(FORMATS)}), --torch, --jax, --numpy or --ros2-control")
+    joints += words
+    _check_settings(outputs, folder, name, joints)
+    for path in outputs.values():
+        refuse_existing(path, force)
+    check_outputs([(_option(form), path) for form, path in outputs.items()], [Path(mech)])
+    mechanism = load(mech)
+    for form, path in outputs.items():
+        file = "FILE" if path == STANDARD else path.name
+        _write(path, form, text_of(mechanism, form, "pfk" if name is None else name, joints or None, file))
+    if folder is not None:
+        _write_package(mechanism, folder, joints, name, force)
+    return 0
+
+
+def _option(form: str) -> str:
+    return f"--{form}" if form in BACKENDS else "-o"
+
+
+def _check_settings(outputs: dict[str, Path], folder: Path | None, name: str | None, joints: tuple[str, ...]) -> None:
+    """Stop where a setting is of no output."""
+    forms = [*outputs, *(["--ros2-control"] if folder else [])]
+    for form in forms:
+        if name is not None and form not in (*NAMED, "--ros2-control"):
+            raise click.UsageError(f"--name is of {', '.join(NAMED)} and --ros2-control: {form} has none")
+        if joints and form not in (*NAMED, *BACKENDS, "--ros2-control"):
+            raise click.UsageError(f"--joints is of {', '.join((*NAMED, *BACKENDS))} and --ros2-control, not of {form}")
+    if folder is not None and not joints:
+        raise click.UsageError("--ros2-control needs --joints: those of the robot's description, in series")
+
+
+def _write(path: Path, form: str, text: str) -> None:
+    with whole_file(path) as handle:
         handle.write(text)
-    if output != STANDARD:
-        click.echo(f"wrote {output}", err=True)
+    if path != STANDARD:
+        click.echo(f"wrote {path}", err=True)
     if form == "linuxcnc" and text.startswith("/*"):
         note("LinuxCNC has no kinematics that are this machine's: a module for it")
-    return 0
+
+
+def _write_package(
+    mechanism: pf.Mechanism, folder: Path, joints: tuple[str, ...], name: str | None, force: bool
+) -> None:
+    from ..export.ros2_control import prefix_of, ros2_control_texts
+
+    for place in ros2_control_texts(mechanism, joints, prefix_of(folder, name)):
+        refuse_existing(folder / place, force)
+    pf.export_ros2_control(mechanism, folder, joints=joints, name=name)
+    click.echo(f"wrote {folder}", err=True)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from shlex import quote
 from typing import Literal, TypeAlias, get_args
 
 from ..checks import require_names
@@ -13,10 +14,11 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..whole_files import whole_path
 from .machine_data import Machine
+from .named_joints import fitting_path
 from .source import source
 from .wording import Precision
 
-Part: TypeAlias = Literal["ik", "limits", "fk"]
+Part: TypeAlias = Literal["ik", "limits", "fk", "rates"]
 PARTS: tuple[Part, ...] = get_args(Part)
 NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -28,6 +30,7 @@ def export_c(
     precision: Precision = "double",
     parts: Sequence[Part] = PARTS,
     name: str = "pfk",
+    joints: str | Sequence[str] | None = None,
 ) -> Path:
     """Write a mechanism's kinematics as one file of C99, for a controller.
 
@@ -41,8 +44,11 @@ def export_c(
     path : the file to write; whatever has this name is replaced, when the text is complete.
     precision : "double", or "float" for controllers without double precision in hardware.
     parts : "ik" from poses to actuators, completed where the task leaves something open; "limits" every limit, with the
-        number of the one exceeded most; "fk" from actuators to the pose, by Newton's method from a start.
+        number of the one exceeded most; "fk" from actuators to the pose, by Newton's method from a start; "rates" the
+        Jacobian, speeds of actuators, and torques of them and back.
     name : prefix of all names in the file; lower-case letters, digits and underscores.
+    joints : names of joints in series from the base to the end effector: then there are functions of these too, and
+        rates are by them.
 
     Raises
     ------
@@ -50,16 +56,22 @@ def export_c(
         and why. Also where "fk" is asked for and the actuators leave the end effector free.
     InvalidArgument : an unknown precision or part, or a name that is not allowed.
     """
-    text = c_source(mechanism, precision=precision, parts=parts, name=name)
+    text = c_source(mechanism, precision=precision, parts=parts, name=name, joints=joints, file=Path(path).name)
     with whole_path(path) as part:
         part.write_text(text, encoding="ascii")
     return Path(path)
 
 
 def c_source(
-    mechanism: Mechanism, *, precision: Precision = "double", parts: Sequence[Part] = PARTS, name: str = "pfk"
+    mechanism: Mechanism,
+    *,
+    precision: Precision = "double",
+    parts: Sequence[Part] = PARTS,
+    name: str = "pfk",
+    joints: str | Sequence[str] | None = None,
+    file: str = "FILE",
 ) -> str:
-    """The text that `export_c` writes."""
+    """The text that `export_c` writes; `file` is the name in the command that compiles its self-test."""
     checked_mechanism(mechanism)
     if not isinstance(precision, str) or precision not in get_args(Precision):
         raise InvalidArgument("precision", repr(precision), "'double' or 'float'")
@@ -71,4 +83,5 @@ def c_source(
     if "fk" in parts and machine.uncontrolled:
         reason = f"its actuators leave the end effector {counted(machine.uncontrolled, 'freedom')}: leave 'fk' out"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-    return source(machine, name, precision, parts)
+    path = None if joints is None else fitting_path(mechanism, machine, joints)
+    return source(machine, name, precision, parts, path, quote(file))

@@ -53,6 +53,37 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
    their number. Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #endif
+#if JOINTS
+/* The pose at coordinates of the joints in series from the base to the end effector. */
+void pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose *pose);
+#endif
+#if TO_ACTUATORS
+/* Actuators at joint coordinates; nothing is written unless 0 is returned. */
+int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS]);
+#endif
+#if TO_JOINTS
+/* Joint coordinates at which actuators are, by Newton's method from those in `joints`, in at most 40 steps; `steps` may
+   be 0, or is set to their number. Limits are not checked. Nothing is written to `joints` unless 0 is returned. */
+int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps);
+#endif
+#if RATES
+/* Return codes are those of pfk_limits without its limits; nothing is written unless 0 is returned. A crank or carriage at
+   its dead point has rate 0. */
+#if JOINTS
+typedef const pfk_real *pfk_at; /* joint coordinates; rates are those of the joints, torques also forces of slides */
+#else
+typedef const pfk_pose *pfk_at; /* a whole pose; rates are a twist: the velocity of the reference point and the angular
+   velocity, in base coordinates, or the nearest that the legs allow; torques a force there and a moment */
+#endif
+/* Rates of actuators by each of the rates. */
+int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES]);
+/* Rates of actuators, and back. */
+int pfk_speeds(pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS]);
+int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES]);
+/* Torques and forces of actuators, the least that give those wanted, and back: what they give. */
+int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS]);
+int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES]);
+#endif
 
 #ifdef __cplusplus
 }
@@ -133,6 +164,14 @@ typedef struct {
     pfk_real sense, lo, hi, home; /* lo and hi of the deviation */
 } pfk_coordinate;
 
+#if JOINTS
+/* A joint in series, from the base outward, at home; its deviation is sense * (value - home). */
+typedef struct {
+    int place, turns; /* of its coordinate; 1: a hinge, 0: a slide */
+    pfk_real sense, home, axis[3], point[3];
+} pfk_joint;
+
+#endif
 #if CONES
 /* The half angle of a rod about an axis fixed to the body that its base end, or its platform end, is on. */
 typedef struct {
@@ -177,6 +216,9 @@ typedef struct {
 typedef struct {
     int leg;
     pfk_real off, slope[PFK_COLUMNS];
+#if RATES
+    pfk_real by_given; /* of an actuator's: the derivative by its coordinate */
+#endif
 } pfk_row;
 #endif
 
@@ -876,7 +918,7 @@ static pfk_row *pfk_pivot_rows(const pfk_state *state, int k, int sloped, pfk_ro
 }
 
 #endif
-#if FK
+#if FK || RATES
 /* The equation of hinges at an end of a rod, of which the coordinate at `place` is given: kept . u = value, kept a
    direction of what they are on. Of one hinge n it is n x line turned by the angle; of two, a and b, the first turns b,
    the second leaves a. */
@@ -888,6 +930,9 @@ static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real
     const int end = at_platform_end ? rod->platform_ending : rod->base_ending;
     const pfk_real (*axes)[3] = at_platform_end ? rod->platform_end_axes : rod->base_end_axes;
     pfk_real turned[3], across[3], kept[3], off, value = 0.0;
+#if RATES
+    pfk_real turning[3], now[3], by_value = 0.0;
+#endif
     if (end == PFK_HINGE) {
         pfk_cross(axes[0], rod->line, across);
         pfk_about_angle(across, axes[0], given, turned);
@@ -898,7 +943,19 @@ static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real
         pfk_about_angle(rod->line, axes[1], given, across);
         pfk_copy(axes[0], turned);
         value = pfk_dot(turned, across);
+#if RATES
+        pfk_cross(axes[1], across, now);
+        by_value = pfk_dot(axes[0], now);
+#endif
     }
+#if RATES
+    pfk_cross(axes[0], turned, turning); /* 0 of the second of two hinges */
+    if (at_platform_end)
+        pfk_rotate(&state->frame[rod->frame], turning, now);
+    else
+        pfk_carried(&pfk_legs[rod->main], &state->leg[rod->main], 1.0, turning, now);
+    row->by_given = (pfk_dot(now, own->span) - by_value * own->length) / PFK_SIZE;
+#endif
     if (at_platform_end)
         pfk_rotate(&state->frame[rod->frame], turned, kept);
     else
@@ -911,6 +968,27 @@ static pfk_row *pfk_hinge_row(const pfk_state *state, int k, int place, pfk_real
 }
 
 #if PIVOTS
+#if RATES
+/* The derivative of kept . R moved by a turn of `kept` about an axis, and by one of `moved` the other way. */
+static pfk_real pfk_turning(const pfk_state *state, int k, const pfk_real axis[3], const pfk_real kept[3],
+                            const pfk_real moved[3])
+{
+    pfk_real by_angle[3], turned[3];
+    pfk_cross(axis, kept, by_angle);
+    pfk_rotate(&state->frame[pfk_legs[k].frame], moved, turned);
+    return pfk_dot(by_angle, turned);
+}
+
+static pfk_real pfk_turning_back(const pfk_state *state, int k, const pfk_real kept[3], const pfk_real axis[3],
+                                 const pfk_real moved[3])
+{
+    pfk_real by_angle[3], turned[3];
+    pfk_cross(axis, moved, by_angle);
+    pfk_rotate(&state->frame[pfk_legs[k].frame], by_angle, turned);
+    return -pfk_dot(kept, turned);
+}
+
+#endif
 /* The equation of hinges a, b, c of a pivot, R = Rot(a) [Rot(b) [Rot(c)]]: kept . R moved = value, with one of both
    turned by the angle. */
 static pfk_row *pfk_pivot_hinge_row(const pfk_state *state, int k, int place, pfk_real given, pfk_row *row)
@@ -920,23 +998,39 @@ static pfk_row *pfk_pivot_hinge_row(const pfk_state *state, int k, int place, pf
     pfk_real across[3], turned[3];
     if (pivot->base_ending == PFK_HINGE) {
         pfk_about_angle(pivot->kept[0], a, given, turned);
+#if RATES
+        row->by_given = pfk_turning(state, k, a, turned, pivot->kept[1]);
+#endif
         return pfk_pair_row(state, k, turned, pivot->kept[1], 0.0, 1, row);
     }
     if (pivot->base_ending == PFK_CROSS) {
         pfk_cross(a, b, across);
         pfk_about_angle(across, place == PFK_BASE_END ? a : b, place == PFK_BASE_END ? given : -given, turned);
+#if RATES
+        row->by_given = place == PFK_BASE_END ? pfk_turning(state, k, a, turned, b) : pfk_turning_back(state, k, a, b, turned);
+#endif
         return place == PFK_BASE_END ? pfk_pair_row(state, k, turned, b, 0.0, 1, row)
                                  : pfk_pair_row(state, k, a, turned, 0.0, 1, row);
     }
     if (place == PFK_BASE_END) {
         pfk_about_angle(b, a, given, turned);
+#if RATES
+        row->by_given = pfk_turning(state, k, a, turned, c);
+#endif
         return pfk_pair_row(state, k, turned, c, -pfk_dot(b, c), 1, row);
     }
     if (place == PFK_BASE_END + 1) {
         pfk_about_angle(c, b, given, turned);
+#if RATES
+        pfk_cross(b, turned, across);
+        row->by_given = -pfk_dot(a, across);
+#endif
         return pfk_pair_row(state, k, a, c, -pfk_dot(a, turned), 1, row);
     }
     pfk_about_angle(b, c, -given, turned);
+#if RATES
+    row->by_given = pfk_turning_back(state, k, a, c, turned);
+#endif
     return pfk_pair_row(state, k, a, turned, -pfk_dot(a, b), 1, row);
 }
 
@@ -951,11 +1045,17 @@ static pfk_row *pfk_drive_row(const pfk_state *state, const pfk_coordinate *driv
         const pfk_real *slide = pfk_legs[k].rows[place >= PFK_PLATFORM_END ? place - PFK_PLATFORM_END : 0];
         if (place < PFK_PLATFORM_END)
             return pfk_pivot_hinge_row(state, k, place, given, row);
+#if RATES
+        row->by_given = -1.0 / PFK_SIZE;
+#endif
         return pfk_put(state, k, PFK_SIZE, pfk_dot(slide, own->span) - given, slide, pfk_zero, pfk_zero, 1, row);
     }
 #endif
     if (place == PFK_Q_PROXIMAL)
         return row;
+#if RATES
+    row->by_given = -1.0 / PFK_SIZE;
+#endif
     if (place == PFK_SLIDE)
         return pfk_put(state, k, PFK_SIZE, own->value[PFK_SLIDE] - given, own->u, pfk_zero, pfk_zero, 1, row);
     return pfk_hinge_row(state, k, place, given, row);
@@ -1482,7 +1582,7 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[])
 }
 
 #endif
-#if IK || FK
+#if IK || FK || RATES
 /* The actuators at the state of the legs. */
 static void pfk_read(const pfk_state *state, pfk_real actuators[PFK_ACTUATORS])
 {
@@ -1531,6 +1631,417 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
 #endif
     *pose = own;
     pfk_read(&state, actuators);
+    return 0;
+}
+
+#endif
+#if JOINTS
+/* The pose at joint coordinates, and its twist by each of them. */
+static void pfk_walk(const pfk_real joints[PFK_JOINTS], pfk_pose *pose, pfk_real twist[PFK_JOINTS][6])
+{
+    pfk_real at[PFK_JOINTS][3], column[3], turned[3], value;
+    int i, j, k;
+    pfk_home(pose);
+    /* from the end effector inward: each joint moves all that comes after it */
+    for (k = PFK_JOINTS - 1; k >= 0; --k) {
+        const pfk_joint *joint = &pfk_joints[k];
+        const pfk_real cosine = cos(joint->sense * (joints[joint->place] - joint->home));
+        const pfk_real sine = sin(joint->sense * (joints[joint->place] - joint->home));
+        value = joint->sense * (joints[joint->place] - joint->home);
+        for (i = k; i < PFK_JOINTS; ++i) { /* axes of joints after it, then points on them */
+            pfk_real *axis = twist[pfk_joints[i].place];
+            if (i == k) {
+                pfk_copy(joint->axis, axis + 3);
+                pfk_copy(joint->point, at[i]);
+            } else if (joint->turns) {
+                pfk_about(axis + 3, joint->axis, cosine, sine, turned);
+                pfk_copy(turned, axis + 3);
+                pfk_along(at[i], -1.0, joint->point, column);
+                pfk_about(column, joint->axis, cosine, sine, turned);
+                pfk_along(joint->point, 1.0, turned, at[i]);
+            } else {
+                pfk_along(at[i], value, joint->axis, at[i]);
+            }
+        }
+        if (!joint->turns) {
+            pfk_along(pose->p, value, joint->axis, pose->p);
+            continue;
+        }
+        pfk_along(pose->p, -1.0, joint->point, column);
+        pfk_about(column, joint->axis, cosine, sine, turned);
+        pfk_along(joint->point, 1.0, turned, pose->p);
+        for (j = 0; j < 3; ++j) {
+            for (i = 0; i < 3; ++i)
+                column[i] = pose->R[i][j];
+            pfk_about(column, joint->axis, cosine, sine, turned);
+            for (i = 0; i < 3; ++i)
+                pose->R[i][j] = turned[i];
+        }
+    }
+    for (k = 0; k < PFK_JOINTS; ++k) {
+        pfk_real *own = twist[pfk_joints[k].place], lever[3];
+        for (i = 0; i < 3; ++i)
+            own[3 + i] *= pfk_joints[k].sense;
+        if (pfk_joints[k].turns) {
+            pfk_along(pose->p, -1.0, at[k], lever);
+            pfk_cross(own + 3, lever, own);
+        } else {
+            pfk_copy(own + 3, own);
+            pfk_copy(pfk_zero, own + 3);
+        }
+    }
+}
+
+void pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose *pose)
+{
+    pfk_real twist[PFK_JOINTS][6];
+    pfk_walk(joints, pose, twist);
+}
+
+#endif
+#if TO_ACTUATORS
+int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS])
+{
+    pfk_state state;
+    pfk_pose pose;
+    int code;
+    pfk_pose_at(joints, &pose);
+    if (pfk_make_exact(&pose))
+        return PFK_NO_POSE;
+    code = pfk_rest(&pose, &state);
+    if (code)
+        return PFK_LEG + code;
+#if LIMITS
+    {
+        pfk_real slack[PFK_LIMITS + 1];
+        code = pfk_slacks(&state, slack);
+        if (code)
+            return code;
+    }
+#endif
+    pfk_read(&state, actuators);
+    return 0;
+}
+
+#endif
+#if RATES
+/* Makes v square to `count` vectors, orthonormal ones, and of length 1; 0 where no more than rounding is left of it. */
+static int pfk_make_square(pfk_real basis[][6], int count, pfk_real v[6])
+{
+    pfk_real share, size;
+    int i, j, k;
+    for (k = 0; k < 2; ++k)
+        for (i = 0; i < count; ++i) {
+            share = pfk_dot(basis[i], v) + pfk_dot(basis[i] + 3, v + 3);
+            for (j = 0; j < 6; ++j)
+                v[j] -= share * basis[i][j];
+        }
+    size = sqrt(pfk_dot(v, v) + pfk_dot(v + 3, v + 3));
+    for (j = 0; j < 6 && size > PFK_RANK; ++j)
+        v[j] /= size;
+    return size > PFK_RANK;
+}
+
+/* Rates of actuators by the twist of the end effector: `raw` ones, of twists that the legs allow, or of all. */
+static int pfk_twist_rates(const pfk_pose *pose, int raw, pfk_real rates[PFK_ACTUATORS][6])
+{
+    pfk_state state;
+    pfk_row row[PFK_ROWS];
+    pfk_real drive[PFK_ACTUATORS][PFK_COLUMNS], basis[6][6], actuators[PFK_ACTUATORS], worst, share;
+    int i, j, k, count = 0, code = pfk_rest(pose, &state);
+#if REDUNDANT
+    int used[PFK_ROWS] = {0};
+#endif
+    if (code)
+        return PFK_LEG + code;
+    pfk_read(&state, actuators);
+    pfk_equations(&state, 0, 1, row, &worst);
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        const pfk_coordinate *driven = &pfk_driven[i];
+        const pfk_placed *own = &state.leg[driven->leg];
+        if (driven->place == PFK_Q_PROXIMAL) {
+            for (j = 0; j < PFK_COLUMNS; ++j)
+                drive[i][j] = j < 6 ? own->follow[j] : 0.0;
+#if REDUNDANT
+            if (pfk_legs[driven->leg].kind == PFK_REDUNDANT) {
+                for (j = 0; j < 6; ++j)
+                    drive[i][j] = 0.0;
+                drive[i][6 + pfk_legs[driven->leg].column] = 1.0;
+            } else {
+                for (j = pfk_legs[driven->leg].on; j > 0; j = pfk_legs[j - 1].on)
+                    drive[i][6 + pfk_legs[j - 1].column] += pfk_dot(drive[i], state.leg[j - 1].follow)
+                                                            + pfk_dot(drive[i] + 3, state.leg[j - 1].follow + 3);
+            }
+#endif
+        } else {
+            pfk_row one;
+            pfk_drive_row(&state, driven, driven->sense * (actuators[i] - driven->home), &one);
+            for (j = 0; j < PFK_COLUMNS; ++j)
+                drive[i][j] = one.by_given != 0.0 ? -one.slope[j] / one.by_given : 0.0;
+        }
+        for (j = 0; j < PFK_COLUMNS; ++j)
+            drive[i][j] *= driven->sense;
+    }
+#if REDUNDANT
+    /* redundant joints follow by the equation that tells most of each */
+    for (k = 6; k < PFK_COLUMNS; ++k) {
+        int best = -1;
+        for (i = 0; i < PFK_OWN_ROWS; ++i)
+            if (!used[i] && fabs(row[i].slope[k]) * PFK_SIZE > PFK_RANK
+                && (best < 0 || fabs(row[i].slope[k]) > fabs(row[best].slope[k])))
+                best = i;
+        if (best < 0)
+            continue;
+        used[best] = 1;
+        for (i = 0; i < PFK_OWN_ROWS; ++i) {
+            share = i == best ? 0.0 : row[i].slope[k] / row[best].slope[k];
+            for (j = 0; j < PFK_COLUMNS && share != 0.0; ++j)
+                row[i].slope[j] = j == k ? 0.0 : row[i].slope[j] - share * row[best].slope[j];
+        }
+        for (i = 0; i < PFK_ACTUATORS; ++i) {
+            share = drive[i][k] / row[best].slope[k];
+            for (j = 0; j < PFK_COLUMNS; ++j)
+                drive[i][j] = j == k ? 0.0 : drive[i][j] - share * row[best].slope[j];
+        }
+    }
+#endif
+    for (k = 0; k < 3 && !raw && !PFK_TURNING; ++k, ++count)
+        for (j = 0; j < 6; ++j)
+            basis[count][j] = j == 3 + k ? 1.0 : 0.0;
+    for (i = 0; i < PFK_OWN_ROWS && !raw && count < 6; ++i) {
+#if REDUNDANT
+        if (used[i])
+            continue;
+#endif
+        for (j = 0; j < 6; ++j)
+            basis[count][j] = row[i].slope[j] * (j < 3 ? PFK_SIZE : 1.0);
+        count += pfk_make_square(basis, count, basis[count]);
+    }
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        for (j = 0; j < 6; ++j)
+            rates[i][j] = drive[i][j] * (j < 3 ? PFK_SIZE : 1.0);
+        for (k = 0; k < count; ++k) {
+            share = pfk_dot(basis[k], rates[i]) + pfk_dot(basis[k] + 3, rates[i] + 3);
+            for (j = 0; j < 6; ++j)
+                rates[i][j] -= share * basis[k][j];
+        }
+        for (j = 0; j < 3; ++j)
+            rates[i][j] /= PFK_SIZE;
+    }
+    return 0;
+}
+
+#if JOINTS
+int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
+{
+    pfk_real rates[PFK_ACTUATORS][6], twist[PFK_JOINTS][6];
+    pfk_pose pose;
+    int i, j, code;
+    pfk_walk(at, &pose, twist);
+    if (pfk_make_exact(&pose))
+        return PFK_NO_POSE;
+    code = pfk_twist_rates(&pose, 1, rates);
+    for (i = 0; i < PFK_ACTUATORS && !code; ++i)
+        for (j = 0; j < PFK_JOINTS; ++j)
+            jacobian[i][j] = pfk_dot(rates[i], twist[j]) + pfk_dot(rates[i] + 3, twist[j] + 3);
+    return code;
+}
+#else
+int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
+{
+    pfk_pose own = *at;
+    return pfk_make_exact(&own) ? PFK_NO_POSE : pfk_twist_rates(&own, 0, jacobian);
+}
+#endif
+
+/* A Jacobian, its lengths over L, as u t q: orthonormal rows q and columns u, `rank` of each, a triangle t. */
+typedef struct {
+    int rank;
+    pfk_real u[PFK_RATES][PFK_ACTUATORS], t[PFK_RATES][PFK_RATES], q[PFK_RATES][PFK_RATES];
+} pfk_factors;
+
+static pfk_real pfk_unit(int actuator)
+{
+    return pfk_driven[actuator].is_length ? PFK_SIZE : 1.0;
+}
+
+/* Takes orthonormal vectors (`count` of them, `width` numbers each) off v, twice; fills their shares; the length left. */
+static pfk_real pfk_take_off(const pfk_real *basis, int count, int width, pfk_real *v, pfk_real *shares)
+{
+    pfk_real share, size = 0.0;
+    int j, k, again;
+    for (k = 0; k < count; ++k)
+        shares[k] = 0.0;
+    for (again = 0; again < 2; ++again)
+        for (k = 0; k < count; ++k) {
+            share = 0.0;
+            for (j = 0; j < width; ++j)
+                share += basis[k * width + j] * v[j];
+            for (j = 0; j < width; ++j)
+                v[j] -= share * basis[k * width + j];
+            shares[k] += share;
+        }
+    for (j = 0; j < width; ++j)
+        size += v[j] * v[j];
+    return sqrt(size);
+}
+
+static void pfk_factorise(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_factors *own)
+{
+    pfk_real row[PFK_RATES], shares[PFK_RATES], left[PFK_ACTUATORS][PFK_RATES], size, whole;
+    int i, j, k;
+    own->rank = 0;
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        whole = 0.0;
+        for (j = 0; j < PFK_RATES; ++j) {
+            row[j] = jacobian[i][j] * pfk_rate_units[j] / pfk_unit(i);
+            whole += row[j] * row[j];
+            left[i][j] = 0.0;
+        }
+        size = pfk_take_off(&own->q[0][0], own->rank, PFK_RATES, row, shares);
+        for (k = 0; k < own->rank; ++k)
+            left[i][k] = shares[k];
+        if (own->rank < PFK_RATES && size > PFK_RANK * sqrt(whole)) {
+            left[i][own->rank] = size;
+            for (j = 0; j < PFK_RATES; ++j)
+                own->q[own->rank][j] = row[j] / size;
+            ++own->rank;
+        }
+    }
+    for (k = 0; k < own->rank; ++k) {
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            own->u[k][i] = left[i][k];
+        size = pfk_take_off(&own->u[0][0], k, PFK_ACTUATORS, own->u[k], shares);
+        for (j = 0; j < k; ++j)
+            own->t[j][k] = shares[j];
+        own->t[k][k] = size;
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            own->u[k][i] /= size;
+    }
+}
+
+int pfk_speeds(pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES];
+    int i, j, code = pfk_jacobian(at, jacobian);
+    for (i = 0; i < PFK_ACTUATORS && !code; ++i)
+        for (speeds[i] = 0.0, j = 0; j < PFK_RATES; ++j)
+            speeds[i] += jacobian[i][j] * rates[j];
+    return code;
+}
+
+int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES];
+    int i, j, code = pfk_jacobian(at, jacobian);
+    for (j = 0; j < PFK_RATES && !code; ++j)
+        for (given[j] = 0.0, i = 0; i < PFK_ACTUATORS; ++i)
+            given[j] += jacobian[i][j] * torques[i];
+    return code;
+}
+
+int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], z[PFK_RATES];
+    pfk_factors own;
+    int i, j, k, code = pfk_jacobian(at, jacobian);
+    if (code)
+        return code;
+    pfk_factorise(jacobian, &own);
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        torques[i] = 0.0;
+    for (k = 0; k < own.rank; ++k) {
+        z[k] = 0.0;
+        for (j = 0; j < PFK_RATES; ++j)
+            z[k] += own.q[k][j] * wanted[j] * pfk_rate_units[j];
+        for (j = 0; j < k; ++j)
+            z[k] -= own.t[j][k] * z[j];
+        z[k] /= own.t[k][k];
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            torques[i] += z[k] * own.u[k][i] / pfk_unit(i);
+    }
+    return 0;
+}
+
+int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], z[PFK_RATES];
+    pfk_factors own;
+    int i, j, k, code = pfk_jacobian(at, jacobian);
+    if (code)
+        return code;
+    pfk_factorise(jacobian, &own);
+    for (j = 0; j < PFK_RATES; ++j)
+        rates[j] = 0.0;
+    for (k = own.rank - 1; k >= 0; --k) {
+        z[k] = 0.0;
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            z[k] += own.u[k][i] * speeds[i] / pfk_unit(i);
+        for (j = k + 1; j < own.rank; ++j)
+            z[k] -= own.t[k][j] * z[j];
+        z[k] /= own.t[k][k];
+        for (j = 0; j < PFK_RATES; ++j)
+            rates[j] += z[k] * own.q[k][j] * pfk_rate_units[j];
+    }
+    return 0;
+}
+
+#endif
+#if TO_JOINTS
+int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps)
+{
+    pfk_state state;
+    pfk_pose pose;
+    pfk_row row[PFK_ROWS];
+    pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], x[PFK_UNKNOWNS], twist[PFK_JOINTS][6], given[PFK_ACTUATORS];
+    pfk_real now[PFK_JOINTS], worst, last = 0.0, size, off;
+    int i, j, count;
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        given[i] = pfk_driven[i].sense * (actuators[i] - pfk_driven[i].home);
+        if (!(fabs(0.0 * given[i]) <= 0.0))
+            return PFK_NO_ACTUATORS;
+    }
+    for (j = 0; j < PFK_JOINTS; ++j)
+        now[j] = joints[j];
+    for (count = 0;; ++count) {
+        int open;
+        pfk_walk(now, &pose, twist);
+        if (pfk_make_exact(&pose))
+            return PFK_NO_POSE;
+        pfk_place(&pose, given, &state);
+        open = pfk_equations(&state, given, 1, row, &worst);
+        if (worst <= PFK_CLOSED || (count && worst <= PFK_CLOSE && worst > 0.25 * last))
+            break;
+        if (count == PFK_FK_STEPS)
+            return PFK_LEG + open;
+        last = worst;
+        for (i = 0; i < PFK_ROWS; ++i) {
+            for (j = 0; j < PFK_JOINTS; ++j)
+                system[i][j] = pfk_rate_units[j]
+                               * (pfk_dot(row[i].slope, twist[j]) + pfk_dot(row[i].slope + 3, twist[j] + 3));
+            system[i][PFK_JOINTS] = -row[i].off;
+        }
+        if (pfk_least_squares(system, PFK_ROWS, PFK_JOINTS, x))
+            return PFK_LEG + open;
+        size = 0.0;
+        for (j = 0; j < PFK_JOINTS; ++j)
+            size = fabs(x[j]) > size ? fabs(x[j]) : size;
+        for (j = 0; j < PFK_JOINTS; ++j)
+            now[j] += pfk_rate_units[j] * x[j] * (size > PFK_LONGEST_STEP ? PFK_LONGEST_STEP / size : 1.0);
+    }
+    if (steps)
+        *steps = count;
+    if (pfk_place(&pose, 0, &state))
+        return PFK_OTHER_MODE;
+    pfk_read(&state, given);
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        off = given[i] - actuators[i];
+        off = pfk_driven[i].is_length ? off / PFK_SIZE : pfk_wrap(off, 0.0);
+        if (!(fabs(off) <= PFK_MODE_APART))
+            return PFK_OTHER_MODE;
+    }
+    for (j = 0; j < PFK_JOINTS; ++j)
+        joints[j] = now[j];
     return 0;
 }
 

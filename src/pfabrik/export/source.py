@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from importlib import resources
 
+from ..motion.joint_path import JointPath
 from .machine_data import Machine
 from .self_test import AGREEMENT, checks_of
 from .tables import checks_h, features, machine_h, tables_h
@@ -16,18 +17,29 @@ Permission to use, copy, modify, and distribute this file for any purpose with o
 provided "as is" and without any warranty; its authors are not liable for anything that comes of its use."""
 
 
-def source(machine: Machine, name: str, precision: Precision, parts: Sequence[str]) -> str:
+def source(
+    machine: Machine,
+    name: str,
+    precision: Precision,
+    parts: Sequence[str],
+    path: JointPath | None = None,
+    file: str = "FILE",
+) -> str:
     """The text of the file: header, tables and routines."""
     routines = resources.files(__package__).joinpath("kinematics.c").read_text(encoding="utf-8")
-    text = _selected(routines[routines.index("#ifndef") :], features(machine, parts))
-    included = {"machine.h": machine_h(machine, parts), "tables.h": tables_h(machine, precision, parts, text)}
+    text = selected(routines[routines.index("#ifndef") :], features(machine, parts, path))
+    included = {
+        "machine.h": machine_h(machine, parts, path),
+        "tables.h": tables_h(machine, precision, parts, text, path),
+    }
     if "ik" in parts:
         included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), AGREEMENT[precision])
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
-    return in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, parts)}\n{text}"), name, precision)
+    words = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, parts, path)}\n{text}"), name, precision)
+    return words.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)
 
 
-def _selected(routines: str, conditions: set[str]) -> str:
+def selected(routines: str, conditions: set[str]) -> str:
     """The routines whose conditions hold; `#ifdef` and `#ifndef` stay for the preprocessor."""
     lines: list[str] = []
     blocks: list[bool | None] = []  # of each open block, if it is kept; None of the preprocessor's own
@@ -44,7 +56,7 @@ def _selected(routines: str, conditions: set[str]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _header(machine: Machine, parts: Sequence[str]) -> str:
+def _header(machine: Machine, parts: Sequence[str], path: JointPath | None) -> str:
     """The comment at the top: conventions, actuators, limits and legs, and the notice."""
     mechanism, unit = machine.mechanism, machine.mechanism.length_unit
     lines = [
@@ -67,6 +79,12 @@ def _header(machine: Machine, parts: Sequence[str]) -> str:
     ]
     for place, (name, driven) in enumerate(zip(mechanism.actuator_names, machine.driven, strict=True)):
         lines.append(f"{place:<9} {name:<21} {driven.home:.10g} {unit if driven.is_length else 'rad'}")
+    if path is not None:
+        lines += ["", "coordinate joint               home"]
+        for place, (coordinate, home) in enumerate(zip(path.coordinates, path.home, strict=True)):
+            lines.append(
+                f"{place:<10} {coordinate.name:<20} {home:.10g} {'rad' if coordinate.kind == 'angle' else unit}"
+            )
     if "limits" in parts:
         lines += ["", "limit     joint                 bound"]
         bounds = [

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ..arrays import Record
+from ..arrays import Floats, Record
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.legs import records as K
+from ..motion.joint_path import JointPath, PathMotion
 from .machine_data import Coordinate, ExportedLeg, Machine
 from .self_test import Checks
 from .wording import ACCURACY, Precision, comment, literal, quoted
@@ -25,8 +26,8 @@ FAR = 1e30
 """The bound of a coordinate without one [L or rad]."""
 
 
-def features(machine: Machine, parts: Sequence[str]) -> set[str]:
-    """The names of conditions in `kinematics.c` that hold for a machine and the parts asked for."""
+def features(machine: Machine, parts: Sequence[str], path: JointPath | None = None) -> set[str]:
+    """The names of conditions in `kinematics.c` that hold for a machine, the parts asked for and named joints."""
     records = [leg.record for leg in machine.legs]
     names = {part.upper() for part in parts}
     completes = "ik" in parts and machine.completes
@@ -41,23 +42,38 @@ def features(machine: Machine, parts: Sequence[str]) -> set[str]:
         "COMPLETES": completes,
         "CONTINUES": completes or machine.has_implicit_joints,
         "MOVES": completes or machine.has_implicit_joints or "fk" in parts,
-        "RESTS": "limits" in parts or (machine.n_redundant and "fk" in parts) or ("ik" in parts and not completes),
-        "SOLVES": machine.equations > 0 or "fk" in parts,
+        "RESTS": {"limits", "rates"} & {*parts}
+        or path is not None
+        or (machine.n_redundant and "fk" in parts)
+        or ("ik" in parts and not completes),
+        "SOLVES": machine.equations > 0 or "fk" in parts or "rates" in parts,
+        "JOINTS": path is not None,
+        "TO_ACTUATORS": path is not None and "ik" in parts,
+        "TO_JOINTS": path is not None and "fk" in parts,
     }
     return names | {name for name, holds in conditions.items() if holds}
 
 
-def machine_h(machine: Machine, parts: Sequence[str]) -> str:
+def machine_h(machine: Machine, parts: Sequence[str], path: JointPath | None = None) -> str:
     """Constants for callers of the file."""
     limits = len(machine.limits) if "limits" in parts else 0
-    return f"enum {{ PFK_ACTUATORS = {len(machine.driven)}, PFK_LIMITS = {limits} }};\n"
+    counts = {"PFK_ACTUATORS": len(machine.driven), "PFK_LIMITS": limits}
+    counts |= {} if path is None else {"PFK_JOINTS": len(path.coordinates)}
+    counts |= {"PFK_RATES": 6 if path is None else len(path.coordinates)} if "rates" in parts else {}
+    return f"enum {{ {', '.join(f'{name} = {count}' for name, count in counts.items())} }};\n"
 
 
-def tables_h(machine: Machine, precision: Precision, parts: Sequence[str], routines: str) -> str:
+def tables_h(
+    machine: Machine, precision: Precision, parts: Sequence[str], routines: str, path: JointPath | None = None
+) -> str:
     """Constants and tables for the routines, in the members of the structures that these declare."""
-    lines, members = [*_numbers(machine, precision, parts)], _members(routines, "pfk_leg")
+    lines, members = [*_numbers(machine, precision, parts, path)], _members(routines, "pfk_leg")
     lines += _table("pfk_leg pfk_legs[PFK_LEGS]", (_leg(leg, members) for leg in machine.legs))
     lines += _table("pfk_coordinate pfk_driven[PFK_ACTUATORS]", map(_coordinate, machine.driven))
+    if path is not None:
+        lines += _table("pfk_joint pfk_joints[PFK_JOINTS]", (_joint(motion, path) for motion in path.motions))
+    if path is not None or "rates" in parts:
+        lines += [f"static const pfk_real pfk_rate_units[] = {literal(rate_units(machine, path))};", ""]
     if "limits" in parts:
         lines += _table("pfk_coordinate pfk_limited[]", map(_coordinate, machine.limited))
         lines += _table("pfk_cone pfk_cones[]", map(_cone, machine.cones)) if len(machine.cones) else []
@@ -77,10 +93,26 @@ def checks_h(checks: Checks, exact: float) -> str:
     return "\n".join([*lines, *_table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
 
 
-def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> Iterator[str]:
+def rate_units(machine: Machine, path: JointPath | None) -> Floats:
+    """The units of rates: L of lengths, 1 of angles."""
+    size = machine.mechanism.characteristic_length
+    if path is None:
+        return np.array([size] * 3 + [1.0] * 3)
+    return np.array([1.0 if each.kind == "angle" else size for each in path.coordinates])
+
+
+def _joint(motion: PathMotion, path: JointPath) -> str:
+    numbers = ", ".join(map(literal, (motion.sign, path.home[motion.place], motion.axis, motion.point)))
+    return f"    {{{motion.place}, {int(motion.kind == 'turn')}, {numbers}}}"
+
+
+def _numbers(
+    machine: Machine, precision: Precision, parts: Sequence[str], path: JointPath | None = None
+) -> Iterator[str]:
     accuracy, turning = ACCURACY[precision], not machine.mechanism.end_effector_is_joint
-    forward = "fk" in parts
+    forward, drives = "fk" in parts, "fk" in parts or "rates" in parts
     unknowns = machine.n_redundant + ((6 if turning else 3) if forward else machine.unset)
+    unknowns = max(unknowns, len(path.coordinates) if path is not None and forward else 0)
     yield "/* Lengths are in the unit of the machine; L is the radius of the smallest sphere around its joints. */"
     yield f"#define PFK_SIZE {literal(machine.mechanism.characteristic_length)}"
     yield f"#define PFK_KEPT {literal(accuracy.kept)}         /* a limit is kept to this [L or rad] */"
@@ -103,10 +135,10 @@ def _numbers(machine: Machine, precision: Precision, parts: Sequence[str]) -> It
     yield f"    PFK_ATTEMPTS = {6 if machine.has_implicit_joints else 3}, /* to reach a target */"
     yield f"    PFK_TURNING = {int(turning)}, /* 0: the end effector is a point */"
     yield f"    PFK_OWN_ROWS = {machine.equations}, /* equations of the legs */"
-    yield f"    PFK_ROWS = {machine.equations + machine.drive_equations * forward}, /* and of actuators */"
+    yield f"    PFK_ROWS = {machine.equations + machine.drive_equations * drives}, /* and of actuators */"
     yield f"    PFK_UNKNOWNS = {unknowns}"
     yield "};"
-    if {"IK", "MOVES"} & features(machine, parts):
+    if {"IK", "MOVES"} & features(machine, parts, path):
         yield f"static const int pfk_axes[3] = {{{', '.join(map(str, machine.axes))}}}; /* 1: the task sets x, y, z */"
     yield f"static const pfk_real pfk_reference[3] = {literal(np.asarray(machine.mechanism.reference_point))};"
     yield ""

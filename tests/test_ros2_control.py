@@ -1,0 +1,134 @@
+"""The transmission for ros2_control, compiled against stubs of its documented interface: it maps there and back."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import pfabrik as pf
+from machines import closure
+from pfabrik.cli import main
+from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+from pfabrik.motion.joint_path import joint_path
+
+DATA = Path(__file__).parent / "data"
+STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+needs_compilers = pytest.mark.skipif(
+    not (shutil.which("gcc") and shutil.which("g++")), reason="no compilers of C and C++ here: gcc, g++"
+)
+MACHINES = {
+    "g1_ankle": (("pitch_joint", "roll_joint"), (0.4, 0.2)),
+    "ankle_ups": (("pivot",), (0.3, 0.3)),
+    "tricept": (("D", "E"), (0.2, 0.2, 20.0)),
+    "ankle": (("ankle",), (0.2, 0.2)),
+}
+
+
+def machine(name: str) -> pf.Mechanism:
+    return closure.ankle() if name == "ankle" else pf.load(name)
+
+
+def package(name: str, tmp_path: Path) -> Path:
+    return pf.export_ros2_control(machine(name), tmp_path / "leg_transmission", joints=MACHINES[name][0])
+
+
+def mapped(folder: Path, rows: np.ndarray, n_joints: int, n_actuators: int) -> tuple[np.ndarray, np.ndarray]:
+    """Values of actuators, and back of joints, as (rows, 3, n): positions, velocities, efforts."""
+    stubs, built = DATA / "ros2_stubs", folder / "built"
+    built.mkdir()
+    commands = [
+        ["gcc", "-std=c99", *STRICT, "-c", str(folder / "src/leg_kinematics.c"), "-o", str(built / "kinematics.o")],
+        ["g++", "-std=c++17", *STRICT, "-I", str(stubs), "-I", str(folder / "include"),
+         str(folder / "src/leg_transmission.cpp"), str(DATA / "run_transmission.cpp"), str(built / "kinematics.o"),
+         "-o", str(built / "run"), "-lm"],
+    ]  # fmt: skip
+    for command in commands:
+        run = subprocess.run(command, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+    text = f"{n_joints} {n_actuators} {len(rows)}\n" + "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+    run = subprocess.run([str(built / "run")], input=text, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    told = np.array([line.split() for line in run.stdout.splitlines()], float)
+    actuators, joints = told[:, : 3 * n_actuators], told[:, 3 * n_actuators :]
+    return actuators.reshape(-1, 3, n_actuators), joints.reshape(-1, 3, n_joints)
+
+
+@needs_compilers
+@pytest.mark.parametrize("name", MACHINES)
+def test_joints_to_actuators_and_back_is_where_it_began_and_power_is_conserved(name: str, tmp_path: Path) -> None:
+    mechanism, (names, reach) = machine(name), MACHINES[name]
+    path, n, n_a = joint_path(mechanism, names), len(reach), len(mechanism.actuator_names)
+    values = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 3, n))
+    values[:, 0] = path.home + 0.1 + values[:, 0] * reach  # an offset of 0.1 of every joint
+    actuators, joints = mapped(package(name, tmp_path), values.reshape(40, -1), n, n_a)
+    scale = np.abs(values).max(axis=0)
+    assert (np.abs(joints - values) / scale).max() <= 1e-12
+    power = (actuators[:, 1] * actuators[:, 2]).sum(axis=1) - (values[:, 1] * values[:, 2]).sum(axis=1)
+    assert np.abs(power).max() <= 1e-12 * np.abs(actuators[:, 1] * actuators[:, 2]).max()
+    solution = pf.solve_ik(mechanism.without_limits(), path.poses(values[:, 0] - 0.1))
+    size = mechanism.characteristic_length
+    np.testing.assert_allclose(actuators[:, 0], 2.0 * solution.actuators, atol=1e-11 * max(1.0, size))
+
+
+@needs_compilers
+def test_what_is_not_finite_is_passed_on_and_what_does_not_reach_is_not_written(tmp_path: Path) -> None:
+    rows = np.zeros((3, 6))
+    rows[1, 0], rows[2, :2] = np.nan, 1.5
+    folder = package("g1_ankle", tmp_path)
+    actuators, _ = mapped(folder, rows, 2, 2)
+    assert np.isnan(actuators[1]).all()
+    assert np.isfinite(actuators[0]).all()
+    np.testing.assert_array_equal(np.isnan(actuators[2]), np.isnan(actuators[1]))  # as before: nothing was written
+
+
+def test_the_package_names_one_plugin_everywhere(tmp_path: Path) -> None:
+    folder = package("g1_ankle", tmp_path)
+    plugin = ET.parse(folder / "leg_transmission_plugins.xml").getroot()[0]
+    snippet = ET.parse(folder / "leg_transmission.urdf.xml").getroot()
+    assert snippet.findtext("plugin") == plugin.get("name") == "leg_transmission/Transmission"
+    assert plugin.get("type") == "leg_transmission::TransmissionLoader"
+    assert [each.get("name") for each in snippet.iter("joint")] == ["pitch_joint", "roll_joint"]
+    assert [each.get("role") for each in snippet.iter("actuator")] == ["actuator1", "actuator2"]
+    assert ET.parse(folder / "package.xml").getroot().findtext("name") == "leg_transmission"
+    listed = (folder / "CMakeLists.txt").read_text()
+    assert "project(leg_transmission" in listed and "leg_transmission_plugins.xml" in listed
+    assert not [path for path in folder.rglob("*") if path.is_file() and "@NAME@" in path.read_text()]
+
+
+def test_joints_and_names_that_do_not_fit_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match="in series"):
+        pf.export_ros2_control(machine("g1_ankle"), tmp_path / "a", joints=["roll_joint"])
+    with pytest.raises(InvalidArgument, match="lower-case"):
+        pf.export_ros2_control(machine("g1_ankle"), tmp_path / "b", joints=["pitch_joint", "roll_joint"], name="Leg")
+    with pytest.raises(UnsupportedMechanism):
+        pf.export_ros2_control(
+            pf.load("panda"), tmp_path / "c", joints=[joint.name for joint in pf.load("panda").joints]
+        )
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_writes_tensors_and_packages_and_never_over_files(tmp_path: Path) -> None:
+    joints = ["--joints", "pitch_joint", "roll_joint"]
+    for option, place in (("--torch", "a.py"), ("--jax", "b.py"), ("--numpy", "c.py"), ("--ros2-control", "leg")):
+        line = ["export", "g1_ankle", option, str(tmp_path / place), *joints]
+        result = CliRunner().invoke(main, line)
+        assert result.exit_code == 0, result.output
+        assert (tmp_path / place).exists()
+        again = CliRunner().invoke(main, line)
+        assert again.exit_code != 0 and "exists already" in again.output
+        assert CliRunner().invoke(main, [*line, "--force"]).exit_code == 0
+    for line, said in (
+        (["export", "g1_ankle"], "expected a FORMAT"),
+        (["export", "g1_ankle", "c", "d"], "after --joints"),
+        (["export", "g1_ankle", "mjcf", *joints], "not of mjcf"),
+        (["export", "g1_ankle", "--torch", str(tmp_path / "d.py"), "--name", "x"], "torch has none"),
+        (["export", "g1_ankle", "--ros2-control", str(tmp_path / "other")], "needs --joints"),
+    ):
+        result = CliRunner().invoke(main, line)
+        assert result.exit_code == 2 and said in result.output, result.output

@@ -1,0 +1,434 @@
+"""Files of tensors: they answer as the library does, with derivatives, and never with NaN."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import warnings
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from machines import closure
+from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
+from pfabrik.export.self_test import targets_around_home
+from pfabrik.export.tensors import tensor_source
+from pfabrik.motion.joint_path import joint_path
+from pfabrik.motion.joint_series import passive_series
+
+KEEP = pf.Options(working_mode="keep")
+REFUSED = {
+    "nrpm": "poses leave joints A1, B1",
+    "panda": "a joint between the ends of its rod",
+    "snake60": "a joint between the ends of its rod",
+    "serial_arm": "legs on joints J3",
+}
+CATALOGUE = [name for name in pf.catalog() if name not in REFUSED]
+OTHERS = {
+    "exechon": closure.exechon,
+    "upu": closure.upu,
+    "puu": closure.puu,
+    "ankle": closure.ankle,
+    "tricept_of_legs": closure.tricept,
+    "planar_4rpr": closure.planar_4rpr,
+    "hinge": closure.hinge,
+    "slider": closure.slider,
+}
+SERIES = ["ankle_rss", "ankle_ups", "g1_ankle", "tricept", "ankle", "tricept_of_legs"]
+EXACT = {"float64": 1e-12, "float32": 1e-5}
+
+
+@cache
+def machine(name: str) -> pf.Mechanism:
+    return OTHERS[name]() if name in OTHERS else pf.load(name)
+
+
+@cache
+def module(name: str, backend: str = "numpy", joints: tuple[str, ...] = ("task",)) -> ModuleType:
+    """The exported file as a module; skips where its library is not installed."""
+    {"torch": torch, "jax": jax}.get(backend, str)()
+    made = ModuleType(f"{name}_{backend}")
+    exec(compile(tensor_source(machine(name), backend=backend, joints=joints), made.__name__, "exec"), made.__dict__)  # type: ignore[arg-type]
+    return made
+
+
+@cache
+def series(name: str) -> tuple[str, ...]:
+    return passive_series(machine(name))
+
+
+def units(mechanism: pf.Mechanism) -> np.ndarray:
+    lengths = [mechanism.joint(name).type == "prismatic" for name in mechanism.actuator_names]
+    return np.where(lengths, mechanism.characteristic_length, 1.0)
+
+
+@cache
+def known(name: str, count: int) -> tuple[np.ndarray, pf.Solution]:
+    """Targets that the library reaches without limits, and its answers."""
+    mechanism = machine(name)
+    targets = targets_around_home(mechanism, 3 * count, np.random.default_rng(5))
+    solution = pf.solve_ik(mechanism.without_limits(), targets, options=KEEP)
+    if not (solution.status == 0).any():  # of a machine with less freedoms than its task: nearest to the targets
+        targets = np.ascontiguousarray(solution.pose)
+        solution = pf.solve_ik(mechanism.without_limits(), targets, options=KEEP)
+    rows = np.flatnonzero(solution.status == 0)[:count]
+    return targets[rows], solution[rows]
+
+
+def library_jacobian(mechanism: pf.Mechanism, solution: pf.Solution) -> np.ndarray:
+    jacobian = pf.inverse_jacobian(solution)
+    return np.concatenate([jacobian, 0.0 * jacobian], axis=-1) if jacobian.shape[-1] == 3 else jacobian
+
+
+def as_rates(mechanism: pf.Mechanism, jacobian: np.ndarray) -> np.ndarray:
+    """A Jacobian by twists over L and rad."""
+    scale = np.repeat([mechanism.characteristic_length, 1.0], 3)
+    return jacobian * scale / units(mechanism)[:, None]
+
+
+def off(mechanism: pf.Mechanism, actuators: Any, others: Any) -> np.ndarray:
+    return np.abs(np.asarray(actuators) - others) / units(mechanism)
+
+
+def check_actuators(name: str, made: ModuleType, number: Any, count: int, dtype: str = "float64") -> None:
+    """Actuators and Jacobians at whole poses are the library's; where cranks are nearly dead, as far as rounding is."""
+    mechanism, (targets, solution) = machine(name), known(name, count)
+    actuators, jacobian = made.with_jacobian(number(targets))
+    expected = library_jacobian(mechanism, solution)
+    sharpness = np.maximum(1.0, np.linalg.norm(as_rates(mechanism, expected), axis=-1))
+    wrong = off(mechanism, actuators, solution.actuators) / sharpness
+    assert len(targets) > 0.2 * count
+    assert wrong.max() <= EXACT[dtype]
+    if dtype == "float64":
+        error = np.abs(as_rates(mechanism, np.asarray(jacobian) - expected)).max(axis=(1, 2))
+        assert (error <= 1e-9 * sharpness.max(axis=1) ** 2).all()
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
+def test_actuators_and_jacobians_are_the_library_s(name: str) -> None:
+    check_actuators(name, module(name), np.asarray, 200)
+    check_actuators(name, module(name), lambda poses: poses.astype(np.float32), 200, "float32")
+
+
+@pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
+def test_forward_kinematics_come_back_to_the_pose(name: str) -> None:
+    mechanism, (targets, solution), made = machine(name), known(name, 100), module(name)
+    actuators = made.to_actuators(targets)
+    start = solution.pose.copy()
+    start[:, :3, 3] += 1e-3 * mechanism.characteristic_length * np.random.default_rng(0).normal(size=(len(start), 3))
+    found = made.to_pose(actuators, start=start)
+    again = off(mechanism, np.angle(np.exp(1j * (made.to_actuators(found) - actuators))), 0.0)
+    lengths = units(mechanism) != 1.0
+    again[:, lengths] = off(mechanism, made.to_actuators(found), actuators)[:, lengths]
+    singular = pf.singularity(solution)
+    clear = np.asarray(singular.forward) > 1e-2 if hasattr(singular, "forward") else np.ones(len(start), bool)
+    assert clear.mean() > 0.5
+    assert np.median(again[clear].max(axis=1)) <= 1e-12
+    assert (again[clear].max(axis=1) <= 1e-9).mean() > 0.9
+
+
+@pytest.mark.parametrize("name", SERIES)
+def test_joints_give_poses_actuators_and_jacobians_and_come_back(name: str) -> None:
+    mechanism, joints = machine(name), series(name)
+    path, made = joint_path(mechanism, joints), module(name, joints=joints)
+    reach = np.array([0.3 if c.kind == "angle" else 0.2 * mechanism.characteristic_length for c in path.coordinates])
+    low, high = np.maximum(path.low, path.home - reach), np.minimum(path.high, path.home + reach)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(len(low), -1).T
+    q = np.concatenate([corners, np.random.default_rng(3).uniform(low, high, (200, len(low)))])
+    poses, twists = path.poses_and_twists(q)
+    solution = pf.solve_ik(mechanism.without_limits(), poses, options=KEEP)
+    rows = np.flatnonzero(solution.status == 0)
+    actuators, jacobian = made.with_jacobian(q[rows])
+    expected = library_jacobian(mechanism, solution[rows]) @ twists[rows]
+    assert len(rows) > 150
+    assert np.abs(made.pose(q) - poses).max() <= 1e-14 * max(1.0, 10.0 * mechanism.characteristic_length)
+    sharpness = np.maximum(
+        1.0, np.linalg.norm(as_rates(mechanism, library_jacobian(mechanism, solution[rows])), axis=-1)
+    )
+    assert (off(mechanism, actuators, solution[rows].actuators) / sharpness).max() <= 1e-12
+    assert np.abs(jacobian - expected).max() <= 1e-11 * np.abs(expected).max()
+    assert np.abs(made.to_joints(actuators) - q[rows]).max() <= 1e-9 * reach.max()
+    rates, torques = np.ones(q[rows].shape), np.ones(actuators.shape)
+    power = (made.velocities(q[rows], rates) * torques).sum(-1) - (
+        made.torques_to_joints(q[rows], torques) * rates
+    ).sum(-1)
+    assert np.abs(power).max() <= 1e-12 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", ["g1_ankle", "stewart", "delta", "prs"])
+def test_any_leading_shape_is_taken_and_single_precision_stays(name: str) -> None:
+    made, targets = module(name), known(name, 12)[0]
+    actuators = made.to_actuators(targets)
+    folded = targets.reshape(3, 4, 4, 4).astype(np.float32)
+    n_a = actuators.shape[-1]
+    for values, shape in (
+        (made.to_actuators(folded), (3, 4, n_a)),
+        (made.jacobian(folded), (3, 4, n_a, 6)),
+        (made.to_pose(made.to_actuators(folded)), (3, 4, 4, 4)),
+        (made.margins(folded), (3, 4, len(made.LIMITS))),
+    ):
+        assert values.shape == shape and values.dtype == np.float32
+    np.testing.assert_array_equal(made.to_actuators(targets[0]), actuators[0])
+    many = np.stack([made.parameters()] * len(targets))
+    np.testing.assert_allclose(made.to_actuators(targets, many), actuators, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_nothing_is_ever_nan_and_the_margin_says_what_is_out_of_reach(name: str) -> None:
+    mechanism, made = machine(name), module(name)
+    random, size = np.random.default_rng(1), mechanism.characteristic_length
+    steps = random.uniform(-3.0, 3.0, (300, 3)) * size
+    wild = pf.pose(mechanism.home_pose[:3, 3] + steps, rotvec=random.uniform(-3.0, 3.0, (300, 3)))
+    with np.errstate(all="raise", under="ignore"):
+        results = [*made.with_jacobian(wild), made.margins(wild), made.to_pose(made.to_actuators(wild))]
+    assert all(np.isfinite(values).all() for values in results)
+    reached = pf.solve_ik(mechanism, wild, options=KEEP).status == 0
+    margin, place = made.margin(wild)
+    assert (margin[reached] > -1e-9).all()
+    assert set(np.unique(place)) <= set(range(len(made.LIMITS)))
+
+
+def test_at_a_dead_point_the_value_is_clamped_and_the_margin_changes_sign() -> None:
+    """A crank of length r and a rod of length l reach r + l: there the margin is 0, beyond the crank points there."""
+    made = module("five_bar")
+    at = dict(made.DIMENSIONS)
+    centre, crank = np.array(at["cranks.centre"][0]), np.array(at["cranks.base_end"][0])
+    reach = np.linalg.norm(crank - centre) + at["cranks.length"][0]
+    targets = np.tile(np.eye(4), (3, 1, 1))
+    axis = np.array(at["cranks.axis"][0])
+    direction = np.cross(axis, [0.6, 0.7, 0.5])
+    direction /= np.linalg.norm(direction)
+    targets[:, :3, 3] = centre + np.array([0.99, 1.0, 1.01])[:, None] * reach * direction
+    dead = next(place for place, limit in enumerate(made.LIMITS) if limit.startswith("dead point"))
+    margins = made.margins(targets)[:, dead]
+    assert margins[0] > 1e-3 and abs(margins[1]) < 1e-12 and margins[2] < -1e-3
+    assert np.isfinite(made.jacobian(targets)).all()
+
+
+@pytest.mark.parametrize("name", ["stewart", "g1_ankle", "agile_eye", "canfield", "rrr"])
+def test_margins_are_those_measured_on_all_joints(name: str) -> None:
+    """Against limits measured by the C's own test, on the coordinates of all joints."""
+    from test_export_c import limit_units, truth
+
+    truths, made, mechanism = truth(name, 100), module(name), machine(name)
+    rows = np.flatnonzero(truths.closes)
+    measured = made.margins(truths.whole[rows])[:, : truths.slack.shape[1]] / limit_units(mechanism)
+    np.testing.assert_allclose(measured, truths.slack[rows], atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize(("name", "said"), REFUSED.items())
+def test_machines_without_closed_forms_are_refused_by_name(name: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(UnsupportedMechanism) as caught:
+        pf.export_numpy(machine(name), tmp_path / "machine.py")
+    assert said in str(caught.value) and machine(name).name in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_joints_that_do_not_fit_are_refused_with_the_reason() -> None:
+    with pytest.raises(InvalidArgument, match="in series"):
+        tensor_source(machine("g1_ankle"), joints=["roll_joint"])
+    with pytest.raises(UnknownName, match="pitch_joint"):
+        tensor_source(machine("g1_ankle"), joints=["pitch", "roll"])
+    with pytest.raises(InvalidArgument, match="backend"):
+        tensor_source(machine("g1_ankle"), backend="tensorflow")  # type: ignore[arg-type]
+
+
+def test_joints_of_a_leg_that_others_hold_are_refused() -> None:
+    joints = ["A1.1", "A1.2"] if "A1.1" in [joint.name for joint in machine("rrr").joints] else None
+    chain = joints or [joint.name for joint in machine("rrr").joints][:3]
+    with pytest.raises((UnsupportedMechanism, InvalidArgument)):
+        tensor_source(machine("rrr"), joints=chain)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "jax"])
+def test_a_file_imports_its_library_alone_and_is_ascii(backend: str, tmp_path: Path) -> None:
+    path = pf.export_tensors(machine("g1_ankle"), tmp_path / "ankle.py", backend=backend, joints=series("g1_ankle"))  # type: ignore[arg-type]
+    tree = ast.parse(path.read_bytes().decode("ascii"))
+    imported = {node.module if isinstance(node, ast.ImportFrom) else node.names[0].name for node in ast.walk(tree)
+                if isinstance(node, ast.Import | ast.ImportFrom)}  # fmt: skip
+    assert {str(name).split(".")[0] for name in imported} <= {backend, "functools"}
+
+
+def test_the_names_of_dimensions_are_those_of_their_numbers() -> None:
+    made = module("stewart")
+    values = dict(zip(made.PARAMETER_NAMES, made.parameters(), strict=True))
+    assert values["struts.base_end[0].x"] == made.DIMENSIONS["struts.base_end"][0][0]
+    assert values["struts.length[5]"] == made.DIMENSIONS["struts.length"][5]
+
+
+def test_other_dimensions_are_another_machine() -> None:
+    """A rod end moved: the same answers as those of a mechanism described so."""
+    import dataclasses
+
+    mechanism, made = machine("ankle_ups"), module("ankle_ups", joints=series("ankle_ups"))
+    shifted = [dataclasses.replace(joint, at=(-82.0, 48.0, 0.0)) if joint.name == "AL" else joint
+               for joint in mechanism.joints]  # fmt: skip
+    moved = dataclasses.replace(mechanism, joints=tuple(shifted))
+    other = ModuleType("other")
+    exec(compile(tensor_source(moved, joints=series("ankle_ups")), "other", "exec"), other.__dict__)
+    q = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 2))
+    parameters = other.parameters()
+    np.testing.assert_allclose(made.to_actuators(q, parameters), other.to_actuators(q), rtol=1e-13)
+    assert np.abs(made.to_actuators(q) - other.to_actuators(q)).max() > 1e-3
+
+
+# --- PyTorch and JAX: where they are installed. ---
+
+
+@cache
+def torch() -> Any:
+    if importlib.util.find_spec("torch") is None:
+        pytest.skip("PyTorch is not installed: pip install 'pfabrik[tensors]'")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return importlib.import_module("torch")
+
+
+@cache
+def jax() -> Any:
+    if importlib.util.find_spec("jax") is None:
+        pytest.skip("JAX is not installed: pip install 'pfabrik[tensors]'")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = importlib.import_module("jax")
+        found.config.update("jax_enable_x64", True)
+        importlib.import_module("jax.test_util")
+    return found
+
+
+def number_of(backend: str, dtype: str = "float64") -> Any:
+    """What makes arrays of a backend."""
+    if backend == "torch":
+        return lambda values: torch().tensor(values, dtype=getattr(torch(), dtype))
+    if backend == "jax":
+        return lambda values: jax().numpy.asarray(values, dtype=dtype)
+    return lambda values: values.astype(dtype)
+
+
+@pytest.mark.parametrize("backend", ["torch", "jax"])
+@pytest.mark.parametrize("name", ["g1_ankle", "stewart", "delta", "agile_eye", "tricept", "prr"])
+def test_tensors_answer_as_the_library_does(name: str, backend: str) -> None:
+    for dtype in EXACT:
+        check_actuators(name, module(name, backend), number_of(backend, dtype), 100, dtype)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("dtype", list(EXACT))
+@pytest.mark.parametrize("backend", ["numpy", "torch", "jax"])
+@pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
+def test_tensors_answer_as_the_library_does_on_many_poses(name: str, backend: str, dtype: str) -> None:
+    check_actuators(name, module(name, backend), number_of(backend, dtype), 20_000, dtype)
+
+
+def inside(name: str, joints: tuple[str, ...], count: int) -> np.ndarray:
+    """Coordinates well within all limits."""
+    made = module(name, joints=joints)
+    if joints != ("task",):
+        return np.random.default_rng(2).uniform(-0.1, 0.1, (count, len(joints))) + made.DIMENSIONS["joints.home"]
+    targets = known(name, 200)[0]
+    margins = made.margins(targets)
+    n = len(made.LIMITS) - ("legs do not close" in made.LIMITS)
+    return targets[(margins[:, :n] > 1e-2).all(axis=1) & (margins > 0.0).all(axis=1)][:count]
+
+
+GRADIENTS = [("g1_ankle", True), ("ankle_ups", True), ("delta", False), ("stewart", False), ("agile_eye", False)]
+
+
+@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS)
+def test_gradcheck_by_coordinates_and_parameters(name: str, by_joints: bool) -> None:
+    joints = series(name) if by_joints else ("task",)
+    made, check = module(name, "torch", joints), torch().autograd.gradcheck
+    q = number_of("torch")(inside(name, joints, 1))
+    parameters = made.parameters().requires_grad_()
+    forward = made.to_joints if by_joints else made.to_pose
+    actuators = made.to_actuators(q).detach().requires_grad_()
+    settings = {"eps": 1e-6, "atol": 1e-4, "rtol": 1e-4}
+    if by_joints:  # entries of a pose are not free: numbers of a pose are differentiated in the test below
+        q.requires_grad_()
+    assert check(made.to_actuators, (q, parameters), **settings)
+    if by_joints:
+        assert check(made.jacobian, (q, parameters), **settings)
+    assert check(lambda a, p: forward(a, parameters=p), (actuators, parameters), **settings)
+
+
+@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS)
+def test_the_jacobian_is_what_autograd_says(name: str, by_joints: bool) -> None:
+    """Of poses along the twists that the machine can make."""
+    joints = series(name) if by_joints else ("task",)
+    made, library = module(name, "torch", joints), torch()
+    q = number_of("torch")(inside(name, joints, 1)[0])
+    jacobian = made.jacobian(q)
+    if by_joints:
+        assert library.allclose(library.autograd.functional.jacobian(made.to_actuators, q), jacobian, rtol=1e-10)
+        return
+    pose = made.pose(q)
+
+    def at(twist: Any) -> Any:
+        w = twist[3:]
+        zero = 0.0 * w[0]
+        turn = library.stack(
+            [library.stack([zero, -w[2], w[1]]), library.stack([w[2], zero, -w[0]]), library.stack([-w[1], w[0], zero])]
+        )
+        upper = library.cat([pose[:3, :3] + turn @ pose[:3, :3], (pose[:3, 3] + twist[:3])[:, None]], -1)
+        return made.to_actuators(library.cat([upper, pose[3:]], 0))
+
+    found = library.autograd.functional.jacobian(at, library.zeros(6, dtype=library.float64))
+    feasible = jacobian @ library.linalg.pinv(jacobian) @ found if name == "delta" else found
+    scale = library.tensor([made.SIZE] * 3 + [1.0] * 3, dtype=library.float64)
+    if name == "stewart":
+        assert library.allclose(found * scale, jacobian * scale, rtol=1e-9)
+    else:  # along twists that the legs allow
+        allowed = library.linalg.pinv(jacobian * scale, rtol=1e-9) @ (jacobian * scale)
+        assert library.allclose(feasible * scale @ allowed, jacobian * scale @ allowed, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS[:4])
+def test_no_gradient_is_nan_at_and_beyond_dead_points(name: str, by_joints: bool) -> None:
+    joints = series(name) if by_joints else ("task",)
+    made = module(name, "torch", joints)
+    random = np.random.default_rng(4)
+    if by_joints:
+        wild = random.uniform(-2.0, 2.0, (200, len(made.JOINTS)))
+    else:
+        home = machine(name).home_pose
+        wild = pf.pose(
+            home[:3, 3] + 2.0 * made.SIZE * random.uniform(-1, 1, (200, 3)), rotvec=random.uniform(-2, 2, (200, 3))
+        )
+        wild = np.concatenate([wild, home[None]])
+    q, parameters = number_of("torch")(wild).requires_grad_(), made.parameters().requires_grad_()
+    actuators = made.to_actuators(q, parameters)
+    forward = made.to_joints if by_joints else made.to_pose
+    values = [
+        actuators,
+        made.jacobian(q, parameters),
+        made.margins(q, parameters),
+        forward(actuators, parameters=parameters),
+    ]
+    for value in values:
+        gradients = torch().autograd.grad(value.sum(), (q, parameters), retain_graph=True)
+        assert torch().isfinite(value).all()
+        assert all(torch().isfinite(gradient).all() for gradient in gradients)
+
+
+@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS[:3])
+def test_check_grads_of_jax_by_coordinates_and_parameters(name: str, by_joints: bool) -> None:
+    joints = series(name) if by_joints else ("task",)
+    made, check = module(name, "jax", joints), jax().test_util.check_grads
+    q, parameters = number_of("jax")(inside(name, joints, 1)), made.parameters()
+    forward = made.to_joints if by_joints else made.to_pose
+    actuators = made.to_actuators(q)
+    modes = {"order": 1, "modes": ("fwd", "rev"), "atol": 1e-4, "rtol": 1e-4, "eps": 1e-6}
+    check(lambda p: made.to_actuators(q, p), (parameters,), **modes)
+    check(lambda a, p: forward(a, parameters=p), (actuators, parameters), **modes)
+    if by_joints:
+        check(made.to_actuators, (q, parameters), **modes)
+    jitted = jax().jit(made.with_jacobian)(q)
+    np.testing.assert_allclose(jitted[0], actuators, rtol=1e-12)
+    one = jax().vmap(made.to_actuators)(q)
+    np.testing.assert_allclose(one, actuators, rtol=1e-12)
