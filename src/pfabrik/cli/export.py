@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, cast
 
 import click
 
@@ -38,11 +39,12 @@ def text_of(
     if form in BACKENDS:
         from ..export.tensors import TASK, tensor_source
 
-        return tensor_source(mechanism, backend=form, joints=joints or TASK)
+        return tensor_source(mechanism, backend=cast(Any, form), joints=joints or TASK)
     from ..export.export_c import c_source
 
-    precision = "float" if form == "c-float" else "double"
-    return c_source(mechanism, precision=precision, name=name, joints=joints, file=file)
+    return c_source(
+        mechanism, precision="float" if form == "c-float" else "double", name=name, joints=joints, file=file
+    )
 
 
 @click.command()
