@@ -1,34 +1,38 @@
 # Needs make and Python >= 3.11; everything else is installed into .venv, inside this folder.
 PYTHON ?= python3
 BIN := .venv/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # What a run of the machines needs, and with it what tests and checks need.
 READY := .venv/.ready
 STAMP := .venv/.installed
+# The kernels, compiled in place where there is a C compiler; without one Numba compiles what is needed.
+MODULE := src/pfabrik/kernels/_compiled.json
+KERNELS := $(shell find src/pfabrik/kernels building -name '*.py' -o -name '*.c')
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
 .PHONY: demo reproduce docs test test-tensors test-fast test-interpreted campaign check bench clean
 
-demo: $(READY)
+demo: $(READY) $(MODULE)
 	@$(BIN)/pfabrik demo
 
 # The experiments of the paper, next to what it printed: a report, pictures and CSV files in out/.
-reproduce: $(STAMP)
+reproduce: $(STAMP) $(MODULE)
 	@$(BIN)/python -m paper
 
 # The documentation as a site, in site/; no page needs the network. It stops at a link that leads nowhere.
 docs: $(STAMP)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@$(BIN)/zensical build --clean --strict
 
-# In parallel: the kernels are compiled first, once, and every worker loads them. The routines that kernels are made of
-# are tested as plain Python: compiled alone, each would take longer than its tests.
+# In parallel. The routines that kernels are made of are tested as plain Python: compiled alone, each would take longer
+# than its tests.
 ROUTINES := tests/test_kernels.py tests/test_quadratic.py tests/test_platform_kernels.py
 
-test: $(STAMP)
+test: $(STAMP) $(MODULE)
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(ROUTINES)
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
-test-fast: $(STAMP)
+test-fast: $(STAMP) $(MODULE)
 	@$(BIN)/python -m pytest -m "not slow and not campaign"
 
 # Files of tensors in PyTorch and JAX, which are large: in an environment of their own.
@@ -42,7 +46,10 @@ test-interpreted: $(STAMP)
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not slow and not campaign" --cov --cov-report=term
 
 # Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
-campaign: $(STAMP)
+campaign: $(STAMP) $(MODULE)
+	@PFABRIK_KERNELS=numba $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or not campaign" \
+		tests/test_kernels.py tests/test_quadratic.py tests/test_compiling_ahead.py tests/test_compiled_and_interpreted.py \
+		tests/test_warm_up.py
 	@PFABRIK_HYPOTHESIS=explore $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or hypothesis"
 
 check: $(STAMP)
@@ -51,11 +58,12 @@ check: $(STAMP)
 	$(BIN)/mypy --strict src paper tests/typing
 	$(BIN)/lint-imports
 
-bench: $(STAMP)
+bench: $(STAMP) $(MODULE)
 	@$(BIN)/python benchmarks/run.py
 
 clean:
 	rm -rf .venv out site build dist htmlcov .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -f src/pfabrik/kernels/_compiled.*
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(READY): pyproject.toml
@@ -64,13 +72,16 @@ $(READY): pyproject.toml
 	@printf 'installing pfabrik into .venv ' >&2
 	@(while sleep 2 && kill -0 $$$$ 2>/dev/null; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
 		$(PYTHON) -m venv .venv && \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot]' && echo >&2
+		$(PIP) hatchling editables && $(PIP) --no-build-isolation --editable '.[jit,plot]' && echo >&2
 	@touch $@
+
+$(MODULE): $(READY) $(KERNELS)
+	@$(BIN)/python building/compile_kernels.py || [ $$? = 3 ]
 
 $(STAMP): $(READY)
 	@printf 'installing what tests and checks need ' >&2
 	@(while sleep 2 && kill -0 $$$$ 2>/dev/null; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot,view,dev]' && echo >&2
+		$(PIP) --no-build-isolation --editable '.[plot,view,dev]' && echo >&2
 	@# the model of a robot, which tests read from its maker's wheel: without what its programs need, and skipped without it
-	@-$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps reachy-mini reachy-mini-rust-kinematics
+	@-$(PIP) --no-deps reachy-mini reachy-mini-rust-kinematics
 	@touch $@

@@ -20,22 +20,24 @@ settings.load_profile(os.environ.get("PFABRIK_HYPOTHESIS", "fixed"))
 
 COMPILING = """
 import sys
-import numba
 from pfabrik.kernels import ahead
+from pfabrik.kernels._numba.decorators import compile_for
 
 of_legs = sys.argv[1] == "legs"
 for kernel, arguments in ahead.KERNELS:
-    if kernel.py_func.__module__.startswith(("pfabrik.kernels.legs", "pfabrik.kernels.reaching")) == of_legs:
-        kernel.compile(tuple(numba.typeof(argument) for argument in arguments))
+    if kernel.py_func.__module__.startswith(("pfabrik.kernels.legs", "pfabrik.kernels.platform")) == of_legs:
+        compile_for(kernel, arguments)
 """
 """Compiles all kernels in two parts that share little and take about as long, for two processes."""
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile ahead where workers run in parallel: each that found no kernels would compile them for itself."""
+    """Where Numba compiles and workers run in parallel, compile ahead: each would compile everything for itself."""
     if INTERPRETED or not getattr(session.config.option, "numprocesses", None):
         return
-    started = [subprocess.Popen([sys.executable, "-c", COMPILING, part]) for part in ("legs", "the rest")]
+    from pfabrik.kernels._shipped import COMPILES
+
+    started = [subprocess.Popen([sys.executable, "-c", COMPILING, part]) for part in ("legs", "the rest") if COMPILES]
     for process in started:
         if process.wait():
             raise pytest.UsageError("the kernels do not compile")

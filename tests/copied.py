@@ -9,6 +9,8 @@ from itertools import count
 from pathlib import Path
 from types import ModuleType
 
+from pfabrik import kernels
+
 _NUMBERS = count()
 
 
@@ -21,3 +23,12 @@ def copied(folder: Path, name: str) -> ModuleType:
     sys.modules[package] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sys.modules[package])
     return importlib.import_module(f"{package}.{name}")
+
+
+def copy_kernels(folder: Path) -> None:
+    """Copy what compiles kernels, without the compiled ones: Numba compiles there."""
+    own = Path(kernels.__file__).parent
+    for source in [*own.glob("*.py"), *own.glob("_numba/*.py")]:
+        copy = folder / source.relative_to(own)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(source.read_bytes())

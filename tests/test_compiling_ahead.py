@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from copied import copied
-from pfabrik.kernels import _jit, ahead
-from test_compiled_and_interpreted import INTERPRETED
+from copied import copied, copy_kernels
+from pfabrik.kernels import IS_INTERPRETED, ahead
+from pfabrik.kernels._shipped import COMPILES
 
-pytestmark = pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
+pytestmark = pytest.mark.skipif(IS_INTERPRETED, reason="nothing is compiled")
+by_numba = pytest.mark.skipif(not COMPILES, reason="compiled kernels are here")
 
 ANNOUNCED = """
 import sys
@@ -31,6 +32,7 @@ print(double(float(sys.argv[1])))
 """
 
 
+@by_numba
 def test_every_kernel_is_compiled_for_the_types_that_questions_have() -> None:
     reported: list[str] = []
     ahead.compile_all(lambda name, seconds: reported.append(name))
@@ -47,6 +49,7 @@ def test_every_kernel_is_compiled_for_the_types_that_questions_have() -> None:
         assert len(kernel.signatures) == 1
 
 
+@by_numba
 def test_kernels_with_scratch_memory_of_their_caller_cannot_allocate() -> None:
     names = {kernel.py_func.__name__ for kernel, _ in ahead.KERNELS if not kernel.targetoptions["_nrt"]}
     assert names == {
@@ -67,6 +70,7 @@ def test_a_kernel_is_announced_when_it_is_compiled_and_not_when_it_is_loaded(tmp
     script = tmp_path / "script.py"
     script.write_text(ANNOUNCED)
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment["PFABRIK_KERNELS"] = "numba"
     told = []
     for _ in range(2):
         ran = subprocess.run(
@@ -89,10 +93,8 @@ def load(path: Path) -> ModuleType:
 def test_an_edit_beside_a_kernel_or_in_the_kernels_it_uses_makes_its_cache_stale(
     edited: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for folder in ("kernels", "beside"):
-        (tmp_path / folder).mkdir()
-    for source in Path(_jit.__file__).parent.glob("*.py"):
-        (tmp_path / "kernels" / source.name).write_bytes(source.read_bytes())
+    (tmp_path / "beside").mkdir()
+    copy_kernels(tmp_path / "kernels")
     caller = tmp_path / "beside" / "caller.py"
     (tmp_path / "beside" / "part.py").touch()
     uses = "    from ..kernels import vectors\n    from .part import share\n"

@@ -22,10 +22,14 @@ from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, quaternions, vectors
 from pfabrik.kernels._jit import kernel
+from pfabrik.kernels._shipped import LIBRARY
 from pfabrik.kernels.legs import complete_poses
 from pfabrik.kernels.reaching import half_spaces, moving_frames, restrict, solve
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
+
+if LIBRARY is not None:
+    pytest.skip("only Numba compiles kernels of tests", allow_module_level=True)
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),

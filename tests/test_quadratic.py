@@ -7,7 +7,11 @@ import pytest
 
 from checks import INTERPRETED
 from pfabrik.kernels._jit import kernel
+from pfabrik.kernels._shipped import LIBRARY
 from pfabrik.kernels.qp import factorise, new_qp, solve_qp
+
+if LIBRARY is not None:
+    pytest.skip("only Numba compiles kernels of tests", allow_module_level=True)
 
 pytestmark = [] if INTERPRETED else [pytest.mark.campaign]  # a kernel of its own, as in `test_kernels`
 

@@ -9,26 +9,26 @@ from click.testing import CliRunner
 import pfabrik as pf
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument
-from pfabrik.kernels import _cache, _jit
-
-INTERPRETED = bool(_jit._config.DISABLE_JIT)
+from pfabrik.kernels._shipped import COMPILES
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
+@pytest.mark.skipif(not COMPILES, reason="nothing is compiled")
 def test_afterwards_nothing_is_compiled_whatever_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pfabrik.kernels._numba.cache import KernelCache
+
     told: list[tuple[str, float]] = []
     pf.warm_up(on_step=lambda what, seconds: told.append((what, seconds)))
     assert told
     assert all(what and seconds >= 0.0 for what, seconds in told)
     asked: list[object] = []
-    load = _cache.KernelCache.load_overload
+    load = KernelCache.load_overload
 
-    def watched(self: _cache.KernelCache, signature: object, context: object) -> object:
+    def watched(self: KernelCache, signature: object, context: object) -> object:
         asked.append(signature)
         return load(self, signature, context)
 
-    monkeypatch.setattr(_cache.KernelCache, "load_overload", watched)
+    monkeypatch.setattr(KernelCache, "load_overload", watched)
     for name in pf.catalog():
         ask_everything(pf.load(name))
     assert asked == []
@@ -60,7 +60,17 @@ def test_what_is_no_mechanism_is_refused() -> None:
         pf.warm_up("stewart")  # type: ignore[arg-type]
 
 
+@pytest.mark.skipif(COMPILES, reason="something is compiled")
+def test_where_nothing_is_to_be_compiled_the_command_says_so() -> None:
+    told: list[str] = []
+    pf.warm_up(on_step=lambda what, _: told.append(what))
+    assert told == []
+    result = CliRunner().invoke(main, ["compile"])
+    assert (result.exit_code, result.stdout) == (0, "nothing to compile: the kernels are here\n")
+
+
 @pytest.mark.slow
+@pytest.mark.skipif(not COMPILES, reason="nothing is compiled")
 def test_the_command_says_each_step_with_its_seconds() -> None:
     result = CliRunner().invoke(main, ["compile"])
     assert result.exit_code == 0

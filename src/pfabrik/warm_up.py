@@ -29,10 +29,10 @@ FAR = 3.0
 
 
 def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float], None] | None = None) -> None:
-    """Compile ahead what questions need: seconds once per version, then kept in a cache on disk.
+    """Compile ahead what questions need, where the kernels did not come compiled: there Numba keeps them in a cache.
 
-    In every new process the compiled code is loaded when it is first needed, which takes a part of a second; this does
-    it at a time of your choice.
+    Where they did, in a wheel and in a clone after `make`, nothing is compiled, and without a mechanism nothing done.
+    With one, what its first questions prepare, which takes tenths of a second, is done at a time of your choice.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from ..errors import PfabrikError, near_miss
+from ..kernels import NoKernels
 from .printing import complain
 from .stops import Stops
 
@@ -122,7 +123,7 @@ def code_of(run: Callable[[], Any], stops: Stops) -> int:
         complain(f"{error.format_message().rstrip('.')} (see '{place} --help')")
     except click.ClickException as error:
         complain(error.format_message())
-    except PfabrikError as error:
+    except (PfabrikError, NoKernels) as error:
         complain(str(error))
     except SystemExit:  # click leaves this way when the reader of a pipe has gone
         return PIPE_CLOSED

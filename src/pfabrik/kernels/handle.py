@@ -8,6 +8,8 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from . import IS_INTERPRETED
+
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays, and of such NamedTuples
 
 
@@ -19,12 +21,9 @@ class Handle(Generic[R]):
     """
 
     def __init__(self, record: R) -> None:
-        import numba
-
-        config: Any = numba.config
         self.record = record
         self._memory = np.fromiter(_descriptors(record), np.int64)
-        self.address: Any = record if config.DISABLE_JIT else self._memory.ctypes.data
+        self.address: Any = record if IS_INTERPRETED else self._memory.ctypes.data
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies get new arrays and their addresses."""

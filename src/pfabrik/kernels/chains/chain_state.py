@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints
+from .._jit import opener
 from ..closure.loops import BALL
 from ..closure.pose_objective import PoseGradient
-from ..references import opener
 from .chain_records import SEEDS, SerialChain
 
 

@@ -11,9 +11,8 @@ import math
 from typing import NamedTuple
 
 from ...arrays import Floats
-from .._jit import inlined, routine, search
+from .._jit import inlined, opener, routine, search
 from ..quaternions import exponential, turn_about_z, turn_ball, yaw_of
-from ..references import opener
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .normal_equations import (
     add_cones,

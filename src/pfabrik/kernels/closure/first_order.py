@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import routine, search
+from .._jit import opener, routine, search
 from ..quaternions import turn_ball
-from ..references import opener
 from .loops import BALL, CONSTRAINT, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Loops
 from .path_kinematics import LAYOUT, LOOPS, Equations, State, end_path, new_equations, new_state, open_loops, walk_path
 

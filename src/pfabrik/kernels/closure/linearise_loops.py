@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Records
-from .._jit import routine
+from .._jit import opener, routine
 from ..free_motions import (
     Elimination,
     FreeMotions,
@@ -19,7 +19,6 @@ from ..free_motions import (
     project_gradient,
 )
 from ..qp import QP, new_qp
-from ..references import opener
 from ..sqp import CONTROL, REACH, Hessian, new_hessian
 from .loops import BALL, Loops, Objective
 from .path_kinematics import (

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import inlined, routine
+from .._jit import inlined, opener, routine
 from ..quaternions import difference, logarithm, rotate_by, turn_ball
-from ..references import opener
 from .loops import BALL, SLIDE, Closed, Layout, Loops
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..references import opener
+from .._jit import opener
 from .records import CONE, COORDINATE, LEG, TASK, Table
 
 _RECORDS = (LEG, COORDINATE, CONE, COORDINATE, COORDINATE, TASK, np.dtype(np.int64))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import routine, search
+from .._jit import opener, routine, search
 from ..legs.answer import deviation, place_legs, put_rows, put_slopes
 from ..legs.complete_poses import load_pose
 from ..legs.endings import LEAST_MARGIN
@@ -16,7 +16,6 @@ from ..legs.frames import set_frames
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import Table
 from ..legs.rods import put_proximal_slope
-from ..references import opener
 from ..vectors import copy_row
 from .equations import (
     LegEvaluation,

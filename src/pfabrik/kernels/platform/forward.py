@@ -13,13 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record
-from .._jit import kernel, routine
+from .._jit import kernel, opener, routine
 from ..legs.answer import KEPT, deviation, excess_of, largest_entry
 from ..legs.complete_poses import middle_of, orthonormalise
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import PIVOT, Q_PROXIMAL, Table
 from ..linear import solve_spd, solve_square
-from ..references import opener
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, sub, vec, wrap

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from .._jit import routine, search
+from .._jit import opener, routine, search
 from ..closure.first_order import size_of, triangularise
-from ..references import opener
 
 # Slope up to which a constraint follows from others [L or rad].
 IMPLIED = 1e-9

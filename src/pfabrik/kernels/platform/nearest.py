@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
-from .._jit import routine, search
+from .._jit import opener, routine, search
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import limit_multipliers
@@ -18,7 +18,6 @@ from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import REDUNDANT, Table
 from ..qp import QP, new_qp
 from ..quaternions import difference, yaw_difference
-from ..references import opener
 from ..rows import (
     CERTAIN,
     HOLD,

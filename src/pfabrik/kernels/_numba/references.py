@@ -17,7 +17,6 @@ _cgutils: Any = cgutils
 _imputils: Any = imputils
 _extending: Any = extending
 _AttributeTemplate: Any = AttributeTemplate
-_config: Any = numba.config
 _typeof: Any = numba.typeof
 
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
@@ -75,8 +74,6 @@ def argument_type(given: Any) -> Any:
 
 def opener(sample: R) -> Callable[[Any], R]:
     """Compiled function from the address of a `Handle` to its NamedTuple, with the types of a sample."""
-    if _config.DISABLE_JIT:
-        return lambda record: record
     reference = Reference(_typeof(sample))
 
     def open_record(typing_context: Any, address: Any) -> Any:

@@ -4,52 +4,31 @@ from __future__ import annotations
 
 import gc
 import sys
-import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partialmethod
+from functools import cache, partialmethod
 from types import SimpleNamespace
 from typing import Any
 
 from numba.core import base, codegen, compiler, cpu, dispatcher, event, types
 from numba.core.registry import cpu_target
 
-# Numba has type annotations in some versions only, and none for internals.
-_Library: Any = getattr(codegen, "JITCodeLibrary", object)
-_Codegen: Any = getattr(codegen, "CPUCodegen", object)
-_Compiler: Any = getattr(compiler, "Compiler", object)
-_Flags: Any = getattr(compiler, "Flags", object)
-_Dispatcher: Any = dispatcher.Dispatcher
-_Function: Any = getattr(types, "BaseFunction", object)
-_Context: Any = getattr(base, "BaseContext", object)
-_CpuContext: Any = getattr(cpu, "CPUContext", object)
-_event: Any = event
+from .._shipped import REASON
 
-# Internals of Numba: with a version that lacks one, Numba's own pipeline compiles everything, which takes longer.
-_HOOKS = (
-    (_Library, "_optimize_functions _optimize_final_module finalize codegen"),
-    (_Codegen, "_function_pass_manager _module_pass_manager"),
-    (_Compiler, "define_pipelines"),
-    (_Flags, "summary copy"),
-    (_Function, "get_call_type"),
-    (_Context, "get_abi_sizeof get_preferred_array_alignment install_registry mangler refresh"),
-    (_CpuContext, "load_additional_registries"),
-    (_event, "broadcast"),
-)
-IS_HOOKED = all(hasattr(owner, name) for owner, names in _HOOKS for name in names.split())
+# Numba has type annotations in some versions only, and none for internals.
+_Library: Any = codegen.JITCodeLibrary
+_Compiler: Any = compiler.Compiler
+_Flags: Any = compiler.Flags
+_Dispatcher: Any = dispatcher.Dispatcher
+_Function: Any = types.BaseFunction
+_Context: Any = base.BaseContext
+_CpuContext: Any = cpu.CPUContext
+_event: Any = event
 
 LARGE = 150
 """Instructions of a part, before optimisation, above which a search does not inline it."""
-
-TICK = 2.0
-"""Seconds between two dots of progress while a kernel compiles."""
-
-
-def name_of(function: Callable[..., Any]) -> str:
-    """Name of a kernel in announcements: its folder and its function."""
-    return f"{function.__module__.rpartition('.')[0].rpartition('.')[2]}.{function.__name__}".lstrip(".")
 
 
 def compile_announced(name: str, original: Callable[..., Any], *arguments: Any) -> Any:
@@ -57,21 +36,21 @@ def compile_announced(name: str, original: Callable[..., Any], *arguments: Any) 
 
     Numba calls this for what is not in the cache, holding its lock: one thread compiles, the others wait.
     """
+    _say_reason()
     _say(f"pfabrik: compiling {name} ...")
-    began, done = time.perf_counter(), threading.Event()
-    threading.Thread(target=_tick, args=(done,), daemon=True).start()
+    began = time.perf_counter()
     try:
         with in_haste():
             return original(*arguments)
     finally:
-        done.set()
         _say(f" {time.perf_counter() - began:.1f} s\n")
 
 
-def _tick(done: threading.Event) -> None:
-    """Write a dot on standard error every few seconds until done."""
-    while not done.wait(TICK):
-        _say(".")
+@cache
+def _say_reason() -> None:
+    """Say once why no kernels that were compiled before run here."""
+    if REASON:
+        _say(f"pfabrik: {REASON}; Numba compiles\n")
 
 
 def _say(text: str) -> None:
@@ -89,16 +68,14 @@ def in_haste() -> Iterator[None]:
     """
     collects = gc.isenabled()
     gc.disable()
-    if IS_HOOKED:
-        cpu_target.target_context.refresh()
-        for owner, name, _, ours in _REPLACED:
-            setattr(owner, name, ours)
+    cpu_target.target_context.refresh()
+    for owner, name, _, ours in _REPLACED:
+        setattr(owner, name, ours)
     try:
         yield
     finally:
-        if IS_HOOKED:
-            for owner, name, theirs, _ in _REPLACED:
-                setattr(owner, name, theirs)
+        for owner, name, theirs, _ in _REPLACED:
+            setattr(owner, name, theirs)
         if collects:
             gc.enable()
 
@@ -155,7 +132,7 @@ def _no_broadcast(event: Any) -> None:
 
 def _replaced(owner: Any, name: str, ours: Callable[..., Any], *, asks: bool) -> tuple[Any, str, Any, Any]:
     """A function of Numba with its replacement, which gets the original as an argument if `asks`."""
-    theirs = getattr(owner, name, None)
+    theirs = getattr(owner, name)
     return owner, name, theirs, partialmethod(ours, theirs) if asks else ours
 
 
@@ -210,11 +187,15 @@ class _KernelLibrary(_Library):
         super().finalize()
 
     def _optimize_final_module(self) -> None:
+        self.prepare()
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+    def prepare(self) -> None:
+        """Mark what only this kernel calls."""
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage.name == "linkonce_odr":
                 function.linkage = "internal"
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
 
 
 class _SearchLibrary(_KernelLibrary):
@@ -224,11 +205,11 @@ class _SearchLibrary(_KernelLibrary):
         """Defer: the search is optimised with all its parts, and has no loop that vectorises."""
         module.data_layout = self._codegen._data_layout
 
-    def _optimize_final_module(self) -> None:
+    def prepare(self) -> None:
         for function in self._final_module.functions:
             if str(function).count("\n  ") > LARGE and not any(b"alwaysinline" in each for each in function.attributes):
                 function.add_function_attribute("noinline")
-        super()._optimize_final_module()
+        super().prepare()
 
 
 class _StackedOptions(_Flags):
