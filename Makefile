@@ -8,6 +8,9 @@ STAMP := .venv/.installed
 # The kernels, compiled in place where there is a C compiler; without one Numba compiles what is needed.
 MODULE := src/pfabrik/kernels/_compiled.json
 KERNELS := $(shell find src/pfabrik/kernels building -name '*.py' -o -name '*.c')
+# Matrices are small here: threads of the linear algebra would only wait for each other, the more so where tests run in
+# parallel.
+export OPENBLAS_NUM_THREADS := 1
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 
 .PHONY: demo reproduce docs test test-tensors test-fast test-interpreted campaign check bench clean
