@@ -237,6 +237,26 @@ def test_suggested_poses_beat_random_ones() -> None:
     assert worst(information(found.suggest(20))) < best
 
 
+def test_tolerances_of_joints_add_to_the_error_of_a_pose() -> None:
+    mechanism = pf.load("stewart")
+    solution = pf.solve_ik(mechanism, pf.pose([10, 5, 190], rotvec=[0.05, 0.1, 0]))
+    own = pf.parameters(mechanism, ["AL1", "CR2"])
+    slopes = pf.sensitivity(solution, own)
+    errors = dict.fromkeys(own.names, 0.02) | {"BL1": 0.01}
+    worst = pf.accuracy(solution, errors, sensitivity=slopes)
+    exact = []
+    for signs in np.ndindex(*(2,) * (len(own) + 1)):
+        signed = 2.0 * np.array(signs) - 1.0
+        other = own.apply(own.values + 0.02 * signed[:-1]).without_limits()
+        readings = solution.actuators + 0.01 * signed[-1] * (np.arange(6) == 0)
+        moved = pf.solve_fk(other, readings, start=solution.q)
+        exact.append(np.linalg.norm(moved.pose[:3, 3] - solution.pose[:3, 3]))
+    assert worst.position == pytest.approx(max(exact), rel=2e-3)
+    usual = pf.accuracy(solution, errors, "rms", sensitivity=slopes)
+    squares = (slopes.pose[:3] ** 2).sum() * 0.02**2 + (pf.forward_jacobian(solution)[:3, 0] ** 2).sum() * 0.01**2
+    assert usual.position == pytest.approx(np.sqrt(squares), rel=1e-9)
+
+
 def test_measurements_from_a_table(tmp_path: Path) -> None:
     mechanism = pf.load("linear_delta")
     solution = pf.solve_ik(mechanism, [[0, 0, 0], [10, 5, -3], [0, 20, 1]])

@@ -55,6 +55,13 @@ figure.savefig("error.png", dpi=110)
 play = dict.fromkeys(machine.actuator_names, off) | {f"C{leg}": 1e-4 for leg in range(1, 7)}
 print(f"{pf.accuracy(here, play).position * 1e3:.2f} µm with play in the upper joints")
 
+# Places of the joints are known to 20 µm at best after calibration. Parameters count by their names, with the pose's
+# sensitivity to them; `pf.sensitivity` has the derivatives, here by the centres of the six lower joints.
+centres = pf.parameters(machine, [f"A{leg}" for leg in range(1, 7)])
+built = dict.fromkeys(centres.names, 0.02)
+placed = pf.accuracy(here, built, "rms", sensitivity=pf.sensitivity(here, centres))
+print(f"{placed.position * 1e3:.0f} µm rms by joints that are off by 20 µm rms")
+
 # ## How fine the struts must be
 #
 # To first order, errors grow in proportion: for one micrometre everywhere in the slice, the struts may be off by

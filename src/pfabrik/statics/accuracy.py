@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -55,21 +55,38 @@ class PoseAccuracy:
     reason: str | Reasons
 
 
-def accuracy(
-    solution: Solution, errors: float | Mapping[str, float], kind: Literal["worst", "rms"] = "worst"
-) -> PoseAccuracy:
-    """The error of the pose that errors of actuators and play in joints make, at a configuration or a batch.
+class Slopes(Protocol):
+    """Derivatives of poses by parameters of their machine, as `pf.sensitivity` gives them."""
 
-    To first order, x = F e - sum R' d: with the forward Jacobian F, errors e of the actuators, and play d of joints,
-    whose reactions to a wrench w are R w. "worst" is the largest |x| for all |e_i| and |d_j| within bounds, found at
-    their corners; "rms" takes them for independent, with a mean of 0.
+    @property
+    def pose(self) -> Floats: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+
+def accuracy(
+    solution: Solution,
+    errors: float | Mapping[str, float],
+    kind: Literal["worst", "rms"] = "worst",
+    *,
+    sensitivity: Slopes | None = None,
+) -> PoseAccuracy:
+    """The error of the pose by errors of actuators, play in joints and tolerances of parts, at one configuration or many.
+
+    To first order, x = F e - sum R' d + P p: with the forward Jacobian F, errors e of the actuators, play d of joints,
+    whose reactions to a wrench w are R w, and the sensitivity P to parameters p. "worst" is the largest |x| for all
+    |e_i|, |d_j| and |p_k| within bounds, found at their corners; "rms" takes them for independent, with a mean of 0.
 
     Parameters
     ----------
     errors : actuator -> how far its coordinate may be off [length or rad], half its resolution and half its backlash
         together; a number alone for all actuators. Other joint -> how far its centre may be off, in any direction
-        [length]: half the clearance of its diameter. What is not named is exact.
+        [length]: half the clearance of its diameter. Parameter of `sensitivity` -> its tolerance, in its unit. What is
+        not named is exact.
     kind : "worst", and errors are bounds; "rms", and they are standard deviations, of a joint in each direction.
+
+    sensitivity : of this solution, as `pf.sensitivity(solution, parameters)` gives it, if errors name parameters.
 
     Raises
     ------
@@ -79,10 +96,11 @@ def accuracy(
     mechanism = checked_solution(solution).mechanism
     if kind not in ("worst", "rms"):
         raise InvalidArgument("kind", repr(kind), "'worst' or 'rms'")
+    tolerances, errors = _tolerances(solution, errors, sensitivity)
     of_actuators, of_joints = _errors(mechanism, errors)
     maps = maps_of(solution)
     reasons = maps.reasons
-    by_actuator = maps.forward * of_actuators
+    by_actuator = np.concatenate([maps.forward * of_actuators, tolerances], axis=-1)
     by_joint = np.zeros((len(by_actuator), 0, by_actuator.shape[1], 3))
     if of_joints:
         by_joint, is_loose = _by_joint(solution, maps, of_joints)
@@ -100,13 +118,29 @@ def accuracy(
         found = [
             *(sizes for sizes, _ in parts),
             components,
-            np.stack([signs for _, signs in parts], axis=1) * of_actuators,
+            np.stack([signs[:, : len(of_actuators)] for _, signs in parts], axis=1) * of_actuators,
         ]
     for array in found:
         array[is_unknown] = np.nan
     position, rotation, components, more = (shaped(array, shape) for array in found)
     covariance, actuators = (more, None) if kind == "rms" else (None, more)
     return PoseAccuracy(kind, position, rotation, components, covariance, actuators, in_shape(reasons, shape))
+
+
+def _tolerances(
+    solution: Solution, errors: float | Mapping[str, float], slopes: Slopes | None
+) -> tuple[Floats, float | Mapping[str, float]]:
+    """Errors of poses by parameters, (n, r, p), and the errors that are no parameters'."""
+    n, r = len(solution._rows.status), 3 if solution.mechanism.end_effector_is_joint else 6
+    if slopes is None or not isinstance(errors, Mapping):
+        return np.zeros((n, r, 0)), errors
+    by_parameter = np.reshape(slopes.pose, (-1, *np.shape(slopes.pose)[-2:]))
+    if by_parameter.shape[:2] != (n, r):
+        raise InvalidArgument("sensitivity", f"shape {np.shape(slopes.pose)}", "that of this solution")
+    named = [name for name in errors if name in slopes.names and name not in solution.mechanism.actuator_names]
+    bounds = np.array([require_positive(f"errors['{name}']", errors[name]) for name in named])
+    columns = by_parameter[:, :, [slopes.names.index(name) for name in named]]
+    return columns * bounds, {name: error for name, error in errors.items() if name not in named}
 
 
 def _errors(mechanism: Mechanism, given: float | Mapping[str, float]) -> tuple[Floats, dict[int, float]]:
