@@ -72,7 +72,7 @@ def accuracy(
     *,
     sensitivity: Slopes | None = None,
 ) -> PoseAccuracy:
-    """The error of the pose by errors of actuators, play in joints and tolerances of parts, at one configuration or many.
+    """The error of the pose by errors of actuators, play in joints and tolerances of parts, at any configurations.
 
     To first order, x = F e - sum R' d + P p: with the forward Jacobian F, errors e of the actuators, play d of joints,
     whose reactions to a wrench w are R w, and the sensitivity P to parameters p. "worst" is the largest |x| for all
