@@ -23,6 +23,7 @@ from in_c import IS_THERE, InC
 from in_placo import peer
 from maps import maps
 from passes import passes
+from proofs import proofs
 from table import Row, cells, machine, table
 from timing import Solve, best_times, draw, in_blocks
 from viewer import viewer
@@ -217,6 +218,7 @@ def main() -> None:
         *chain_rows(rng, runs, 100 if given.quick else 1000),
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),
+        *proofs(runs),
         *maps(rng, min(runs, 5), 2000 if given.quick else 10_000),
         *viewer(min(runs, 5)),
         *([] if given.quick else start_up(5)),

@@ -11,6 +11,7 @@ Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, wor
            Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 Look over   workspace, singularity_map
+Prove      certify, largest; PoseRegion, Certificate
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Load        forces, wrench_capacity, transmission, stiffness, accuracy
 Look into  search_log (every attempt behind an answer)
@@ -60,6 +61,10 @@ _NAMES = {
     "calibration.plot_calibration": ("plot_calibration",),
     "calibration.sensitivity": ("Sensitivity", "sensitivity"),
     "catalog": ("catalog",),
+    "certify.certificates": ("Certificate",),
+    "certify.question": ("certify",),
+    "certify.enclosure": ("Enclosure",),
+    "certify.pose_region": ("PoseRegion",),
     "configuration": ("configuration",),
     "decomposition.decompose": ("SubChain", "decompose"),
     "description.legs": ("Leg",),
@@ -96,6 +101,7 @@ _NAMES = {
     "warm_up": ("warm_up",),
     "workspace.ask": ("workspace",),
     "workspace.inscribed": ("Inscribed",),
+    "workspace.largest": ("Largest", "largest"),
     "workspace.result": ("Workspace",),
     "workspace.singular": ("SingularityMap", "SingularityTrack", "singularity_map"),
 }
@@ -132,6 +138,10 @@ if TYPE_CHECKING:
     from .calibration.plot_calibration import plot_calibration as plot_calibration
     from .calibration.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
     from .catalog import catalog as catalog
+    from .certify.certificates import Certificate as Certificate
+    from .certify.question import certify as certify
+    from .certify.enclosure import Enclosure as Enclosure
+    from .certify.pose_region import PoseRegion as PoseRegion
     from .configuration import configuration as configuration
     from .decomposition.decompose import SubChain as SubChain, decompose as decompose
     from .description.legs import Leg as Leg
@@ -177,6 +187,7 @@ if TYPE_CHECKING:
     from .warm_up import warm_up as warm_up
     from .workspace.ask import workspace as workspace
     from .workspace.inscribed import Inscribed as Inscribed
+    from .workspace.largest import Largest as Largest, largest as largest
     from .workspace.result import Workspace as Workspace
     from .workspace.singular import (
         SingularityMap as SingularityMap,

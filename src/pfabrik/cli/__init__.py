@@ -22,6 +22,7 @@ __all__ = ["main"]
         "track": "Follow a path of targets.",
         "travel": "Tell how far the end effector can go along and about axes.",
         "workspace": "Tell how big the workspace is, and which limits form its border.",
+        "certify": "Prove that every pose of a region is reached, or find one that is not.",
         "calibrate": "Find the parameters of a machine from measurements.",
         "time": "Find the fastest way along a path.",
         "speed": "Tell how fast the platform may move.",

@@ -46,6 +46,7 @@ SECONDS_A_LINE = 5.0
 @click.option("--tilt", type=FINITE, metavar="DEG", help="Positions where it can lean so far to every side.")
 @click.option("--within", multiple=True, metavar="NAME=MIN:MAX", help="Where to look [length or deg]. May be repeated.")
 @click.option("--resolution", type=FINITE, metavar="R", help="Cells at the border [length; deg if all are angles].")
+@click.option("--certified", is_flag=True, help="Enclose the size between two bounds that are proved, too.")
 @click.option("--largest", type=click.Choice(["sphere", "box", "cylinder"]), help="The largest that fits in.")
 @click.option("--centre", metavar="V,V[,V]", help="Its centre [length or deg]. Default: where it is largest.")
 @click.option(
@@ -66,6 +67,7 @@ def workspace(
     tilt: float | None,
     within: tuple[str, ...],
     resolution: float | None,
+    certified: bool,
     largest: Kind | None,
     centre: str | None,
     outputs: tuple[Path, ...],
@@ -102,6 +104,7 @@ def workspace(
         tilt=None if tilt is None else math.radians(tilt),
         within={name: (low, high) for name, (low, high) in pairs("--within", within, 2).items()} or None,
         resolution=None if resolution is None else in_its_unit(mechanism, names, held, resolution),
+        certified=certified,
         on_progress=None if sys.stderr.isatty() else lines_of_progress(),
     )
     middle = None if centre is None else point(space, centre)
@@ -200,6 +203,9 @@ def describe(space: pf.Workspace, shape: pf.Inscribed | None) -> str:
         for name, low, high, factor, unit in zip(space.names, *space.bounds.tolist(), factors, units, strict=True)
     ]
     blocks = [in_words(space), aligned(["", "min", "max", "unit"], rows), border_table(space)]
+    if space.enclosure is not None:
+        lower, upper = space.enclosure.lower, space.enclosure.upper
+        blocks.append(f"proved: at least {lower:,.7g} and at most {upper:,.7g} {space.size_unit}")
     if len(space.components) > 1:
         blocks.append("\n".join(describe_component(space, component) for component in space.components))
     elif space.at_start is None:

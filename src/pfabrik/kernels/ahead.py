@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ._shipped import COMPILES, name_of
+from .certify.prove import prove
 from .chains.answer_chains import nearest_in_chains, reach_in_chains, walk_chains
 from .chains.chain_records import ChainAim, ChainAnswers
 from .closure.close import close
@@ -93,6 +94,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),
     (join, tuple(_values("I2 i1"))),
+    (prove, tuple(_values("i i"))),
     (walk_path, tuple(_values("F2 F1 F2 f3 f3"))),
     (second_derivatives, tuple(_values("F1 F2 f2"))),
     (fastest, tuple(_values("F1 F2 F2 F1 F1 b f1"))),

@@ -12,11 +12,13 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start, joint_vectors, start_of
 from ..arrays import Floats
-from ..checks import require_mapping
+from ..certify.enclosure import Enclosure, enclose
+from ..checks import require_mapping, require_positive
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..description.task import task_of
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument, UnknownName, UnsupportedMechanism
+from ..model import model_of
 from ..poses import SupportsMatrix
 from ..telling import OnProgress, telling
 from .border_search import searched, step_of
@@ -31,6 +33,9 @@ FEWEST_CELLS = 24
 
 MOST_HALVINGS = 6
 
+ENCLOSED, MOST_CELLS = 1e-3, 1_000_000
+"""Gap between both bounds of an enclosed size, as a share of it, and the most cells that are looked at for it."""
+
 
 def workspace(
     mechanism: Mechanism,
@@ -42,6 +47,7 @@ def workspace(
     within: Mapping[str, tuple[float, float]] | None = None,
     resolution: float | None = None,
     start: Start | None = None,
+    certified: bool | float = False,
     executor: Executor | None = None,
     on_progress: OnProgress | None = None,
 ) -> Workspace:
@@ -66,6 +72,8 @@ def workspace(
         forms answer; halved where a workspace would be smaller than 24 cells.
     start : a single Solution or joint vector q, which sets the working mode; the component that contains it is
         `at_start`; default home.
+    certified : True to enclose the size between two proved bounds too, `Workspace.enclosure`, to 0.1 %; or the share to
+        which it is to be enclosed. For closed forms, in home's working mode.
     executor : of `concurrent.futures`, or one like it, that measures points; default: here, on all cores. Without
         closed forms, points are explored here, each from one within reach; a separate component is found if one of 96
         samples, spread over the points not yet reached, is within it.
@@ -90,8 +98,35 @@ def workspace(
             raise InvalidArgument("tilt", "an angle", "None with orientation='any'")
     hold: Literal["orientation", "position"] = "position" if is_any else "orientation"
     question = MapQuestion(space, begin, _turns(space, tilt), hold, *_ends(space, within))
+    accuracy = _accuracy(question, certified)
     with telling("workspace", on_progress) as tell:
-        return _refined_workspace(question, resolution, executor, tell)
+        space_found = _refined_workspace(question, resolution, executor, tell)
+    if accuracy > 0.0:
+        space_found.enclosure = _enclosure(question, accuracy)
+    return space_found
+
+
+def _accuracy(question: MapQuestion, certified: Any) -> float:
+    """The share to which the size is to be enclosed; 0 if it is not."""
+    if certified is False or certified is None:
+        return 0.0
+    accuracy = ENCLOSED if certified is True else require_positive("certified", certified)
+    expected = "False: sizes are proved of positions and tilts, at home's working mode"
+    if question.start is not None or len(question.turns) > 1 or question.hold == "position":
+        raise InvalidArgument("certified", f"{certified!r}, with a start, a tilt or any orientation", expected)
+    if question.space.joint is not None:
+        raise InvalidArgument("certified", f"{certified!r}, over the coordinates of a joint", expected)
+    return accuracy
+
+
+def _enclosure(question: MapQuestion, accuracy: float) -> Enclosure:
+    """The size of a workspace between two proved bounds."""
+    model, space = model_of(question.mechanism), question.space
+    if model.why_poses_do_not_suffice:
+        reason = f"no legs in closed form, {model.why_poses_do_not_suffice}"
+        raise UnsupportedMechanism(question.mechanism.name, [reason], "enclosed")
+    ends = question.lowest, question.highest
+    return enclose(model, space.names, space.held, space.rotation, ends, accuracy=accuracy, budget=MOST_CELLS)
 
 
 def _refined_workspace(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from ..certify.enclosure import Enclosure
 from .border_search import sliced
 from .inscribed import Inscribed, Kind, inscribed
 from .region import Region
@@ -32,8 +33,11 @@ class Workspace(Region):
         inside on their left. They are closed.
     limits : (joint, bound) of what may form the border, as of `Feasibility`; a coordinate and "min" or "max" where
         `within` cut the workspace off.
+    enclosure : its size between two proved bounds, if it was asked for; else None.
     face_limit, vertex_limit : which of `limits` forms each face, (f,), and the border at each vertex, (v,).
     """
+
+    enclosure: Enclosure | None = None
 
     @cached_property
     def components(self) -> tuple[Workspace, ...]:
@@ -121,6 +125,7 @@ class Workspace(Region):
             "resolution": self.resolution.tolist(),
             "bounds": ends if len(self.faces) else None,
             "limits": shares,
+            "enclosure": None if self.enclosure is None else self.enclosure.to_dict(),
             "components": [{"size": each.size, "at_start": each is self.at_start} for each in self.components],
         }
 

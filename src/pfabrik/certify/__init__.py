@@ -1,0 +1,1 @@
+"""Proofs that every pose of a region is within all limits, or a pose that is not."""

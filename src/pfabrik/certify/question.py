@@ -1,0 +1,232 @@
+"""`certify`: is every pose of a region, or between the steps of a track, within all limits?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ..answers.solution import Solution
+from ..answers.status import Status
+from ..arrays import Floats
+from ..checks import require_finite, require_names
+from ..description.mechanism import Mechanism, checked_mechanism
+from ..description.task import task_of
+from ..errors import InvalidArgument, UnsupportedMechanism
+from ..feasibility import feasibility
+from ..ik import solve_ik
+from ..kernels.certify.pose_cells import CellParameters
+from ..kernels.certify.prove import BROKEN, DONE, SPENT
+from ..kernels.certify.subdivision import FOUND_MARGIN, LIMIT, N_OPEN, N_PROVED, N_STACK, PROVED_MARGIN
+from ..model import Model, model_of
+from ..poses import are_poses
+from ..rotations import to_rotvec
+from ..targets import Target, as_targets
+from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
+from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
+from .pose_region import PoseRegion
+from .subdividing import Subdividing, first_cells, region_parameters, step_poses, track_parameters
+
+BUDGET = 200_000
+"""Cells that are looked at by default: about a tenth of a second for six struts."""
+
+MOST_DOUBTS = 16
+"""Poses out of reach in home's working mode but reached in another, after which a region is left open."""
+
+
+def certify(
+    mechanism: Mechanism,
+    region: PoseRegion | Target,
+    *,
+    limits: Iterable[str] | None = None,
+    tolerance: float | None = None,
+    budget: int = BUDGET,
+    uncertain: float = 0.0,
+) -> Certificate:
+    """Prove that `solve_ik` reaches every pose of a region, find a pose that it does not reach, or say what is open.
+
+    Legs are in home's working mode: what is proved is reached without a change of it. What is refuted is reached in no
+    working mode.
+
+    Parameters
+    ----------
+    region : a `PoseRegion`; or poses as of `solve_ik` (n, ...), or a Track, whose answers count: every pose between two
+        of them, with the position on a line and the rotation about one axis.
+    limits : names of the joints whose limits count; default all.
+    tolerance : by how much the proved `margin` may be less than the least margin in the region, if the region is
+        proved; by default it is only known to be positive.
+    budget : number of cells to look at, at most.
+    uncertain : radius of a ball about each joint's point that its true place may be anywhere in [length]: proved for
+        all machines with such points and directions of axes as described.
+
+    Raises
+    ------
+    UnsupportedMechanism : a chain has no closed form, or poses leave joints open; the message names them.
+    InvalidArgument : a region over coordinates that the task does not set.
+    """
+    mechanism = _with_limits_of(checked_mechanism(mechanism), limits)
+    model = model_of(mechanism)
+    if model.why_poses_do_not_suffice:
+        raise UnsupportedMechanism(
+            mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"], "certified"
+        )
+    gap, budget, uncertain = _checked(tolerance, budget, uncertain)
+    poses = None if isinstance(region, PoseRegion) else _steps(mechanism, region)
+    if isinstance(region, PoseRegion):
+        _require_task(mechanism, region)
+        parameters = region_parameters(model, region, uncertain)
+    else:
+        assert poses is not None
+        parameters = track_parameters(model, poses, uncertain)
+    ask = _RegionQuestion(model, region if isinstance(region, PoseRegion) else None, poses, parameters)
+    return ask.answer(gap, budget)
+
+
+class _RegionQuestion:
+    """One region and its machine."""
+
+    def __init__(
+        self, model: Model, region: PoseRegion | None, poses: Floats | None, parameters: CellParameters
+    ) -> None:
+        self.model, self.region, self.poses, self.parameters = model, region, poses, parameters
+
+    def answer(self, gap: float, budget: int) -> Certificate:
+        """Subdivide until there is a verdict."""
+        first = first_cells(self.parameters)
+        subdividing = Subdividing(self.model, self.parameters, first, gap, budget)
+        work, n_doubts, reason = subdividing.work, 0, self._restriction()
+        while True:
+            result = subdividing.proceed()
+            if result != BROKEN:
+                break
+            refutation = self._refuted(work.pose.copy(), int(work.counters[LIMIT]))
+            if refutation is not None:
+                return self._certificate(REFUTED, subdividing, "", refutation)
+            n_doubts += 1
+            if n_doubts >= MOST_DOUBTS:
+                break
+        if n_doubts:
+            reason = reason or "some poses are reached in another working mode than home's"
+        elif result != DONE:
+            spent = f"after {subdividing.n_cells} cells" if result == SPENT else "cells became too small"
+            reason = reason or spent
+        return self._certificate(OPEN if reason else PROVED, subdividing, reason, None)
+
+    def _certificate(
+        self, verdict: Verdict, subdividing: Subdividing, reason: str, refutation: Refutation | None
+    ) -> Certificate:
+        work = subdividing.work
+        margin = float(work.measures[PROVED_MARGIN]) if verdict == PROVED else -math.inf
+        proved = work.proved[: min(int(work.counters[N_PROVED]), len(work.proved))]
+        n_left = int(work.counters[N_OPEN])
+        left = np.concatenate([work.stack[: int(work.counters[N_STACK])], work.left[:n_left]])
+        is_whole = len(proved) == int(work.counters[N_PROVED])
+        return Certificate(
+            self.model.mechanism,
+            self.region,
+            self.poses,
+            verdict,
+            margin,
+            float(work.measures[FOUND_MARGIN]),
+            reason,
+            refutation,
+            subdividing.n_cells,
+            is_whole,
+            self.parameters,
+            proved,
+            left,
+        )
+
+    def _restriction(self) -> str:
+        """Why nothing can be proved of the region: a leg that leaves a constraint on its poses; empty if none does."""
+        model, table = self.model, self.model.legs
+        home = model.mechanism.home_pose
+        if self.region is not None:
+            ends = np.stack([self.region.low, self.region.high])
+            far = np.abs(ends[:, 3:]).max(axis=0)
+            shifts = np.diag(self.region.half[:3])
+            shifts = np.concatenate([shifts, (self.region.middle[:3] - home[:3, 3])[None]]) / model.length
+            turns = np.diag(far)
+        else:
+            assert self.poses is not None
+            shifts = (self.poses[:, :3, 3] - home[:3, 3]) / model.length
+            turns = np.concatenate([to_rotvec(self.poses[:, :3, :3]), self.parameters.moves[:, 3:]])
+        if task_of(model.mechanism).rotations == 2 and np.any(turns):
+            return "the task leaves the yaw of the platform open"
+        leg = leg_that_restricts(table, shifts, turns)
+        if leg >= 0:
+            return f"the leg with {names_of_leg(table, leg)} restricts the platform in this region, or carries others"
+        if self.parameters.uncertain[0] > 0.0 and len(table.legs) and table.legs["has_rows"].any():
+            return "with uncertain points, legs restrict the platform"
+        unknown = joints_without_bounds(table)
+        return f"limits of {unknown} have no bounds over regions yet" if unknown else ""
+
+    def _refuted(self, parameters: Floats, limit: int) -> Refutation | None:
+        """The refutation by a pose that breaks the limit of a row; None if `solve_ik` reaches it."""
+        mechanism = self.model.mechanism
+        if self.region is not None:
+            units = np.array([self.model.length] * 3 + [1.0] * 3)
+            pose = self.region.pose(parameters * units)
+        else:
+            assert self.poses is not None
+            pose = step_poses(model_of(mechanism), self.parameters, parameters[None, 1::-1])[0]
+        answer = solve_ik(mechanism, pose)
+        if answer.status != Status.PROJECTED:
+            return None
+        feasible = feasibility(mechanism, pose)
+        n_limits, binding = len(self.model.legs.limits), int(feasible.binding)
+        if binding < 0:  # a configuration that has no margins there: the limit that the search found broken
+            binding = limit if limit < n_limits else n_limits + (limit - n_limits) // 2
+        return Refutation(pose, feasible.limits[binding], float(feasible.margin), answer)
+
+
+def _with_limits_of(mechanism: Mechanism, limits: Any) -> Mechanism:
+    """The mechanism with the limits of some joints only."""
+    if limits is None:
+        return mechanism
+    names = set(require_names("limits", limits))
+    for name in names:
+        mechanism.joint(name)
+    others = {
+        joint.name: None
+        for joint in mechanism.joints
+        if joint.name not in names and (joint.range is not None or joint.cone is not None)
+    }
+    return mechanism.with_limits(others) if others else mechanism
+
+
+def _checked(tolerance: Any, budget: Any, uncertain: Any) -> tuple[float, int, float]:
+    """The gap, the budget and the uncertainty, checked."""
+    gap = math.inf if tolerance is None else require_finite("tolerance", tolerance)
+    if not gap > 0.0:
+        raise InvalidArgument("tolerance", f"{tolerance!r}", "a positive number, or None")
+    if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or not 1 <= budget <= 10**8:
+        raise InvalidArgument("budget", f"{budget!r}", "a number of cells, from 1 to 100 million")
+    radius = require_finite("uncertain", uncertain)
+    if radius < 0.0:
+        raise InvalidArgument("uncertain", f"{uncertain!r}", "a length that is not negative")
+    return gap, int(budget), radius
+
+
+def _steps(mechanism: Mechanism, track: Any) -> Floats:
+    """The poses (n, 4, 4) of a track, two or more."""
+    poses, shape = as_targets(mechanism, track.pose if isinstance(track, Solution) else track)
+    if len(shape) != 1 or len(poses) < 2:
+        raise InvalidArgument("region", f"poses of batch shape {shape}", "a PoseRegion, a Track, or two or more poses")
+    if not are_poses(poses).all():
+        raise InvalidArgument("region", "rows that are no poses", "finite poses whose rotation is one")
+    return np.asarray(poses)
+
+
+def _require_task(mechanism: Mechanism, region: PoseRegion) -> None:
+    """Raise if a region spans, or shifts, what the task does not set."""
+    task, home = task_of(mechanism), mechanism.home_pose
+    at_home = np.array([*home[:3, 3], 0.0, 0.0, 0.0])
+    turns = task.turns if task.rotations < 3 else (True, True, True)
+    names = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
+    for i, counts in enumerate((*task.axes, *turns)):
+        if not counts and (region.low[i] != at_home[i] or region.high[i] != at_home[i]):
+            found = f"{names[i]} from {region.low[i]:g} to {region.high[i]:g}"
+            raise InvalidArgument("region", found, f"{at_home[i]:g}, as at home: the task does not set it")

@@ -1,0 +1,140 @@
+"""``pfabrik certify``: is every pose of a region within all limits?"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import pfabrik as pf
+
+from ..cells import is_finite
+from .arguments import FINITE, MECH, load
+from .outputs import check_outputs
+from .printing import json_option, print_answer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@click.option("--box", metavar="X1:X2,Y1:Y2,Z1:Z2", help="Positions between these ends [length]; one value fixes.")
+@click.option("--cylinder", metavar="X,Y,Z,R,H", help="Positions in a cylinder along z: centre, radius, height.")
+@click.option("--ball", metavar="X,Y,Z,R", help="Positions in a ball: centre, radius.")
+@click.option("--track", "path", type=click.Path(path_type=Path), metavar="FILE", help="Every pose of a path instead.")
+@click.option("--rotation", metavar="DEG[,DEG,DEG]", help="Rotation vectors up to this to either side, by component.")
+@click.option("--tilt", type=FINITE, metavar="DEG", help="Lean so far to every side, instead.")
+@click.option("--yaw", metavar="MIN:MAX", help="With it, turns about z before the tilt [deg]. Default: 0.")
+@click.option("--limits", metavar="NAME[,NAME]", help="Joints whose limits count. Default: all.")
+@click.option(
+    "--tolerance", type=FINITE, metavar="M", help="Prove the least margin up to this. Default: its sign only."
+)
+@click.option("--budget", type=click.IntRange(min=1), metavar="N", help="Cells to look at, at most.")
+@click.option("--uncertain", type=FINITE, metavar="R", help="For joints that may be so far off their points [length].")
+@json_option()
+def certify(
+    mech: str,
+    box: str | None,
+    cylinder: str | None,
+    ball: str | None,
+    path: Path | None,
+    rotation: str | None,
+    tilt: float | None,
+    yaw: str | None,
+    limits: str | None,
+    tolerance: float | None,
+    budget: int | None,
+    uncertain: float | None,
+    as_json: bool,
+) -> int:
+    """Prove that every pose of a region is reached, or find one that is not.
+
+    Exit code 0: proved. 1: refuted, by a pose that is printed; or left open.
+    """
+    given = [
+        name for name, value in (("--box", box), ("--cylinder", cylinder), ("--ball", ball), ("--track", path)) if value
+    ]
+    if len(given) != 1:
+        raise click.UsageError(f"{' and '.join(given) or 'no region'}: give one of --box, --cylinder, --ball, --track")
+    if path is not None and (rotation is not None or tilt is not None or yaw is not None):
+        raise click.UsageError("--track has its orientations; leave out --rotation, --tilt and --yaw")
+    check_outputs([], [Path(mech)], as_json=as_json)
+    mechanism = load(mech)
+    region = (
+        pf.read_path(path, mechanism).targets if path is not None else _region(box, cylinder, ball, rotation, tilt, yaw)
+    )
+    asked: dict[str, Any] = {"tolerance": tolerance, "uncertain": uncertain or 0.0}
+    if budget is not None:
+        asked["budget"] = budget
+    certificate = pf.certify(mechanism, region, limits=None if limits is None else limits.split(","), **asked)
+    print_answer(as_json, certificate.to_dict, lambda: _describe(certificate))
+    return 0 if certificate else 1
+
+
+def _region(
+    box: str | None, cylinder: str | None, ball: str | None, rotation: str | None, tilt: float | None, yaw: str | None
+) -> pf.PoseRegion:
+    """The region that options describe, its angles in degrees."""
+    turns: dict[str, Any] = {}
+    if rotation is not None:
+        sizes = [math.radians(size) for size in _numbers("--rotation", rotation, (1, 3), ",")]
+        turns["rotation"] = sizes if len(sizes) == 3 else sizes[0]
+    if tilt is not None:
+        turns["tilt"] = math.radians(tilt)
+    if yaw is not None:
+        ends = [math.radians(end) for end in _numbers("--yaw", yaw, (1, 2), ":")]
+        turns["yaw"] = [ends[0], ends[-1]]
+    if box is not None:
+        sides = [_numbers("--box", side, (1, 2), ":") for side in box.split(",")]
+        if len(sides) != 3:
+            raise click.UsageError(f"--box: found '{box}'; expected three ranges or values with commas between")
+        return pf.PoseRegion.box([side[0] for side in sides], [side[-1] for side in sides], **turns)
+    if cylinder is not None:
+        *centre, radius, height = _numbers("--cylinder", cylinder, (5,), ",")
+        return pf.PoseRegion.cylinder(centre, radius, height, **turns)
+    *centre, radius = _numbers("--ball", ball or "", (4,), ",")
+    return pf.PoseRegion.ball(centre, radius, **turns)
+
+
+def _numbers(option: str, words: str, counts: Sequence[int], between: str) -> list[float]:
+    """The numbers of an option."""
+    values = words.split(between)
+    if len(values) not in counts or not all(map(is_finite, values)):
+        expected = " or ".join(map(str, counts))
+        raise click.UsageError(
+            f"{option}: found '{words}'; expected {expected} finite numbers with '{between}' between"
+        )
+    return [float(value) for value in values]
+
+
+def _describe(certificate: pf.Certificate) -> str:
+    """The verdict, and what it rests on, for people."""
+    lines = [f"{certificate.verdict}  {certificate.n_cells} cells"]
+    unit, refutation = certificate.mechanism.length_unit, certificate.refutation
+    if certificate:
+        lines.append(f"every pose is reached; margin at least {certificate.margin:.4g}")
+    elif refutation is not None:
+        joint, bound = refutation.limit
+        x, y, z = refutation.pose[:3, 3].tolist()
+        roll, pitch, yaw = _rpy(refutation.pose)
+        answer = refutation.answer
+        off, turned = float(answer.position_error), math.degrees(float(answer.rotation_error))
+        lines += [
+            f"not reached: {x:.6g} {y:.6g} {z:.6g} {unit}, roll {roll:.4g}, pitch {pitch:.4g}, yaw {yaw:.4g} deg",
+            f"{joint} {bound}: margin {refutation.margin:.4g}; nearest pose {off:.4g} {unit} and {turned:.4g} deg away",
+        ]
+    else:
+        lines.append(f"open: {certificate.reason}")
+    return "\n".join(lines)
+
+
+def _rpy(pose: Any) -> list[float]:
+    """Roll, pitch and yaw of a pose [deg]."""
+    import numpy as np
+
+    from ..rotations import to_rpy
+
+    return [float(angle) for angle in np.degrees(to_rpy(pose[:3, :3]))]

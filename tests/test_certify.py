@@ -1,0 +1,459 @@
+"""What is proved holds, what is refuted is not reached, and sizes lie between their bounds."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from checks import INTERPRETED
+from machines.redescribed import moved, relabelled, scaled
+from pfabrik import PoseRegion, Status
+from pfabrik.certify.subdividing import region_parameters
+from pfabrik.cli import main
+from pfabrik.kernels.certify.affine_forms import ABOVE, AWAY, BELOW, BOUNDS, CENTRE, ERROR
+from pfabrik.kernels.certify.half_spaces_of_cells import share_above
+from pfabrik.kernels.certify.limit_rows import put_limits
+from pfabrik.kernels.certify.pose_cells import CURVATURE, CellParameters, new_cell, put_cell
+from pfabrik.kernels.certify.subdivision import new_rows
+from pfabrik.model import model_of
+from pfabrik.platform.table import kernel_table
+
+CENTRE_OF_STEWART = np.array([0.0, 0.0, 210.0])
+ROD_OF_ORTHOGLIDE = 310.582854123025
+# Machines whose legs leave the region of positions at home's orientation free, and the axes that they move along.
+POSITIONED = {
+    "stewart": (1, 1, 1),
+    "servo_hexapod": (1, 1, 1),
+    "hexaglide": (1, 1, 1),
+    "reachy_mini": (1, 1, 1),
+    "ucu": (1, 1, 1),
+    "delta": (1, 1, 1),
+    "linear_delta": (1, 1, 1),
+    "orthoglide": (1, 1, 1),
+    "psu": (1, 1, 1),
+    "five_bar": (0, 1, 1),
+    "rpr": (1, 1, 0),
+    "rrr": (1, 1, 0),
+    "prr": (1, 1, 0),
+}
+PLANAR = ("rpr", "rrr", "prr")
+
+
+def stewart_box(half: float, degrees: float) -> PoseRegion:
+    return PoseRegion.box(CENTRE_OF_STEWART - half, CENTRE_OF_STEWART + half, rotation=math.radians(degrees))
+
+
+def random_region(name: str, rng: np.random.Generator) -> PoseRegion:
+    """A region about a random pose near home, of a random shape where the machine has one."""
+    machine = pf.load(name)
+    L, axes = machine.characteristic_length, np.array(POSITIONED[name], float)
+    centre = machine.home_pose[:3, 3] + axes * rng.uniform(-0.3, 0.3, 3) * L * rng.uniform()
+    half = axes * rng.uniform(0.02, 0.4, 3) * L * rng.uniform() + 1e-3 * L * axes
+    if "rotation" not in machine.task:
+        return PoseRegion.box(centre - half, centre + half)
+    turn = rng.uniform(0.0, 0.5, 3) * rng.uniform()
+    if name in PLANAR:
+        return PoseRegion.box(centre - half, centre + half, rotation=turn * (0.0, 0.0, 1.0))
+    kind = rng.integers(3)
+    if kind == 0:
+        return PoseRegion.box(centre - half, centre + half, rotation=turn)
+    if kind == 1:
+        return PoseRegion.ball(centre, half.max(), tilt=turn[0], yaw=[-turn[2], turn[2]])
+    return PoseRegion.cylinder(centre, half.max(), 2.0 * half.min(), rotation=turn)
+
+
+def random_poses(region: PoseRegion, n: int, rng: np.random.Generator) -> np.ndarray:
+    """Random poses of a region, many of them on its sides and edges."""
+    points = rng.uniform(region.low, region.high, (n, 6))
+    is_end = rng.random(points.shape) < 0.3
+    points = np.where(is_end, np.where(rng.random(points.shape) < 0.5, region.low, region.high), points)
+    return region.pose(points[region.contains(points)])
+
+
+def assert_holds(certificate: pf.Certificate, n: int, rng: np.random.Generator) -> None:
+    """Random poses, and poses where the search went, agree with a verdict."""
+    assert certificate.region is not None
+    poses = random_poses(certificate.region, n, rng)
+    if certificate.verdict == "REFUTED":
+        assert certificate.refutation is not None
+        assert pf.solve_ik(certificate.mechanism, certificate.refutation.pose).status == Status.PROJECTED
+        assert certificate.refutation.margin < 0.0
+    elif certificate and len(poses):
+        assert (np.asarray(pf.solve_ik(certificate.mechanism, poses).status) == Status.REACHED).all()
+        assert pf.feasibility(certificate.mechanism, poses).margin.min() >= certificate.margin - 1e-12
+
+
+def test_a_stewart_platform_reaches_a_box_that_is_proved_and_not_a_slightly_larger_one() -> None:
+    machine = pf.load("stewart")
+    proved, refuted = (pf.certify(machine, stewart_box(*sizes)) for sizes in ((34.0, 7.5), (35.0, 8.0)))
+    assert proved and proved.verdict == "PROVED" and not len(proved.open_boxes)
+    assert refuted.verdict == "REFUTED" and refuted.refutation is not None
+    assert refuted.refutation.limit[1] in ("min", "max") and refuted.refutation.answer.status == Status.PROJECTED
+    for certificate in (proved, refuted):
+        assert_holds(certificate, 5 if INTERPRETED else 50_000, np.random.default_rng(0))
+    # The margin, from all corners of the box: they are the extremes here to a hundredth.
+    corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 6, indexing="ij"), -1).reshape(-1, 6)
+    region = stewart_box(34.0, 7.5)
+    least = pf.feasibility(machine, region.pose(region.middle + corners * region.half)).margin.min()
+    close = pf.certify(machine, region, tolerance=1e-3)
+    assert least - 2e-3 <= close.margin <= least
+    assert 0.0 <= proved.margin <= close.margin
+
+
+@pytest.mark.parametrize("name", POSITIONED)
+def test_verdicts_on_random_regions_hold(name: str) -> None:
+    rng, machine = np.random.default_rng(len(name)), pf.load(name)
+    verdicts = set()
+    for _ in range(1 if INTERPRETED else 10):
+        certificate = pf.certify(machine, random_region(name, rng), budget=10 if INTERPRETED else 20_000)
+        assert_holds(certificate, 3 if INTERPRETED else 3000, rng)
+        verdicts.add(certificate.verdict)
+    assert INTERPRETED or "PROVED" in verdicts
+
+
+@pytest.mark.parametrize("name", POSITIONED)
+def test_bounds_of_every_limit_enclose_its_values_on_random_cells(name: str) -> None:
+    """The forms of all rows over a cell, against the forms at single poses of it, which depend on no bound."""
+    machine, rng = pf.load(name), np.random.default_rng(1)
+    model = model_of(machine)
+    table = kernel_table(model.legs)
+    sides, cell_rows, rows = model.legs.home_sides[0], new_rows(table), new_rows(table)
+    n_checked = 0
+    for _ in range(2 if INTERPRETED else 8):
+        region = random_region(name, rng)
+        parameters = region_parameters(model, region, 0.0)
+        share = 10.0 ** rng.uniform(-3.0, -0.5)
+        box = np.concatenate([parameters.middle, share * parameters.half])
+        n = int(parameters.kinds[2])
+        put_cell(parameters, box, cell_rows.cell)
+        for s in rng.uniform(-1.0, 1.0, (6, 6)):
+            put_cell(parameters, np.concatenate([box[:6] + s * box[6:], np.zeros(6)]), rows.cell)
+            for k in np.unique(rows.owners):
+                put_limits(table, sides, 0.0, int(k), n, cell_rows)
+                put_limits(table, sides, 0.0, int(k), n, rows)
+            form, value = cell_rows.rows, rows.rows[:, CENTRE]
+            linear = form[:, CENTRE] + form[:, :n] @ s[:n]
+            # Angles are known but for whole turns, and rows of cells beside dead points hold where the rod reaches.
+            is_known = np.isfinite(form[:, BELOW]) & np.isfinite(rows.rows[:, BELOW])
+            is_known &= np.abs(value - form[:, CENTRE]) < 1.0
+            first = 2 * len(table.limited) + len(table.cones)
+            is_known[first:] = False
+            excess = np.maximum(linear + form[:, BELOW] - value, value - linear - form[:, ABOVE])
+            assert (excess[is_known] <= 1e-13).all(), name
+            n_checked += int(is_known.sum())
+    assert n_checked > 50 or not len(table.limited) + len(table.cones)
+
+
+def test_rotations_move_points_as_their_cells_say() -> None:
+    """p + R b of exp, by SciPy, against the linear part of a cell and its bound, over rotation vectors and tilts."""
+    rng = np.random.default_rng(2)
+    for trial in range(300):
+        kind, size = trial % 2, 10.0 ** rng.uniform(-3.0, 0.0)
+        box = np.concatenate([np.zeros(3), rng.uniform(-1.2, 1.2, 3), np.zeros(3), size * rng.uniform(0.0, 1.0, 3)])
+        parameters = CellParameters(
+            np.array([kind, 0, 6, 0]), box[:6], box[6:], np.zeros((1, 12)), np.zeros((1, 6)), np.zeros(1)
+        )
+        cell, s, b = new_cell(), rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
+        put_cell(parameters, box, cell)
+
+        def rotation(r: np.ndarray, kind: int = kind) -> Rotation:
+            if kind == 0:
+                return Rotation.from_rotvec(r)
+            return Rotation.from_rotvec([r[0], r[1], 0.0]) * Rotation.from_rotvec([0.0, 0.0, r[2]])
+
+        before, after = (rotation(r).apply(b) for r in (box[3:6], box[3:6] + s * box[9:]))
+        linear = np.cross(s @ cell.motions[3:, 3:], before)
+        error = np.linalg.norm(after - before - linear)
+        assert error <= cell.sizes[CURVATURE] * np.linalg.norm(b) + 1e-15
+        turn = (rotation(box[3:6] + s * box[9:]) * rotation(box[3:6]).inv()).magnitude()
+        assert turn <= cell.sizes[3] + 1e-15
+
+
+def test_rounding_stays_within_its_bound_far_from_the_origin() -> None:
+    """Lengths of struts at single poses of a machine moved 1e4 lengths away, against extended precision."""
+    stewart = pf.load("stewart")
+    away = np.array([1.3e6, -0.7e6, 0.4e6])
+    machine = moved(stewart, np.eye(3), away)
+    model, rng = model_of(machine), np.random.default_rng(3)
+    table, rows = kernel_table(model.legs), new_rows(kernel_table(model.legs))
+    region = PoseRegion.box(CENTRE_OF_STEWART + away - 20, CENTRE_OF_STEWART + away + 20, rotation=0.2)
+    parameters = region_parameters(model, region, 0.0)
+    wide = np.longdouble
+    for _ in range(30):
+        point = parameters.middle + rng.uniform(-1, 1, 6) * parameters.half
+        put_cell(parameters, np.concatenate([point, np.zeros(6)]), rows.cell)
+        r = point[3:].astype(wide)
+        angle = np.sqrt((r * r).sum())
+        K = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]], dtype=wide)
+        R = np.eye(3, dtype=wide) + np.sin(angle) / angle * K + (1 - np.cos(angle)) / angle**2 * (K @ K)
+        for limit, coordinate in enumerate(table.limited):
+            leg = table.legs[coordinate["leg"]]
+            put_limits(table, model.legs.home_sides[0], 0.0, int(coordinate["leg"]), 6, rows)
+            v = R @ leg["platform_end_point"].astype(wide) + point[:3].astype(wide)
+            v = v - leg["base_end_point"].astype(wide)
+            exact = np.sqrt((v * v).sum()) - wide(leg["length"]) - wide(coordinate["lo"])
+            row = rows.rows[2 * limit]
+            error = abs(float(exact - wide(row[CENTRE])))
+            assert error <= -row[BELOW] and error <= row[ABOVE]
+            assert -row[BELOW] < 1e-8  # and it is still a bound of use
+    assert pf.certify(machine, PoseRegion.ball(CENTRE_OF_STEWART + away, 20.0, tilt=0.1))
+
+
+@pytest.mark.parametrize("change", ["moved", "scaled", "relabelled"])
+def test_verdicts_do_not_depend_on_where_a_machine_is_or_on_its_unit_or_names(change: str) -> None:
+    stewart = pf.load("stewart")
+    turn = Rotation.from_rotvec([0.0, 0.0, 0.7]).as_matrix()
+    for radius, tilt, expected in ((30.0, 0.2, "PROVED"), (60.0, 0.2, "REFUTED")):
+        centre, size = CENTRE_OF_STEWART, radius
+        machine = stewart
+        if change == "moved":
+            machine, centre = moved(stewart, turn, np.array([500.0, -300.0, 50.0])), centre + [500.0, -300.0, 50.0]
+        elif change == "scaled":
+            machine, centre, size = scaled(stewart, 1e-3), 1e-3 * centre, 1e-3 * radius
+        else:
+            machine, _, _ = relabelled(stewart, np.random.default_rng(4))
+        certificate = pf.certify(machine, PoseRegion.ball(centre, size, tilt=tilt))
+        original = pf.certify(stewart, PoseRegion.ball(CENTRE_OF_STEWART, radius, tilt=tilt))
+        assert certificate.verdict == original.verdict == expected
+        assert_holds(certificate, 3 if INTERPRETED else 2000, np.random.default_rng(5))
+
+
+def test_a_leg_in_another_working_mode_is_neither_proved_nor_refuted() -> None:
+    machine = pf.load("five_bar").without_limits().with_limits(p1=(-3.0, 0.1))
+    region = PoseRegion.box([0, -5, 125], [0, 5, 135])
+    pose = [0.0, 0.0, 130.0]
+    assert pf.feasibility(machine, pose).margin < 0.0 and pf.solve_ik(machine, pose).status == Status.REACHED
+    certificate = pf.certify(machine, region)
+    assert certificate.verdict == "OPEN" and "another working mode" in certificate.reason
+
+
+def test_every_pose_between_the_steps_of_a_track_counts() -> None:
+    machine = pf.load("stewart")
+    s = np.linspace(0.0, 2.0 * np.pi, 12 if INTERPRETED else 1001)
+    circle = np.stack([30 * np.cos(s), 30 * np.sin(s), 210 + 10 * np.sin(3 * s)], axis=-1)
+    track = pf.track(machine, pf.pose(circle, rpy=np.stack([0.1 * np.cos(s), 0.1 * np.sin(s), 0 * s], axis=-1)))
+    proved = pf.certify(machine, track)
+    assert proved and proved.replay()
+    # Ends that are reached, on either side of what is too near to a crank's axis: less than 145 - 110.
+    machine = pf.load("five_bar").without_limits()
+    beside, across = ([[0.0, y, 60.0], [0.0, y, -60.0]] for y in (-90.0, -50.0))
+    assert (np.asarray(pf.solve_ik(machine, across).status) == Status.REACHED).all()
+    refuted = pf.certify(machine, across).refutation
+    assert refuted is not None and np.hypot(refuted.pose[1, 3] + 50.0, refuted.pose[2, 3]) < 35.0
+    assert pf.certify(machine, beside)
+
+
+def test_an_orthoglide_fills_what_three_cylinders_share_and_a_five_bar_two_rings() -> None:
+    """Steinmetz's solid, 8 (2 - sqrt 2) l^3; and two circular rings, by their integral."""
+    accuracy = 0.3 if INTERPRETED else 1e-3
+    volume = 8.0 * (2.0 - math.sqrt(2.0)) * ROD_OF_ORTHOGLIDE**3
+    orthoglide = enclosure_of(pf.load("orthoglide").without_limits(), ("x", "y", "z"), accuracy)
+    assert orthoglide.lower <= volume <= orthoglide.upper <= (1.0 + accuracy) * orthoglide.lower
+    five_bar = enclosure_of(pf.load("five_bar").without_limits(), ("y", "z"), 0.1 * accuracy)
+    assert five_bar.lower <= 145_913.8687 <= five_bar.upper <= (1.0 + 0.1 * accuracy) * five_bar.lower
+    sides = np.prod(five_bar.inside[:, 1] - five_bar.inside[:, 0], axis=1)
+    assert sides.sum() <= five_bar.lower
+    machine = pf.load("five_bar").without_limits()
+    boxes = five_bar.inside[np.argsort(-sides)[:200]]
+    corners = np.concatenate([boxes[:, 0], boxes[:, 1]])
+    assert (pf.feasibility(machine, np.insert(corners, 0, 0.0, axis=1)).margin >= 0.0).all()
+
+
+def enclosure_of(machine: pf.Mechanism, names: tuple[str, ...], accuracy: float) -> pf.Enclosure:
+    from pfabrik.certify.enclosure import COORDINATES, enclose
+
+    held = dict(zip(COORDINATES, [*machine.home_pose[:3, 3], 0.0, 0.0, 0.0], strict=True))
+    ends = np.full(len(names), np.inf)
+    return enclose(model_of(machine), names, held, np.eye(3), (-ends, ends), accuracy=accuracy, budget=2_000_000)
+
+
+@pytest.mark.skipif(INTERPRETED, reason="maps take long as plain Python")
+def test_a_certified_workspace_has_its_size_between_two_bounds() -> None:
+    space = pf.workspace(pf.load("five_bar"), resolution=2, certified=1e-3)
+    enclosure = space.enclosure
+    assert enclosure is not None and enclosure.upper <= 1.001 * enclosure.lower
+    assert enclosure.lower - space.uncertainty <= space.area <= enclosure.upper + space.uncertainty
+    assert space.to_dict()["enclosure"]["lower"] == enclosure.lower
+    every = np.concatenate([enclosure.inside, enclosure.border])
+    inside = np.all(
+        (space.vertices[:, None] >= every[:, 0] - 1e-9) & (space.vertices[:, None] <= every[:, 1] + 1e-9), -1
+    )
+    assert inside.any(axis=1).all()
+    with pytest.raises(pf.errors.InvalidArgument, match="certified"):
+        pf.workspace(pf.load("stewart"), tilt=0.1, certified=True)
+
+
+@pytest.mark.skipif(INTERPRETED, reason="maps take long as plain Python")
+def test_the_largest_box_is_proved_and_a_larger_one_is_not() -> None:
+    machine = pf.load("five_bar")
+    found = pf.largest(machine, "box", accuracy=0.01)
+    assert found.certificate and found.certificate.replay()
+    half = 0.5 * 1.02 * found.extents
+    assert not pf.certify(machine, PoseRegion.box(found.centre - half, found.centre + half))
+    ball = pf.largest(pf.load("stewart"), "ball", centre=CENTRE_OF_STEWART, extents=[60, 60, 60], tilt=0.2)
+    assert ball.certificate and ball.certificate.region.shape == "ball"
+    with pytest.raises(pf.errors.UnknownName):
+        pf.largest(machine, "cube")  # type: ignore[arg-type]
+
+
+def test_uncertain_points_are_proved_for_all_machines_near() -> None:
+    machine, rng = pf.load("servo_hexapod"), np.random.default_rng(6)
+    L = machine.characteristic_length
+    centre, half = machine.home_pose[:3, 3], 0.02 * L
+    region = PoseRegion.box(centre - half, centre + half, rotation=0.03)
+    radius = 2e-3 * L
+    assert pf.certify(machine, region, uncertain=radius)
+    model = model_of(machine)
+    points = model._geometry.points
+    for _ in range(2 if INTERPRETED else 20):
+        away = rng.normal(size=points.shape)
+        away *= radius / np.linalg.norm(away, axis=1, keepdims=True)
+        other = model.with_geometry(points=points + away).mechanism
+        poses = random_poses(region, 5 if INTERPRETED else 200, rng)
+        assert (np.asarray(pf.solve_ik(other, poses).status) == Status.REACHED).all()
+    wide = pf.certify(machine, region, uncertain=0.2 * L, budget=500)
+    assert wide.verdict == "OPEN"
+
+
+def test_a_replay_sees_a_box_that_is_missing_or_too_large() -> None:
+    machine = pf.load("stewart")
+    certificate = pf.certify(machine, stewart_box(30.0, 7.5 if INTERPRETED else 9.0))
+    assert certificate and certificate.replay()
+    if len(certificate.boxes) > 1:
+        assert not dataclasses.replace(certificate, _proved=certificate._proved[1:]).replay()
+    widened = certificate._proved.copy()
+    widened[:, 9:12] *= 2.0
+    assert not dataclasses.replace(certificate, _proved=widened).replay()
+
+
+def test_only_the_limits_of_named_joints_count() -> None:
+    machine = pf.load("stewart")
+    region = stewart_box(35.0, 8.0)
+    cones = [joint.name for joint in machine.joints if joint.cone is not None]
+    certificate = pf.certify(machine, region, limits=cones)
+    assert certificate and all(not joint.range or joint.name in cones for joint in certificate.mechanism.joints)
+    with pytest.raises(pf.errors.UnknownName):
+        pf.certify(machine, region, limits=["no_such_joint"])
+
+
+def test_machines_and_regions_that_cannot_be_proved_say_why() -> None:
+    with pytest.raises(pf.errors.UnsupportedMechanism, match="no legs in closed form"):
+        pf.certify(pf.load("panda"), PoseRegion.box([0, 0, 0], [1, 1, 1]))
+    with pytest.raises(pf.errors.UnsupportedMechanism, match="A1, B1"):
+        pf.certify(pf.load("nrpm"), PoseRegion.box([0, 0, 0], [1, 1, 1]))
+    with pytest.raises(pf.errors.InvalidArgument, match="rotation about x"):
+        pf.certify(pf.load("delta"), PoseRegion.box([0, 0, -180], [0, 0, -170], rotation=0.1))
+    tricept = pf.load("tricept")
+    p = tricept.home_pose[:3, 3]
+    certificate = pf.certify(tricept, PoseRegion.box(p - 1, p + 1), budget=100)
+    assert certificate.verdict == "OPEN" and "restricts the platform" in certificate.reason
+    ankle = pf.load("ankle_ups")
+    at_home = pf.certify(ankle, PoseRegion.box(ankle.home_pose[:3, 3], ankle.home_pose[:3, 3]))
+    assert at_home.verdict == "OPEN" and "no bounds" in at_home.reason
+    eye = pf.load("agile_eye").without_limits()  # three hinges through a point, which do not reach every rotation
+    turned = pf.certify(eye, PoseRegion.box([0, 0, 0], [0, 0, 0], rotation=0.1), budget=100)
+    assert turned.verdict == "OPEN"
+    for wrong in ({"low": [0, 0, 1], "high": [0, 0, 0]}, {"low": [0, 0], "high": [1, 1, 1]}):
+        with pytest.raises(pf.errors.InvalidArgument):
+            PoseRegion.box(**wrong)
+    with pytest.raises(pf.errors.InvalidArgument, match="tilt"):
+        PoseRegion.ball([0, 0, 0], 1, tilt=0.1, rotation=0.1)
+    with pytest.raises(pf.errors.InvalidArgument, match="budget"):
+        pf.certify(pf.load("stewart"), stewart_box(1, 1), budget=0)
+
+
+def test_the_share_of_a_cell_above_a_plane_is_its_volume() -> None:
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-1.0, 1.0, (400_000, 3))
+    for trial in range(30):
+        row = np.zeros(9)
+        row[:3] = rng.normal(size=3) * 10.0 ** rng.uniform(-3, 0, 3)
+        row[0] = 0.0 if trial % 5 == 0 else row[0]
+        row[CENTRE] = rng.uniform(-1, 1) * np.abs(row[:3]).sum()
+        inner, outer = share_above(row, 3, BELOW), share_above(row, 3, ABOVE)
+        sampled = float((points @ row[:3] + row[CENTRE] >= 0.0).mean())
+        assert inner <= outer <= inner + 1e-3
+        assert inner - 4e-3 <= sampled <= outer + 4e-3
+
+
+def test_bounds_of_a_span_hold_for_every_pose_of_a_cell() -> None:
+    """`AWAY` and `ERROR` of the span of rods on cranks, against its values at single poses."""
+    machine, rng = pf.load("servo_hexapod"), np.random.default_rng(8)
+    model = model_of(machine)
+    table, sides = kernel_table(model.legs), model.legs.home_sides[0]
+    over, at = new_rows(table), new_rows(table)
+    for _ in range(3 if INTERPRETED else 40):
+        region = random_region("servo_hexapod", rng)
+        parameters = region_parameters(model, region, 0.0)
+        box = np.concatenate([parameters.middle, 10.0 ** rng.uniform(-3, -1) * parameters.half])
+        put_cell(parameters, box, over.cell)
+        put_limits(table, sides, 0.0, 0, 6, over)
+        span = over.bounds.span
+        for s in rng.uniform(-1, 1, (8, 6)):
+            put_cell(parameters, np.concatenate([box[:6] + s * box[6:], np.zeros(6)]), at.cell)
+            put_limits(table, sides, 0.0, 0, 6, at)
+            if at.bounds.span[BOUNDS, ERROR] > 1e-6:
+                continue
+            away = at.bounds.span[CENTRE] - span[CENTRE]
+            assert np.linalg.norm(away) <= span[BOUNDS, AWAY] + 1e-13
+            assert np.linalg.norm(away - s @ span[:6]) <= span[BOUNDS, ERROR] + 1e-13
+
+
+def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:
+    def said(*words: str) -> tuple[int, str]:
+        result = CliRunner().invoke(main, ["certify", "stewart", *words])
+        return result.exit_code, result.stdout + (result.stderr if result.exit_code == 2 else "")
+
+    code, text = said("--box=-34:34,-34:34,176:244", "--rotation", "5")
+    assert code == 0 and text.startswith("PROVED")
+    code, text = said("--box=-35:35,-35:35,175:245", "--rotation", "8,8,8", "--json")
+    refutation = json.loads(text)["refutation"]
+    expected = pf.certify(pf.load("stewart"), stewart_box(35.0, 8.0)).refutation
+    assert expected is not None
+    assert code == 1 and (refutation["joint"], refutation["bound"]) == expected.limit
+    assert np.allclose(refutation["pose"], expected.pose)
+    code, text = said("--ball", "0,0,210,20", "--tilt", "5", "--yaw=-3:3")
+    assert code == 0 and "margin at least" in text
+    path = tmp_path / "path.csv"
+    path.write_text("x,y,z\n0,0,200\n10,0,205\n500,0,205\n", encoding="utf-8")
+    code, text = said("--track", str(path))
+    assert code == 1 and "not reached" in text
+    for words in (("--tilt", "3"), ("--ball", "1,2,3"), ("--box", "1:2,3:4"), ("--track", str(path), "--tilt", "3")):
+        code, text = said(*words)
+        assert code == 2 and "certify" in text
+
+
+@pytest.mark.campaign
+def test_ten_million_random_poses_of_what_is_proved_are_feasible() -> None:
+    rng, machine = np.random.default_rng(9), pf.load("stewart")
+    certificate = pf.certify(machine, stewart_box(34.0, 7.5))
+    assert certificate
+    for _ in range(100):
+        poses = random_poses(stewart_box(34.0, 7.5), 100_000, rng)
+        assert pf.feasibility(machine, poses).margin.min() >= certificate.margin - 1e-12
+    for name in POSITIONED:
+        for _ in range(60):
+            assert_holds(pf.certify(pf.load(name), random_region(name, rng)), 20_000, rng)
+
+
+@pytest.mark.campaign
+def test_no_descent_from_a_proved_box_finds_a_smaller_margin() -> None:
+    machine, region = pf.load("stewart"), stewart_box(34.0, 7.5)
+    certificate = pf.certify(machine, region)
+
+    def margin(point: np.ndarray) -> float:
+        return float(pf.feasibility(machine, region.pose(point)).margin)
+
+    for low, high in certificate.boxes:
+        for start in (0.5 * (low + high), low, high):
+            found = minimize(margin, start, bounds=list(zip(low, high, strict=True)), method="Powell")
+            assert margin(np.clip(found.x, low, high)) >= certificate.margin - 1e-12
