@@ -17,8 +17,8 @@ from ..fk import solve_fk
 from ..motion.displacements import actuator_units
 from ..motion.joint_path import JointPath, joint_path
 from ..poses import as_floats
-from .capacity import HalfSpaces, image_of_box, preimage_of_box
 from .determined import require_determined
+from .drive_limits import HalfSpaces, image_of_box, preimage_of_box
 from .hull import Hull, feasible_hull
 from .inverses import inverses
 from .mapped import Mapped

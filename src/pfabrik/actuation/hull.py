@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
-from .capacity import clipped, distinct
+from .drive_limits import clipped, distinct
 from .named_values import box_of
 from .placed import Placer
 

@@ -11,7 +11,7 @@ from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
 from ..view.looks import ACHIEVED, SHADE
-from .capacity import HalfSpaces, clipped, image_of_box
+from .drive_limits import HalfSpaces, clipped, image_of_box
 from .named_values import box_of, per_actuator
 from .placed import Placer
 

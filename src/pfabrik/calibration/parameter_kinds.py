@@ -13,7 +13,7 @@ from ..description.geometry import Geometry, geometry_of
 from ..description.mechanism import Joint, Mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..tolerances import TOLERANCES
-from .shifts import Rods, Shift
+from .shifts import DrivenRods, Shift
 
 KINDS = ("points", "axes", "offsets", "lengths")
 
@@ -33,7 +33,7 @@ class Candidates:
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.geometry = mechanism, geometry_of(mechanism)
         self.length = mechanism.characteristic_length
-        self.rods: list[Rods] = []
+        self.rods: list[DrivenRods] = []
 
     def of_kind(self, kind: str) -> list[Shift]:
         """The shifts of a kind."""
@@ -84,7 +84,7 @@ class Candidates:
             reason = "no rod is between an actuated joint on the base and the end effector; free 'points' or dimensions"
             raise UnsupportedMechanism(self.mechanism.name, [reason], "calibrated by its lengths")
 
-    def _rods_on(self, proximal: Joint, column: int) -> Iterator[Rods]:
+    def _rods_on(self, proximal: Joint, column: int) -> Iterator[DrivenRods]:
         """The rods on the body that a proximal joint moves; they are to be of one length."""
         mechanism = self.mechanism
         if mechanism.base not in proximal.connects or proximal.type not in ("revolute", "prismatic"):
@@ -101,7 +101,7 @@ class Candidates:
             raise UnsupportedMechanism(mechanism.name, [reason], "calibrated by its lengths")
         number = mechanism.joints.index(proximal)
         turns = proximal.type == "revolute"
-        yield Rods(number, column, *pairs[0], moved=np.array(on_body), turns=turns)
+        yield DrivenRods(number, column, *pairs[0], moved=np.array(on_body), turns=turns)
 
     def _far_ends(self, j: int, body: str) -> Iterator[int]:
         """Joints at the end effector of the rods that begin at joint j."""

@@ -43,8 +43,8 @@ class Shift:
 
 
 @dataclass(frozen=True)
-class Rods:
-    """Rods of one length between a proximal joint's body and the platform.
+class DrivenRods:
+    """DrivenRods of one length between a proximal joint's body and the platform.
 
     The proximal joint takes up the difference of another length: at home it is then elsewhere, and the rest is not.
 
@@ -73,7 +73,7 @@ class ShiftedGeometry:
         them in it, but have an axis and a value at home, which still follow from the centres.
     """
 
-    def __init__(self, mechanism: Mechanism, shifts: list[Shift], rods: list[Rods]) -> None:
+    def __init__(self, mechanism: Mechanism, shifts: list[Shift], rods: list[DrivenRods]) -> None:
         self.shifts, self.rods = shifts, rods
         joints = mechanism.joints
         at = {joint.name: j for j, joint in enumerate(joints)}
@@ -147,7 +147,7 @@ def square_pairs(lines: Floats) -> Floats:
     return np.stack([first, second], axis=1)
 
 
-def _lengthen(rods: Rods, lengths: Floats, points: Floats, axes: Floats, home: Floats) -> None:
+def _lengthen(rods: DrivenRods, lengths: Floats, points: Floats, axes: Floats, home: Floats) -> None:
     """Move a proximal joint so that its rods have other lengths (b,), in points, axes and home values."""
     axis, centre = axes[:, rods.proximal, 0], points[:, rods.proximal]
     end, begin = points[:, rods.platform_end], points[:, rods.base_end]
