@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")  # pictures open no window, whatever the user's settings
+os.environ.pop("COLUMNS", None)  # workers have that of a terminal, which output would be fitted to
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 settings.register_profile(

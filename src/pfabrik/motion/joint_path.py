@@ -122,7 +122,7 @@ class JointPath:
 
         is_joint = self.mechanism.end_effector_is_joint
         poses, twists = np.empty((len(q), 4, 4)), np.empty((len(q), 6, len(self.coordinates)))
-        deviations, end = q - self.home, np.array(self.mechanism.reference_point)
+        deviations, end = np.ascontiguousarray(q - self.home), np.array(self.mechanism.reference_point)
 
         def run(block: slice) -> None:
             walk_path(self._table, end, deviations[block], poses[block], twists[block])
