@@ -71,7 +71,7 @@ WRONG: dict[str, Callable[[pf.Mechanism], Any]] = {
     "start: found a ragged nest": lambda machine: pf.workspace(machine, start=[[1, 2], [3]]),
     "on_progress: found": lambda machine: pf.track(machine, ARRAY, on_progress=3),
     "on_step: found": lambda machine: pf.warm_up(machine, on_step=3),
-    "joint coordinates of 3": lambda machine: pf.solve_ik(machine, {3: 4}),
+    "no joint named '3'": lambda machine: pf.solve_ik(machine, {3: 4}),
     "limits: found": lambda machine: machine.with_limits(3),
     "no joint named": lambda machine: machine.joint([]),
     "task: found": lambda machine: pf.Mechanism("m", machine.joints, "platform", (0, 0, 1), task=[["x"]]),

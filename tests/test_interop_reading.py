@@ -605,7 +605,7 @@ def test_the_command_says_what_is_wrong_in_one_line(tmp_path: Path) -> None:
         (("check", str(tmp_path / "robot.urdf")), "pfabrik import"),
         (("export", "stewart"), "FORMAT"),
         (("export", "stewart", "mjfc"), "mjcf"),
-        (("export", "stewart", "mjcf", "--name", "arm"), "--name is of c and c-float"),
+        (("export", "stewart", "mjcf", "--name", "arm"), "--name is of c, c-float and"),
         (("export", "stewart", "c", "--name", "A b"), "found 'A b'"),
         (("export", "stewart", "klipper", "-o", str(tmp_path / "new.xml")), "cannot be exported"),
     ):

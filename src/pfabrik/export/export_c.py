@@ -9,7 +9,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Literal, TypeAlias, get_args
 
-from ..checks import require_names
+from ..checks import require_names, require_path
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..whole_files import whole_path
@@ -56,7 +56,9 @@ def export_c(
         and why. Also where "fk" is asked for and the actuators leave the end effector free.
     InvalidArgument : an unknown precision or part, or a name that is not allowed.
     """
-    text = c_source(mechanism, precision=precision, parts=parts, name=name, joints=joints, file=Path(path).name)
+    text = c_source(
+        mechanism, precision=precision, parts=parts, name=name, joints=joints, file=require_path("path", path).name
+    )
     with whole_path(path) as part:
         part.write_text(text, encoding="ascii")
     return Path(path)

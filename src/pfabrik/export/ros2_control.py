@@ -8,6 +8,7 @@ from importlib import resources
 from os import PathLike
 from pathlib import Path
 
+from ..checks import require_path
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..motion.joint_path import JointPath
@@ -52,7 +53,7 @@ def export_ros2_control(
     UnsupportedMechanism : some chain is no leg in closed form, or joints and actuators do not determine each other.
     UnknownName, InvalidArgument : of the joints or the name.
     """
-    path = Path(folder)
+    path = require_path("folder", folder)
     for place, text in ros2_control_texts(mechanism, joints, prefix_of(path, name)).items():
         file = path / place
         file.parent.mkdir(parents=True, exist_ok=True)
