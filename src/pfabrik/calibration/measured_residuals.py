@@ -56,6 +56,7 @@ class Fit:
         self.length = self.machine.characteristic_length
         self._columns = _sensor_columns(self.machine, measurements)
         self._start: Configurations | None = None
+        self._last_slopes: tuple[bytes, list[Residuals]] | None = None
         self._last: tuple[bytes, Mechanism, Solution] | None = None
 
     def begin(self, start: Solution | None) -> None:
@@ -107,6 +108,8 @@ class Fit:
 
     def blocks(self, values: Floats, *, slopes: bool = False) -> list[Residuals]:
         """Residuals at values (p,), quantity by quantity; NaN where the machine cannot be assembled."""
+        if slopes and self._last_slopes is not None and self._last_slopes[0] == values.tobytes():
+            return self._last_slopes[1]
         mechanism, solution = self._assembled(values)
         missing = np.ravel(solution.status) != Status.REACHED
         poses = np.array(solution.pose)
@@ -121,7 +124,10 @@ class Fit:
             twists, rates = first.at_held_actuators()
             require_closed(first.opened, self.parameters)
             rates += changes.home.T
-        return list(self._blocks(poses, q, twists, rates))
+        blocks = list(self._blocks(poses, q, twists, rates))
+        if slopes:
+            self._last_slopes = values.tobytes(), blocks
+        return blocks
 
     def _blocks(self, poses: Floats, q: Floats, twists: Floats | None, rates: Floats | None) -> Iterator[Residuals]:
         given, rows = self.measurements, np.arange(self.measurements.rows)

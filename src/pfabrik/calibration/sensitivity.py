@@ -109,21 +109,22 @@ class GeometrySlopes:
         moves = column_moves(mechanism)
         body = mechanism.end_effector_body
         present = screws(mechanism, q)
-        changes = geometry_screws(mechanism, q, np.nan_to_num(slopes.points), slopes.axes)
+        weights = np.concatenate([np.nan_to_num(slopes.points), slopes.axes[:, :, 0], slopes.axes[:, :, 1]], axis=2)
+        units = np.eye(9)[:, None] * np.ones((len(mechanism.joints), 1))
+        changes = geometry_screws(mechanism, q, units[..., :3], units[..., 3:].reshape(9, -1, 2, 3))
         self.units = rate_units(mechanism)
         self.drives = [drive.column for drive in mechanism.drives]
         self.zeros = slopes.home[:, self.drives] / self.units[self.drives]
         """Changes of the drives' zeros, (p, n_a) [rad or L]."""
         self.loops = loop_conditions(tree.loops[:, owners] * moves, present)
-        n, p = len(q), len(slopes.points)
-        self.openings = np.einsum("lj,njpk->nlkp", tree.loops, changes).reshape(n, -1, p)
+        self.openings = _summed(changes, weights, tree.loops)
         here = end_effector_pose(mechanism, q)[:, :3, 3] / self.length
         self.twist = _at(body_twist(tree.paths[body][owners] * moves, present), here)
         rotations = displacements(mechanism, q)[body][:, :3, :3]
-        self.twist_changes = _at(np.einsum("j,njpk->nkp", tree.paths[body], changes), here)
+        self.twist_changes = _at(_summed(changes, weights, tree.paths[body][None]), here)
         self.twist_changes[:, :3] += np.einsum("nab,pb->nap", rotations, slopes.reference_point) / self.length
         self.rotations = rotations
-        self.opened = np.zeros(p)
+        self.opened = np.zeros(len(self.zeros))
         """How far loops are from closing per unit of a parameter, (p,) [L or rad]; 0 until it is computed."""
 
     def at_held_actuators(self) -> tuple[Floats, Floats]:
@@ -159,6 +160,22 @@ class GeometrySlopes:
         turns = np.zeros((len(self.twist), task.rotations, 6))
         turns[:, :, 3:] = np.broadcast_to(axes, (len(self.twist), 3, 3))[:, list(task.turns)]
         return np.concatenate([position, turns], axis=1)
+
+
+def _summed(screws: Floats, weights: Floats, passes: Floats) -> Floats:
+    """Sums of the joints' screws along ways, (n, 6 ways, p).
+
+    Parameters
+    ----------
+    screws : of every joint per unit of its geometry's numbers, (n, joints, 9, 6).
+    weights : changes of these numbers per unit of each parameter, (p, joints, 9).
+    passes : how each way passes every joint, (ways, joints).
+    """
+    n, ways, (p, joints, numbers) = len(screws), len(passes), weights.shape
+    along = passes[:, None, :, None] * weights  # (ways, p, joints, 9)
+    flat = np.moveaxis(screws, -1, 1).reshape(6 * n, joints * numbers)
+    sums = (flat @ along.reshape(ways * p, joints * numbers).T).reshape(n, 6, ways, p)
+    return np.asarray(np.swapaxes(sums, 1, 2).reshape(n, 6 * ways, p))
 
 
 def _at(twists: Floats, points: Floats) -> Floats:
