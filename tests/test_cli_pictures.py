@@ -60,7 +60,8 @@ def test_plot_writes_the_names_of_all_joints(monkeypatch: pytest.MonkeyPatch) ->
 def test_plot_draws_the_torques_of_joints_in_series() -> None:
     result = run("plot", "g1_ankle", "--torque-map", "--torque", "25")
     assert (result.exit_code, result.stdout) == (0, "wrote g1_ankle.png\n")
-    assert run("plot", "five_bar", "--torque-map", "--joints", "p1,p2", "-o", "a.svg").exit_code == 0
+    for joints in (["--joints", "p1,p2"], ["--joints", "p1", "p2"], ["--joints", "p1", "--joints", "p2"]):
+        assert run("plot", "five_bar", "--torque-map", *joints, "-o", "a.svg").exit_code == 0
     axes = pf.actuation(pf.load("g1_ankle"), ("roll_joint", "pitch_joint")).plot_torques(25.0)
     assert axes.get_xlabel() == "roll_joint [deg]" and "by actuators of 25" in axes.get_title()
     assert len(axes.patches) > 30  # polygons
@@ -83,6 +84,8 @@ def test_travel_prints_its_table_and_draws_it() -> None:
         (("plot", "five_bar", "--position", "0", "0"), "--position"),
         (("plot", "stewart", "--torque-map"), "no passive joints in series from base to end effector; give --joints"),
         (("plot", "g1_ankle", "--torque", "3"), "--joints and --torque belong to --torque-map"),
+        (("plot", "g1_ankle", "roll_joint", "--torque-map"), "names after --joints"),
+        (("plot", "g1_ankle", "--torque-map", "--joints", "a", "b", "--joints", "c"), "--joints once with all names"),
         (("plot", "g1_ankle", "--torque-map", "--names"), "does not go with a target or --names"),
         (("plot", "tricept", "--torque-map"), "two angles, or two lengths, for a torque map"),
         (("track", "five_bar", "path.csv", "--animate", "a.png"), "expected a name that ends in .gif or .mp4"),

@@ -123,8 +123,13 @@ def test_the_command_writes_tensors_and_packages_and_never_over_files(tmp_path: 
         again = CliRunner().invoke(main, line)
         assert again.exit_code != 0 and "exists already" in again.output
         assert CliRunner().invoke(main, [*line, "--force"]).exit_code == 0
+    text = (tmp_path / "c.py").read_bytes()
+    for names in (["pitch_joint,roll_joint"], ["pitch_joint", "--joints", "roll_joint"]):
+        line = ["export", "g1_ankle", "--numpy", str(tmp_path / "c.py"), "--force", "--joints", *names]
+        assert CliRunner().invoke(main, line).exit_code == 0 and (tmp_path / "c.py").read_bytes() == text
     for line, said in (
         (["export", "g1_ankle"], "expected a FORMAT"),
+        (["export", "g1_ankle", "c", *joints, "--joints", "x"], "--joints once with all names"),
         (["export", "g1_ankle", "c", "d"], "after --joints"),
         (["export", "g1_ankle", "mjcf", *joints], "not of mjcf"),
         (["export", "g1_ankle", "--torch", str(tmp_path / "d.py"), "--name", "x"], "torch has none"),

@@ -239,11 +239,21 @@ def test_joints_that_do_not_fit_are_refused_with_the_reason() -> None:
         tensor_source(machine("g1_ankle"), backend="tensorflow")  # type: ignore[arg-type]
 
 
-def test_joints_of_a_leg_that_others_hold_are_refused() -> None:
-    joints = ["A1.1", "A1.2"] if "A1.1" in [joint.name for joint in machine("rrr").joints] else None
-    chain = joints or [joint.name for joint in machine("rrr").joints][:3]
-    with pytest.raises((UnsupportedMechanism, InvalidArgument)):
-        tensor_source(machine("rrr"), joints=chain)
+@pytest.mark.parametrize(
+    ("name", "joints", "said"),
+    [("upu", ("U1.1", "P1.2", "U1.3"), "not 5"), ("puu", ("P1.1", "U1.2", "U1.3"), "not 5")],
+)
+def test_joints_that_actuators_do_not_fit_are_refused_as_by_actuation(
+    name: str, joints: tuple[str, ...], said: str
+) -> None:
+    """A leg's joints, which the other legs hold: a reason, and the same sentence as of the map in the library."""
+    reasons = []
+    for refuse in (lambda: tensor_source(machine(name), joints=joints), lambda: pf.actuation(machine(name), joints)):
+        with pytest.raises(UnsupportedMechanism) as caught:
+            refuse()
+        reasons.append(caught.value.reasons)
+    assert reasons[0] == reasons[1]
+    assert said in str(reasons[0])
 
 
 @pytest.mark.parametrize("backend", ["numpy", "torch", "jax"])
@@ -337,6 +347,7 @@ def inside(name: str, joints: tuple[str, ...], count: int) -> np.ndarray:
     return targets[(margins[:, :n] > 1e-2).all(axis=1) & (margins > 0.0).all(axis=1)][:count]
 
 
+OVERCONSTRAINED = ("agile_eye",)
 GRADIENTS = [("g1_ankle", True), ("ankle_ups", True), ("delta", False), ("stewart", False), ("agile_eye", False)]
 
 
@@ -354,6 +365,8 @@ def test_gradcheck_by_coordinates_and_parameters(name: str, by_joints: bool) -> 
     assert check(made.to_actuators, (q, parameters), **settings)
     if by_joints:
         assert check(made.jacobian, (q, parameters), **settings)
+    elif name not in OVERCONSTRAINED:  # whose legs other dimensions do not let move
+        assert check(lambda p: made.jacobian(q, p), (parameters,), **settings)
     assert check(lambda a, p: forward(a, parameters=p), (actuators, parameters), **settings)
 
 

@@ -14,10 +14,10 @@ from ..arrays import Floats, shaped
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..fk import solve_fk
+from ..motion.determined import require_determined
 from ..motion.displacements import actuator_units
 from ..motion.joint_path import JointPath, joint_path
 from ..poses import as_floats
-from .determined import require_determined
 from .drive_limits import HalfSpaces, image_of_box, preimage_of_box
 from .hull import Hull, feasible_hull
 from .inverses import inverses
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TASK = "task"
+PURPOSE = "mapped between joints and actuators"
 
 
 class Gains(NamedTuple):
@@ -73,10 +74,10 @@ def actuation(mechanism: Mechanism, joints: str | Sequence[str]) -> Actuation:
     checked_mechanism(mechanism)
     if joints == TASK and TASK not in {joint.name for joint in mechanism.joints}:
         task = TaskPath(mechanism)
-        require_determined(mechanism, task.names, task)
+        require_determined(mechanism, task.names, task.rates_of, PURPOSE)
         return Actuation(task)
     path = joint_path(mechanism, joints)
-    require_determined(mechanism, path.names, path.columns.tolist())
+    require_determined(mechanism, path.names, path.rates_of, PURPOSE)
     return Actuation(path)
 
 

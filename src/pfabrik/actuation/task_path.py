@@ -106,6 +106,10 @@ class TaskPath:
         """Rates of the coordinates by the twist of the platform, (n, k, 6); (n, k, 3) for a joint end effector."""
         return self._all_rates(poses)[:, self._places]
 
+    def rates_of(self, motions: Floats, twists: Floats) -> Floats:
+        """Rates of the coordinates near home, (n, k, f), by the twists (n, 6, f) of f motions."""
+        return np.asarray(self.rates(np.repeat(self.mechanism.home_pose[None], len(twists), axis=0)) @ twists)
+
     def _all_rates(self, poses: Floats) -> Floats:
         """Rates of all that the task sets, (n, m, 6) or (n, m, 3).
 

@@ -137,6 +137,13 @@ def joint_coordinates(mechanism: pf.Mechanism, words: str) -> tuple[str, float |
     return name, coordinates if len(coordinates) > 1 else coordinates[0]
 
 
+def named_joints(option: tuple[str, ...], words: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of --joints in their order: with commas between, or apart, and then the later ones are `words`."""
+    if len(option) > 1 and words:
+        raise click.UsageError(f"found {' '.join(words)}; expected --joints once with all names, or once for each")
+    return tuple(name for word in (*option, *words) for name in word.split(",") if name)
+
+
 def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--hold`` and ``--projection``, which the command gets as `options` for the solver."""
 

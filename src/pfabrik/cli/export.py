@@ -9,7 +9,7 @@ import click
 
 import pfabrik as pf
 
-from .arguments import MECH, load
+from .arguments import MECH, load, named_joints
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import note
 
@@ -63,7 +63,7 @@ def text_of(
 )
 @click.option(
     "--joints",
-    metavar="NAME...",
+    metavar="NAME[,NAME]...",
     multiple=True,
     help="Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.",
 )
@@ -106,7 +106,7 @@ def export(
         raise click.UsageError(f"found {' '.join(words)}; expected one FORMAT, or names after --joints")
     if not outputs and folder is None:
         raise click.UsageError(f"expected a FORMAT ({', '.join(FORMATS)}), --torch, --jax, --numpy or --ros2-control")
-    joints += words
+    joints = named_joints(joints, words)
     _check_settings(outputs, folder, name, joints)
     for path in outputs.values():
         refuse_existing(path, force)

@@ -11,7 +11,7 @@ import click
 
 import pfabrik as pf
 
-from .arguments import FINITE
+from .arguments import FINITE, named_joints
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,22 @@ def torque_map_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @click.option("--torque-map", "wanted", is_flag=True, help="Draw the torques that actuators give two joints.")
     @click.option(
-        "--joints", metavar="NAME[,NAME]", help="The joints of --torque-map.  [default: the passive ones in series]"
+        "--joints",
+        metavar="NAME[,NAME]...",
+        multiple=True,
+        help="The joints of --torque-map.  [default: the passive ones in series]",
     )
+    @click.argument("words", metavar="", nargs=-1)
     @click.option("--torque", type=FINITE, help="Of every actuator, for --torque-map.  [default: 1]")
     @functools.wraps(command)
-    def with_torque_map(*, wanted: bool, joints: str | None, torque: float | None, **parameters: Any) -> Any:
-        if not wanted and (joints is not None or torque is not None):
+    def with_torque_map(
+        *, wanted: bool, joints: tuple[str, ...], words: tuple[str, ...], torque: float | None, **parameters: Any
+    ) -> Any:
+        if words and not joints:
+            raise click.UsageError(f"found {' '.join(words)}; expected one MECH, or names after --joints")
+        if not wanted and (joints or torque is not None):
             raise click.UsageError("--joints and --torque belong to --torque-map")
-        names = tuple(name for name in (joints or "").split(",") if name)
-        torque_map = TorqueMap(names, 1.0 if torque is None else torque) if wanted else None
+        torque_map = TorqueMap(named_joints(joints, words), 1.0 if torque is None else torque) if wanted else None
         return command(torque_map=torque_map, **parameters)
 
     return with_torque_map

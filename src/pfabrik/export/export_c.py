@@ -85,5 +85,5 @@ def c_source(
     if "fk" in parts and machine.uncontrolled:
         reason = f"its actuators leave the end effector {counted(machine.uncontrolled, 'freedom')}: leave 'fk' out"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-    path = None if joints is None else fitting_path(mechanism, machine, joints)
+    path = None if joints is None else fitting_path(mechanism, joints)
     return source(machine, name, precision, parts, path, quote(file))

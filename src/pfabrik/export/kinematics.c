@@ -127,7 +127,7 @@ typedef struct {
     int proximal, slides;
     int twists; /* 1: both ends keep the rod from spinning about itself */
     int base_ending, platform_ending;
-    int base_end_aimed, platform_end_aimed; /* 1: the angles of this ending are computed */
+    int base_end_aimed, platform_end_aimed; /* 1: the angles of this ending have limits; 2: rates need them too */
     pfk_real base_end[3];
     pfk_real platform_end[3]; /* from the reference point; of a leg read from the platform, from the base's origin */
     pfk_real length, line[3]; /* the direction from base end to platform end */
@@ -224,25 +224,25 @@ typedef struct {
 
 static const pfk_real pfk_zero[3] = {0.0, 0.0, 0.0};
 
-static pfk_real pfk_dot(const pfk_real a[3], const pfk_real b[3])
+static inline pfk_real pfk_dot(const pfk_real a[3], const pfk_real b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static pfk_real pfk_norm(const pfk_real a[3])
+static inline pfk_real pfk_norm(const pfk_real a[3])
 {
     return sqrt(pfk_dot(a, a));
 }
 
 /* `out` is neither of the two. */
-static void pfk_cross(const pfk_real a[3], const pfk_real b[3], pfk_real out[3])
+static inline void pfk_cross(const pfk_real a[3], const pfk_real b[3], pfk_real out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static void pfk_copy(const pfk_real a[3], pfk_real out[3])
+static inline void pfk_copy(const pfk_real a[3], pfk_real out[3])
 {
     int i;
     for (i = 0; i < 3; ++i)
@@ -250,21 +250,21 @@ static void pfk_copy(const pfk_real a[3], pfk_real out[3])
 }
 
 /* a + k b; `out` may be one of them. */
-static void pfk_along(const pfk_real a[3], pfk_real k, const pfk_real b[3], pfk_real out[3])
+static inline void pfk_along(const pfk_real a[3], pfk_real k, const pfk_real b[3], pfk_real out[3])
 {
     int i;
     for (i = 0; i < 3; ++i)
         out[i] = a[i] + k * b[i];
 }
 
-static void pfk_rotate(const pfk_frame *frame, const pfk_real v[3], pfk_real out[3])
+static inline void pfk_rotate(const pfk_frame *frame, const pfk_real v[3], pfk_real out[3])
 {
     int i;
     for (i = 0; i < 3; ++i)
         out[i] = pfk_dot(frame->R[i], v);
 }
 
-static void pfk_rotate_back(const pfk_frame *frame, const pfk_real v[3], pfk_real out[3])
+static inline void pfk_rotate_back(const pfk_frame *frame, const pfk_real v[3], pfk_real out[3])
 {
     int i;
     for (i = 0; i < 3; ++i)
@@ -315,7 +315,7 @@ static void pfk_displaced(const pfk_frame *frame, const pfk_real point[3], pfk_r
 }
 
 /* v turned about a unit vector; `out` is not v. */
-static void pfk_about(const pfk_real v[3], const pfk_real axis[3], pfk_real cosine, pfk_real sine, pfk_real out[3])
+static inline void pfk_about(const pfk_real v[3], const pfk_real axis[3], pfk_real cosine, pfk_real sine, pfk_real out[3])
 {
     const pfk_real rest = (1.0 - cosine) * pfk_dot(axis, v);
     int i;
@@ -363,7 +363,8 @@ static pfk_real pfk_either(pfk_real A, pfk_real B, pfk_real C, pfk_real over, pf
     return rest / square;
 }
 
-/* Angles of two crossed hinges that turn u, given at home, into w; the singularity margin, as above. */
+/* Angles of two crossed hinges that turn u, given at home, into w, unless `angles` is 0; the singularity margin, as
+   above. */
 static pfk_real pfk_aim(const pfk_real axes[3][3], const pfk_real u[3], const pfk_real w[3], pfk_real side,
                         pfk_real angles[])
 {
@@ -374,6 +375,8 @@ static pfk_real pfk_aim(const pfk_real axes[3][3], const pfk_real u[3], const pf
     A = pfk_dot(a, flat);
     C = pfk_dot(a, w) - pfk_dot(a, b) * bu;
     margin = pfk_either(A, pfk_dot(a, across), C, A - C, side, &cosine, &sine);
+    if (!angles)
+        return margin;
     pfk_about(u, b, cosine, sine, turned);
     angles[0] = pfk_angle(a, turned, w);
     angles[1] = atan2(sine, cosine);
@@ -403,15 +406,16 @@ static pfk_real pfk_last_angle(const pfk_frame *frame, const pfk_leg *pivot, con
 }
 
 #endif
-/* Turns a crank until its rod reaches the platform end, or to where it comes nearest; whether it is near a dead
-   point. What the platform end has moved since home tells more digits than where it is: with x = reach + moved, C =
+/* Turns a crank until its rod reaches the platform end, or to where it comes nearest; fills its angle where `angles` are
+   asked for; whether it is near a dead point. What the platform end has moved since home tells more digits than where it is: with x = reach + moved, C =
    crank . reach + c. */
-static int pfk_turn_crank(const pfk_leg *rod, const pfk_real moved[3], pfk_placed *own)
+static int pfk_turn_crank(const pfk_leg *rod, const pfk_real moved[3], int angles, pfk_placed *own)
 {
     const pfk_real a = pfk_dot(rod->crank, moved), B = pfk_dot(rod->across, rod->reach) + pfk_dot(rod->across, moved);
     const pfk_real c = pfk_dot(moved, rod->reach) + 0.5 * pfk_dot(moved, moved), A = pfk_dot(rod->crank, rod->reach);
     const pfk_real margin = pfk_either(A + a, B, A + c, a - c, rod->side, &own->cosine, &own->sine);
-    own->value[PFK_Q_PROXIMAL] = atan2(own->sine, own->cosine);
+    if (angles)
+        own->value[PFK_Q_PROXIMAL] = atan2(own->sine, own->cosine);
     return !(margin > PFK_DEAD);
 }
 
@@ -460,13 +464,15 @@ static void pfk_place_base_end(const pfk_leg *rod, const pfk_leg *main, const pf
     }
 }
 
-/* Angles of the hinges at an end of a rod that has to point along `line`; the singularity margin, see pfk_aim. */
+/* Angles of the hinges at an end of a rod that has to point along `line`, unless `angles` is 0; the singularity margin,
+   see pfk_aim. */
 static pfk_real pfk_aim_end(int end, const pfk_real axes[3][3], const pfk_real home[3], const pfk_real line[3],
                             pfk_real side, pfk_real angles[])
 {
     if (end != PFK_HINGE)
         return pfk_aim(axes, home, line, side, angles);
-    angles[0] = pfk_angle(axes[0], home, line);
+    if (angles)
+        angles[0] = pfk_angle(axes[0], home, line);
     return 1.0;
 }
 
@@ -496,7 +502,8 @@ static pfk_real pfk_twist(const pfk_frame *frame, const pfk_leg *rod, const pfk_
 /* Fills the state of a rod at a pose; returns the gap by which it does not reach [L]. `main_state` is that of the
    leg with its proximal joint. Two crossed hinges point a rod by either of two solutions, half a turn about it apart:
    those of home, unless the two ends then hold the rod the other way around. */
-static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const pfk_placed *main_state, pfk_placed *own)
+static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const pfk_placed *main_state, int angles,
+                              pfk_placed *own)
 {
     const pfk_leg *main = &pfk_legs[rod->main];
     pfk_real moved[3], margin, gap = 0.0;
@@ -508,7 +515,7 @@ static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const 
             own->sine = sin(own->value[PFK_Q_PROXIMAL]);
         } else {
             pfk_displaced(frame, rod->platform_end, moved);
-            own->is_held = rod->proximal == PFK_CRANK ? pfk_turn_crank(rod, moved, own)
+            own->is_held = rod->proximal == PFK_CRANK ? pfk_turn_crank(rod, moved, angles, own)
                                                      : pfk_move_carriage(rod, moved, own);
         }
     }
@@ -519,18 +526,21 @@ static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const 
     if (!(own->length > 0.0))
         return 1.0;
     pfk_along(pfk_zero, 1.0 / own->length, own->span, own->u);
-    pfk_carried(main, main_state, -1.0, own->u, own->base_line);
-    pfk_rotate_back(frame, own->u, own->platform_line);
+    if (angles || rod->base_end_aimed)
+        pfk_carried(main, main_state, -1.0, own->u, own->base_line);
+    if (angles || rod->platform_end_aimed)
+        pfk_rotate_back(frame, own->u, own->platform_line);
     if (pfk_has_proximal(rod) && own->is_held && !own->is_given)
         gap = fabs(own->value[PFK_SLIDE]) / PFK_SIZE;
     if (rod->base_end_aimed) {
         margin = pfk_aim_end(rod->base_ending, rod->base_end_axes, rod->line, own->base_line, rod->base_end_side,
-                           &own->value[PFK_BASE_END]);
+                             angles || rod->base_end_aimed == 2 ? &own->value[PFK_BASE_END] : 0);
         gap = -margin > gap ? -margin : gap;
     }
     if (rod->platform_end_aimed) {
         margin = pfk_aim_end(rod->platform_ending, rod->platform_end_axes, rod->line, own->platform_line,
-                             rod->platform_end_side, &own->value[PFK_PLATFORM_END]);
+                             rod->platform_end_side,
+                             angles || rod->platform_end_aimed == 2 ? &own->value[PFK_PLATFORM_END] : 0);
         gap = -margin > gap ? -margin : gap;
     }
 #if TWISTS
@@ -550,7 +560,7 @@ static pfk_real pfk_place_rod(const pfk_frame *frame, const pfk_leg *rod, const 
 
 #if PIVOTS
 /* Fills the state of a pivot at a pose; returns the gap by which it does not reach. */
-static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pfk_placed *own)
+static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, int has_angles, pfk_placed *own)
 {
     pfk_real last[3], margin, *angles = &own->value[PFK_BASE_END];
     int i;
@@ -558,17 +568,21 @@ static pfk_real pfk_place_pivot(const pfk_frame *frame, const pfk_leg *pivot, pf
     pfk_along(own->platform_end, -1.0, pivot->base_end, own->span);
     for (i = 0; i < pivot->slides; ++i)
         own->value[PFK_PLATFORM_END + i] = pfk_dot(pivot->rows[i], own->span);
+    if (pivot->base_ending == PFK_TRIPLE) {
+        pfk_rotate(frame, pivot->base_end_axes[2], last);
+        margin = pfk_aim(pivot->base_end_axes, pivot->base_end_axes[2], last, pivot->side, has_angles ? angles : 0);
+        if (has_angles)
+            angles[2] = pfk_last_angle(frame, pivot, angles, 2);
+        return margin < 0.0 ? -margin : 0.0;
+    }
+    if (!has_angles)
+        return 0.0;
     if (pivot->base_ending == PFK_HINGE) {
         angles[0] = pfk_spin_angle(frame, pivot->base_end_axes[0]);
     } else if (pivot->base_ending == PFK_CROSS) {
         pfk_rotate(frame, pivot->base_end_axes[1], last);
         angles[0] = pfk_angle(pivot->base_end_axes[0], pivot->base_end_axes[1], last);
         angles[1] = pfk_last_angle(frame, pivot, angles, 1);
-    } else if (pivot->base_ending == PFK_TRIPLE) {
-        pfk_rotate(frame, pivot->base_end_axes[2], last);
-        margin = pfk_aim(pivot->base_end_axes, pivot->base_end_axes[2], last, pivot->side, angles);
-        angles[2] = pfk_last_angle(frame, pivot, angles, 2);
-        return margin < 0.0 ? -margin : 0.0;
     }
     return 0.0;
 }
@@ -663,8 +677,8 @@ static void pfk_start(pfk_state *state)
 
 #endif
 /* Places all legs at a pose, with driven proximal joints as they are given, if they are; 0, or the number of the leg
-   that is farthest from reaching. */
-static int pfk_place(const pfk_pose *pose, const pfk_real *given, pfk_state *state)
+   that is farthest from reaching. Without `angles` it fills those alone that equations need. */
+static int pfk_place(const pfk_pose *pose, const pfk_real *given, int angles, pfk_state *state)
 {
     pfk_real gap, worst = PFK_CLOSE;
     int i, k, missing = 0;
@@ -695,10 +709,10 @@ static int pfk_place(const pfk_pose *pose, const pfk_real *given, pfk_state *sta
 #endif
 #if PIVOTS
         if (leg->kind == PFK_PIVOT)
-            gap = pfk_place_pivot(frame, leg, &state->leg[k]);
+            gap = pfk_place_pivot(frame, leg, angles || leg->base_end_aimed == 2, &state->leg[k]);
         else
 #endif
-            gap = pfk_place_rod(frame, leg, &state->leg[leg->main], &state->leg[k]);
+            gap = pfk_place_rod(frame, leg, &state->leg[leg->main], angles, &state->leg[k]);
         if (!(gap <= worst)) {
             worst = gap;
             missing = k + 1;
@@ -768,10 +782,10 @@ static void pfk_follow(const pfk_frame *frame, const pfk_leg *rod, pfk_placed *o
         own->follow[i] = 0.0;
     if (own->is_held)
         return;
-    rate = pfk_proximal_rate(rod, own->base_end, own->u, pfk_zero);
+    rate = -1.0 / pfk_proximal_rate(rod, own->base_end, own->u, pfk_zero);
     pfk_slope(rod, frame, own->platform_end, own->u, pfk_zero, own->follow);
     for (i = 0; i < 6; ++i)
-        own->follow[i] /= -rate;
+        own->follow[i] *= rate;
 }
 
 /* Fills an equation of leg k; `off` and a . (dH - dF) + b . W + c . w, its derivative, are in `unit`. F and H are
@@ -782,10 +796,11 @@ static pfk_row *pfk_put(const pfk_state *state, int k, pfk_real unit, pfk_real o
 {
     const pfk_leg *leg = &pfk_legs[k], *main = &pfk_legs[leg->main];
     const pfk_placed *own = &state->leg[k];
+    const pfk_real per_unit = 1.0 / unit;
     pfk_real rate;
     int i;
     row->leg = k + 1;
-    row->off = off / unit;
+    row->off = off * per_unit;
     if (!sloped)
         return row + 1;
     pfk_slope(leg, &state->frame[leg->frame], own->platform_end, a, c, row->slope);
@@ -804,7 +819,7 @@ static pfk_row *pfk_put(const pfk_state *state, int k, pfk_real unit, pfk_real o
         row->slope[i] = 0.0;
 #endif
     for (i = 0; i < PFK_COLUMNS; ++i)
-        row->slope[i] /= unit;
+        row->slope[i] *= per_unit;
     return row + 1;
 }
 
@@ -845,6 +860,8 @@ static pfk_row *pfk_twist_row(const pfk_state *state, int k, int sloped, pfk_row
     pfk_real base_mark[3], platform_mark[3], first[3], by_base_end[3], by_platform_end[3];
     pfk_real base_spin[3], platform_spin[3];
     const pfk_real off = pfk_twist(frame, rod, main, main_state, own, base_mark, platform_mark);
+    if (!sloped)
+        return pfk_put(state, k, 1.0, off, pfk_zero, pfk_zero, pfk_zero, 0, row);
     pfk_carried(main, main_state, 1.0, rod->base_end_axes[0], first);
     pfk_spin_rate(rod->base_ending, first, base_mark, own->u, by_base_end, base_spin);
     pfk_rotate(frame, rod->platform_end_axes[0], first);
@@ -1259,7 +1276,7 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
     int redundant_from;
 #endif
     for (*steps = 0;; ++*steps) {
-        missing = pfk_place(pose, given, state);
+        missing = pfk_place(pose, given, !given, state);
         if (missing && strict)
             return missing;
         open = pfk_equations(state, given, 1, row, &worst);
@@ -1326,14 +1343,15 @@ static int pfk_make_exact(pfk_pose *pose)
 {
     pfk_real gram[3][3], turned[3], off = 0.0;
     int i, j, k, step;
-    for (step = 0; step < 2; ++step) {
+    for (step = 0; step < 2 && (step == 0 || off * off > 1e-3 * PFK_CLOSED); ++step) { /* off becomes its square */
         for (i = 0; i < 3; ++i)
-            for (j = 0; j < 3; ++j) {
+            for (j = 0; j <= i; ++j) {
                 gram[i][j] = i == j ? -1.0 : 0.0;
                 for (k = 0; k < 3; ++k)
                     gram[i][j] += pose->R[k][i] * pose->R[k][j];
+                gram[j][i] = gram[i][j];
                 if (step == 0)
-                    off += fabs(gram[i][j]);
+                    off += (i == j ? 1.0 : 2.0) * fabs(gram[i][j]);
             }
         for (k = 0; k < 3; ++k) {
             for (j = 0; j < 3; ++j)
@@ -1544,28 +1562,44 @@ static int pfk_reach(const pfk_pose *target, const pfk_pose *start, int moves, p
 
 #endif
 #if RESTS
-/* Places legs at a whole pose: 0, or the number of a leg that does not reach or close. */
-static int pfk_rest(const pfk_pose *pose, pfk_state *state)
+#if SOLVES
+/* Places legs at a whole pose, and fills their equations, with derivatives if `sloped`; `angles` as of pfk_place. 0, or
+   the number of a leg that does not reach or close. */
+static int pfk_close(const pfk_pose *pose, int angles, int sloped, pfk_state *state, pfk_row row[PFK_ROWS])
 {
-    int code;
+    pfk_real worst;
+    int code, open;
 #if IMPLICIT
     pfk_pose own;
+    (void)angles;
     code = pfk_reach(pose, pose, PFK_REDUNDANT_ALONE, &own, state);
+    if (!sloped)
+        return code;
 #else
 #if REDUNDANT
     pfk_start(state);
 #endif
-    code = pfk_place(pose, 0, state);
+    code = pfk_place(pose, 0, angles, state);
+#endif
+    if (code)
+        return code;
+    open = pfk_equations(state, 0, sloped, row, &worst);
+    return worst <= PFK_CLOSE ? 0 : open;
+}
+
+#endif
+/* Places legs at a whole pose: 0, or the number of a leg that does not reach or close. */
+static int pfk_rest(const pfk_pose *pose, pfk_state *state)
+{
 #if SOLVES
-    if (!code) {
-        pfk_row row[PFK_ROWS];
-        pfk_real worst;
-        code = pfk_equations(state, 0, 0, row, &worst);
-        code = worst <= PFK_CLOSE ? 0 : code;
-    }
+    pfk_row row[PFK_ROWS];
+    return pfk_close(pose, 1, 0, state, row);
+#else
+#if REDUNDANT
+    pfk_start(state);
 #endif
+    return pfk_place(pose, 0, 1, state);
 #endif
-    return code;
 }
 
 #endif
@@ -1636,47 +1670,59 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
 
 #endif
 #if JOINTS
+/* Turns a vector about a unit axis, and a point about a joint. */
+static void pfk_turn_vector(pfk_real v[3], const pfk_real axis[3], pfk_real cosine, pfk_real sine)
+{
+    pfk_real turned[3];
+    pfk_about(v, axis, cosine, sine, turned);
+    pfk_copy(turned, v);
+}
+
+static void pfk_turn_point(pfk_real point[3], const pfk_joint *joint, pfk_real cosine, pfk_real sine)
+{
+    pfk_along(point, -1.0, joint->point, point);
+    pfk_turn_vector(point, joint->axis, cosine, sine);
+    pfk_along(joint->point, 1.0, point, point);
+}
+
+/* 1 if a pose has finite numbers alone. */
+static int pfk_is_finite(const pfk_pose *pose)
+{
+    return fabs(0.0 * (pose->p[0] + pose->p[1] + pose->p[2] + pose->R[0][0] + pose->R[1][0] + pose->R[2][0])) <= 0.0;
+}
+
 /* The pose at joint coordinates, and its twist by each of them. */
 static void pfk_walk(const pfk_real joints[PFK_JOINTS], pfk_pose *pose, pfk_real twist[PFK_JOINTS][6])
 {
-    pfk_real at[PFK_JOINTS][3], column[3], turned[3], value;
-    int i, j, k;
+    pfk_real at[PFK_JOINTS][3], x[3] = {1.0, 0.0, 0.0}, y[3] = {0.0, 1.0, 0.0}, z[3];
+    int i, k;
     pfk_home(pose);
     /* from the end effector inward: each joint moves all that comes after it */
     for (k = PFK_JOINTS - 1; k >= 0; --k) {
         const pfk_joint *joint = &pfk_joints[k];
-        const pfk_real cosine = cos(joint->sense * (joints[joint->place] - joint->home));
-        const pfk_real sine = sin(joint->sense * (joints[joint->place] - joint->home));
-        value = joint->sense * (joints[joint->place] - joint->home);
-        for (i = k; i < PFK_JOINTS; ++i) { /* axes of joints after it, then points on them */
-            pfk_real *axis = twist[pfk_joints[i].place];
-            if (i == k) {
-                pfk_copy(joint->axis, axis + 3);
-                pfk_copy(joint->point, at[i]);
-            } else if (joint->turns) {
-                pfk_about(axis + 3, joint->axis, cosine, sine, turned);
-                pfk_copy(turned, axis + 3);
-                pfk_along(at[i], -1.0, joint->point, column);
-                pfk_about(column, joint->axis, cosine, sine, turned);
-                pfk_along(joint->point, 1.0, turned, at[i]);
-            } else {
-                pfk_along(at[i], value, joint->axis, at[i]);
-            }
-        }
+        const pfk_real value = joint->sense * (joints[joint->place] - joint->home);
+        pfk_copy(joint->axis, twist[joint->place] + 3);
+        pfk_copy(joint->point, at[k]);
         if (!joint->turns) {
+            for (i = k + 1; i < PFK_JOINTS; ++i)
+                pfk_along(at[i], value, joint->axis, at[i]);
             pfk_along(pose->p, value, joint->axis, pose->p);
             continue;
         }
-        pfk_along(pose->p, -1.0, joint->point, column);
-        pfk_about(column, joint->axis, cosine, sine, turned);
-        pfk_along(joint->point, 1.0, turned, pose->p);
-        for (j = 0; j < 3; ++j) {
-            for (i = 0; i < 3; ++i)
-                column[i] = pose->R[i][j];
-            pfk_about(column, joint->axis, cosine, sine, turned);
-            for (i = 0; i < 3; ++i)
-                pose->R[i][j] = turned[i];
+        const pfk_real cosine = cos(value), sine = sin(value);
+        for (i = k + 1; i < PFK_JOINTS; ++i) {
+            pfk_turn_vector(twist[pfk_joints[i].place] + 3, joint->axis, cosine, sine);
+            pfk_turn_point(at[i], joint, cosine, sine);
         }
+        pfk_turn_point(pose->p, joint, cosine, sine);
+        pfk_turn_vector(x, joint->axis, cosine, sine);
+        pfk_turn_vector(y, joint->axis, cosine, sine);
+    }
+    pfk_cross(x, y, z);
+    for (i = 0; i < 3; ++i) {
+        pose->R[i][0] = x[i];
+        pose->R[i][1] = y[i];
+        pose->R[i][2] = z[i];
     }
     for (k = 0; k < PFK_JOINTS; ++k) {
         pfk_real *own = twist[pfk_joints[k].place], lever[3];
@@ -1706,7 +1752,7 @@ int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_A
     pfk_pose pose;
     int code;
     pfk_pose_at(joints, &pose);
-    if (pfk_make_exact(&pose))
+    if (!pfk_is_finite(&pose))
         return PFK_NO_POSE;
     code = pfk_rest(&pose, &state);
     if (code)
@@ -1725,20 +1771,42 @@ int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_A
 
 #endif
 #if RATES
+/* Takes orthonormal vectors (`count` of them, `width` numbers each) off v, once more where most of it goes; fills their
+   shares; the length left. */
+static pfk_real pfk_take_off(const pfk_real *basis, int count, int width, pfk_real *v, pfk_real *shares)
+{
+    pfk_real share[6], size = 0.0, before;
+    int j, k, again;
+    for (k = 0; k < count; ++k)
+        shares[k] = 0.0;
+    for (j = 0; j < width; ++j)
+        size += v[j] * v[j];
+    for (again = 0; count && again < 2; ++again) {
+        for (k = 0; k < count; ++k)
+            for (share[k] = 0.0, j = 0; j < width; ++j)
+                share[k] += basis[k * width + j] * v[j];
+        for (k = 0; k < count; ++k) {
+            for (j = 0; j < width; ++j)
+                v[j] -= share[k] * basis[k * width + j];
+            shares[k] += share[k];
+        }
+        before = size;
+        for (size = 0.0, j = 0; j < width; ++j)
+            size += v[j] * v[j];
+        if (size > 0.01 * before)
+            break; /* no more than a digit has cancelled */
+    }
+    return sqrt(size);
+}
+
 /* Makes v square to `count` vectors, orthonormal ones, and of length 1; 0 where no more than rounding is left of it. */
 static int pfk_make_square(pfk_real basis[][6], int count, pfk_real v[6])
 {
-    pfk_real share, size;
-    int i, j, k;
-    for (k = 0; k < 2; ++k)
-        for (i = 0; i < count; ++i) {
-            share = pfk_dot(basis[i], v) + pfk_dot(basis[i] + 3, v + 3);
-            for (j = 0; j < 6; ++j)
-                v[j] -= share * basis[i][j];
-        }
-    size = sqrt(pfk_dot(v, v) + pfk_dot(v + 3, v + 3));
+    pfk_real shares[6];
+    const pfk_real size = pfk_take_off(&basis[0][0], count, 6, v, shares);
+    int j;
     for (j = 0; j < 6 && size > PFK_RANK; ++j)
-        v[j] /= size;
+        v[j] *= 1.0 / size;
     return size > PFK_RANK;
 }
 
@@ -1747,15 +1815,17 @@ static int pfk_twist_rates(const pfk_pose *pose, int raw, pfk_real rates[PFK_ACT
 {
     pfk_state state;
     pfk_row row[PFK_ROWS];
-    pfk_real drive[PFK_ACTUATORS][PFK_COLUMNS], basis[6][6], actuators[PFK_ACTUATORS], worst, share;
-    int i, j, k, count = 0, code = pfk_rest(pose, &state);
+    pfk_real drive[PFK_ACTUATORS][PFK_COLUMNS], basis[6][6], share;
+    const int sloped = !raw || PFK_N_REDUNDANT > 0;
+    int i, j, k, count = 0, code = pfk_close(pose, 0, sloped, &state, row);
 #if REDUNDANT
     int used[PFK_ROWS] = {0};
 #endif
     if (code)
         return PFK_LEG + code;
-    pfk_read(&state, actuators);
-    pfk_equations(&state, 0, 1, row, &worst);
+    for (i = 0; i < PFK_LEGS && !sloped; ++i)
+        if (pfk_has_proximal(&pfk_legs[i]))
+            pfk_follow(&state.frame[pfk_legs[i].frame], &pfk_legs[i], &state.leg[i]);
     for (i = 0; i < PFK_ACTUATORS; ++i) {
         const pfk_coordinate *driven = &pfk_driven[i];
         const pfk_placed *own = &state.leg[driven->leg];
@@ -1775,9 +1845,10 @@ static int pfk_twist_rates(const pfk_pose *pose, int raw, pfk_real rates[PFK_ACT
 #endif
         } else {
             pfk_row one;
-            pfk_drive_row(&state, driven, driven->sense * (actuators[i] - driven->home), &one);
+            pfk_drive_row(&state, driven, driven->sense * pfk_deviation(driven, &state), &one);
+            share = one.by_given != 0.0 ? -1.0 / one.by_given : 0.0;
             for (j = 0; j < PFK_COLUMNS; ++j)
-                drive[i][j] = one.by_given != 0.0 ? -one.slope[j] / one.by_given : 0.0;
+                drive[i][j] = share * one.slope[j];
         }
         for (j = 0; j < PFK_COLUMNS; ++j)
             drive[i][j] *= driven->sense;
@@ -1826,7 +1897,7 @@ static int pfk_twist_rates(const pfk_pose *pose, int raw, pfk_real rates[PFK_ACT
                 rates[i][j] -= share * basis[k][j];
         }
         for (j = 0; j < 3; ++j)
-            rates[i][j] /= PFK_SIZE;
+            rates[i][j] *= 1.0 / PFK_SIZE;
     }
     return 0;
 }
@@ -1838,7 +1909,7 @@ int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
     pfk_pose pose;
     int i, j, code;
     pfk_walk(at, &pose, twist);
-    if (pfk_make_exact(&pose))
+    if (!pfk_is_finite(&pose))
         return PFK_NO_POSE;
     code = pfk_twist_rates(&pose, 1, rates);
     for (i = 0; i < PFK_ACTUATORS && !code; ++i)
@@ -1860,30 +1931,9 @@ typedef struct {
     pfk_real u[PFK_RATES][PFK_ACTUATORS], t[PFK_RATES][PFK_RATES], q[PFK_RATES][PFK_RATES];
 } pfk_factors;
 
-static pfk_real pfk_unit(int actuator)
+static pfk_real pfk_per_unit(int actuator)
 {
-    return pfk_driven[actuator].is_length ? PFK_SIZE : 1.0;
-}
-
-/* Takes orthonormal vectors (`count` of them, `width` numbers each) off v, twice; fills their shares; the length left. */
-static pfk_real pfk_take_off(const pfk_real *basis, int count, int width, pfk_real *v, pfk_real *shares)
-{
-    pfk_real share, size = 0.0;
-    int j, k, again;
-    for (k = 0; k < count; ++k)
-        shares[k] = 0.0;
-    for (again = 0; again < 2; ++again)
-        for (k = 0; k < count; ++k) {
-            share = 0.0;
-            for (j = 0; j < width; ++j)
-                share += basis[k * width + j] * v[j];
-            for (j = 0; j < width; ++j)
-                v[j] -= share * basis[k * width + j];
-            shares[k] += share;
-        }
-    for (j = 0; j < width; ++j)
-        size += v[j] * v[j];
-    return sqrt(size);
+    return pfk_driven[actuator].is_length ? 1.0 / PFK_SIZE : 1.0;
 }
 
 static void pfk_factorise(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_factors *own)
@@ -1894,7 +1944,7 @@ static void pfk_factorise(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_facto
     for (i = 0; i < PFK_ACTUATORS; ++i) {
         whole = 0.0;
         for (j = 0; j < PFK_RATES; ++j) {
-            row[j] = jacobian[i][j] * pfk_rate_units[j] / pfk_unit(i);
+            row[j] = jacobian[i][j] * (pfk_rate_units[j] * pfk_per_unit(i));
             whole += row[j] * row[j];
             left[i][j] = 0.0;
         }
@@ -1904,11 +1954,22 @@ static void pfk_factorise(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_facto
         if (own->rank < PFK_RATES && size > PFK_RANK * sqrt(whole)) {
             left[i][own->rank] = size;
             for (j = 0; j < PFK_RATES; ++j)
-                own->q[own->rank][j] = row[j] / size;
+                own->q[own->rank][j] = row[j] * (1.0 / size);
             ++own->rank;
         }
     }
-    for (k = 0; k < own->rank; ++k) {
+    for (k = 0; k < own->rank && own->rank == PFK_ACTUATORS; ++k) { /* a triangle: put upside down it is t */
+        for (i = 0; i < PFK_ACTUATORS; ++i) {
+            own->u[k][i] = i == own->rank - 1 - k ? 1.0 : 0.0;
+            own->t[k][i] = left[own->rank - 1 - k][own->rank - 1 - i];
+        }
+        for (j = 0; j < PFK_RATES && 2 * k < own->rank; ++j) {
+            size = own->q[k][j];
+            own->q[k][j] = own->q[own->rank - 1 - k][j];
+            own->q[own->rank - 1 - k][j] = size;
+        }
+    }
+    for (k = 0; k < own->rank && own->rank < PFK_ACTUATORS; ++k) {
         for (i = 0; i < PFK_ACTUATORS; ++i)
             own->u[k][i] = left[i][k];
         size = pfk_take_off(&own->u[0][0], k, PFK_ACTUATORS, own->u[k], shares);
@@ -1958,7 +2019,7 @@ int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PF
             z[k] -= own.t[j][k] * z[j];
         z[k] /= own.t[k][k];
         for (i = 0; i < PFK_ACTUATORS; ++i)
-            torques[i] += z[k] * own.u[k][i] / pfk_unit(i);
+            torques[i] += z[k] * own.u[k][i] * pfk_per_unit(i);
     }
     return 0;
 }
@@ -1976,7 +2037,7 @@ int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real ra
     for (k = own.rank - 1; k >= 0; --k) {
         z[k] = 0.0;
         for (i = 0; i < PFK_ACTUATORS; ++i)
-            z[k] += own.u[k][i] * speeds[i] / pfk_unit(i);
+            z[k] += own.u[k][i] * speeds[i] * pfk_per_unit(i);
         for (j = k + 1; j < own.rank; ++j)
             z[k] -= own.t[k][j] * z[j];
         z[k] /= own.t[k][k];
@@ -2006,9 +2067,9 @@ int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_J
     for (count = 0;; ++count) {
         int open;
         pfk_walk(now, &pose, twist);
-        if (pfk_make_exact(&pose))
+        if (!pfk_is_finite(&pose))
             return PFK_NO_POSE;
-        pfk_place(&pose, given, &state);
+        pfk_place(&pose, given, 0, &state);
         open = pfk_equations(&state, given, 1, row, &worst);
         if (worst <= PFK_CLOSED || (count && worst <= PFK_CLOSE && worst > 0.25 * last))
             break;
@@ -2031,7 +2092,7 @@ int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_J
     }
     if (steps)
         *steps = count;
-    if (pfk_place(&pose, 0, &state))
+    if (pfk_place(&pose, 0, 1, &state))
         return PFK_OTHER_MODE;
     pfk_read(&state, given);
     for (i = 0; i < PFK_ACTUATORS; ++i) {
@@ -2088,7 +2149,7 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 #if IMPLICIT
     code = pfk_settle(&own, 0, PFK_REDUNDANT_ALONE, PFK_IK_STEPS, PFK_NEAR, 0, &state, &i);
 #else
-    code = pfk_place(&own, 0, &state);
+    code = pfk_place(&own, 0, 1, &state);
 #endif
     if (code)
         return PFK_OTHER_MODE;

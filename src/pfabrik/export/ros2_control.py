@@ -72,7 +72,8 @@ def ros2_control_texts(mechanism: Mechanism, joints: str | Sequence[str], name: 
     checked_mechanism(mechanism)
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")
-    path = fitting_path(mechanism, Machine(mechanism), joints)
+    Machine(mechanism)  # its legs have closed forms
+    path = fitting_path(mechanism, joints)
     words, templates = _words(mechanism, path, name), resources.files(__package__).joinpath("ros2_package")
     texts = {f"src/{name}_kinematics.c": c_source(mechanism, parts=("ik", "fk", "rates"), name=name, joints=path.names)}
     for template, place in FILES.items():

@@ -68,7 +68,10 @@ def tables_h(
 ) -> str:
     """Constants and tables for the routines, in the members of the structures that these declare."""
     lines, members = [*_numbers(machine, precision, parts, path)], _members(routines, "pfk_leg")
-    lines += _table("pfk_leg pfk_legs[PFK_LEGS]", (_leg(leg, members) for leg in machine.legs))
+    lines += _table(
+        "pfk_leg pfk_legs[PFK_LEGS]",
+        (_leg(leg, _aimed(machine, place), members) for place, leg in enumerate(machine.legs)),
+    )
     lines += _table("pfk_coordinate pfk_driven[PFK_ACTUATORS]", map(_coordinate, machine.driven))
     if path is not None:
         lines += _table("pfk_joint pfk_joints[PFK_JOINTS]", (_joint(motion, path) for motion in path.motions))
@@ -173,7 +176,20 @@ def _members(routines: str, struct: str) -> dict[str, str]:
     return members
 
 
-def _leg(leg: ExportedLeg, members: Mapping[str, str]) -> str:
+def _aimed(machine: Machine, place: int) -> dict[str, int]:
+    """Of both ends of a leg: 1 where angles have limits, 2 where rates need them, for a driven hinge or a twist."""
+    record = machine.legs[place].record
+    driven = [each.place for each in machine.driven if each.leg == place]
+    aimed = {}
+    for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
+        is_driven = any(start <= each < start + 3 for each in driven)
+        aimed[f"{end}_aimed"] = (
+            2 if is_driven or (record["twists"] and record[end] == K.CROSS) else int(record[f"{end}_aimed"])
+        )
+    return aimed
+
+
+def _leg(leg: ExportedLeg, aimed: Mapping[str, int], members: Mapping[str, str]) -> str:
     """A leg, member by member in order: C++ has had designated initialisers only since 2020."""
     record = leg.record
     fields = {"kind": KINDS[int(record["kind"])], "proximal": PROXIMAL_JOINTS.get(int(record["proximal"]), "")}
@@ -182,7 +198,7 @@ def _leg(leg: ExportedLeg, members: Mapping[str, str]) -> str:
         fields["base_ending"] = ENDINGS[int(record["base_end"])]
     if record["kind"] == K.ROD:
         fields["platform_ending"] = ENDINGS[int(record["platform_end"])]
-    integers = {name: record[name] for name in ("slides", "twists", "base_end_aimed", "platform_end_aimed", "upright")}
+    integers = {name: record[name] for name in ("slides", "twists", "upright")} | {**aimed}
     integers |= {"main": leg.main, "is_back": record["reversed"], "pairs": record["axis_rows"]}
     integers |= {"on": record["redundant"] + 1, "is_inner": record["inner"]}
     if record["kind"] == K.REDUNDANT:

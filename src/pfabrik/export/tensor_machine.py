@@ -26,7 +26,7 @@ class TensorMachine:
 
     def __init__(self, mechanism: Mechanism, joints: Sequence[str] | None) -> None:
         self.mechanism, self.machine = mechanism, Machine(mechanism)
-        self.path = None if joints is None else fitting_path(mechanism, self.machine, joints)
+        self.path = None if joints is None else fitting_path(mechanism, joints)
         if reason := self._refused():
             raise UnsupportedMechanism(mechanism.name, [reason], "exported")
 

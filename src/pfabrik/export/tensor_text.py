@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from importlib import resources
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,14 @@ KEPT = 1e-9
 LONGEST = 120
 
 
-def tensor_text(machine: TensorMachine, backend: str, steps: int) -> str:
+class Steps(NamedTuple):
+    """Numbers of Newton steps: of forward kinematics, and for what the task leaves open of a pose."""
+
+    forward: int
+    completing: int
+
+
+def tensor_text(machine: TensorMachine, backend: str, steps: Steps) -> str:
     """The text of the file."""
     folder = resources.files(__package__)
     routines = folder.joinpath("tensors.py.in").read_text(encoding="utf-8")
@@ -119,7 +126,7 @@ def _header(machine: TensorMachine, backend: str) -> str:
     return '"""' + "\n".join(comment(line).replace("\\", "/").replace('"', "'") for line in lines) + '\n"""'
 
 
-def _tables(machine: TensorMachine, steps: int) -> Iterator[str]:
+def _tables(machine: TensorMachine, steps: Steps) -> Iterator[str]:
     """Constants and tables."""
     mechanism, size = machine.mechanism, machine.mechanism.characteristic_length
     inner, path = machine.machine, machine.path
@@ -129,9 +136,9 @@ def _tables(machine: TensorMachine, steps: int) -> Iterator[str]:
     yield from _limit_names(machine)
     yield f"LENGTH_UNIT = {str(mechanism.length_unit)!a}"
     yield f"SIZE = {size!r}  # a length of the machine, by which lengths are compared with angles"
-    yield f"STEPS = {steps}  # of Newton's method, for forward kinematics"
+    yield f"STEPS = {steps.forward}  # of Newton's method, for forward kinematics"
     if machine.completes:
-        yield "COMPLETING_STEPS = 8  # for what the task leaves open"
+        yield f"COMPLETING_STEPS = {steps.completing}  # for what the task leaves open"
     yield ""
     yield from _dimensions(machine)
     yield "# --- How the machine is built. ---"
@@ -159,7 +166,8 @@ def _tables(machine: TensorMachine, steps: int) -> Iterator[str]:
         yield f"SERIES = {_rows(series)}"
         yield f"JOINT_UNITS = {units!r}"
     else:
-        yield f"MOTIONS = {_rows(nested(np.eye(6)[:, : 3 if machine.is_point else 6]))}"
+        yield f"MOTIONS = {_rows(nested(np.eye(6)[:, :3])) if machine.is_point else None}  # of the pose; None: all"
+        yield f"FIXED = {3 if machine.is_point else 0}  # of the six that a pose has"
     if machine.completes:
         yield f"ALL_PROXIMAL = {machine.proximal!r}"
         yield f"ROTATIONS = {inner.rotations}  # of the pose's three that the task sets"

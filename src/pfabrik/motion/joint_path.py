@@ -85,6 +85,10 @@ class JointPath:
         """Their places in `mechanism.coordinate_names`, (k,)."""
         return np.array([each.column for each in self.coordinates], np.int64)
 
+    def rates_of(self, motions: Floats, _: Floats) -> Floats:
+        """Their rates (n, k, f) by f motions, given as rates of all joints (n, nq, f)."""
+        return motions[:, self.columns]
+
     @cached_property
     def home(self) -> Floats:
         """Their values in the home configuration, (k,) [rad or length]."""

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism, counted
-from ..motion.joint_rates import actuated_columns, first_order, right_singular
-from ..motion.mobility import generic_of
-from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
-from .task_path import TaskPath
-
-PURPOSE = "mapped between joints and actuators"
+from .joint_rates import actuated_columns, first_order, right_singular
+from .mobility import generic_of
+from .walks import around_home
 
 MOST_NAMED = 6
 """Most coordinates that are named."""
@@ -22,7 +21,9 @@ CONFIGURATIONS = 4
 """Configurations around home that are looked at: home itself may be singular, and others hardly all are."""
 
 
-def require_determined(mechanism: Mechanism, names: tuple[str, ...], columns: list[int] | TaskPath) -> None:
+def require_determined(
+    mechanism: Mechanism, names: tuple[str, ...], rates_of: Callable[[Floats, Floats], Floats], purpose: str
+) -> None:
     """Refuse coordinates that do not determine the actuators, or that these do not determine.
 
     The motions that the loops allow are the null space N of their conditions. With Q the rates of the named
@@ -31,7 +32,9 @@ def require_determined(mechanism: Mechanism, names: tuple[str, ...], columns: li
 
     Parameters
     ----------
-    columns : those of named joints; or the coordinates of the task.
+    rates_of : rates of the coordinates (n, k, f) by f motions, given as rates of all joints (n, nq, f), with the twists
+        of the platform (n, 6, f), or (n, 3, f).
+    purpose : what is refused: "exported".
 
     Raises
     ------
@@ -42,15 +45,11 @@ def require_determined(mechanism: Mechanism, names: tuple[str, ...], columns: li
     values, right = right_singular(closure)
     regular = np.count_nonzero(values > TOLERANCES.alignment, axis=1) == rank
     motions = np.swapaxes(right[regular, rank:], 1, 2)
-    if isinstance(columns, TaskPath):
-        poses = np.repeat(mechanism.home_pose[None], len(motions), axis=0)
-        named = columns.rates(poses) @ twists[regular] @ motions
-    else:
-        named = motions[:, columns]
+    named = rates_of(motions, twists[regular] @ motions)
     actuators = motions[:, actuated_columns(mechanism)]
     reason = _reason(mechanism, names, named, actuators)
     if reason:
-        raise UnsupportedMechanism(mechanism.name, [reason], PURPOSE)
+        raise UnsupportedMechanism(mechanism.name, [reason], purpose)
 
 
 def _reason(mechanism: Mechanism, names: tuple[str, ...], named: Floats, actuators: Floats) -> str:
