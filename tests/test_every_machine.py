@@ -214,7 +214,7 @@ def targets_beside_the_border(mechanism: Mechanism, n: int, seed: int = 0) -> np
 
 
 @pytest.mark.parametrize(
-    ("count", "seed"), [(2 if INTERPRETED else 12, 0), pytest.param(200, 1, marks=pytest.mark.campaign)]
+    ("count", "seed"), [(2 if INTERPRETED else 6, 0), pytest.param(200, 1, marks=pytest.mark.campaign)]
 )
 @pytest.mark.parametrize("name", EVERY)
 def test_answers_asked_again_from_themselves_stay(name: str, count: int, seed: int) -> None:

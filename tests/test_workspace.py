@@ -258,6 +258,68 @@ def test_any_orientation_reaches_what_some_orientation_reaches() -> None:
     assert found.area > max(each.area for each in turned)
 
 
+def reached_at_some_yaw(mechanism: pf.Mechanism, points: Array) -> Array:
+    """Whether a planar platform on struts reaches points (n, 2) at one of many yaws, by the lengths of its struts."""
+    rows = np.zeros(len(points), bool)
+    for yaw in np.linspace(-np.pi, np.pi, 2000, endpoint=False):
+        rings = strut_rings(mechanism, pf.pose([0, 0, 0], rpy=[0, 0, yaw])[:3, :3], 0.0)
+        rows |= within(rings, points)
+    return rows
+
+
+@pytest.mark.slow
+def test_any_orientation_is_that_of_some_yaw_of_a_platform_on_three_struts(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = struts_only(pf.load("rpr"))
+    with monkeypatch.context() as patched:
+        patched.setattr(MapQuestion, "_answers", None)  # what projects all that is out of reach
+        found = pf.workspace(machine, orientation="any")
+    low, high = found.bounds
+    points = np.random.default_rng(5).uniform(low - 0.2, high + 0.2, (3000, 2))
+    oracle, contained = reached_at_some_yaw(machine, points), found.contains(points)
+    assert contained[oracle].all()
+    assert (contained & ~oracle).sum() <= 6  # beside the border, between two yaws
+    box = np.prod(high - low + 0.4)
+    assert found.area == pytest.approx(oracle.mean() * box, rel=0.06)
+    assert found.contains(found.vertices).all()
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+    assert all(bound in ("min", "max") for _, bound in found.shares)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "resolution"), [("stewart", 16.0), ("hexaglide", 60.0), ("rrr", 20.0)])
+def test_any_orientation_loses_nothing_that_solve_ik_reaches(name: str, resolution: float) -> None:
+    machine = pf.load(name)
+    found = pf.workspace(machine, orientation="any", resolution=resolution)
+    rng = np.random.default_rng(1)
+    near = found.vertices[rng.integers(len(found.vertices), size=150)]
+    points = near + rng.normal(0.0, 0.4 * resolution, near.shape)
+    options = pf.Options(hold="position", working_mode="any")
+    answers = pf.solve_ik(machine, found.poses(points), options=options)
+    reached = answers.position_error <= 1e-9 * machine.characteristic_length
+    assert 30 < reached.sum() < 120
+    assert found.contains(points[reached]).all()
+    assert found.contains(found.vertices).all()
+
+
+@pytest.mark.slow
+def test_any_orientation_ends_at_a_window_and_keeps_the_working_mode_of_a_start() -> None:
+    machine = pf.load("rpr")
+    low, high = pf.workspace(machine, orientation="any", resolution=0.2).bounds
+    middle = 0.5 * (low + high)[0]
+    found = pf.workspace(machine, orientation="any", resolution=0.2, within={"x": (middle, high[0] + 1.0)})
+    assert found.bounds[0, 0] == pytest.approx(middle, abs=5e-3)
+    assert ("x", "min") in found.shares
+    arms = pf.load("rrr")
+    start = pf.solve_ik(arms, arms.home_pose)
+    kept = pf.workspace(arms, orientation="any", resolution=20.0, start=start)
+    points = grid(kept, 8)
+    options = pf.Options(hold="position", working_mode="keep")
+    answers = pf.solve_ik(arms, kept.poses(points), start=start, options=options)
+    reached = answers.position_error <= 1e-9 * arms.characteristic_length
+    assert kept.contains(points)[reached].all()
+    assert kept.area <= pf.workspace(arms, orientation="any", resolution=20.0).area * (1.0 + 1e-6)
+
+
 def test_orientations_at_a_place_are_those_that_are_reached_there() -> None:
     machine = pf.load("stewart")
     found = pf.workspace(machine, fixed={"x": 10.0, "y": 0.0, "z": 200.0}, resolution=0.1)
@@ -324,13 +386,13 @@ EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor]]] = {
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_the_answer_is_the_same_wherever_it_is_worked_out(kind: str) -> None:
-    machine = pf.load("five_bar")
     with EXECUTORS[kind]() as executor:
-        there = pf.workspace(machine, resolution=4.0, executor=executor)
-    here = pf.workspace(machine, resolution=4.0)
-    assert np.array_equal(there.vertices, here.vertices)
-    assert np.array_equal(there.faces, here.faces)
-    assert np.array_equal(there.face_limit, here.face_limit)
+        for name, asked in (("five_bar", {"resolution": 4.0}), ("rpr", {"resolution": 0.2, "orientation": "any"})):
+            there = pf.workspace(pf.load(name), executor=executor, **asked)
+            here = pf.workspace(pf.load(name), **asked)
+            assert np.array_equal(there.vertices, here.vertices)
+            assert np.array_equal(there.faces, here.faces)
+            assert np.array_equal(there.face_limit, here.face_limit)
 
 
 def test_who_interrupts_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -349,9 +411,11 @@ def test_who_interrupts_leaves_nothing_behind(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_progress_counts_up_to_all() -> None:
+@pytest.mark.parametrize(("name", "orientation"), [("five_bar", None), ("rpr", "any")])
+def test_progress_counts_up_to_all(name: str, orientation: str | None) -> None:
     told: list[tuple[int, int]] = []
-    pf.workspace(pf.load("five_bar"), on_progress=lambda done, total: told.append((done, total)))
+    pf.workspace(pf.load(name), orientation=orientation, on_progress=lambda done, total: told.append((done, total)))
+    assert len(told) > 4
     assert [done for done, _ in told] == sorted(done for done, _ in told)
     assert all(done <= total for done, total in told)
 

@@ -206,6 +206,34 @@ def _multipliers(model: Model, projection: ProjectionMode) -> NearestPose:
     return NearestPose(model, model.legs, projection.weights, {"steps": 0}, no_starts(model.legs))
 
 
+def nearest_positions(model: Model, targets: Floats, starts: Starts, *, seeds: bool, keep_mode: bool) -> PoseSolutions:
+    """Feasible configurations whose positions are nearest to those of targets (n, 4, 4) [length], in any orientation.
+
+    Distances are those of positions alone; rows whose position is reached have the status REACHED.
+
+    Parameters
+    ----------
+    starts, seeds, keep_mode : as of `nearest_poses`.
+    """
+    search = _position_search(model, seeds, keep_mode)
+    return search.find(np.require(targets, requirements=["C", "W"]), starts)
+
+
+@derived
+def _position_search(model: Model, seeds: bool, keep_mode: bool) -> NearestPose:
+    """The search for nearest positions; the orientation does not count."""
+    settings = {
+        "steps": MOST_STEPS,
+        "stays": int(keep_mode),
+        "position": TOLERANCES.position * model.length,
+        "rotation": np.inf,
+        "held_position": np.inf,
+        "held_rotation": np.inf,
+    }
+    seed_starts = seeds_of(model) if seeds else no_starts(model.legs)
+    return NearestPose(model, model.legs, model.task.weights(1.0, 0.0), settings, seed_starts)
+
+
 def nearest_actuators(model: Model, values: Floats, starts: Starts, *, seeds: bool) -> PoseSolutions:
     """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
     poses = in_lengths(starts.poses, model.length)

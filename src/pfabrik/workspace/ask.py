@@ -63,7 +63,8 @@ def workspace(
         "tilt_x", "tilt_y", "yaw": R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held.
     fixed : values of other coordinates [length or rad]; those in neither are as at the start.
     orientation : R_0, a matrix (3, 3) or a SciPy Rotation, by default the start's; or "any": positions that are reached
-        with some orientation or other (the reachable workspace), without a start in any working mode.
+        with some orientation or other (the reachable workspace), without a start in any working mode; each from the
+        configurations of neighbouring ones, and what they do not lead to from the machine's seeds.
     tilt : the largest angle by which the platform must be able to lean to every side [rad]: only positions count where
         it can ("total" workspace up to a tilt).
     within : coordinate -> (least, greatest), the range searched; default: as far as anything is within reach.

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..batch import take, take_each
+from ..kernels.platform.search_records import Starts
 from ..telling import OnProgress
 from .verdicts import MapQuestion
 
@@ -17,6 +21,9 @@ POSES_A_BLOCK = 1 << 14
 
 SLOWER = 64
 """Factor by which a pose takes longer without closed forms, at least; blocks are smaller by that factor."""
+
+Result = TypeVar("Result")
+"""What a method of a question gives for a block."""
 
 LOOKS = 4
 """Approximate number of points that locate the crossings of the border in each of its cells."""
@@ -44,16 +51,28 @@ class Measure:
         """Margins and bindings of points (n, d), as of `MapQuestion.measure`."""
         if self._explorer is not None:
             return self.question.explored(points, self._explorer, self._report)
-        blocks = [points[i : i + self._points_a_block] for i in range(0, len(points), self._points_a_block)]
-        if self._executor is None:
-            measured = [self._counted(self.question.measure(block), len(block)) for block in blocks]
-        else:
-            measured = self._elsewhere(self._executor, blocks)
+        blocks = [(points[block],) for block in self._blocks(len(points))]
         margins, bindings = [np.zeros(0)], [np.zeros(0, np.int64)]
-        for margin, binding in measured:
+        for margin, binding in self._measured(MapQuestion.measure, blocks):
             margins.append(margin)
             bindings.append(binding)
         return np.concatenate(margins), np.concatenate(bindings)
+
+    def approach(self, points: Floats, starts: Starts, *, seeds: bool) -> tuple[Floats, Starts]:
+        """Margins of points (n, d), and configurations nearest to them, (n,); as of `MapQuestion.approach`."""
+        blocks = [(points[block], take_each(starts, block), seeds) for block in self._blocks(len(points))]
+        margins, ends = [np.zeros(0)], [take(starts, slice(0))]
+        for margin, _, end in self._measured(MapQuestion.approach, blocks):
+            margins.append(margin)
+            ends.append(end)
+        return np.concatenate(margins), Starts(*map(np.concatenate, zip(*ends, strict=True)))
+
+    def name_limits_near(self, points: Floats, starts: Starts) -> Ints:
+        """The limits that positions (n, d) just beyond the border exceed, as of `MapQuestion.name_limits_near`."""
+        blocks = [(points[block], take(starts, block)) for block in self._blocks(len(points))]
+        return np.concatenate(
+            [np.zeros(0, np.int64), *self._measured(MapQuestion.name_limits_near, blocks, counts=False)]
+        )
 
     def expect(self, cells: int, width: int, d: int) -> None:
         """Update the estimate of the total, given the number and width of the cells at the border."""
@@ -62,11 +81,26 @@ class Measure:
             ahead, points, width = ahead + points, points * 2 ** (d - 1), width // 2
         self.total = self._done + ahead + LOOKS * points // 2**d
 
-    def _elsewhere(self, executor: Executor, blocks: list[Floats]) -> list[tuple[Floats, Ints]]:
+    def _blocks(self, n: int) -> list[slice]:
+        """Slices of n points, each of as many as are worth sending to another process."""
+        return [slice(i, i + self._points_a_block) for i in range(0, n, self._points_a_block)]
+
+    def _measured(self, method: Callable[..., Result], blocks: list[Any], *, counts: bool = True) -> list[Result]:
+        """What a method of the question gives for blocks: points, and what else it takes; counted if they are new."""
+        if self._executor is None:
+            return [self._counted(method(self.question, *block), counts * len(block[0])) for block in blocks]
+        return self._elsewhere(self._executor, method, blocks, counts)
+
+    def _elsewhere(
+        self, executor: Executor, method: Callable[..., Result], blocks: list[Any], counts: bool
+    ) -> list[Result]:
         """Measure blocks on an executor's workers; on a failure or interruption, drop those that have not begun."""
-        futures = [executor.submit(measure_block, self._sent, block) for block in blocks]
+        futures = [executor.submit(measure_block, self._sent, method, *block) for block in blocks]
         try:
-            return [self._counted(future.result(), len(block)) for future, block in zip(futures, blocks, strict=True)]
+            return [
+                self._counted(future.result(), counts * len(block[0]))
+                for future, block in zip(futures, blocks, strict=True)
+            ]
         finally:
             for future in futures:
                 future.cancel()
@@ -75,7 +109,7 @@ class Measure:
         """The limits that points (n, d) just beyond the border exceed, as of `MapQuestion.name_limits`."""
         return self.question.name_limits(points, self._explorer)
 
-    def _counted(self, measured: tuple[Floats, Ints], n: int) -> tuple[Floats, Ints]:
+    def _counted(self, measured: Result, n: int) -> Result:
         self._report(n)
         return measured
 
@@ -86,9 +120,9 @@ class Measure:
             self._on_progress(self._done, max(self._done, self.total))
 
 
-def measure_block(sent: bytes, points: Floats) -> tuple[Floats, Ints]:
+def measure_block(sent: bytes, method: Callable[..., Result], *block: Any) -> Result:
     """Measure a block on a worker; the question, which many blocks share, is unpacked once."""
-    return _question(sent).measure(points)
+    return method(_question(sent), *block)
 
 
 @lru_cache(maxsize=4)

@@ -6,10 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, Mask
 from .numbering import Numbering
 from .refining import Cells, Refined
 from .sampled_lattice import Lattice, codes, corners
+from .verdicts import MapQuestion
 
 
 class Parts:
@@ -17,6 +18,7 @@ class Parts:
 
     def __init__(self, lattice: Lattice, cells: Refined) -> None:
         self._origin, self._step, self._points = lattice.origin, lattice.step, lattice.points
+        self._neighbours = lattice.neighbours
         self._cells = sorted((*cells.within, cells.border), key=lambda each: each.width)
 
     @cached_property
@@ -47,20 +49,39 @@ class Parts:
 
     def of(self, points: Floats) -> Ints:
         """The parts of points (n, d), (n,): of the nearest corner within reach of the cell each is in; -1 if none."""
+        nearest = self._nearest(points)
+        return np.where(nearest >= 0, self.labels[nearest], -1)
+
+    def reached(self, question: MapQuestion, points: Floats) -> Mask:
+        """Mask (n,) of points (n, d) within reach; positions are searched for from near configurations too."""
+        reached = np.asarray(question.measure(points)[0] >= 0.0)
+        if self._neighbours is None or not len(self._neighbours.at_border.poses):
+            return reached
+        rows = np.flatnonzero(~reached)
+        starts = self._neighbours.at(self._nearest(points[rows]))
+        reached[rows] = question.approach(points[rows], starts, False)[0] >= 0.0
+        rows = np.flatnonzero(~reached)
+        places = question.space.poses(points[rows])[:, :3, 3] / question.mechanism.characteristic_length
+        reached[rows] = question.approach(points[rows], self._neighbours.of_border(places), False)[0] >= 0.0
+        return reached
+
+    def _nearest(self, points: Floats) -> Ints:
+        """The number of the nearest corner within reach of the cell that each of points (n, d) is in, (n,); or -1."""
         d, places = len(self._step), (points - self._origin) / self._step
-        parts = np.full(len(points), -1)
+        nearest = np.full(len(points), -1)
         for cells, known in zip(self._cells, self._known, strict=True):
             width = cells.width
-            rows = np.flatnonzero(parts < 0)
+            rows = np.flatnonzero(nearest < 0)
             low = np.floor(places[rows] / width).astype(np.int64) * width
             is_known = known.find(codes(low)) >= 0
             rows, low = rows[is_known], low[is_known]
             around = low[:, None] + width * corners(d)
-            labels = self.labels[self._points.find(codes(around))]
+            numbers = self._points.find(codes(around))
             far = np.linalg.norm((around - places[rows, None]) * self._step, axis=2)
-            nearest = np.where(labels >= 0, far, np.inf).argmin(axis=1)
-            parts[rows] = labels[np.arange(len(rows)), nearest]
-        return parts
+            far[self.labels[numbers] < 0] = np.inf
+            numbers[np.isinf(far)] = -1
+            nearest[rows] = numbers[np.arange(len(rows)), far.argmin(axis=1)]
+        return nearest
 
 
 def _links(cells: Cells, d: int) -> Ints:

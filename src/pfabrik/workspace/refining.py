@@ -122,7 +122,7 @@ def _box(lattice: Lattice, width: int, reach: int) -> Cells:
         axes = [np.arange(a, b + 1) * width for a, b in zip(low, high, strict=True)]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         code = codes(places)
-        numbers = lattice.number(code)
+        numbers = lattice.number(code, width)
         inside = lattice.margins[numbers] >= 0.0
         by = np.maximum(2, (GROWS * (high - low)).astype(np.int64))
         faces = [np.moveaxis(inside, axis, 0) for axis in range(d)]
@@ -153,7 +153,7 @@ def _cells(lattice: Lattice, code: Ints, numbers: Ints, width: int) -> Cells:
 def _divided(lattice: Lattice, cells: Cells) -> Cells:
     """The halves of cells, along each coordinate."""
     d, width = lattice.d, cells.width // 2
-    numbers = lattice.number(cells.codes[:, None] + offsets(width * np.indices((3,) * d).reshape(d, -1).T))
+    numbers = lattice.number(cells.codes[:, None] + offsets(width * np.indices((3,) * d).reshape(d, -1).T), width)
     places = (corners(d)[:, None] + corners(d)) @ 3 ** np.arange(d)[::-1]
     at_corners = numbers[:, places].reshape(-1, 2**d)
     code = (cells.codes[:, None] + offsets(width * corners(d))).ravel()
@@ -172,7 +172,7 @@ def _with_neighbours(lattice: Lattice, cells: Cells) -> Cells:
                 face = inside[:, cell_corners[:, axis] == side]
                 known.number(latest.codes[face.any(axis=1) & ~face.all(axis=1)] + offset * (2 * side - 1))
         new = known.codes[before:]
-        numbers = lattice.number(new[:, None] + offsets(width * cell_corners))
+        numbers = lattice.number(new[:, None] + offsets(width * cell_corners), width)
         latest = Cells(new, width, numbers, lattice.margins[numbers])
         numbers_found.append(numbers)
     at_corners = np.concatenate(numbers_found)

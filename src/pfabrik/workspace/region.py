@@ -102,7 +102,7 @@ class Region:
         """
         array = self._points("points", points)
         rows = array.reshape(-1, array.shape[-1])
-        inside: Mask = self._question.measure(rows)[0] >= 0.0
+        inside = self._parts.reached(self._question, rows)
         if self._part is not None:
             inside[inside] = self._parts.of(rows[inside]) == self._part
         return inside.reshape(array.shape[:-1]) if array.ndim > 1 else bool(inside[0])

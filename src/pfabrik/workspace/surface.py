@@ -15,15 +15,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from .measuring import Measure
 from .refining import Cells
-from .sampled_lattice import Lattice, places_of
+from .sampled_lattice import Lattice
 
 CLOSE, CLOSE_ONE_BY_ONE = 1e-3, 1e-2
 """Accuracy of vertices, where closed forms give margins and elsewhere [steps of the lattice]."""
-
-MOST_LOOKS = 40
-"""Largest number of points measured on an edge; bisection alone takes ten."""
 
 Edge: TypeAlias = tuple[int, int]
 Face: TypeAlias = tuple[Edge, ...]
@@ -79,7 +75,7 @@ class BorderMesh(NamedTuple):
 def mesh_of(lattice: Lattice, cells: Cells) -> BorderMesh:
     """The mesh of the border through cells that it does not leave."""
     ends, faces = crossed_edges(cells, len(lattice.points))
-    vertices, limits, inner = _vertices(lattice, ends, cells.width)
+    vertices, limits, inner = _vertices(lattice, ends, faces, cells.width)
     return BorderMesh(vertices, faces, limits, inner)
 
 
@@ -147,53 +143,11 @@ def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
             yield edges[leaving % 4], edges[k - 1]
 
 
-def _vertices(lattice: Lattice, ends: Ints, width: int) -> tuple[Floats, Ints, Ints]:
+def _vertices(lattice: Lattice, ends: Ints, faces: Ints, width: int) -> tuple[Floats, Ints, Ints]:
     """The crossings of the border with edges, their limits, and the ends within; (e, ...) each."""
-    margins = lattice.margins[ends]
-    within, every = (margins[1] >= 0.0).astype(np.int64), np.arange(ends.shape[1])
-    places = places_of(lattice.points.codes, lattice.d)
-    inner, outer = (lattice.coordinates(places[ends[side, every]]) for side in (within, 1 - within))
+    sides = np.concatenate([faces[:, (k, (k + 1) % faces.shape[1])] for k in range(faces.shape[1])])
+    within, every = (lattice.margins[ends[1]] >= 0.0).astype(np.int64), np.arange(ends.shape[1])
+    inner = ends[within, every]
     close = (CLOSE if lattice.measure.question.has_margins else CLOSE_ONE_BY_ONE) / width
-    points, limits = crossings(lattice.measure, inner, outer, margins[within, every], margins[1 - within, every], close)
-    return points, limits, ends[within, every]
-
-
-def crossings(
-    measure: Measure, inner: Floats, outer: Floats, inside: Floats, outside: Floats, close: float
-) -> tuple[Floats, Ints]:
-    """The last points within on lines from points within to points beyond, (n, d), and the limits exceeded next, (n,).
-
-    Parameters
-    ----------
-    inside, outside : the margins at both ends, (n,).
-    close : their accuracy [share of the way].
-    """
-    near, far = np.zeros(len(inner)), np.ones(len(inner))
-    inside, outside = inside.copy(), outside.copy()
-    limits, halve = np.full(len(inner), -1), np.zeros(len(inner), bool)
-    rows = np.arange(len(inner))
-    for _ in range(MOST_LOOKS):
-        rows = rows[far[rows] - near[rows] > close]
-        if not len(rows):
-            break
-        width = far[rows] - near[rows]
-        at = near[rows] + width * _share(inside[rows], outside[rows], halve[rows], close / width)
-        margins, binding = measure(inner[rows] + at[:, None] * (outer - inner)[rows])
-        kept = margins >= 0.0
-        near[rows[kept]], inside[rows[kept]] = at[kept], margins[kept]
-        far[rows[~kept]], outside[rows[~kept]] = at[~kept], margins[~kept]
-        limits[rows[~kept]] = binding[~kept]
-        halve[rows] = far[rows] - near[rows] > 0.5 * width
-    unknown = np.flatnonzero(limits < 0) if measure.question.has_margins else np.arange(len(inner))
-    if len(unknown):
-        limits[unknown] = measure.name_limits((inner + far[:, None] * (outer - inner))[unknown])
-    return inner + near[:, None] * (outer - inner), limits
-
-
-def _share(inside: Floats, outside: Floats, halve: Mask, close: Floats) -> Floats:
-    """The share of the way to measure next: half, or just beyond the zero of linearly interpolated margins."""
-    with np.errstate(invalid="ignore"):
-        even = inside / (inside - outside)
-    usable = np.isfinite(even) & ~halve
-    beyond = np.where(even < 0.5, 0.45, -0.45) * close
-    return np.asarray(np.where(usable, np.clip(even + beyond, 0.4 * close, 1.0 - 0.4 * close), 0.5))
+    points, limits = lattice.crossings(np.stack([inner, ends[1 - within, every]]), sides, close)
+    return points, limits, inner

@@ -11,6 +11,7 @@ from ..answers.active_limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
+from ..batch import take
 from ..chains.chain_engine import ChainEngine
 from ..closure.closure_engine import ClosureEngine
 from ..configuration import configuration
@@ -18,12 +19,14 @@ from ..description.mechanism import Mechanism
 from ..engine import engine_of
 from ..feasibility import feasibility
 from ..ik import solve_ik
+from ..kernels.platform.search_records import Starts
 from ..model import model_of
 from ..motion.displacements import home_coordinates
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .exploring import Explorer, Tell
 from .orientations import least_of_all
+from .reachable_positions import coordinates_nearest, follows_positions, reach_positions, start_at
 from .space import Space
 
 Limits: TypeAlias = tuple[tuple[str, str], ...]
@@ -90,8 +93,34 @@ class MapQuestion:
         margins, bindings = np.where(reached, INSIDE, OUTSIDE), np.full(len(points), self._unknown)
         return self._cut(points, margins, bindings)
 
+    @property
+    def follows_positions(self) -> bool:
+        """True if positions count in whatever orientation, and configurations lead from one to the next."""
+        return self.hold == "position" and follows_positions(model_of(self.mechanism))
+
+    @property
+    def first_start(self) -> Starts:
+        """The configuration that positions are first searched for from."""
+        return start_at(model_of(self.mechanism), self.start)
+
+    def approach(self, points: Floats, starts: Starts, seeds: bool) -> tuple[Floats, Ints, Starts]:
+        """Margins and bindings as of `measure`, and configurations at the positions of points, or nearest to them.
+
+        Negative margins are distances from these configurations [L].
+
+        Parameters
+        ----------
+        starts, seeds : as of `reach_positions`.
+        """
+        model, targets = model_of(self.mechanism), self.space.poses(points)
+        distances, ends = reach_positions(model, targets, starts, seeds=seeds, keep_mode=self.start is not None)
+        margins, bindings = np.where(distances > 0.0, -distances, INSIDE), np.full(len(points), self._unknown)
+        return (*self._cut(points, margins, bindings), ends)
+
     def measure(self, points: Floats) -> tuple[Floats, Ints]:
         """Margins (n,) of points (n, d), negative beyond reach, and which of `limits` each is of; -1 for none."""
+        if self.follows_positions:
+            return self.approach(points, self.first_start, True)[:2]
         return self._cut(points, *least_of_all(self.turns, self.space.poses(points), self._of_poses))
 
     @property
@@ -145,11 +174,27 @@ class MapQuestion:
             coordinates = self._answers(poses)[0]._coordinates
         else:
             coordinates = explorer.explore(poses, points[rows] / self._lengths, _no_progress)[1]
-        place = {limit: index for index, limit in enumerate(_known_limits(self.mechanism, self.has_margins))}
-        for row, held in zip(rows.tolist(), active_limits(self.mechanism, coordinates), strict=True):
-            if held:
-                bindings[row] = place[held[0].joint, held[0].bound]
+        bindings[rows] = self._active(coordinates)
         return bindings
+
+    def name_limits_near(self, points: Floats, starts: Starts) -> Ints:
+        """As `name_limits`, of positions (n, d) just beyond the border, from configurations (n,) nearest to them."""
+        model, targets = model_of(self.mechanism), self.space.poses(points)
+        offsets = targets[:, :3, 3] / model.length - starts.poses[:, :3, 3]
+        bindings = self._cut(points, -np.linalg.norm(offsets, axis=1), np.full(len(points), self._unknown))[1]
+        rows = np.flatnonzero(bindings == self._unknown)
+        starts = take(starts, rows)
+        coordinates = coordinates_nearest(model, targets[rows], starts, keep_mode=self.start is not None)
+        bindings[rows] = self._active(coordinates)
+        return bindings
+
+    def _active(self, coordinates: Floats) -> Ints:
+        """The first limit that each row of joint coordinates is on, by its place in `limits`; that of reach if none."""
+        place = {limit: index for index, limit in enumerate(_known_limits(self.mechanism, self.has_margins))}
+        held = active_limits(self.mechanism, coordinates)
+        return np.array(
+            [place[limits[0].joint, limits[0].bound] if limits else self._unknown for limits in held], np.int64
+        )
 
 
 def _no_progress(done: int) -> None:
