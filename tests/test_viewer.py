@@ -405,3 +405,18 @@ def test_the_page_says_when_the_program_is_gone() -> None:
     text = panel_html.watch_html()
     assert "has ended" in text and "/pfabrik-alive" in text
     assert "//" not in text  # it asks the server of the page alone
+
+
+def test_thick_links_move_with_the_machine(shown: Callable[..., pf.Viewer]) -> None:
+    stewart = pf.load("stewart")
+    struts = [
+        pf.Shape(f"rod{side}{k}", between=(f"A{side}{k}", f"C{side}{k}"), thickness=9) for side in "LR" for k in (1, 2)
+    ]
+    thick = stewart.with_shapes([*struts, pf.Shape("platform", "sphere", at=(0, 0, 240), diameter=20)])
+    viewer = shown(thick)
+    solids = viewer._stage.scene._solids
+    assert len(solids) == 5
+    before = solids[-1].vertices.mean(axis=0).copy()
+    viewer.show(pf.solve_ik(thick, (0, 0, 210)))
+    moved = solids[-1].vertices.mean(axis=0) - before
+    assert np.allclose(moved * thick.characteristic_length, [0, 0, 15], atol=1e-3)

@@ -6,7 +6,7 @@
     sol = pf.solve_ik(m, [10, 0, 190])           # REACHED, or PROJECTED to the nearest feasible pose
     fk = pf.solve_fk(m, sol.actuators)           # from actuator values to the pose
 
-Describe   load, save, catalog; Mechanism, Joint, Cone, Leg
+Describe   load, save, catalog; Mechanism, Joint, Cone, Leg, Shape
 Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
            Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
@@ -14,6 +14,7 @@ Look over   workspace, singularity_map
 Prove      certify, largest; PoseRegion, Certificate
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Load        forces, wrench_capacity, transmission, stiffness, accuracy
+Apart       clearance (the least distance between links)
 Look into  search_log (every attempt behind an answer)
 Real machines   parameters, sensitivity, Measurements, calibrate
 Drive      actuation (a serial model's joints to motors, and back: torques, inertia, limits)
@@ -65,10 +66,11 @@ _NAMES = {
     "certify.question": ("certify",),
     "certify.enclosure": ("Enclosure",),
     "certify.pose_region": ("PoseRegion",),
+    "clearance.clearance": ("Clearance", "clearance"),
     "configuration": ("configuration",),
     "decomposition.decompose": ("SubChain", "decompose"),
     "description.legs": ("Leg",),
-    "description.mechanism": ("Cone", "Joint", "Mechanism"),
+    "description.mechanism": ("Cone", "Joint", "Mechanism", "Shape"),
     "export.export_c": ("export_c",),
     "export.ros2_control": ("export_ros2_control",),
     "export.tensors": ("export_jax", "export_numpy", "export_tensors", "export_torch"),
@@ -142,10 +144,11 @@ if TYPE_CHECKING:
     from .certify.question import certify as certify
     from .certify.enclosure import Enclosure as Enclosure
     from .certify.pose_region import PoseRegion as PoseRegion
+    from .clearance.clearance import Clearance as Clearance, clearance as clearance
     from .configuration import configuration as configuration
     from .decomposition.decompose import SubChain as SubChain, decompose as decompose
     from .description.legs import Leg as Leg
-    from .description.mechanism import Cone as Cone, Joint as Joint, Mechanism as Mechanism
+    from .description.mechanism import Cone as Cone, Joint as Joint, Mechanism as Mechanism, Shape as Shape
     from .export.export_c import export_c as export_c
     from .export.ros2_control import export_ros2_control as export_ros2_control
     from .export.tensors import (

@@ -10,6 +10,7 @@ import numpy as np
 
 from .answers.solution import Solution
 from .arrays import Floats
+from .clearance.solid_meshes import SolidMesh, solids_of
 from .description.common_centre import arc, common_centre, is_around
 from .description.mechanism import Joint, Mechanism
 from .description.places import Places, joint_places, joints_on, middle
@@ -58,6 +59,7 @@ class Skeleton:
     ----------
     rails : both ends of the travel of every prismatic joint on the base, (k, 2, 3) [length].
     stem : from amid the joints that carry the reference point to it, (2, 3); None where the end effector is a joint.
+    solids : the shapes of bodies that have one.
     """
 
     mechanism: Mechanism
@@ -66,13 +68,15 @@ class Skeleton:
     rails: Floats
     reference: Floats
     stem: Floats | None
+    solids: tuple[SolidMesh, ...] = ()
 
     @property
     def points(self) -> Floats:
         """Every point that is drawn, (n, 3) [length]."""
         outlines = [part.outline for part in self.parts]
         places = [mark.place for mark in self.marks]
-        return np.concatenate([places, *outlines, self.rails.reshape(-1, 3), [self.reference]])
+        solids = [solid.vertices for solid in self.solids]
+        return np.concatenate([places, *outlines, self.rails.reshape(-1, 3), [self.reference], *solids])
 
     @property
     def is_held(self) -> bool:
@@ -111,6 +115,7 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
         np.reshape(list(rails.values()), (-1, 2, 3)),
         np.array(reference),
         None if mechanism.end_effector_is_joint else np.array([middle(ends), reference]),
+        solids_of(mechanism, solution) if mechanism.shapes else (),
     )
 
 

@@ -42,7 +42,8 @@ def ik(
 
     A target out of reach gets the feasible answer nearest to it, with the limits that hold it back, the hardest first.
 
-    A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit.
+    A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit. Where links have a
+    thickness, a line says how far apart they are, which no limit keeps.
 
     With --force, or --moment, it also says what the actuators exert to hold it: positive drives a coordinate up.
 
@@ -61,14 +62,14 @@ def ik(
         note_unused_projection("--all")
         return print_working_modes(mechanism, pose, as_json)
     solution = pf.solve_ik(mechanism, pose, options=options)
-    from .report import describe, margins_table
+    from .report import clearance_line, describe, margins_table
 
     wrench = (force or (0.0, 0.0, 0.0)) + (moment or ()) if force or moment else None
     held = None if wrench is None else pf.forces(solution, wrench)
 
     def in_words() -> str:
         tables = [describe(solution), *([] if held is None else [forces_table(solution, held)])]
-        return "\n\n".join(tables + ([margins_table(solution)] if with_margins else []))
+        return "\n\n".join(tables + ([margins_table(solution), *clearance_line(solution)] if with_margins else []))
 
     print_answer(as_json, lambda: as_object(solution, with_margins, held), in_words)
     return 0 if solution else 1
@@ -100,8 +101,12 @@ def as_object(solution: pf.Solution, with_margins: bool, held: pf.Forces | None)
         plain["forces"] = {"actuators": as_plain(held.actuators), "reason": held.reason}
     if with_margins:
         from ..answers.margins import nearest_first
+        from ..description.links import has_pairs
 
         names = ("joint", "bound", "margin")
+        if has_pairs(solution.mechanism):
+            apart = pf.clearance(solution)
+            plain["clearance"] = {"distance": apart.distance, "links": apart.links, "points": apart.points.tolist()}
         plain["margins"] = [dict(zip(names, limit, strict=True)) for limit in nearest_first(solution)]
     return plain
 

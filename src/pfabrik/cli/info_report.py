@@ -51,6 +51,10 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
             }
             for joint in mechanism.joints
         ],
+        "shapes": [
+            {name: value for name, value in dataclasses.asdict(shape).items() if value is not None}
+            for shape in mechanism.shapes
+        ],
         "sub_chains": [
             {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(mechanism)}
             for chain in pf.decompose(mechanism)
@@ -61,6 +65,7 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
 def describe(mechanism: pf.Mechanism) -> str:
     """A mechanism in tables, for people."""
     tables = [summary(mechanism), joint_table(mechanism), chain_table(mechanism), parallelogram_table(mechanism)]
+    tables.append(shape_table(mechanism))
     return "\n\n".join(table for table in tables if table)
 
 
@@ -187,6 +192,29 @@ def why(mechanism: pf.Mechanism) -> str:
     if is_chain(model):
         return "no loops, no closed form; closure where they do not reach"
     return f"no closed forms: {model.why_no_legs}"
+
+
+def shape_table(mechanism: pf.Mechanism) -> str:
+    """The shapes of bodies, and how far apart the nearest two are at home; empty without any."""
+    from .report import clearance_line
+
+    if not mechanism.shapes:
+        return ""
+    rows = [(shape.body, shape.kind, sizes(shape), " - ".join(shape.between or ())) for shape in mechanism.shapes]
+    table = aligned(("body", "shape", f"size [{mechanism.length_unit}]", "between"), rows)
+    return "\n".join(
+        [table, *(f"at home {line}" for line in clearance_line(pf.solve_ik(mechanism, mechanism.home_pose)))]
+    )
+
+
+def sizes(shape: pf.Shape) -> str:
+    """The lengths of a shape: ``thickness 8``."""
+    named = (("size", shape.size), ("diameter", shape.diameter), ("thickness", shape.thickness))
+    return ", ".join(
+        f"{name} {' x '.join(f'{part:.6g}' for part in (value if isinstance(value, tuple) else (value,)))}"
+        for name, value in named
+        if value is not None
+    )
 
 
 def parallelogram_table(mechanism: pf.Mechanism) -> str:

@@ -80,6 +80,21 @@ def margins_table(solution: pf.Solution) -> str:
     return aligned(["joint", "bound", "margin"], rows) if rows else "no limits"
 
 
+def clearance_line(solution: pf.Solution) -> list[str]:
+    """The least distance between links, where some have a thickness."""
+    from ..description.links import has_pairs
+
+    if not has_pairs(solution.mechanism):
+        return []
+    apart = pf.clearance(solution)
+    first, second = apart.links
+    unit, distance = solution.mechanism.length_unit, float(apart.distance)
+    size = f"{plain(abs(distance), 1e-9)} {unit}"
+    return [
+        f"{first} and {second} {f'are {size} apart' if distance >= 0.0 else f'overlap by {size}'} (no limit keeps it)"
+    ]
+
+
 def print_modes(search: Callable[[], Modes], kind: str, header: Sequence[str], cells: ModeCells, as_json: bool) -> int:
     """Print all modes of a kind that a search finds, in a table with `cells` under `header`; the exit code."""
     try:

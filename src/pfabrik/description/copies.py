@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import Fault, near_miss
+from .body_shapes import Shape
 from .coercion import numbers, unit_vector
 from .form_faults import direction_faults, is_name, is_pair_of_names, is_point, key_faults, shown
 from .joints import Cone, Joint, Vector
@@ -88,6 +89,22 @@ class Patterns:
         """
         bodies, joints = frozenset(self.copied_bodies()), self.copied_joints()
         return [copy for index, pattern in enumerate(self.patterns) for copy in _copies(index, pattern, bodies, joints)]
+
+    def copied_shapes(self, shape: Shape) -> list[Shape]:
+        """The shapes that one stands for: a copy for each copy of its body, turned and renamed as that is."""
+        bodies, joints = self.copied_bodies(), self.copied_joints()
+        pattern = bodies.get(shape.body) if isinstance(shape.body, str) else None
+        if pattern is None or pattern.count is None or pattern.axis is None:
+            return [shape]
+        count, names = pattern.count, frozenset(bodies)
+        return [
+            dataclasses.replace(
+                _turned_shape(shape, pattern.axis, number - 1, count),
+                body=_numbered(shape.body, number, names),
+                between=_numbered(shape.between, number, joints),
+            )
+            for number in range(1, count + 1)
+        ]
 
     def as_written(self, text: str, copy: Copy) -> str:
         """A text about a copy with the names as its file writes them, without the copy's number."""
@@ -171,6 +188,24 @@ def turned(joint: Joint, axis: Vector, step: int, steps: int) -> Joint:
     axes: Any = tuple(map(turn, joint.axes)) if isinstance(joint.axes, tuple) else joint.axes
     cone = joint.cone and Cone(turn(joint.cone.axis), joint.cone.half_angle, joint.cone.fixed_to)
     return dataclasses.replace(joint, at=turn(joint.at), axis=turn(joint.axis), axes=axes, cone=cone)
+
+
+def _turned_shape(shape: Shape, axis: Vector, step: int, steps: int) -> Shape:
+    """The shape turned by `step` of `steps` equal parts of a full turn."""
+    if step == 0:
+        return shape
+
+    def turn(value: Any) -> Any:
+        if is_point(value):
+            return rotated(value, axis, step, steps)
+        return tuple(map(turn, value)) if isinstance(value, tuple) else value
+
+    directions: Any = shape.axes
+    if shape.kind == "box" and directions is None:
+        directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    return dataclasses.replace(
+        shape, at=turn(shape.at), axis=turn(shape.axis), ends=turn(shape.ends), axes=turn(directions)
+    )
 
 
 def rotated(vector: Vector, axis: Vector, step: int, steps: int) -> Vector:

@@ -14,11 +14,14 @@ from .home_faults import home_faults
 from .joint_types import TASK_COORDINATES, TASK_TURNS, WHOLE_TASK
 from .joints import Joint
 from .legs import LEG_KEYS
+from .links import collisions_at_home
+from .shape_faults import form_of_shapes, shape_faults
 from .structure import Structure
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
 _FIELD = re.compile(r"joint\[\d+\]\.(\w+)")
 _JOINT = re.compile(r"joint\[(\d+)\]")
+_BODY = re.compile(r"body\[(\d+)\]")
 _LEG = re.compile(r"leg\[(\d+)\](?:\.([A-Za-z]+))?")
 
 
@@ -33,7 +36,13 @@ def find_faults(mechanism: Structure) -> list[Fault]:
     form = [list(joint_faults(f"joint[{index}]", joint)) for index, joint in enumerate(joints)]
     sound = {joint.name: joint for joint, faults in zip(joints, form, strict=True) if not faults}
     faults = [*_head_faults(mechanism), *(fault for each in form for fault in each)]
-    return in_order([*faults, *_point_faults(mechanism), *graph_faults(mechanism), *home_faults(mechanism, sound)])
+    faults += [*_point_faults(mechanism), *graph_faults(mechanism), *home_faults(mechanism, sound)]
+    if mechanism.shapes or mechanism.ignore:
+        of_shapes = list(form_of_shapes(mechanism.shapes))
+        if not faults and not of_shapes:
+            of_shapes = list(shape_faults(mechanism)) or list(collisions_at_home(mechanism))
+        faults += of_shapes
+    return in_order(faults)
 
 
 def in_order(faults: Sequence[Fault]) -> list[Fault]:
@@ -55,6 +64,9 @@ def _same_place(one: str, other: str) -> bool:
 
 
 def _rank(place: str) -> tuple[int, int, int, str]:
+    body = _BODY.match(place)
+    if body is not None:
+        return (2, int(body[1]), 0, "")
     leg = _LEG.match(place)
     if leg is None:
         return (0, joint_index(place), _field_rank(place), "")

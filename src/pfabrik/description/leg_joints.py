@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
 
 from ..errors import Fault
+from .body_shapes import Shape
 from .chains import read_chain
 from .copies import MOST_COPIES
 from .form_faults import is_pair_of_names
@@ -14,7 +16,15 @@ from .leg_maker import LegJoint, LegMaker
 from .leg_points import count_legs
 from .legs import Leg
 
-__all__ = ["LegJoint", "count_joints", "faults_of_legs", "legs_name", "placed_joints"]
+__all__ = [
+    "LegJoint",
+    "count_joints",
+    "faults_of_legs",
+    "faults_of_shapes",
+    "leg_shapes",
+    "legs_name",
+    "placed_joints",
+]
 
 
 def placed_joints(
@@ -68,6 +78,42 @@ def faults_of_legs(faults: Sequence[Fault], first: int, placed: Sequence[LegJoin
         place = part.places.get(match[2], f"{part.place}.{match[2]}".rstrip(".")) + fault.place[match.end() :]
         if reporter.setdefault(place, part.leg) == part.leg:
             written.append(Fault(place, f"{fault.found} (joint {part.joint.name})", fault.expected))
+    return written
+
+
+def leg_shapes(legs: Sequence[Leg], placed: Sequence[LegJoint]) -> list[tuple[Shape, str]]:
+    """The capsules of legs with a thickness, between neighbouring joints with a centre, and where that is said."""
+    shapes: list[tuple[Shape, str]] = []
+    for index, leg in enumerate(legs):
+        place = f"leg[{index}]"
+        own = [part for part in placed if part.place.startswith(f"{place}.") and part.joint.at is not None]
+        for first, second in pairwise(own):
+            if leg.thickness is not None and first.leg == second.leg:
+                ends = (first.joint.name, second.joint.name)
+                shape = Shape(second.joint.connects[0], thickness=leg.thickness, between=ends)
+                shapes.append((shape, place))
+    return shapes
+
+
+def faults_of_shapes(faults: Sequence[Fault], places: Sequence[str]) -> list[Fault]:
+    """The faults of shapes at the places of their description, each reported of one copy.
+
+    Parameters
+    ----------
+    places : of each shape its table; of a leg's link that of the leg, whose thickness is then at fault.
+    """
+    written: list[Fault] = []
+    reporter: dict[str, int] = {}
+    for fault in faults:
+        match = re.match(r"body\[(\d+)\]", fault.place)
+        if match is not None and int(match[1]) < len(places):
+            table = places[int(match[1])]
+            place = table + (fault.place[match.end() :] if table.startswith("body") else ".thickness")
+            if place in reporter and (reporter[place] != int(match[1]) or table.startswith("leg")):
+                continue
+            reporter[place] = int(match[1])
+            fault = Fault(place, fault.found, fault.expected)
+        written.append(fault)
     return written
 
 

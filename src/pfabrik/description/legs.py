@@ -14,7 +14,7 @@ from .coercion import numbers, text, texts
 from .form_faults import shown
 from .joints import Cone, Range, set_fields
 
-LEG_KEYS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "copies")
+LEG_KEYS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "thickness", "copies")
 """What can be said of legs, in the order in which it is told, beside what is said of single joints."""
 
 JOINT_KEYS = ("axis", "axes", "actuated", "home", "range", "cone", "max_speed", "max_acceleration")
@@ -38,6 +38,7 @@ class Leg:
     axis : direction of the joints that need one: three numbers or a word ("radial", "tangential", "vertical", "x", "y",
         "z", "-" before it for the opposite), for all legs or one for each leg.
     stroke : range of the prismatic joint.
+    thickness : diameter of the links between neighbouring joints of the chain that have a centre, for `clearance`.
     name : what comes before the names of joints and bodies.
     connects : the bodies that the legs lead from and to; the base and the end effector by default.
     by_letter : what is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are
@@ -58,10 +59,12 @@ class Leg:
     connects: tuple[str, str] | None = None
     by_letter: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     copies: Mapping[str, int | ArrayLike] | None = None
+    thickness: float | None = None
 
     def __post_init__(self) -> None:
         deep = {name: numbers(getattr(self, name), 3) for name in ("base", "platform", "via", "axis", "stroke")}
         plain = {"chain": text(self.chain), "name": text(self.name), "connects": texts(self.connects)}
+        set_fields(self, thickness=numbers(self.thickness))
         set_fields(self, **deep, **plain, by_letter=_frozen(self.by_letter, 3), copies=_frozen(self.copies, 1))
 
 

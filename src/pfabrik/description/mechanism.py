@@ -13,16 +13,17 @@ from numpy.typing import ArrayLike
 from ..checks import require_mapping
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
 from ..frozen import FrozenMapping
+from .body_shapes import Shape
 from .coercion import items
 from .faults import find_faults, in_order, joint_index, merged
 from .form_faults import joint_faults, shown
 from .home_mobility import end_effector_freedom, is_held, unclear_conditions
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
-from .leg_joints import faults_of_legs, legs_name, placed_joints
+from .leg_joints import faults_of_legs, faults_of_shapes, leg_shapes, legs_name, placed_joints
 from .legs import Leg, as_legs
 from .mechanism_html import mechanism_html
-from .structure import Structure
+from .structure import Structure, as_pairs
 
 __all__ = [
     "JOINT_TYPES",
@@ -32,6 +33,7 @@ __all__ = [
     "Limit",
     "Mechanism",
     "Range",
+    "Shape",
     "Vector",
     "checked_mechanism",
     "told_apart",
@@ -73,6 +75,8 @@ class Mechanism(Structure):
     length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
     task : what a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
         "yaw" (the twist about z); by default everything. What it leaves out follows from the mechanism.
+    shapes : how thick bodies are, for `clearance` and pictures; no limit of any answer.
+    ignore : pairs of bodies that may touch each other.
     """
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
@@ -87,6 +91,8 @@ class Mechanism(Structure):
             length_unit: str = "mm",
             angle_unit: Literal["deg", "rad"] = "deg",
             task: Sequence[str] | None = None,
+            shapes: Iterable[Shape] = (),
+            ignore: Iterable[Sequence[str]] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -116,6 +122,7 @@ class Mechanism(Structure):
         via: ArrayLike | None = None,
         axis: ArrayLike | None = None,
         stroke: Range | None = None,
+        thickness: float | None = None,
         copies: Mapping[str, int | ArrayLike] | None = None,
         name: str | None = None,
         end_effector: str = "platform",
@@ -123,6 +130,8 @@ class Mechanism(Structure):
         task: Sequence[str] | None = None,
         base_body: str = "base",
         joints: Iterable[Joint] = (),
+        shapes: Iterable[Shape] = (),
+        ignore: Iterable[Sequence[str]] = (),
         length_unit: str = "mm",
         angle_unit: Literal["deg", "rad"] = "deg",
         **by_letter: Mapping[str, object],
@@ -132,26 +141,33 @@ class Mechanism(Structure):
         Parameters
         ----------
         legs : a chain such as "U-P*-S"; or a `Leg`, or several, which then have the points and all else up to `copies`.
-        base, platform, via, axis, stroke, copies : as of a `Leg`; lengths, and angles in radians.
+        base, platform, via, axis, stroke, thickness, copies : as of a `Leg`; lengths, and angles in radians.
         by_letter : what is said of single joints of the chain: `A={"axis": "radial", "range": (-1, 1)}`.
         name : by default what the field calls it, such as "6-UPS".
         end_effector, reference_point, task, length_unit, angle_unit : as of a `Mechanism`.
         base_body : the name of the body that does not move.
         joints : joints beside those of the legs, before which they come.
+        shapes : shapes beside those of legs with a `thickness`, before which they come.
+        ignore : as of a `Mechanism`.
 
         Raises
         ------
         InvalidMechanism : with every fault; places such as `leg[0].platform` are those of a file.
         InvalidArgument : neither a chain nor legs, or both.
         """
-        parts = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke, "copies": copies}
-        described = as_legs(legs, parts | {"by_letter": by_letter})
+        parts = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke}
+        others = {"thickness": thickness, "copies": copies, "by_letter": by_letter}
+        described = as_legs(legs, parts | others)
         own = items(joints)
         if not isinstance(own, tuple):
             raise InvalidArgument("joints", shown(own), "a list of joints")
         tips = [joint.name for joint in own if isinstance(joint, Joint)]
         placed, faults = placed_joints(described, base_body, end_effector, tips)
         made = own + tuple(each.joint for each in placed)
+        own_shapes, of_legs = items(shapes), leg_shapes(described, placed)
+        if not isinstance(own_shapes, tuple):
+            raise InvalidArgument("shapes", shown(own_shapes), "a list of Shape")
+        places = [*(f"body[{k}]" for k in range(len(own_shapes))), *(place for _, place in of_legs)]
         if faults:
             sound = ((index, joint) for index, joint in enumerate(made) if isinstance(joint, Joint))
             alone = [fault for index, joint in sound for fault in joint_faults(f"joint[{index}]", joint)]
@@ -166,9 +182,12 @@ class Mechanism(Structure):
                 length_unit=length_unit,
                 angle_unit=angle_unit,
                 task=task,
+                shapes=own_shapes + tuple(shape for shape, _ in of_legs),
+                ignore=ignore,
             )
         except InvalidMechanism as error:
-            raise InvalidMechanism(in_order(faults_of_legs(error.faults, len(own), placed))) from None
+            found = faults_of_legs(faults_of_shapes(error.faults, places), len(own), placed)
+            raise InvalidMechanism(in_order(found)) from None
 
     def _check(self) -> None:
         faults = find_faults(self)
@@ -256,6 +275,15 @@ class Mechanism(Structure):
     def without_limits(self) -> Mechanism:
         """A copy in which no joint has a range or a cone."""
         return self._with_joints(_limited(joint, None) for joint in self.joints)
+
+    def with_shapes(self, shapes: Iterable[Shape], ignore: Iterable[Sequence[str]] = ()) -> Mechanism:
+        """A copy with other shapes of bodies, and other pairs of bodies that may touch.
+
+        Raises
+        ------
+        InvalidMechanism : a shape that is none, or links that overlap at home.
+        """
+        return self._with(shapes=items(shapes), ignore=as_pairs(ignore))
 
     def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
         """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import UnknownName
 from ..kernels.tape import LENGTH, V_DIVIDE, V_SUBTRACT, result
+from .body_shapes import Shape
 from .coercion import items, numbers, text, texts
 from .enclosing import enclosing_radius
 from .joint_coordinates import JointCoordinate
@@ -38,9 +39,12 @@ class Structure:
     length_unit: str = "mm"
     angle_unit: Literal["deg", "rad"] = field(default="deg", compare=False)
     task: tuple[str, ...] = field(default=cast(Any, None))  # never None once constructed
+    shapes: tuple[Shape, ...] = ()
+    ignore: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         set_fields(self, joints=items(self.joints), reference_point=numbers(self.reference_point))
+        set_fields(self, shapes=items(self.shapes), ignore=as_pairs(self.ignore))
         set_fields(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
         tip = self._end_effector_joint()
         if tip is not None and cast(Any, self.reference_point) is None:
@@ -221,6 +225,12 @@ class Structure:
         """The joint that the end effector is named after, whatever else may be wrong with the description."""
         joints = self.joints if isinstance(self.joints, tuple) else ()
         return next((each for each in joints if isinstance(each, Joint) and each.name == self.end_effector), None)
+
+
+def as_pairs(pairs: Any) -> Any:
+    """Pairs of names as tuples; anything else as it is."""
+    listed = texts(pairs) if isinstance(pairs, str) else items(pairs)
+    return tuple(map(texts, listed)) if isinstance(listed, tuple) else listed
 
 
 def _in_order(task: Any) -> Any:

@@ -14,7 +14,10 @@ from typing import Any
 from ..description.directions import WORDS
 from ..errors import Fault, counted, near_miss
 
-TEXTS = ("name", "type", "connects", "along", "chain", "fixed_to", "base", "end_effector", "units", "task", "schema")
+TEXTS = (
+    *("name", "type", "connects", "along", "chain", "fixed_to", "base", "end_effector", "units", "task", "schema"),
+    *("shape", "between", "ignore"),
+)
 """Keys whose strings are text. Of a leg, `base` has points: there, strings in lists are expressions."""
 
 LONGEST = 200

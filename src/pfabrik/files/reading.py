@@ -12,13 +12,21 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
+from ..description.body_shapes import Shape
 from ..description.chains import ChainJoint, read_chain
 from ..description.coercion import numbers
 from ..description.copies import Copy, Pattern, Patterns, count_of, read_copies
 from ..description.faults import in_order, joint_index, merged
 from ..description.form_faults import is_name, joint_faults, key_faults, name_faults, number_faults, shown
 from ..description.joints import Cone, Joint, set_fields
-from ..description.leg_joints import LegJoint, count_joints, faults_of_legs, placed_joints
+from ..description.leg_joints import (
+    LegJoint,
+    count_joints,
+    faults_of_legs,
+    faults_of_shapes,
+    leg_shapes,
+    placed_joints,
+)
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
@@ -26,8 +34,10 @@ from ..errors import Fault, InvalidMechanism, near_miss
 from .dimensions import dimension_values, with_numbers
 from .units import angle_in_radians, in_radians
 
-HEAD_KEYS = ("schema", "name", "units", "base", "end_effector", "reference_point", "task", "dimensions", "joint", "leg")
+DESCRIBED = ("name", "base", "end_effector", "reference_point", "task", "ignore")
+HEAD_KEYS = ("schema", "units", *DESCRIBED, "dimensions", "joint", "leg", "body")
 UNIT_KEYS = ("length", "angle")
+SHAPE_KEYS = ("name", "shape", *(field.name for field in dataclasses.fields(Shape)[2:]))
 _JOINT_FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
 
 MOST_JOINTS = 1000
@@ -90,15 +100,16 @@ class Source:
 
 def _read(table: Table, kind: type[Described]) -> Described:
     faults = list(_head_faults(table))
-    tables = {kind: _tables(table, kind, faults) for kind in ("joint", "leg")}
+    tables = {kind: _tables(table, kind, faults) for kind in ("joint", "leg", "body")}
     unit = _units(table).get("angle", "deg")
     patterns = [_pattern(each, f"joint[{index}]", unit, faults) for index, each in enumerate(tables["joint"])]
     legs = [_leg(each, f"leg[{index}]", unit, faults) for index, each in enumerate(tables["leg"])]
-    return _expanded(table, patterns, legs, faults, kind)
+    shapes = [_shape(each, f"body[{index}]", faults) for index, each in enumerate(tables["body"])]
+    return _expanded(table, (patterns, legs, shapes), faults, kind)
 
 
 def _head_faults(table: Table) -> Iterator[Fault]:
-    yield from key_faults("", table, HEAD_KEYS)
+    yield from key_faults("", table, HEAD_KEYS, _head_hint)
     if type(table.get("schema")) is not int or table["schema"] != 1:
         yield Fault("schema", shown(table.get("schema")), "1")
     for key, default in (("name", None), ("base", "base"), ("end_effector", None)):
@@ -112,6 +123,12 @@ def _head_faults(table: Table) -> Iterator[Fault]:
             yield Fault("units.angle", shown(units["angle"]), "'deg' or 'rad'")
     else:
         yield Fault("units", shown(units), f"a table: {', '.join(UNIT_KEYS)}")
+
+
+def _head_hint(key: str) -> str:
+    if key == "clearance":
+        return ": no solver keeps a clearance yet; compare what `pfabrik.clearance` measures"
+    return near_miss(key, HEAD_KEYS)
 
 
 def _unknown_keys(place: str, table: Table, known: Sequence[str]) -> Iterator[Fault]:
@@ -129,13 +146,13 @@ def _units(table: Table) -> Table:
 
 
 def _tables(table: Table, kind: str, faults: list[Fault]) -> list[Any]:
-    """The [[joint]] or [[leg]] tables of a file."""
+    """The [[joint]], [[leg]] or [[body]] tables of a file."""
     tables = table.get(kind, [])
     if not isinstance(tables, list):
         faults.append(Fault(kind, shown(tables), f"[[{kind}]] tables"))
         return []
     if len(tables) > MOST_JOINTS:
-        noun = "joints" if kind == "joint" else "[[leg]] tables"
+        noun = "joints" if kind == "joint" else f"[[{kind}]] tables"
         raise InvalidMechanism([*faults, Fault(kind, f"{len(tables)} {noun}", f"at most {MOST_JOINTS}")])
     return tables
 
@@ -164,6 +181,16 @@ def _cone(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Cone 
     faults += _unknown_keys(place, table, CONE_KEYS)
     half_angle = angle_in_radians(table.get("half_angle"), angle_unit)
     return Cone(cast(Any, table.get("axis")), half_angle, cast(Any, table.get("fixed_to")))
+
+
+def _shape(table: Any, place: str, faults: list[Fault]) -> Shape:
+    """The shape that a table describes, as far as it can be read."""
+    if not isinstance(table, dict):
+        faults.append(Fault(place, shown(table), "a [[body]] table"))
+        table = {}
+    faults += _unknown_keys(place, table, SHAPE_KEYS)
+    values = {key: table[key] for key in SHAPE_KEYS[2:] if key in table}
+    return Shape(cast(Any, table.get("name")), table.get("shape", "capsule"), **values)
 
 
 def _leg(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
@@ -205,10 +232,14 @@ def _joint_fields(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
 
 
 def _expanded(
-    table: Table, patterns: Sequence[Pattern], legs: Sequence[Leg], faults: list[Fault], kind: type[Described]
+    table: Table,
+    described: tuple[Sequence[Pattern], Sequence[Leg], Sequence[Shape]],
+    faults: list[Fault],
+    kind: type[Described],
 ) -> Described:
     """The mechanism of all copies and legs. If it is not clear what is copied, or where legs are, only faults of single
     joints are searched for."""
+    patterns, legs, shapes = described
     is_unclear = any(map(_hides_joints, faults))
     base, end_effector = table.get("base", "base"), cast(str, table.get("end_effector"))
     placed, leg_faults = _placed(base, end_effector, patterns, legs)
@@ -221,7 +252,8 @@ def _expanded(
     if is_unclear or leg_faults:
         alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
         raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(patterns), placed)))
-    return _built(table, layout, placed, faults, kind)
+    thick = [(copy, f"body[{index}]") for index, shape in enumerate(shapes) for copy in layout.copied_shapes(shape)]
+    return _built(table, layout, placed, [*thick, *leg_shapes(legs, placed)], faults, kind)
 
 
 def _placed(
@@ -252,11 +284,16 @@ def _hides_joints(fault: Fault) -> bool:
 
 
 def _built(
-    table: Table, layout: Patterns, placed: Sequence[LegJoint], faults: list[Fault], kind: type[Described]
+    table: Table,
+    layout: Patterns,
+    placed: Sequence[LegJoint],
+    shapes: Sequence[tuple[Shape, str]],
+    faults: list[Fault],
+    kind: type[Described],
 ) -> Described:
     copies = layout.expanded()
     head: Table = {"name": None, "joints": tuple(copy.joint for copy in copies)}
-    head |= {key: table[key] for key in ("name", "base", "end_effector", "reference_point", "task") if key in table}
+    head |= {key: table[key] for key in DESCRIBED if key in table} | {"shapes": tuple(each for each, _ in shapes)}
     head |= {f"{key}_unit": _units(table)[key] for key in UNIT_KEYS if key in _units(table)}
     try:
         with warnings.catch_warnings():
@@ -265,7 +302,8 @@ def _built(
             mechanism = kind(**head)
     except InvalidMechanism as error:
         n_joints = len(layout.patterns) - len(placed)
-        faults = merged(faults, faults_of_legs(_as_written(error.faults, layout, copies), n_joints, placed))
+        found = faults_of_shapes(_as_written(error.faults, layout, copies), [place for _, place in shapes])
+        faults = merged(faults, faults_of_legs(found, n_joints, placed))
     if faults:
         raise InvalidMechanism(in_order(faults))
     return mechanism

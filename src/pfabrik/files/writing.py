@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ..description.mechanism import Joint, Mechanism
+from ..description.mechanism import Joint, Mechanism, Shape
 from .units import MEASURED, converted, exact_degrees, measured
+
+TABLES = ("joint", "leg", "body")
+"""Keys of a file that are lists of tables, in their order."""
 
 
 def dumps(mechanism: Mechanism) -> str:
@@ -24,15 +28,24 @@ def dumps(mechanism: Mechanism) -> str:
     convert = _degrees if degrees else float
     tables = ["\n".join(_head(mechanism, "deg" if degrees else "rad"))]
     tables += ["\n".join(["[[joint]]", *_joint(joint, convert)]) for joint in mechanism.joints]
+    tables += ["\n".join(["[[body]]", *_shape(shape)]) for shape in mechanism.shapes]
     return "\n\n".join(tables) + "\n"
+
+
+def _shape(shape: Shape) -> Iterator[str]:
+    yield f"name = {_value(shape.body)}"
+    yield f"shape = {_value(shape.kind)}"
+    for field in dataclasses.fields(shape)[2:]:
+        if getattr(shape, field.name) is not None:
+            yield f"{field.name} = {_value(getattr(shape, field.name))}"
 
 
 def _as_read(table: dict[str, Any]) -> str:
     """The text of a parsed file."""
-    head = [f"{key} = {_value(item)}" for key, item in table.items() if key not in ("dimensions", "joint", "leg")]
+    head = [f"{key} = {_value(item)}" for key, item in table.items() if key not in ("dimensions", *TABLES)]
     parts = ["\n".join(head)]
     parts.append("\n".join(["[dimensions]", *_lines(table["dimensions"])]))
-    parts += ["\n".join([f"[[{kind}]]", *_lines(each)]) for kind in ("joint", "leg") for each in table.get(kind, [])]
+    parts += ["\n".join([f"[[{kind}]]", *_lines(each)]) for kind in TABLES for each in table.get(kind, [])]
     return "\n\n".join(parts) + "\n"
 
 
@@ -51,6 +64,8 @@ def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
         yield f"reference_point = {_value(mechanism.reference_point)}"
     if mechanism.task != mechanism.whole_task:
         yield f"task = {_value(mechanism.task)}"
+    if mechanism.ignore:
+        yield f"ignore = {_value(mechanism.ignore)}"
 
 
 def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:

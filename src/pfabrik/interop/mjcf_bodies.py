@@ -14,6 +14,7 @@ from ..description.home_mobility import universal_axes
 from ..description.joint_coordinates import JointCoordinate
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
+from ..description.links import links_of
 from ..description.mechanism import Mechanism
 from ..motion.displacements import columns
 from .cuts import Branch, CutTree
@@ -82,6 +83,7 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
         body.append(_inertial(branch.body, points.get(branch.body, [origin]), origin, physics))
     for name in mechanism.bodies:
         elements[name].extend(_drawn(points[name], origins[name], physics))
+        elements[name].extend(_thick(mechanism, name, origins[name], metres))
     for site, body_name, point in _sites(mechanism, tree, names, metres):
         place = vector(point - origins[body_name])
         ET.SubElement(elements[body_name], "site", name=site, pos=place, size=repr(2.0 * THICKNESS * physics.length))
@@ -137,6 +139,39 @@ def _axes(mechanism: Mechanism, joint: Joint) -> Floats:
     if joint.type == "universal":
         return universal_axes(mechanism, joint)
     return np.array([mechanism.home_axis(joint.name)] * len(KINDS[joint.type].coordinates))
+
+
+SLIDING = ("prismatic", "cylindrical")
+"""Joints whose centre rests on one of their bodies only."""
+
+
+def _thick(mechanism: Mechanism, body: str, origin: Floats, metres: float) -> Iterator[ET.Element]:
+    """The shapes of a body as geoms of group 3, which touch nothing and weigh nothing until told otherwise.
+
+    Left out are capsules between joints of two bodies, as of a strut: their length changes, that of a geom does not.
+    """
+    links = links_of(mechanism) if mechanism.shapes else None
+    for k, shape in enumerate(mechanism.shapes if links is not None else ()):
+        assert links is not None
+        joints = [mechanism.joint(name) for name in links.joints[k]]
+        if shape.body != body or any(body not in each.connects or each.type in SLIDING for each in joints):
+            continue
+        places, size = links.places[k], np.array([0.5 * metres])
+        attributes = {"pos": vector(places[0] * metres - origin)}
+        if shape.kind == "capsule":
+            attributes = {"fromto": vector((places[:2] * metres - origin).ravel())}
+            size = size * shape.thickness
+        elif shape.kind == "sphere":
+            size = size * (shape.diameter or 0.0)
+        elif shape.kind == "box":
+            attributes["xyaxes"] = vector(places[1:3].ravel())
+            size = size * np.array(shape.size)
+        else:
+            attributes["zaxis"] = vector(places[1])
+            size = size * [shape.diameter or 0.0, shape.thickness]
+        kind = "cylinder" if shape.kind == "disc" else shape.kind
+        untouched = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "3"}
+        yield ET.Element("geom", {"type": kind, **attributes, "size": vector(size), **untouched})
 
 
 def _inertial(body: str, points: list[Floats], origin: Floats, physics: Physics) -> ET.Element:

@@ -38,7 +38,8 @@ def to_mjcf(
     Lengths become metres, and every joint counts as it does in the mechanism: `qpos` of a hinge or slide is the
     coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a double of a
     body, of hardly any mass, welded to it. Sites are at all joints and at the reference point; actuated joints have
-    position servos; there is a keyframe `home`. Cones, which MuJoCo does not know, are in comments and in
+    position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, but for those
+    of struts, whose length changes. Cones, which MuJoCo does not know, are in comments and in
     custom elements, as are base, end effector and task, and highest speeds and accelerations.
 
     Parameters

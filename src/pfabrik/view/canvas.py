@@ -89,6 +89,16 @@ class Canvas:
 
         return self.axes.add_patch(Polygon(self.seen(points), linewidth=0, **style))
 
+    def solid(self, triangles: Floats, **style: Any) -> Any:
+        """A solid of triangles (n, 3, 3)."""
+        if self.plane is None:
+            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+            return self.axes.add_collection3d(Poly3DCollection(triangles, linewidth=0, **style))
+        from matplotlib.collections import PolyCollection
+
+        return self.axes.add_collection(PolyCollection(list(self.seen(triangles)), linewidth=0, **style))
+
     def marks(self, points: Floats, **style: Any) -> Any:
         """Markers at points (n, 3)."""
         style |= {"depthshade": False} if self.plane is None else {}

@@ -35,6 +35,9 @@ MARKS_APART = 16.0
 PENS = (0.45, 1.5)
 """Least and greatest size of lines and markers, against the usual."""
 
+SOLID_ALPHA, NEAREST_ALPHA = 0.06, 0.16
+"""How opaque each of both sides of a thick link is, and of the two that are nearest to each other."""
+
 RAIL_DASHES = (0, (4, 2))
 
 
@@ -43,7 +46,8 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
 
     Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints faces. The
     base is grey, the end effector blue, dashed lines are rails, and a cross marks the reference point. What holds an
-    answer back, or what it exceeds, is orange, and named: "B3 max".
+    answer back, or what it exceeds, is orange, and named: "B3 max". Links with a thickness are drawn as they are, of an
+    answer the two that are nearest to each other darker, and orange if they overlap.
 
     Parameters
     ----------
@@ -82,6 +86,10 @@ def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
     held = {body for mark in skeleton.marks if mark.held_by for body in mark.joint.connects}
     pen = pen_of(canvas, skeleton.mechanism)
     artists: list[Artist] = [each for part in skeleton.parts for each in _body(canvas, part, part.body in held, pen)]
+    for solid in skeleton.solids:
+        colour = HELD if solid.overlaps else LINK
+        alpha = NEAREST_ALPHA if solid.is_nearest else SOLID_ALPHA
+        artists.append(canvas.solid(solid.vertices[solid.faces], facecolor=colour, alpha=alpha, zorder=0))
     for rail in skeleton.rails:
         artists.append(canvas.line(rail, color=EDGE, linewidth=0.9, linestyle=RAIL_DASHES, zorder=1))
     if skeleton.stem is not None:

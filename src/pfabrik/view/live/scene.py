@@ -9,6 +9,7 @@ import numpy as np
 
 from ...answers.tracked import Track
 from ...arrays import Floats
+from ...clearance.solid_meshes import SolidMesh
 from ...description.mechanism import Mechanism
 from ...skeleton import BodyShape, Mark, Skeleton
 from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, PLATFORM, of_a_body, rgb
@@ -64,6 +65,17 @@ class Scene:
             for place, part in enumerate(skeleton.parts)
             if len(part.corners) >= 3
         ]
+        self._solids = [
+            self._scene.add_mesh_simple(
+                f"{MACHINE}/solids/{place}",
+                *_triangles(solid, self._length),
+                color=_colour_of_solid(solid),
+                opacity=0.5,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for place, solid in enumerate(skeleton.solids)
+        ]
         kinds = sorted({mark.joint.type for mark in skeleton.marks})
         self._joints = {kind: self._add_joints(kind, skeleton) for kind in kinds}
         if len(skeleton.rails):
@@ -81,6 +93,8 @@ class Scene:
         corners = (part.outline[:-1] for part in skeleton.parts if len(part.corners) >= 3)
         for face, face_corners in zip(self._faces, corners, strict=True):
             face.vertices = fan(face_corners / self._length)[0]
+        for mesh, solid in zip(self._solids, skeleton.solids, strict=True):
+            mesh.vertices, mesh.color = _triangles(solid, self._length)[0], _colour_of_solid(solid)
         for kind, joints in self._joints.items():
             marks = _of_kind(skeleton, kind)
             joints.batched_positions, joints.batched_colors = self._places(marks), _colours(marks)
@@ -180,6 +194,16 @@ class Scene:
 
 def _colour_of(part: BodyShape) -> tuple[int, int, int]:
     return rgb(BASE if part.role == "base" else of_a_body(part.role))
+
+
+def _triangles(solid: SolidMesh, length: float) -> tuple[Any, Any]:
+    """Vertices and faces in the scene."""
+    return (solid.vertices / length).astype(np.float32), solid.faces.astype(np.uint32)
+
+
+def _colour_of_solid(solid: SolidMesh) -> tuple[int, int, int]:
+    """Dark for the two links that are nearest to each other, orange where they overlap, light elsewhere."""
+    return rgb(HELD if solid.overlaps else ACTUATED if solid.is_nearest else BASE)
 
 
 def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:

@@ -1,0 +1,1 @@
+"""Clearance: how far links are from each other."""

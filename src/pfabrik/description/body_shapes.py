@@ -1,0 +1,75 @@
+"""The shape of a body, or a part of it: how thick a link is, for clearances and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias, cast, get_args
+
+from numpy.typing import ArrayLike
+
+from .coercion import numbers, text, texts, unit_vector, unit_vectors
+from .joints import Vector, set_fields
+
+ShapeKind: TypeAlias = Literal["capsule", "sphere", "box", "disc"]
+SHAPE_KINDS: tuple[ShapeKind, ...] = get_args(ShapeKind)
+
+SHAPE_FIELDS: dict[ShapeKind, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "capsule": (("thickness",), ("between", "ends")),
+    "sphere": (("at", "diameter"), ()),
+    "box": (("at", "size"), ("axes",)),
+    "disc": (("at", "axis", "diameter", "thickness"), ()),
+}
+"""What each shape needs, and what it may have beside."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A solid that moves with a body, at home, in base coordinates. A body may have several.
+
+    Attributes
+    ----------
+    body : the body that it belongs to.
+    kind : "capsule" (a rod with round ends), "sphere", "box" or "disc" (a round plate, or a cylinder).
+    thickness : diameter of a capsule; height of a disc [length].
+    between : the two joints between whose centres the axis of a capsule runs: joints of the body, or of one that slides
+        along it, as the two parts of a strut. By default the two joints of the body, where it has just two.
+    ends : in place of joints, both ends of the axis of a capsule, points of the body.
+    at : centre of a sphere, box or disc.
+    diameter : of a sphere or disc.
+    axis : of a disc.
+    size : lengths of the edges of a box.
+    axes : directions of the first two edges of a box, square to each other; by default x and y.
+    """
+
+    body: str
+    kind: ShapeKind = "capsule"
+    thickness: float = cast(float, None)  # None where the kind has none
+    between: tuple[str, str] | None = None
+    ends: tuple[Vector, Vector] | None = None
+    at: Vector | None = None
+    diameter: float | None = None
+    axis: Vector | None = None
+    size: Vector | None = None
+    axes: tuple[Vector, Vector] | None = None
+
+    if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
+
+        def __init__(
+            self,
+            body: str,
+            kind: ShapeKind = "capsule",
+            thickness: float | None = None,
+            between: Sequence[str] | None = None,
+            ends: ArrayLike | None = None,
+            at: ArrayLike | None = None,
+            diameter: float | None = None,
+            axis: ArrayLike | None = None,
+            size: ArrayLike | None = None,
+            axes: ArrayLike | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        plain = {name: numbers(getattr(self, name)) for name in ("thickness", "ends", "at", "diameter", "size")}
+        named = {"body": text(self.body), "kind": text(self.kind), "between": texts(self.between)}
+        set_fields(self, **plain, **named, axis=unit_vector(self.axis), axes=unit_vectors(self.axes))

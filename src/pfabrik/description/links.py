@@ -1,0 +1,143 @@
+"""The links of a mechanism as solids, the pairs of them that may touch, and those that do at home."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..derived import derived
+from ..errors import Fault
+from ..tolerances import TOLERANCES
+from .body_shapes import Shape
+from .graph import welded
+from .shape_faults import joints_with_centre, sliding_along
+from .structure import Structure
+
+
+class Links(NamedTuple):
+    """The shapes of a mechanism as `kernels.clearance` takes them.
+
+    Attributes
+    ----------
+    sizes : (s, 5) [length]; places : at home, (s, 4, 3): see `kernels.clearance.solids`.
+    joints : names of the two joints that a capsule is between; empty for a shape that moves with its body.
+    pairs : indices of two shapes each, (k, 2), those of two capsules first; n_capsules : how many these are.
+    """
+
+    sizes: Floats
+    places: Floats
+    joints: tuple[tuple[str, ...], ...]
+    pairs: Ints
+    n_capsules: int
+
+
+@derived
+def links_of(mechanism: Structure) -> Links:
+    """The links of a mechanism whose description has no faults."""
+    joints = tuple(_joints_of(mechanism, shape) for shape in mechanism.shapes)
+    sizes = np.zeros((len(joints), 5))
+    places = np.zeros((len(joints), 4, 3))
+    for k, (shape, ends) in enumerate(zip(mechanism.shapes, joints, strict=True)):
+        _put(shape, [mechanism.joint(name).at for name in ends], sizes[k], places[k])
+    touching = list(_pairs(mechanism, joints))
+    touching.sort(key=lambda pair: bool(sizes[list(pair), 0].any()))
+    pairs = np.array(touching, np.int64).reshape(-1, 2)
+    n_capsules = int(np.count_nonzero(~sizes[pairs, 0].any(axis=1)))
+    return Links(sizes, places, joints, pairs, n_capsules)
+
+
+def has_pairs(mechanism: Structure) -> bool:
+    """True if some links have a thickness and may touch."""
+    return bool(mechanism.shapes) and len(links_of(mechanism).pairs) > 0
+
+
+def _joints_of(mechanism: Structure, shape: Shape) -> tuple[str, ...]:
+    if shape.kind != "capsule" or shape.ends is not None:
+        return ()
+    return shape.between or tuple(joint.name for joint in joints_with_centre(mechanism, shape.body))
+
+
+def _put(shape: Shape, ends: list[Any], sizes: Floats, place: Floats) -> None:
+    """Fill the sizes and the place of a shape."""
+    from ..kernels.clearance.solids import BOX, CAPSULE, DISC, KIND, ROUND, A, B
+
+    if shape.kind == "capsule":
+        sizes[KIND], sizes[ROUND] = CAPSULE, 0.5 * shape.thickness
+        place[:2] = ends or shape.ends
+        return
+    place[0], half = shape.at, 0.5 * (shape.diameter or 0.0)
+    if shape.kind == "sphere":
+        sizes[KIND], sizes[ROUND], place[1] = CAPSULE, half, shape.at
+    elif shape.kind == "disc":
+        sizes[KIND], sizes[A], sizes[B], place[1] = DISC, half, 0.5 * shape.thickness, shape.axis
+    else:
+        sizes[KIND], sizes[A : A + 3] = BOX, 0.5 * np.array(shape.size)
+        x, y = np.array(shape.axes or ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+        y = y - (y @ x) * x
+        place[1:] = x, y / np.linalg.norm(y), np.cross(x, y / np.linalg.norm(y))
+
+
+def _pairs(mechanism: Structure, ends: tuple[tuple[str, ...], ...]) -> Iterator[tuple[int, int]]:
+    """Pairs of shapes that may touch: not of one body, nor of two that share a joint, nor of two that are ignored.
+
+    Bodies that a fixed joint holds together are one. Joints in one place of one body are as one: so the two struts
+    of a double ball joint share it.
+    """
+    rigid = welded([joint for joint in mechanism.joints if joint.is_rigid], mechanism.base)
+    ignored = {frozenset(pair) for pair in mechanism.ignore}
+    own = [_bodies_of(mechanism, shape, names) for shape, names in zip(mechanism.shapes, ends, strict=True)]
+    as_one = [{rigid.get(body, body) for body in bodies} for bodies in own]
+    around = [_neighbours(mechanism, bodies, rigid) for bodies in as_one]
+    near = TOLERANCES.home_slack * mechanism.characteristic_length
+    for i, j in combinations(range(len(own)), 2):
+        if as_one[i] & as_one[j] or any(frozenset((a, b)) in ignored for a in own[i] for b in own[j]):
+            continue
+        if any(body in as_one[j] for body, _ in around[i]) or any(
+            body == other and at is not None and place is not None and np.linalg.norm(at - place) <= near
+            for body, at in around[i]
+            for other, place in around[j]
+        ):
+            continue
+        yield i, j
+
+
+def _bodies_of(mechanism: Structure, shape: Shape, names: tuple[str, ...]) -> set[str]:
+    """The bodies that a shape belongs to: of a strut both of its parts."""
+    along = sliding_along(mechanism, shape.body)
+    return {shape.body} | {body for name in names for body in mechanism.joint(name).connects if body in along}
+
+
+def _neighbours(mechanism: Structure, bodies: set[str], rigid: dict[str, str]) -> list[tuple[str, Floats | None]]:
+    """Bodies that a joint connects with some, and where."""
+    found: list[tuple[str, Floats | None]] = []
+    for joint in mechanism.joints:
+        first, second = (rigid.get(body, body) for body in joint.connects)
+        at = None if joint.at is None else np.array(joint.at)
+        if first in bodies and second not in bodies:
+            found.append((second, at))
+        elif second in bodies and first not in bodies:
+            found.append((first, at))
+    return found
+
+
+def collisions_at_home(mechanism: Structure) -> Iterator[Fault]:
+    """The pairs of links that overlap at home, the deepest first."""
+    from ..kernels.clearance.least_clearance import least_clearance
+
+    links = links_of(mechanism)
+    clearance, nearest, points = np.empty(1), np.empty(1, np.int64), np.empty((1, 2, 3))
+    scratch, places = np.zeros(1 + links.places[0].size), links.places[None]
+    overlaps: list[tuple[float, int, int]] = []
+    for pair in links.pairs:
+        clearance[0], nearest[0] = np.inf, -1
+        least_clearance(links.sizes, places, pair[None], scratch, clearance, nearest, points)
+        if clearance[0] < -TOLERANCES.home_slack * mechanism.characteristic_length:
+            overlaps.append((float(clearance[0]), int(pair[0]), int(pair[1])))
+    for distance, first, second in sorted(overlaps):
+        found = f"'{mechanism.shapes[second].body}', which is {-distance:.4g} deep in"
+        found += f" '{mechanism.shapes[first].body}' at home"
+        yield Fault(f"body[{second}]", found, "links that do not overlap at home; or name the pair in `ignore`")

@@ -1,0 +1,1 @@
+"""Distances between links: capsules, spheres, boxes and discs."""

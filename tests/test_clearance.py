@@ -1,0 +1,516 @@
+"""Links are as far apart as other programs say, and what says how thick they are is checked."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from in_mujoco import Model
+from pfabrik.cli import main
+from pfabrik.errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
+from pfabrik.files.units import metres_of
+from pfabrik.files.writing import dumps
+from pfabrik.interop import to_mjcf
+from pfabrik.kernels.clearance.capsules import capsule_clearance
+from pfabrik.kernels.clearance.least_clearance import least_clearance
+from pfabrik.kernels.clearance.solids import BOX, CAPSULE, DISC
+from pfabrik.skeleton import skeleton_of
+from test_compiled_and_interpreted import INTERPRETED
+
+Array = NDArray[np.float64]
+ROWS = 500 if INTERPRETED else 100_000
+SLOW = pytest.mark.slow if INTERPRETED else ()
+KINDS = ("capsule", "box", "disc")
+
+STRUTS = {
+    "base": [[100, 20, 0], [100, -20, 0]],
+    "platform": [[40, 40, 195], [40, -40, 195]],
+    "stroke": (155, 280),
+    "copies": {"count": 3, "axis": [0, 0, 1]},
+    "reference_point": [0, 0, 195],
+}
+DELTA = (Path(pf.__file__).parent / "catalog" / "delta.toml").read_text()
+
+
+def struts(thickness: float = 12.0, **more: object) -> pf.Mechanism:
+    return pf.Mechanism.from_legs("U-P*-S", thickness=thickness, **STRUTS, **more)  # type: ignore[arg-type]
+
+
+def around(machine: pf.Mechanism, count: int, length: float, angle: float) -> pf.Solution:
+    """Answers at poses near home."""
+    rng = np.random.default_rng(3)
+    targets = np.tile(machine.home_pose, (count, 1, 1))
+    targets[:, :3, 3] += rng.uniform(-length, length, (count, 3))
+    targets[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-angle, angle, (count, 3))).as_matrix() @ targets[:, :3, :3]
+    return pf.solve_ik(machine, targets)
+
+
+def refused(make: object, *args: object, **kwargs: object) -> list[str]:
+    with pytest.raises(InvalidMechanism) as caught:
+        make(*args, **kwargs)  # type: ignore[operator]
+    return [str(fault) for fault in caught.value.faults]
+
+
+# Segments
+
+
+def random_segments(rng: np.random.Generator, count: int) -> Array:
+    """Pairs of segments, (count, 4, 3): any; almost parallel; parallel; points; crossing; with an end in common."""
+    ends = rng.normal(size=(count, 4, 3))
+    kind = np.arange(count) % 6
+    d = ends[:, 1] - ends[:, 0]
+    tilt = 10.0 ** rng.uniform(-16, -2, (count, 1)) * rng.normal(size=(count, 3))
+    ends[kind == 1, 3] = (ends[:, 2] + d * rng.uniform(-2, 2, (count, 1)) + tilt)[kind == 1]
+    ends[kind == 2, 3] = (ends[:, 2] + 0.5 * d)[kind == 2]
+    ends[kind == 3, 3] = ends[kind == 3, 2]
+    middle = ends[:, 0] + rng.uniform(0, 1, (count, 1)) * d
+    ends[kind == 4, 3] = (2.0 * middle - ends[:, 2])[kind == 4]
+    ends[kind == 5, 2] = ends[kind == 5, 1]
+    return ends
+
+
+def by_cases(ends: Array) -> Array:
+    """Distances by all cases of the quadratic programme in two parameters: four ends, and inside in 80 bits."""
+    p, q, x, y = np.moveaxis(ends.astype(np.longdouble), 1, 0)
+
+    def to_line(point: Array, start: Array, end: Array) -> Array:
+        d = end - start
+        square = (d * d).sum(-1)
+        t = np.clip(((point - start) * d).sum(-1) / np.where(square > 0, square, 1), 0, 1)
+        return np.linalg.norm((start + t[:, None] * d - point).astype(float), axis=1)
+
+    least = np.min([to_line(p, x, y), to_line(q, x, y), to_line(x, p, q), to_line(y, p, q)], axis=0)
+    d, e, w = q - p, y - x, x - p
+    n = np.cross(d, e)
+    square = (n * n).sum(-1)
+    some = np.where(square > 0, square, 1)
+    s, t = (np.cross(w, e) * n).sum(-1) / some, (np.cross(w, d) * n).sum(-1) / some
+    inside = (square > 0) & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    distance = np.abs((w * n).sum(-1)) / np.sqrt(some)
+    return np.where(inside, np.minimum(distance, least), least).astype(float)
+
+
+def test_segments_are_as_far_apart_as_the_cases_of_their_quadratic_programme_say() -> None:
+    ends = random_segments(np.random.default_rng(0), ROWS)
+    found, nearest = np.full(ROWS, np.inf), np.full(ROWS, -1.0)
+    by_shape = np.ascontiguousarray(ends.reshape(ROWS, 2, 6).transpose(1, 2, 0))
+    capsule_clearance(np.zeros(2), by_shape, np.array([[0, 1]]), found, nearest)
+    np.testing.assert_allclose(
+        found, by_cases(ends), rtol=0, atol=1e-12 if np.finfo(np.longdouble).nmant > 60 else 1e-9
+    )
+    assert (nearest == 0).all()
+
+
+# Solids
+
+
+def random_solid(rng: np.random.Generator, kind: str) -> tuple[Array, Array]:
+    """Sizes and place of a core."""
+    sizes, place = np.zeros(5), np.zeros((4, 3))
+    sizes[0] = {"capsule": CAPSULE, "box": BOX, "disc": DISC}[kind]
+    place[0] = 1.2 * rng.normal(size=3)
+    if kind == "capsule":
+        place[1] = place[0] + rng.normal(size=3)
+    else:
+        sizes[2:] = rng.uniform(0.2, 0.9, 3)
+        place[1:] = Rotation.random(random_state=rng).as_matrix()
+    return sizes, place
+
+
+def inside(solid: tuple[Array, Array], x: Array) -> Array:
+    """The nearest point of a core, written down once more."""
+    sizes, place = solid
+    offset = x - place[0]
+    if sizes[0] == CAPSULE:
+        d = place[1] - place[0]
+        return place[0] + np.clip(offset @ d / (d @ d), 0, 1) * d
+    if sizes[0] == BOX:
+        return place[0] + np.clip(offset @ place[1:].T, -sizes[2:], sizes[2:]) @ place[1:]
+    height = offset @ place[1]
+    flat = offset - height * place[1]
+    flat *= min(1.0, sizes[2] / max(float(np.linalg.norm(flat)), 1e-300))
+    return place[0] + flat + np.clip(height, -sizes[3], sizes[3]) * place[1]
+
+
+def farthest(solid: tuple[Array, Array], n: Array) -> float:
+    """The largest coordinate of a core along each of some directions, (k, 3)."""
+    sizes, place = solid
+    if sizes[0] == CAPSULE:
+        return np.maximum(n @ place[0], n @ place[1])  # type: ignore[no-any-return]
+    if sizes[0] == BOX:
+        return n @ place[0] + np.abs(n @ place[1:].T) @ sizes[2:]  # type: ignore[no-any-return]
+    height = n @ place[1]
+    flat = np.sqrt(np.maximum(0.0, (n * n).sum(-1) - height**2))
+    return n @ place[0] + sizes[2] * flat + sizes[3] * np.abs(height)  # type: ignore[no-any-return]
+
+
+def measured(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[float, Array]:
+    clearance, nearest, points = np.full(1, np.inf), np.full(1, -1), np.empty((1, 2, 3))
+    sizes, places = np.stack([one[0], other[0]]), np.stack([one[1], other[1]])[None]
+    least_clearance(sizes, places, np.array([[0, 1]]), np.zeros(13), clearance, nearest, points)
+    return float(clearance[0]), points[0]
+
+
+@pytest.mark.parametrize(("first", "second"), list(itertools.product(KINDS, KINDS)))
+def test_solids_are_as_far_apart_as_alternating_projections_and_separating_planes_say(first: str, second: str) -> None:
+    rng = np.random.default_rng(4)
+    apart = 0
+    for _ in range(6 if INTERPRETED else 60):
+        one, other = random_solid(rng, first), random_solid(rng, second)
+        distance, points = measured(one, other)
+        if distance <= 0.0:
+            continue
+        apart += 1
+        for _ in range(20):  # never nearer from there
+            points[0] = inside(one, inside(other, points[0]))
+        assert np.linalg.norm(points[0] - inside(other, points[0])) >= distance - 1e-12
+        # A plane square to the line between the two points parts the cores: so none of their points are nearer.
+        _, points = measured(one, other)
+        n = (points[1] - points[0]) / distance
+        assert -farthest(other, -n) - farthest(one, n) == pytest.approx(distance, abs=1e-6)
+        assert np.linalg.norm(inside(one, points[0]) - points[0]) < 1e-12
+        assert np.linalg.norm(inside(other, points[1]) - points[1]) < 1e-12
+    assert apart
+
+
+@pytest.mark.parametrize(("first", "second"), list(itertools.product(KINDS, KINDS)))
+def test_overlapping_solids_are_as_deep_as_the_shortest_way_out(first: str, second: str) -> None:
+    rng = np.random.default_rng(5)
+    directions = rng.normal(size=(20_000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    for _ in range(2 if INTERPRETED else 10):
+        one, other = random_solid(rng, first), random_solid(rng, second)
+        shift = one[1][0] - other[1][0] + 0.1 * rng.normal(size=3)
+        other[1][: 2 if second == "capsule" else 1] += shift
+        if first == second == "capsule":
+            middle = one[1][:2].mean(axis=0) - other[1][:2].mean(axis=0)
+            other[1][:2] += middle
+        clearance, points = measured(one, other)
+
+        def way_out(n: Array) -> Array:
+            return farthest(one, n) + farthest(other, -n)  # noqa: B023
+
+        if clearance > 0.0:
+            continue
+        sampled = directions[np.argsort(way_out(directions))[:5]]
+        least = min(
+            minimize(lambda v: way_out(v / np.linalg.norm(v)), n, method="Nelder-Mead", tol=1e-12).fun for n in sampled
+        )
+        assert -clearance <= least + 1e-6
+        assert np.linalg.norm(points[1] - points[0]) == pytest.approx(-clearance, abs=1e-9)
+
+
+# Machines
+
+
+def test_struts_are_as_far_apart_as_their_axes_less_their_thickness() -> None:
+    machine = struts()
+    answers = around(machine, 20 if INTERPRETED else 200, 60, 0.4)
+    found = pf.clearance(answers)
+    starts = np.stack([answers.points[f"A{k}"] for k in range(1, 7)])
+    ends = np.stack([answers.points[f"C{k}"] for k in range(1, 7)])
+    pairs = list(itertools.combinations(range(6), 2))
+    by_pair = [by_cases(np.stack([starts[i], ends[i], starts[j], ends[j]], axis=1)) - 12.0 for i, j in pairs]
+    valid = np.isfinite(answers.position_error)
+    np.testing.assert_allclose(np.asarray(found.distance)[valid], np.min(by_pair, axis=0)[valid], atol=1e-9)
+    named = [pairs.index(tuple(sorted(int(name[2:]) - 1 for name in row))) for row in np.asarray(found.links)]
+    np.testing.assert_allclose(np.array(by_pair)[named, range(len(named))], found.distance, atol=1e-9)
+    gaps = np.linalg.norm(found.points[:, 1] - found.points[:, 0], axis=-1)
+    np.testing.assert_allclose(gaps, np.abs(found.distance), atol=1e-9)
+
+
+def test_one_answer_has_one_distance_and_the_same_as_in_a_batch() -> None:
+    machine = struts()
+    answers = around(machine, 5, 40, 0.2)
+    found, one = pf.clearance(answers), pf.clearance(answers[3])
+    assert isinstance(one.distance, float)
+    assert one.distance == np.asarray(found.distance)[3]
+    assert one.links == tuple(np.asarray(found.links)[3])
+    np.testing.assert_array_equal(one.points, found.points[3])
+    assert f"'{one.links[0]}'" in repr(one)
+    for shapes in (
+        (),
+        [
+            pf.Shape("base", "box", at=(0, 0, -20), size=(9, 9, 9)),
+            pf.Shape("AB1", "sphere", at=(90, 22, 32), diameter=16),
+        ],
+    ):
+        machine = struts(12.0, shapes=shapes)
+        none = pf.clearance(pf.solve_ik(machine, np.empty((0, 4, 4))))
+        assert np.shape(none.distance) == (0,) and none.points.shape == (0, 2, 3) and none.links.shape == (0, 2)
+        assert none.gradient.shape == (0, 6) and "no configuration" in repr(none)
+
+
+def test_a_row_without_a_configuration_has_no_clearance() -> None:
+    machine = struts()
+    targets = np.stack([machine.home_pose, np.full((4, 4), np.nan)])
+    found = pf.clearance(pf.solve_ik(machine, targets, options=pf.Options(on_invalid="mark")))
+    assert np.isnan(np.asarray(found.distance)).tolist() == [False, True]
+    assert np.asarray(found.links)[1].tolist() == ["", ""]
+    assert np.isnan(found.points[1]).all()
+
+
+def test_a_machine_ten_times_as_large_has_ten_times_the_clearance() -> None:
+    machine = struts()
+    scaled = pf.Mechanism.from_legs(
+        "U-P*-S",
+        base=10.0 * np.array(STRUTS["base"]),
+        platform=10.0 * np.array(STRUTS["platform"]),
+        stroke=(1550, 2800),
+        copies={"count": 3, "axis": [0, 0, 1]},
+        reference_point=[0, 0, 1950],
+        thickness=120,
+    )
+    answers = around(machine, 20, 40, 0.3)
+    poses = answers.pose.copy()
+    poses[:, :3, 3] *= 10.0
+    by_ten = pf.clearance(pf.solve_ik(scaled, poses))
+    np.testing.assert_allclose(by_ten.distance, 10.0 * np.asarray(pf.clearance(answers).distance), atol=1e-6)
+
+
+THICK_DELTA = (
+    DELTA
+    + """
+[[body]]
+name = "rodL"
+thickness = 8
+
+[[body]]
+name = "rodR"
+between = ["BR", "CR"]
+thickness = 8
+
+[[body]]
+name = "platform"
+shape = "disc"
+at = [0, 0, -100]
+axis = [0, 0, 1]
+diameter = 60
+thickness = 5
+
+[[body]]
+name = "arm"
+ends = [[0, -132.011139050208, 0], [0, -244.011139050208, 0]]
+thickness = 14
+
+[[body]]
+name = "base"
+shape = "box"
+at = [0, 0, 60]
+size = [300, 200, 20]
+"""
+)
+HEXAGLIDE = (Path(pf.__file__).parent / "catalog" / "hexaglide.toml").read_text()
+THICK_HEXAGLIDE = HEXAGLIDE + "".join(
+    f'\n[[body]]\nname = "rod{side}{k}"\nthickness = 3\n' for side in "LR" for k in (1, 2, 3)
+)
+THICK_HEXAGLIDE += '\n[[body]]\nname = "platform"\nshape = "sphere"\nat = [0, 0, 260]\ndiameter = 30\n'
+
+
+def loaded(text: str, folder: Path) -> pf.Mechanism:
+    (folder / "machine.toml").write_text(text)
+    return pf.load(folder / "machine.toml")
+
+
+def thick_servo() -> pf.Mechanism:
+    machine = pf.load("servo_hexapod")
+    inner = [body for body in machine.bodies if body not in ("base", machine.end_effector)]
+    plate = pf.Shape("base", "box", at=(0, 0, -6), size=(60, 40, 2), axes=((0.8, 0.6, 0), (-0.6, 0.8, 0)))
+    return machine.with_shapes([plate, *(pf.Shape(body, thickness=2) for body in inner)])
+
+
+def in_mujoco(machine: pf.Mechanism, answers: pf.Solution) -> Array:
+    """The least distance of all pairs of thick bodies that share no joint, in the exported machine, led to answers."""
+    model, metres = Model.of(to_mjcf(machine)), metres_of(machine.length_unit)
+    names, scene = machine.actuator_names, model.model
+    units = np.array([1.0 if machine.joint(name).type == "revolute" else metres for name in names])
+    thick = np.flatnonzero(scene.geom_group == 3)
+    bodies = {int(i): str(scene.body(scene.geom_bodyid[i]).name) for i in thick}
+    assert len(bodies) == len(machine.shapes)
+    joined = {frozenset(joint.connects) for joint in machine.joints}
+    pairs = [
+        pair
+        for pair in itertools.combinations(bodies, 2)
+        if len({bodies[i] for i in pair}) == 2 and frozenset(bodies[i] for i in pair) not in joined
+    ]
+    found = []
+    for actuators in answers.actuators:
+        assert model.lead(names, actuators * units) < 1e-9
+        found.append(min(mujoco.mj_geomDistance(scene, model.data, i, j, 1e3, None) for i, j in pairs) / metres)
+    return np.array(found)
+
+
+def machine_named(name: str, folder: Path) -> pf.Mechanism:
+    texts = {"delta": THICK_DELTA, "hexaglide": THICK_HEXAGLIDE}
+    return thick_servo() if name == "servo_hexapod" else loaded(texts[name], folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "length", "angle"),
+    [("delta", 60, 0.0), ("hexaglide", 25, 0.15), pytest.param("servo_hexapod", 12, 0.1, marks=SLOW)],
+)
+def test_links_are_as_far_apart_as_in_the_exported_machine(
+    name: str, length: float, angle: float, tmp_path: Path
+) -> None:
+    machine = machine_named(name, tmp_path)
+    assert loaded(dumps(machine), tmp_path) == machine
+    answers = around(machine, 2 if INTERPRETED else 20, length, angle)
+    found, expected = np.asarray(pf.clearance(answers).distance), in_mujoco(machine, answers)
+    apart = expected > 0.0
+    assert apart.sum() > len(found) // 2
+    np.testing.assert_allclose(found[apart], expected[apart], atol=1e-5 * machine.characteristic_length)
+    assert (found[~apart] < 1e-5 * machine.characteristic_length).all()
+
+
+def test_links_that_share_a_joint_or_are_ignored_are_left_out() -> None:
+    ends = {"base": [[-50, 0, 0], [50, 0, 0]], "platform": [[0, 0, 100], [0, 0, 100]]}
+    legs = [pf.Leg("U-P*-S", **ends, stroke=(50, 200), thickness=10)]  # two struts to one double ball joint
+    legs += [pf.Leg("U-P*-S", [0, 80, 0], [0, 40, 100], stroke=(50, 200), thickness=10, name="Z")]
+    with pytest.warns(pf.errors.MobilityWarning):
+        machine = pf.Mechanism.from_legs(legs, reference_point=[0, 0, 100])
+    found = pf.clearance(pf.solve_ik(machine, machine.home_pose))
+    assert "ZBC1" in found.links
+    with pytest.warns(pf.errors.MobilityWarning):
+        ignoring = pf.Mechanism.from_legs(legs, reference_point=[0, 0, 100], ignore=[["ZBC1", "BC1"], ["ZAB1", "BC2"]])
+    with pytest.raises(UnsupportedMechanism, match="share a joint, or are one body, or are ignored"):
+        pf.clearance(pf.solve_ik(ignoring, ignoring.home_pose))
+
+
+# What is refused
+
+
+def test_a_machine_without_thickness_has_no_clearance() -> None:
+    machine = pf.load("stewart")
+    with pytest.raises(UnsupportedMechanism, match="no link has a thickness"):
+        pf.clearance(pf.solve_ik(machine, machine.home_pose))
+    with pytest.raises(InvalidArgument):
+        pf.clearance(machine)  # type: ignore[arg-type]
+
+
+def test_links_that_overlap_at_home_are_named_with_how_deep() -> None:
+    faults = refused(struts, 45.0)
+    assert "leg[0].thickness: found 'BC2', which is 5 deep in 'BC1' at home" in faults[0]
+    assert struts(29.282)
+    ignored = [("BC1", "BC2"), ("BC3", "BC4"), ("BC5", "BC6"), ("BC1", "BC4"), ("BC2", "BC5"), ("BC3", "BC6")]
+    assert struts(45.0, ignore=ignored).ignore == tuple(ignored)
+
+
+@pytest.mark.parametrize(
+    ("said", "place", "words"),
+    [
+        ('name = "rodL"\nthickness = -1', "body[0].thickness", "more than 0"),
+        ('name = "rodL"', "body[0].thickness", "a number, for a capsule"),
+        ('name = "rodX"\nthickness = 1', "body[0].name", "no such body; did you mean"),
+        ('name = "rodL"\nshape = "capsul"', "body[0].shape", "did you mean 'capsule'?"),
+        ('name = "rodL"\nshape = "box"\nat = [0, 0, 0]\nsize = [1, 2]', "body[0].size", "three numbers"),
+        ('name = "rodL"\nshape = "sphere"\nat = [0, 0, 0]\ndiameter = 3\nsize = [1, 1, 1]', "body[0].size", "nothing"),
+        ('name = "arm"\nthickness = 3', "body[0].between", "3 joints with a centre"),
+        ('name = "rodL"\nthickness = 3\nbetween = ["A", "BL"]', "body[0].between", "joints of 'rodL"),
+        ('name = "rodL"\nthickness = 3\nlength = 3', "body[0].length", "an unknown key"),
+        ('name = "rodL"\nthickness = 3\nends = [[0, 0, 0]]', "body[0].ends", "two points"),
+    ],
+)
+def test_what_no_body_can_have_is_named_at_its_place(said: str, place: str, words: str, tmp_path: Path) -> None:
+    faults = refused(loaded, f"{DELTA}\n[[body]]\n{said}\n", tmp_path)
+    assert faults[0].startswith(f"{tmp_path / 'machine.toml'}: {place}:") or faults[0].startswith(f"{place}:"), faults
+    assert words in faults[0]
+    assert len(faults) == 1
+
+
+def test_a_clearance_in_a_file_is_refused_as_no_solver_keeps_it(tmp_path: Path) -> None:
+    faults = refused(loaded, DELTA.replace("schema = 1", "schema = 1\nclearance = 2"), tmp_path)
+    assert "no solver keeps a clearance yet" in faults[0]
+
+
+def test_copies_of_a_body_have_its_shape_turned_with_them(tmp_path: Path) -> None:
+    machine = loaded(THICK_DELTA, tmp_path)
+    arms = [shape for shape in machine.shapes if shape.body.startswith("arm")]
+    assert [shape.body for shape in arms] == ["arm1", "arm2", "arm3"]
+    for k, shape in enumerate(arms, start=1):
+        np.testing.assert_allclose(shape.ends[0], machine.joint(f"A{k}").at, atol=1e-9)  # type: ignore[index]
+    with_dimension = THICK_DELTA.replace("thickness = 14", 'thickness = "2 * wide"') + "\n[dimensions]\nwide = 7\n"
+    assert loaded(with_dimension, tmp_path).shapes == machine.shapes
+    assert "wide" in dumps(loaded(with_dimension, tmp_path))
+
+
+def with_pairs_that_part(name: str, folder: Path) -> pf.Mechanism:
+    """A machine in which the nearest pair is not one of rods that end side by side on the platform."""
+    if name == "struts":
+        plate = pf.Shape("platform", "disc", at=(0, 0, 205), axis=(0, 0, 1), diameter=150, thickness=10)
+        return struts(12.0, shapes=[plate, pf.Shape("base", "sphere", at=(0, 0, 150), diameter=20)])
+    machine = machine_named(name, folder)
+    beside = [(f"rodL{i}", f"rod{side}{j}") for side in "LR" for i in (1, 2, 3) for j in (1, 2, 3)]
+    return machine.with_shapes(machine.shapes, beside)
+
+
+@pytest.mark.parametrize("name", ["struts", pytest.param("delta", marks=SLOW)])
+def test_gradients_are_the_differences_by_actuators(name: str, tmp_path: Path) -> None:
+    machine = with_pairs_that_part(name, tmp_path)
+    length, angle = {"struts": (25, 0.1), "delta": (90, 0.0)}[name]
+    answers = around(machine, 20, length, angle)
+    found = pf.clearance(answers)
+    units = np.array([1.0 if drive.kind == "angle" else machine.characteristic_length for drive in machine.drives])
+    compared = 0
+    for row in range(20):
+        if answers.status[row] != pf.Status.REACHED or abs(found.distance[row]) < 1e-3:
+            continue
+        for place, unit in enumerate(units):
+            step = 1e-6 * unit * np.eye(len(units))[place]
+            ends = [pf.solve_fk(machine, answers.actuators[row] + sign * step, start=answers[row]) for sign in (-1, 1)]
+            low, high = (pf.clearance(end) for end in ends)
+            if low.links == high.links == tuple(found.links[row]) and ends[0] and ends[1]:
+                change, scale = (high.distance - low.distance) / (2e-6 * unit), machine.characteristic_length / unit
+                assert found.gradient[row, place] == pytest.approx(change, abs=1e-4 * scale)
+                compared += abs(change) > 1e-2 * scale
+    assert compared > 5
+
+
+# What is shown
+
+
+def test_pictures_and_the_viewer_have_links_as_thick_as_they_are() -> None:
+    machine = struts(12.0, shapes=[pf.Shape("base", "box", at=(0, 0, -20), size=(240, 200, 10))])
+    skeleton = skeleton_of(pf.solve_ik(machine, machine.home_pose))
+    box, strut = skeleton.solids[0], skeleton.solids[1]
+    np.testing.assert_allclose(np.ptp(box.vertices, axis=0), [240, 200, 10])
+    a, b, c = np.moveaxis(strut.vertices[strut.faces], 1, 0)
+    volume = float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6.0)
+    length = float(np.linalg.norm(np.subtract(machine.joint("C1").at, machine.joint("A1").at)))
+    assert abs(volume) == pytest.approx(np.pi * 36 * length + 4 / 3 * np.pi * 216, rel=0.05)
+    assert sum(solid.is_nearest for solid in skeleton.solids) == 2
+    assert not any(solid.overlaps for solid in skeleton.solids)
+    assert len(pf.plot(machine).collections) > len(pf.plot(pf.load("stewart")).collections)
+
+
+def test_the_command_says_how_far_apart_links_are(tmp_path: Path) -> None:
+    file = tmp_path / "hexapod.toml"
+    file.write_text(dumps(struts()))
+    shown = CliRunner().invoke(main, ["info", str(file)]).output
+    assert "BC1       capsule" in shown or "BC1   capsule" in shown
+    assert "at home BC" in shown
+    ik = ["ik", str(file), "--position", "0", "0", "200", "--margins"]
+    assert "17.282 mm apart (no limit keeps it)" in CliRunner().invoke(main, ik).output
+    plain = json.loads(CliRunner().invoke(main, [*ik, "--json"]).output)
+    assert plain["clearance"]["distance"] == pytest.approx(2 * 14.6410161514 - 12)
+    assert "clearance" not in json.loads(CliRunner().invoke(main, ["ik", "stewart", *ik[2:], "--json"]).output)
+
+
+def test_what_is_no_list_of_shapes_or_too_long_a_one_is_refused() -> None:
+    with pytest.raises(InvalidArgument, match="a list of Shape"):
+        struts(12.0, shapes=5)
+    assert "a number" in refused(struts, {})[0]  # type: ignore[arg-type]
+    assert "found [1]" in refused(pf.load("stewart").with_shapes, [1])[0]
+    many = [pf.Shape("base", "sphere", at=(0, 0, -50), diameter=1)] * 301
+    assert "at most 300" in refused(pf.load("stewart").with_shapes, many)[0]
+    assert "pairs of bodies" in refused(pf.load("stewart").with_shapes, (), ignore=7)[0]
+    assert "two bodies" in refused(pf.load("stewart").with_shapes, (), ignore=["base"])[0]
