@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
@@ -42,3 +43,11 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     for process in started:
         if process.wait():
             raise pytest.UsageError("the kernels do not compile")
+
+
+@pytest.fixture(autouse=True)
+def figures_are_closed() -> Iterator[None]:
+    """No figure stays open behind a test: pyplot warns of the twenty-first."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
