@@ -11,6 +11,7 @@ import click
 import pfabrik as pf
 
 from ..cells import is_finite
+from ..errors import counted
 from .arguments import FINITE, MECH, load
 from .outputs import check_outputs
 from .printing import json_option, print_answer
@@ -112,7 +113,7 @@ def _numbers(option: str, words: str, counts: Sequence[int], between: str) -> li
 
 def _describe(certificate: pf.Certificate) -> str:
     """The verdict, and what it rests on, for people."""
-    lines = [f"{certificate.verdict}  {certificate.n_cells} cells"]
+    lines = [f"{certificate.verdict}  {counted(certificate.n_cells, 'cell')}"]
     unit, refutation = certificate.mechanism.length_unit, certificate.refutation
     if certificate:
         lines.append(f"every pose is reached; margin at least {certificate.margin:.4g}")
