@@ -205,7 +205,7 @@ class Actuation:
         return preimage_of_box(J, limits)
 
     def margin(self, q: ArrayLike) -> LimitMargin:
-        """How far coordinates q (..., k) are from what limits them, with the limit's name; nothing is projected."""
+        """Margins of coordinates q (..., k), with the name of the nearest limit; nothing is projected."""
         rows, shape = rows_of(self.names, q)
         margin, limits = self._placer.margins(rows)
         return LimitMargin(shaped(margin, shape), shaped(limits[:, 0], shape), shaped(limits[:, 1], shape))

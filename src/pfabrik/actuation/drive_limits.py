@@ -1,4 +1,4 @@
-"""What limited actuators leave of torques and speeds of joints: half-spaces, and the box inscribed in them."""
+"""Torques and speeds of joints that limited actuators allow: half-spaces, and the box inscribed in them."""
 
 from __future__ import annotations
 

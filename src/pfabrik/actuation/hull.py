@@ -23,10 +23,10 @@ ROUNDS, SHARES = 5, 33
 """Divisions of a line to the border, and points of each: to 3e-8 of the line."""
 
 BEYOND = 1e-4
-"""How far beyond the border its limit is asked, as a share of the way to a point."""
+"""Step beyond the border to a point at which its limit is asked, as a share of the way."""
 
 INSIDE = 1e-6
-"""How far within the border half-spaces end, as a share of half the box."""
+"""Distance of half-spaces from the border, inward, as a share of half the box."""
 
 
 class Hull(NamedTuple):
@@ -174,7 +174,7 @@ AROUND = 1e-2
 """Distance of border points by which its direction is told, as a share of that from the interior."""
 
 FARTHER = 1.5
-"""How far beyond a border point the border is looked for on lines beside it, by the distance from the interior."""
+"""Length of lines beside a border point on which the border is searched for, in distances from the interior."""
 
 STEEP = 0.1
 """Cosine between the way out and the border's normal below which the latter is not used: the border has a kink."""
