@@ -427,9 +427,19 @@ def test_what_no_body_can_have_is_named_at_its_place(said: str, place: str, word
     assert len(faults) == 1
 
 
-def test_a_clearance_in_a_file_is_refused_as_no_solver_keeps_it(tmp_path: Path) -> None:
-    faults = refused(loaded, DELTA.replace("schema = 1", "schema = 1\nclearance = 2"), tmp_path)
-    assert "no solver keeps a clearance yet" in faults[0]
+def test_a_clearance_in_a_file_must_be_one_that_home_keeps(tmp_path: Path) -> None:
+    wrong = {
+        "clearance = -1": "0 or more",
+        "clearance = 'x'": "a number",
+        "clearance = 1e9": "at most",
+        "clearance = 2": "links with a thickness",
+    }
+    for line, expected in wrong.items():
+        assert expected in refused(loaded, DELTA.replace("schema = 1", f"schema = 1\n{line}"), tmp_path)[0]
+    assert "28 from 'BC1' at home; expected links that are at least 30 apart" in refused(struts, clearance=30)[0]
+    kept = struts(clearance=2)
+    assert loaded(dumps(kept), tmp_path) == kept
+    assert kept.with_clearance(None).clearance is None and kept != kept.with_clearance(3)
 
 
 def test_copies_of_a_body_have_its_shape_turned_with_them(tmp_path: Path) -> None:

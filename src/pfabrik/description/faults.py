@@ -15,7 +15,7 @@ from .joint_types import TASK_COORDINATES, TASK_TURNS, WHOLE_TASK
 from .joints import Joint
 from .legs import LEG_KEYS
 from .links import collisions_at_home
-from .shape_faults import form_of_shapes, shape_faults
+from .shape_faults import form_of_clearance, form_of_shapes, shape_faults
 from .structure import Structure
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
@@ -37,8 +37,8 @@ def find_faults(mechanism: Structure) -> list[Fault]:
     sound = {joint.name: joint for joint, faults in zip(joints, form, strict=True) if not faults}
     faults = [*_head_faults(mechanism), *(fault for each in form for fault in each)]
     faults += [*_point_faults(mechanism), *graph_faults(mechanism), *home_faults(mechanism, sound)]
-    if mechanism.shapes or mechanism.ignore:
-        of_shapes = list(form_of_shapes(mechanism.shapes))
+    if mechanism.shapes or mechanism.ignore or mechanism.clearance is not None:
+        of_shapes = [*form_of_shapes(mechanism.shapes), *form_of_clearance(mechanism.clearance)]
         if not faults and not of_shapes:
             of_shapes = list(shape_faults(mechanism)) or list(collisions_at_home(mechanism))
         faults += of_shapes

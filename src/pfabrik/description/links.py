@@ -18,6 +18,10 @@ from .shape_faults import joints_with_centre, sliding_along
 from .structure import Structure
 
 
+MOST_PAIRS = 500
+"""Most pairs of links that searches keep apart: each is a row of their programmes."""
+
+
 class Links(NamedTuple):
     """The shapes of a mechanism as `kernels.clearance` takes them.
 
@@ -125,19 +129,27 @@ def _neighbours(mechanism: Structure, bodies: set[str], rigid: dict[str, str]) -
 
 
 def collisions_at_home(mechanism: Structure) -> Iterator[Fault]:
-    """The pairs of links that overlap at home, the deepest first."""
+    """The pairs of links that overlap at home, or are nearer than the clearance, the worst first."""
     from ..kernels.clearance.least_clearance import least_clearance
 
-    links = links_of(mechanism)
+    links, least = links_of(mechanism), mechanism.clearance or 0.0
+    if mechanism.clearance is not None and not 0 < len(links.pairs) <= MOST_PAIRS:
+        found = (
+            f"{len(links.pairs)} pairs of links that may touch" if len(links.pairs) else "no two links that may touch"
+        )
+        expected = f"at most {MOST_PAIRS}: name others in `ignore`" if len(links.pairs) else "links with a thickness"
+        yield Fault("clearance", found, expected)
+        return
     clearance, nearest, points = np.empty(1), np.empty(1, np.int64), np.empty((1, 2, 3))
     scratch, places = np.zeros(1 + links.places[0].size), links.places[None]
     overlaps: list[tuple[float, int, int]] = []
     for pair in links.pairs:
         clearance[0], nearest[0] = np.inf, -1
         least_clearance(links.sizes, places, pair[None], scratch, clearance, nearest, points)
-        if clearance[0] < -TOLERANCES.home_slack * mechanism.characteristic_length:
+        if clearance[0] < least - TOLERANCES.home_slack * mechanism.characteristic_length:
             overlaps.append((float(clearance[0]), int(pair[0]), int(pair[1])))
     for distance, first, second in sorted(overlaps):
-        found = f"'{mechanism.shapes[second].body}', which is {-distance:.4g} deep in"
-        found += f" '{mechanism.shapes[first].body}' at home"
-        yield Fault(f"body[{second}]", found, "links that do not overlap at home; or name the pair in `ignore`")
+        how = f"{-distance:.4g} deep in" if distance < 0.0 else f"{distance:.4g} from"
+        found = f"'{mechanism.shapes[second].body}', which is {how} '{mechanism.shapes[first].body}' at home"
+        apart = f"that are at least {least:.4g} apart" if least > 0.0 else "that do not overlap"
+        yield Fault(f"body[{second}]", found, f"links {apart} at home; or name the pair in `ignore`")

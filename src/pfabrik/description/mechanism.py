@@ -14,7 +14,7 @@ from ..checks import require_mapping
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
 from ..frozen import FrozenMapping
 from .body_shapes import Shape
-from .coercion import items
+from .coercion import items, numbers
 from .faults import find_faults, in_order, joint_index, merged
 from .form_faults import joint_faults, shown
 from .home_mobility import end_effector_freedom, is_held, unclear_conditions
@@ -75,8 +75,9 @@ class Mechanism(Structure):
     length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
     task : what a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
         "yaw" (the twist about z); by default everything. What it leaves out follows from the mechanism.
-    shapes : how thick bodies are, for `clearance` and pictures; no limit of any answer.
+    shapes : how thick bodies are, for clearances and pictures.
     ignore : pairs of bodies that may touch each other.
+    clearance : the least distance that every answer keeps between links [length]; None where links may overlap.
     """
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
@@ -93,6 +94,7 @@ class Mechanism(Structure):
             task: Sequence[str] | None = None,
             shapes: Iterable[Shape] = (),
             ignore: Iterable[Sequence[str]] = (),
+            clearance: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -132,6 +134,7 @@ class Mechanism(Structure):
         joints: Iterable[Joint] = (),
         shapes: Iterable[Shape] = (),
         ignore: Iterable[Sequence[str]] = (),
+        clearance: float | None = None,
         length_unit: str = "mm",
         angle_unit: Literal["deg", "rad"] = "deg",
         **by_letter: Mapping[str, object],
@@ -148,7 +151,7 @@ class Mechanism(Structure):
         base_body : the name of the body that does not move.
         joints : joints beside those of the legs, before which they come.
         shapes : shapes beside those of legs with a `thickness`, before which they come.
-        ignore : as of a `Mechanism`.
+        ignore, clearance : as of a `Mechanism`.
 
         Raises
         ------
@@ -184,6 +187,7 @@ class Mechanism(Structure):
                 task=task,
                 shapes=own_shapes + tuple(shape for shape, _ in of_legs),
                 ignore=ignore,
+                clearance=clearance,
             )
         except InvalidMechanism as error:
             found = faults_of_legs(faults_of_shapes(error.faults, places), len(own), placed)
@@ -284,6 +288,15 @@ class Mechanism(Structure):
         InvalidMechanism : a shape that is none, or links that overlap at home.
         """
         return self._with(shapes=items(shapes), ignore=as_pairs(ignore))
+
+    def with_clearance(self, clearance: float | None) -> Mechanism:
+        """A copy whose answers keep another least distance between links [length], or none.
+
+        Raises
+        ------
+        InvalidMechanism : a clearance that is none, or links that are nearer at home.
+        """
+        return self._with(clearance=numbers(clearance))
 
     def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
         """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""

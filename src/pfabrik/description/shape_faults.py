@@ -32,6 +32,14 @@ def form_of_shapes(shapes: Any) -> Iterator[Fault]:
         yield from _form_faults(f"body[{index}]", shape)
 
 
+def form_of_clearance(clearance: Any) -> Iterator[Fault]:
+    """Faults of a clearance by itself."""
+    faults = [] if clearance is None else list(number_faults("clearance", clearance, 1))
+    yield from faults
+    if clearance is not None and not faults and clearance < 0.0:
+        yield Fault("clearance", shown(clearance), "0 or more")
+
+
 def _form_faults(place: str, shape: Shape) -> Iterator[Fault]:
     if not isinstance(cast(Any, shape.body), str):
         yield Fault(f"{place}.name", shown(shape.body), "the name of a body")

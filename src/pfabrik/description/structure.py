@@ -41,10 +41,11 @@ class Structure:
     task: tuple[str, ...] = field(default=cast(Any, None))  # never None once constructed
     shapes: tuple[Shape, ...] = ()
     ignore: tuple[tuple[str, str], ...] = ()
+    clearance: float | None = None
 
     def __post_init__(self) -> None:
         set_fields(self, joints=items(self.joints), reference_point=numbers(self.reference_point))
-        set_fields(self, shapes=items(self.shapes), ignore=as_pairs(self.ignore))
+        set_fields(self, shapes=items(self.shapes), ignore=as_pairs(self.ignore), clearance=numbers(self.clearance))
         set_fields(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
         tip = self._end_effector_joint()
         if tip is not None and cast(Any, self.reference_point) is None:

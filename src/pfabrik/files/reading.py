@@ -34,7 +34,7 @@ from ..errors import Fault, InvalidMechanism, near_miss
 from .dimensions import dimension_values, with_numbers
 from .units import angle_in_radians, in_radians
 
-DESCRIBED = ("name", "base", "end_effector", "reference_point", "task", "ignore")
+DESCRIBED = ("name", "base", "end_effector", "reference_point", "task", "ignore", "clearance")
 HEAD_KEYS = ("schema", "units", *DESCRIBED, "dimensions", "joint", "leg", "body")
 UNIT_KEYS = ("length", "angle")
 SHAPE_KEYS = ("name", "shape", *(field.name for field in dataclasses.fields(Shape)[2:]))
@@ -109,7 +109,7 @@ def _read(table: Table, kind: type[Described]) -> Described:
 
 
 def _head_faults(table: Table) -> Iterator[Fault]:
-    yield from key_faults("", table, HEAD_KEYS, _head_hint)
+    yield from key_faults("", table, HEAD_KEYS, lambda key: near_miss(key, HEAD_KEYS))
     if type(table.get("schema")) is not int or table["schema"] != 1:
         yield Fault("schema", shown(table.get("schema")), "1")
     for key, default in (("name", None), ("base", "base"), ("end_effector", None)):
@@ -123,12 +123,6 @@ def _head_faults(table: Table) -> Iterator[Fault]:
             yield Fault("units.angle", shown(units["angle"]), "'deg' or 'rad'")
     else:
         yield Fault("units", shown(units), f"a table: {', '.join(UNIT_KEYS)}")
-
-
-def _head_hint(key: str) -> str:
-    if key == "clearance":
-        return ": no solver keeps a clearance yet; compare what `pfabrik.clearance` measures"
-    return near_miss(key, HEAD_KEYS)
 
 
 def _unknown_keys(place: str, table: Table, known: Sequence[str]) -> Iterator[Fault]:

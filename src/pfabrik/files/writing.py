@@ -66,6 +66,8 @@ def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
         yield f"task = {_value(mechanism.task)}"
     if mechanism.ignore:
         yield f"ignore = {_value(mechanism.ignore)}"
+    if mechanism.clearance is not None:
+        yield f"clearance = {_value(mechanism.clearance)}"
 
 
 def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
