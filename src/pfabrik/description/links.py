@@ -17,7 +17,6 @@ from .graph import welded
 from .shape_faults import joints_with_centre, sliding_along
 from .structure import Structure
 
-
 MOST_PAIRS = 500
 """Most pairs of links that searches keep apart: each is a row of their programmes."""
 
