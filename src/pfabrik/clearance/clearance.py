@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.solution import Solution, checked_solution
+from ..apart.link_distances import least_distances
+from ..apart.placed_links import PlacedLinks
 from ..arrays import Floats, Ints, shaped
-from ..description.links import Links, has_pairs, links_of
+from ..description.links import has_pairs, links_of
 from ..description.mechanism_html import card
 from ..errors import UnsupportedMechanism
-from ..kernels.threads import in_blocks
 from .gradients import gradients_of
-from .placed_links import ends_of, joint_centres, places_of
-
-ROWS_A_BLOCK = 4096
-"""Rows of one call of a kernel, and of the tables of places that it takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,38 +103,12 @@ def clearance(solution: Solution) -> Clearance:
 
 
 def _measured(solution: Solution, nearest: Ints | None = None) -> tuple[Floats, Ints, Floats]:
-    """Distances (n,), the pairs that have them (n,), and their points (n, 2, 3); the points only where pairs are given,
-    or where there are other links than capsules."""
-    links = links_of(solution.mechanism)
-    n = len(solution._rows.status)
-    distances, pairs, points = np.full(n, np.inf), np.full(n, -1.0), np.full((n, 2, 3), np.nan)
-    others_from = len(links.pairs) if nearest is not None else links.n_capsules
-    if nearest is None:
-        _measure_capsules(links, ends_of(solution), distances, pairs)
-    which = pairs.astype(np.int64) if nearest is None else nearest.copy()
-    if nearest is not None or links.n_capsules < len(links.pairs):
-        centres = joint_centres(solution)
-
-        def run(block: slice) -> None:
-            from ..kernels.clearance.least_clearance import least_clearance
-
-            places = places_of(solution, centres, block)
-            scratch = np.zeros(1 + places.shape[2] * places.shape[3])
-            scratch[0] = others_from
-            least_clearance(links.sizes, places, links.pairs, scratch, distances[block], which[block], points[block])
-
-        in_blocks(run, n, ROWS_A_BLOCK)
-    distances[which < 0] = np.nan
-    return distances, which, points
+    """Distances (n,), the pairs that have them (n,), and their points (n, 2, 3), as of `least_distances`."""
+    return least_distances(placed_links(solution), nearest)
 
 
-def _measure_capsules(links: Links, ends: Floats, distances: Floats, pairs: Floats) -> None:
-    """Lower distances (n,) by those of all pairs of capsules, whose ends are (s, 6, n)."""
-    from ..kernels.clearance.capsules import capsule_clearance
-
-    rounds, capsules = links.sizes[:, 1].copy(), links.pairs[: links.n_capsules]
-
-    def run(block: slice) -> None:
-        capsule_clearance(rounds, np.ascontiguousarray(ends[:, :, block]), capsules, distances[block], pairs[block])
-
-    in_blocks(run, len(distances), ROWS_A_BLOCK)
+def placed_links(solution: Solution) -> PlacedLinks:
+    """The links of a solution."""
+    names = {name for ends in links_of(solution.mechanism).joints for name in ends}
+    centres = {name: solution.points[name].reshape(-1, 3) for name in names}
+    return PlacedLinks(solution.mechanism, solution._configurations, centres)

@@ -11,8 +11,7 @@ from ..arrays import Floats, Ints
 from ..description.body_shapes import Shape
 from ..description.links import links_of
 from ..description.mechanism import Mechanism
-from .clearance import clearance
-from .placed_links import joint_centres, places_of
+from .clearance import clearance, placed_links
 
 AROUND, TO_POLE = 16, 4
 """Corners around a capsule or a disc, and rings from its edge to its pole."""
@@ -38,7 +37,7 @@ class SolidMesh:
 def solids_of(mechanism: Mechanism, solution: Solution | None) -> tuple[SolidMesh, ...]:
     """The shapes of a mechanism at home, or of one answer, the nearest two marked."""
     links = links_of(mechanism)
-    places = links.places if solution is None else places_of(solution, joint_centres(solution), slice(None))[0]
+    places = links.places if solution is None else placed_links(solution).places(slice(None))[0]
     nearest: list[int] = []
     overlaps = False
     if solution is not None and len(links.pairs):

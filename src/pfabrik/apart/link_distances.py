@@ -1,0 +1,76 @@
+"""Distances of the links of configurations: the least ones, and those of all pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..description.links import Links, links_of
+from ..kernels.threads import in_blocks
+from .placed_links import PlacedLinks
+
+ROWS_A_BLOCK = 4096
+"""Rows of one call of a kernel, and of the tables of places that it takes."""
+
+
+def least_distances(placed: PlacedLinks, nearest: Ints | None = None) -> tuple[Floats, Ints, Floats]:
+    """The least distances of links (n,) [length], the pairs that have them (n,), and their nearest points (n, 2, 3).
+
+    Distances are between surfaces, and negative where links overlap. The points are there where pairs are given, or
+    where there are other links than capsules; else they are NaN.
+
+    Parameters
+    ----------
+    nearest : the pair of each row, (n,), if it is known already; -1 for none.
+    """
+    links = links_of(placed.mechanism)
+    n = len(placed)
+    distances, pairs, points = np.full(n, np.inf), np.full(n, -1.0), np.full((n, 2, 3), np.nan)
+    if nearest is None:
+        _measure_capsules(links, placed.ends(), distances, pairs)
+    which = pairs.astype(np.int64) if nearest is None else nearest.copy()
+    if nearest is not None or links.n_capsules < len(links.pairs):
+        first = len(links.pairs) if nearest is not None else links.n_capsules
+        _measure_solids(links.pairs, first, placed, distances, which, points)
+    distances[which < 0] = np.nan
+    return distances, which, points
+
+
+def pair_distances(placed: PlacedLinks) -> Floats:
+    """The distance of every pair of links, (n, pairs) [length]; NaN for INVALID rows."""
+    pairs, n = links_of(placed.mechanism).pairs, len(placed)
+    distances = np.empty((n, len(pairs)))
+    for k in range(len(pairs)):
+        of_pair, which, points = np.full(n, np.inf), np.full(n, -1), np.empty((n, 2, 3))
+        _measure_solids(pairs[k : k + 1], 0, placed, of_pair, which, points)
+        distances[:, k] = of_pair
+    return distances
+
+
+def _measure_solids(
+    pairs: Ints, first: int, placed: PlacedLinks, distances: Floats, nearest: Ints, points: Floats
+) -> None:
+    """Lower distances (n,) by those of pairs of any solids, from the first of them on."""
+    from ..kernels.clearance.least_clearance import least_clearance
+
+    sizes = links_of(placed.mechanism).sizes
+
+    def run(block: slice) -> None:
+        places = placed.places(block)
+        scratch = np.zeros(1 + places.shape[2] * places.shape[3])
+        scratch[0] = first
+        least_clearance(sizes, places, pairs, scratch, distances[block], nearest[block], points[block])
+
+    in_blocks(run, len(distances), ROWS_A_BLOCK)
+
+
+def _measure_capsules(links: Links, ends: Floats, distances: Floats, pairs: Floats) -> None:
+    """Lower distances (n,) by those of all pairs of capsules, whose ends are (s, 6, n)."""
+    from ..kernels.clearance.capsules import capsule_clearance
+
+    rounds, capsules = links.sizes[:, 1].copy(), links.pairs[: links.n_capsules]
+
+    def run(block: slice) -> None:
+        capsule_clearance(rounds, np.ascontiguousarray(ends[:, :, block]), capsules, distances[block], pairs[block])
+
+    in_blocks(run, len(distances), ROWS_A_BLOCK)
