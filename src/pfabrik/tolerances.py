@@ -50,6 +50,7 @@ class Tolerances:
     file_digits : gap [L or rad] up to which loops may be open by the digits of a file, where these are known to explain
         it: three digits, added up over a chain of bodies, leave that much.
     file_angle : angle [rad] up to which axes in such a file may have been meant to be parallel: `1.57` is off by 8e-4.
+    apart : least clearance that searches keep [L]: of links that touch no direction leads apart.
     same_mode : largest difference of positions [L] and rotation matrices of two solutions that count as one: where two
         solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
     """
@@ -67,6 +68,7 @@ class Tolerances:
     nearly_implied: float = 1e-3
     implied: float = 1e-12
     independent: float = 5e-2
+    apart: float = 1e-6
     same_mode: float = 1e-5
     speed: float = 1e-6
     rank: float = 1e-9

@@ -17,6 +17,7 @@ from ..motion.closure import Closure
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, close, closing_of, new_closed
 from .effort import steps_within
+from .kept_links import kept_links
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -85,10 +86,10 @@ def _minimise(closure: Closure, coordinates: Floats, objective: Objective) -> Cl
 def limit_multipliers(
     closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
 ) -> Floats:
-    """Multipliers of all limits at configurations nearest to targets, (n, 2 columns + cones).
+    """Multipliers of all limits at configurations nearest to targets, (n, 2 columns + cones + pairs of links).
 
-    The order is low and high bound of each coordinate, then the cones. A multiplier is the decrease of the distance [L]
-    per unit [L or rad] by which the limit is relaxed; 0 for limits that are not active.
+    The order is low and high bound of each coordinate, then the cones, then the pairs. A multiplier is the decrease of
+    the distance [L] per unit [L or rad] by which the limit is relaxed; 0 for limits that are not active.
     """
     return _run(
         closure, coordinates, _objective(closure, clip_targets(closure.mechanism, targets), platform, frame, 0)
@@ -109,7 +110,8 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
 
     closed = new_closed(closure, coordinates, np.tile(np.eye(4), (len(coordinates), 1, 1)), 0.0)
     scratch = _scratch(closure)
-    multipliers = np.zeros((len(coordinates), 2 * len(closure.scale) + len(closure.loops.cone_angles)))
+    n_limits = 2 * len(closure.scale) + len(closure.loops.cone_angles) + len(kept_links(closure.mechanism)[0].pairs)
+    multipliers = np.zeros((len(coordinates), n_limits))
 
     def run(block: slice) -> None:
         results = take(closed, block)
@@ -125,7 +127,7 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
 def _scratch(closure: Closure) -> Scratch[DescentScratch]:
     from ..kernels.closure.linearise_loops import new_descent_scratch
 
-    return Scratch(new_descent_scratch, closure.loops)
+    return Scratch(new_descent_scratch, closure.loops, *kept_links(closure.mechanism))
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:

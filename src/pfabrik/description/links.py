@@ -13,7 +13,7 @@ from ..derived import derived
 from ..errors import Fault
 from ..tolerances import TOLERANCES
 from .body_shapes import Shape
-from .graph import welded
+from .graph import steps_from_base, welded
 from .shape_faults import joints_with_centre, sliding_along
 from .structure import Structure
 
@@ -62,6 +62,23 @@ def _joints_of(mechanism: Structure, shape: Shape) -> tuple[str, ...]:
     if shape.kind != "capsule" or shape.ends is not None:
         return ()
     return shape.between or tuple(joint.name for joint in joints_with_centre(mechanism, shape.body))
+
+
+def bodies_of_ends(mechanism: Structure) -> list[tuple[str, str]]:
+    """The bodies that both ends of every shape move with: twice the same, but for capsules between two joints.
+
+    Of the two bodies of a joint the one nearer to the base, by the number of joints between.
+    """
+    steps = steps_from_base(mechanism)
+
+    def nearest(name: str) -> str:
+        return min(mechanism.joint(name).connects, key=lambda body: steps[body])
+
+    ends = (_joints_of(mechanism, shape) for shape in mechanism.shapes)
+    return [
+        (nearest(each[0]), nearest(each[1])) if each else (shape.body, shape.body)
+        for shape, each in zip(mechanism.shapes, ends, strict=True)
+    ]
 
 
 def _put(shape: Shape, ends: list[Any], sizes: Floats, place: Floats) -> None:

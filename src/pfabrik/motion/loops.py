@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..description.graph import PASSED_THROUGH, cone_line, edges_of, opposite, spanning_tree
+from ..description.graph import PASSED_THROUGH, Step, cone_line, edges_of, opposite, spanning_tree, tree_of
 from ..description.home_mobility import universal_axes
 from ..description.mechanism import Joint, Mechanism
 from ..description.paths import Path, independent_paths
@@ -31,6 +31,16 @@ def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
     for joint in mechanism.joints:
         builder.add_joint(joint)
     return builder.build()
+
+
+def ways_to(mechanism: Mechanism, bodies: Sequence[str]) -> K.Loops:
+    """The table of the paths from the base to some bodies, in their order; they may share joints."""
+    builder, tree = _Builder(mechanism), tree_of(mechanism)
+    for body in bodies:
+        builder.add_path(tuple(Step(mechanism.joints[index], forward) for index, forward in tree.way(body)))
+    for joint in mechanism.joints:
+        builder.add_joint(joint)
+    return builder.build([[path] for path in range(len(bodies))])
 
 
 class _Builder:
@@ -73,8 +83,9 @@ class _Builder:
             self.records += [(kind, axis, point, first + place) for place, (kind, axis) in enumerate(motions)]
         return self.units[joint.name]
 
-    def build(self) -> K.Loops:
-        groups = _connected([{k for k, _ in path} for path in self.paths])
+    def build(self, groups: list[list[int]] | None = None) -> K.Loops:
+        """The table; groups of paths, in their order, are those that share joints unless they are given."""
+        groups = _connected([{k for k, _ in path} for path in self.paths]) if groups is None else groups
         order = [path for group in groups for path in group]
         visits = [visit for path in order for visit in self.paths[path]]
         starts = _starts(len(self.paths[path]) for path in order)

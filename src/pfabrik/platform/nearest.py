@@ -20,6 +20,7 @@ from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_P
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
+from .kept_links import kept_links
 from .nearest_pose import NearestPose, no_starts
 from .seeds import seeds_of
 
@@ -192,7 +193,9 @@ def limit_multipliers(model: Model, targets: Floats, configurations: Starts, pro
     multipliers = _multipliers(model, projection).weigh(targets, configurations)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     cone_joints = [joint.name for joint in mechanism.joints if joint.cone is not None]
-    weights = np.zeros((len(targets), 2 * columns + len(cone_joints)))
+    n_pairs = len(kept_links(model).pairs)
+    weights = np.zeros((len(targets), 2 * columns + len(cone_joints) + n_pairs))
+    weights[:, weights.shape[1] - n_pairs :] = multipliers[:, multipliers.shape[1] - n_pairs :]
     for bound in (0, 1):
         weights[:, 2 * table.limited["column"] + bound] = multipliers[:, bound : 2 * ranges : 2]
     cones = [2 * columns + cone_joints.index(name) for name, bound in table.limits if bound == "cone"]

@@ -22,6 +22,7 @@ from ..kernels.threads import in_blocks
 from ..model import Model
 from ..tolerances import TOLERANCES
 from .carriages import carriages_along, proximal_coordinates, stays_there
+from .kept_links import kept_links
 from .rotation import keeps_rotation, n_implied_rows, without_idle_legs
 from .table import OF_POINTING, search_table
 
@@ -75,7 +76,8 @@ class NearestPose:
         pose_weights, is_fixed = np.array(weights, dtype=float), keeps_rotation(model)
         pose_weights[3:] = LOCKED if is_fixed else pose_weights[3:]
         is_at_home = table.task[0]["rotations"] == 0 and pose_weights[3] == LOCKED and searches
-        legs = without_idle_legs(table) if is_at_home and not len(table.redundant) else search_table(table)
+        has_idle_legs = is_at_home and not len(table.redundant) and model.mechanism.clearance is None
+        legs = without_idle_legs(table) if has_idle_legs else search_table(table)
         self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
         cones = self._legs.record.cones
         n_cones = len(cones) if keep_pointing or not searches else int((cones["leader"] != OF_POINTING).sum())
@@ -87,7 +89,7 @@ class NearestPose:
             setting[name] = value
         setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
         along = stays_there(table) if driven is not None else carriages_along(table)
-        self._plan = Handle(MultistartPlan(pose_weights, setting, *seeds, along))
+        self._plan = Handle(MultistartPlan(pose_weights, setting, *seeds, along, kept_links(model)))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._pointing_search: NearestPose | None = None
         if n_cones < len(cones):
@@ -131,12 +133,12 @@ class NearestPose:
         return n_unsolved
 
     def weigh(self, targets: Floats, configurations: Starts) -> Floats:
-        """The multipliers of all limits, then of all legs, at configurations, for targets (n, 4, 4) [length].
+        """The multipliers of all limits, of legs and pairs of links, at configurations, for targets (n, 4, 4) [length].
 
         For instances whose setting `steps` is 0: nothing is searched for.
         """
-        legs = self._legs.record
-        weights = np.zeros((len(targets), 2 * len(legs.limited) + len(legs.cones) + len(legs.legs)))
+        legs, pairs = self._legs.record, self._plan.record.links.pairs
+        weights = np.zeros((len(targets), 2 * len(legs.limited) + len(legs.cones) + len(legs.legs) + len(pairs)))
         self._run(targets, configurations, new_solution(len(targets), self._table), self._no_values, weights)
         return weights
 

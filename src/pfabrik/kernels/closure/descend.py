@@ -10,6 +10,7 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine, search
+from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import limit_multipliers
 from ..quaternions import turn_ball
@@ -42,6 +43,7 @@ from .linearise_loops import (
 )
 from .loops import BALL, Closed, Loops, Objective
 from .path_kinematics import State, copy_state, load_row, open_loops, store_row
+from .placed_links import add_pair_slope, place_links
 from .pose_objective import pose_gradient
 
 
@@ -69,6 +71,14 @@ def lagrangian_gradient(
         if multipliers[2 * n + cone] != 0.0:
             cone_excess(loops, cone, objective.pose.margin, state, scratch)
             add_cone(loops, cone, multipliers[2 * n + cone], scratch, out)
+    offset, links, is_placed = 2 * n + len(loops.cone_angles), scratch.links, False
+    for pair in range(len(links.pairs)):
+        if multipliers[offset + pair] != 0.0:
+            if not is_placed:
+                place_links(scratch.ways, state, scratch.way_eq, scratch.links)
+            is_placed = True
+            over, multiplier = pair_excess(scratch.links, pair, math.inf), multipliers[offset + pair]
+            add_pair_slope(scratch.ways, scratch.links, pair, over, multiplier, scratch.way_eq, out)
 
 
 @routine
@@ -179,8 +189,8 @@ def nearest_configuration(
 ) -> None:
     """Minimise the objective of every row, from a configuration that is closed within its limits or nearly so.
 
-    With `max_iterations` 0, write instead the multipliers of the limits of each row, (n, 2 columns + cones): the
-    decrease of the distance per unit by which the limit is relaxed; 0 for limits that are not active.
+    With `max_iterations` 0, write instead the multipliers of the limits of each row, (n, 2 columns + cones + pairs of
+    links): the decrease of the distance per unit by which the limit is relaxed; 0 for limits that are not active.
 
     Parameters
     ----------

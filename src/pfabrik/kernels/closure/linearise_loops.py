@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Records
 from .._jit import opener, routine
+from ..clearance.link_limits import NO_LINKS, LinkLimits, new_link_limits, pair_excess
 from ..free_motions import (
     Elimination,
     FreeMotions,
@@ -33,6 +34,7 @@ from .path_kinematics import (
     pose_cone,
     walk_path,
 )
+from .placed_links import add_pair_slope, place_links
 from .pose_objective import PoseGradient, pose_gradient
 
 
@@ -56,12 +58,15 @@ class DescentScratch(NamedTuple):
     balance: Floats  # (rows,): multipliers of the loops and of the held components
     here: Floats  # (columns,)
     there: Floats  # (columns,)
+    links: LinkLimits
+    ways: Loops  # a path from the base to each body that a link moves with
+    way_eq: Equations
 
 
-def new_descent_scratch(loops: Loops) -> DescentScratch:
+def new_descent_scratch(loops: Loops, links: LinkLimits, ways: Loops) -> DescentScratch:
     """Scratch memory of one thread."""
     n, paths, rows = len(loops.lo), len(loops.paths) - 1, 6 * len(loops.paths)
-    limits = 2 * n + len(loops.cone_angles)
+    limits = 2 * n + len(loops.cone_angles) + len(links.pairs)
     elimination = new_elimination(n, rows)
     for r in range(len(loops.row_columns)):
         is_first = r < loops.visit_rows[loops.paths[1]]  # which is in all equations
@@ -84,10 +89,13 @@ def new_descent_scratch(loops: Loops) -> DescentScratch:
         np.zeros(rows),
         np.zeros(n),
         np.zeros(n),
+        new_link_limits(links),
+        ways,
+        new_equations(ways, LAYOUT),
     )
 
 
-open_scratch = opener(new_descent_scratch(LOOPS))
+open_scratch = opener(new_descent_scratch(LOOPS, NO_LINKS, LOOPS))
 
 
 @routine
@@ -201,6 +209,17 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
             add_cone(loops, cone, 1.0, scratch, scratch.row)
             excess = max(excess, h)
             k = add_limit(k, h, 2 * n + cone, scratch.row, reduced)
+    offset, links = 2 * n + len(loops.cone_angles), scratch.links
+    if len(links.pairs) > 0:
+        place_links(scratch.ways, state, scratch.way_eq, scratch.links)
+    for pair in range(len(links.pairs)):
+        h = pair_excess(scratch.links, pair, REACH) + margin
+        if h > -REACH:
+            for j in range(n):
+                row[j] = 0.0
+            add_pair_slope(scratch.ways, scratch.links, pair, h - margin, 1.0, scratch.way_eq, scratch.row)
+            excess = max(excess, h)
+            k = add_limit(k, h, offset + pair, scratch.row, reduced)
     linear.totals[0]["limits"] = k
     linear.totals[0]["excess"] = excess
 

@@ -70,6 +70,10 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
     for i in range(3):
         if pose.platform[i] != 1.0:
             return False
+    n_pairs, multipliers = search.links.pairs.shape[0], search.hessian.multipliers
+    for pair in range(n_pairs):  # which the bound does not know
+        if multipliers[multipliers.shape[0] - n_pairs + pair] > 0.0:
+            return False
     if search.leg_eval.rows.shape[0] == 0:
         evaluate_legs(table, search.best, search.leg_eval)
         put_objective(table, row, objective, search.best, search)

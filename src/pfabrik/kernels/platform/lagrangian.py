@@ -6,6 +6,7 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine
+from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, project, put_multipliers
 from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
@@ -13,6 +14,7 @@ from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
 from .equations import PlatformState, evaluate_leg, has_proximal, length_row, put_leg_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
+from .placed_links import add_pair_slope, place_links
 from .search import SearchScratch, copy_platform_state, move, put_objective
 from .search_records import PlatformObjective
 
@@ -48,6 +50,15 @@ def put_limited_gradient(table: Table, search: SearchScratch, out: Floats) -> No
             dead_point_slope(table, k, search.leg_eval)
             for j in range(out.shape[0]):
                 out[j] += multiplier * slope[j]
+    offset, links, is_placed = offset + kept_sides.shape[0], search.links, False
+    for pair in range(links.pairs.shape[0]):
+        multiplier = multipliers[offset + pair]
+        if multiplier != 0.0:
+            if not is_placed:
+                place_links(table, search.links, search.leg_eval)
+            is_placed = True
+            over = pair_excess(search.links, pair, math.inf)
+            add_pair_slope(table, search.links, pair, over, multiplier, search.leg_eval, out)
 
 
 @routine
@@ -92,6 +103,12 @@ def note_involved(table: Table, objective: PlatformObjective, search: SearchScra
     for i in range(table.cones.shape[0]):
         if multipliers[2 * n_ranges + i] > 0.0:
             involved[table.cones[i]["leg"]] = 1
+    links = search.links
+    for pair in range(links.pairs.shape[0]):
+        for end in range(4 if multipliers[offset + n + pair] > 0.0 else 0):
+            body = links.bodies[links.pairs[pair, end // 2], end % 2]
+            if body >= 0:
+                involved[body] = 1
     for i in range(table.driven.shape[0] if objective.values.shape[0] > 0 else 0):
         involved[table.driven[i]["leg"]] = 1
     for k in range(n - 1, 0, -1):

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 
 from .._jit import routine
+from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
 from ..legs.records import Table
 from ..vectors import dot, vec
 from .equations import PlatformState, evaluate_legs, put_slopes
 from .limits import cone_slope, coordinate_slope, dead_point_slope
+from .placed_links import add_pair_slope, place_links
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 
@@ -105,5 +107,16 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
                 for j in range(slope.shape[0]):
                     slope[j] *= kept_sides[leg]
                 k = add_limit(k, over, offset + leg, search.leg_eval.slope, reduced)
+    offset, links = offset + kept_sides.shape[0], search.links
+    if links.pairs.shape[0] > 0:
+        place_links(table, search.links, search.leg_eval)
+    for pair in range(links.pairs.shape[0]):
+        over = pair_excess(search.links, pair, near) + margin
+        if over > -near:
+            excess = max(excess, over)
+            for j in range(slope.shape[0]):
+                slope[j] = 0.0
+            add_pair_slope(table, search.links, pair, over - margin, 1.0, search.leg_eval, search.leg_eval.slope)
+            k = add_limit(k, over, offset + pair, search.leg_eval.slope, reduced)
     reduced.linear.totals[0]["limits"] = k
     reduced.linear.totals[0]["excess"] = excess

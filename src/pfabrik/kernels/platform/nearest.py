@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import opener, routine, search
+from ..clearance.link_limits import NO_LINKS, pair_excess
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import limit_multipliers
@@ -36,6 +37,7 @@ from .certificate import is_global
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .linearise import linearise
+from .placed_links import place_links
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
 from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
@@ -76,7 +78,7 @@ class NearestScratch(NamedTuple):
 def new_nearest_scratch(table: Table, plan: MultistartPlan) -> NearestScratch:
     """Allocate the scratch memory of one thread."""
     setting, starts = plan.settings[0], plan.poses.shape[0]
-    search, best = new_search_scratch(table, setting["cones"]), new_platform_state(table.legs.shape[0])
+    search, best = new_search_scratch(table, setting["cones"], plan.links), new_platform_state(table.legs.shape[0])
     k, n = search.first.linear.G.shape
     k, n = (k, n) if setting["steps"] == 0 else (0, 0)
     tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
@@ -87,7 +89,7 @@ def new_nearest_scratch(table: Table, plan: MultistartPlan) -> NearestScratch:
 
 _STAYS = Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
 _PLAN = MultistartPlan(
-    np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS
+    np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS, NO_LINKS
 )
 open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
 """The plan and scratch memory of `nearest_pose` at the addresses of their handles."""
@@ -108,6 +110,10 @@ def write_solution(
     orthonormalise(best.pose)
     measures[RESIDUAL] = evaluate_legs(table, best, leg_eval) * length
     measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, leg_eval.values), 0.0)
+    if search.links.pairs.shape[0] > 0:
+        place_links(table, search.links, search.leg_eval)
+    for pair in range(search.links.pairs.shape[0]):
+        measures[LIMIT_EXCESS] = max(measures[LIMIT_EXCESS], pair_excess(search.links, pair, 0.0))
     copy_row(best.q, solutions.q[row])
     copy_row(best.sides, solutions.sides[row])
     for i in range(table.driven.shape[0]):
@@ -372,8 +378,8 @@ def nearest_pose(
 ) -> int:
     """Fill the nearest feasible configuration of every row.
 
-    With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs): the multipliers of the limits where
-    each row starts, as in `closure.descend.nearest_configuration`.
+    With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs + pairs of links): the
+    multipliers of the limits where each row starts, as in `closure.descend.nearest_configuration`.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Records
 from .._jit import routine
+from ..clearance.link_limits import LinkLimits, new_link_limits
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
@@ -51,12 +52,14 @@ class SearchScratch(NamedTuple):
     blocking: Ints  # (legs,): 1 for legs that block the incumbent
     near: Floats  # (1,): limits farther away are left out [rad or L]
     half_angles: Floats  # (n_cones, 3): half angles of the constrained cones, their cosines and sines
+    links: LinkLimits
 
 
-def new_search_scratch(table: Table, n_cones: int) -> SearchScratch:
-    """Allocate the scratch memory of one thread, for searches that constrain the first `n_cones` cones."""
+def new_search_scratch(table: Table, n_cones: int, links: LinkLimits) -> SearchScratch:
+    """Allocate the scratch memory of one thread, for searches that constrain the first `n_cones` cones, and links."""
     n, n_legs = count_unknowns(table), table.legs.shape[0]
     rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0] + n_legs
+    limits += links.pairs.shape[0]
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
@@ -87,6 +90,7 @@ def new_search_scratch(table: Table, n_cones: int) -> SearchScratch:
         np.zeros(n_legs, np.int64),
         np.full(1, NEAR),
         half_angles,
+        new_link_limits(links),
     )
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Records
+from ..clearance.link_limits import LinkLimits
 from ..closure.loops import PoseObjective
 
 STRETCHED = 1e-4
@@ -66,6 +67,7 @@ class MultistartPlan(NamedTuple):
     q: Floats
     sides: Floats
     along: Along
+    links: LinkLimits
 
 
 class PoseSolutions(NamedTuple):

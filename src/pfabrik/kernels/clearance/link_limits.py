@@ -1,0 +1,98 @@
+"""The clearance of pairs of links as limits of a search: their excess, and what changes it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from .._jit import allocator, routine
+from ..vectors import Vec, dot, norm, put, scale, sub, vec
+from .least_clearance import clearance_of, middle_of, reach_of
+from .solids import CAPSULE, KIND, WIDTH, clamp
+
+
+class LinkLimits(NamedTuple):
+    """Links that are to be kept apart, and where they are.
+
+    A link moves with a body. Both ends of the axis of a capsule may move with bodies of their own, as those of a strut.
+    """
+
+    sizes: Floats  # (s, WIDTH) [L], as in `solids`
+    home: Floats  # (s, 4, 3): places at home [L]
+    bodies: Ints  # (s, 2): the body of each end, numbered by the engine
+    pairs: Ints  # (k, 2): two links each
+    least: Floats  # (1,): the clearance [L]
+    places: Floats  # (s, 4, 3): places [L]
+    moved: Floats  # (4, 3): space for the place of a link
+    points: Floats  # (2, 3): nearest points of the pair that was measured last [L]
+    pulls: Floats  # (4, 6): points at the ends of this pair's links, and forces there, as of `put_pulls`
+
+
+@allocator
+def new_link_limits(limits: LinkLimits) -> LinkLimits:
+    """The same links, with memory of its own for their places."""
+    places, moved, points, pulls = np.zeros(limits.home.shape), np.zeros((4, 3)), np.zeros((2, 3)), np.zeros((4, 6))
+    return LinkLimits(
+        limits.sizes, limits.home, limits.bodies, limits.pairs, limits.least, places, moved, points, pulls
+    )
+
+
+NO_LINKS = LinkLimits(
+    np.zeros((0, WIDTH)),
+    np.zeros((0, 4, 3)),
+    np.zeros((0, 2), np.int64),
+    np.zeros((0, 2), np.int64),
+    np.zeros(1),
+    np.zeros((0, 4, 3)),
+    np.zeros((4, 3)),
+    np.zeros((2, 3)),
+    np.zeros((4, 6)),
+)
+"""Nothing to be kept apart."""
+
+
+@routine
+def pair_excess(links: LinkLimits, pair: int, near: float) -> float:
+    """By how much two links are nearer than the clearance, negative where they are farther; fills `links.points`.
+
+    Pairs that are surely farther than `near` beyond it are not measured: minus infinity.
+    """
+    i, j = links.pairs[pair, 0], links.pairs[pair, 1]
+    sizes, other, place, other_place = links.sizes[i], links.sizes[j], links.places[i], links.places[j]
+    between = norm(sub(middle_of(sizes, place), middle_of(other, other_place)))
+    if links.least[0] + near <= between - reach_of(sizes, place) - reach_of(other, other_place):
+        return -math.inf
+    return links.least[0] - clearance_of(sizes, place, other, other_place, links.moved, links.points)
+
+
+@routine
+def put_pulls(links: LinkLimits, pair: int, excess: float, factor: float) -> None:
+    """Fill `links.pulls` with forces whose power is a factor times the rate of the excess of the pair measured last.
+
+    With n from the first of the nearest points to the second and v their velocities, the distance grows by
+    n . (v2 - v1). A link between two bodies has a force at each end, as a lever has; one on a single body has one, at
+    its nearest point.
+    """
+    distance = links.least[0] - excess
+    n = scale(1.0 / distance if distance != 0.0 else 0.0, sub(vec(links.points[1]), vec(links.points[0])))
+    for end in range(2):
+        link, x, force = links.pairs[pair, end], vec(links.points[end]), scale(factor if end == 0 else -factor, n)
+        share, pulls = share_of_end(links, link, x), links.pulls[2 * end : 2 * end + 2]
+        put(pulls[0], vec(links.places[link, 0]) if links.bodies[link, 0] != links.bodies[link, 1] else x)
+        put(pulls[1], vec(links.places[link, 1]))
+        put(pulls[0, 3:], scale(1.0 - share, force))
+        put(pulls[1, 3:], scale(share, force))
+
+
+@routine
+def share_of_end(links: LinkLimits, link: int, x: Vec) -> float:
+    """How far along the axis of a capsule a point beside it is, from 0 to 1; 0 for links that move with one body."""
+    if links.bodies[link, 0] == links.bodies[link, 1] or links.sizes[link, KIND] != CAPSULE:
+        return 0.0
+    start = vec(links.places[link, 0])
+    axis = sub(vec(links.places[link, 1]), start)
+    square = dot(axis, axis)
+    return clamp(dot(sub(x, start), axis) / square, 0.0, 1.0) if square > 0.0 else 0.0
