@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .apart.apart_engine import ApartEngine
 from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .closure.closure_engine import ClosureEngine
@@ -35,11 +36,19 @@ def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Inverse
 
 @derived
 def _engine(model: Model) -> Engine:
+    usual = _usual(model)
+    return usual if model.mechanism.clearance is None else ApartEngine(model, usual, usual)
+
+
+@derived
+def _usual(model: Model) -> Engine:
+    """The engine that knows nothing of links."""
     if model.has_legs:
         return LegsEngine(model)
     return ChainEngine(model) if is_chain(model) else ClosureEngine(model)
 
 
 @derived
-def _reaching(model: Model) -> ReachingEngine:
-    return ReachingEngine(model, _engine(model))
+def _reaching(model: Model) -> InverseEngine:
+    passes = ReachingEngine(model, _usual(model))
+    return passes if model.mechanism.clearance is None else ApartEngine(model, _usual(model), passes)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, Mask
 from ..description.links import Links, links_of
 from ..kernels.threads import in_blocks
+from ..tolerances import TOLERANCES
 from .placed_links import PlacedLinks
 
 ROWS_A_BLOCK = 4096
@@ -34,6 +35,13 @@ def least_distances(placed: PlacedLinks, nearest: Ints | None = None) -> tuple[F
         _measure_solids(links.pairs, first, placed, distances, which, points)
     distances[which < 0] = np.nan
     return distances, which, points
+
+
+def keeps_clearance(placed: PlacedLinks) -> Mask:
+    """True for configurations whose links are nowhere nearer than the clearance, (n,); and for INVALID rows."""
+    mechanism = placed.mechanism
+    least = (mechanism.clearance or 0.0) - TOLERANCES.limit * mechanism.characteristic_length
+    return np.asarray(~(least_distances(placed)[0] < least))
 
 
 def pair_distances(placed: PlacedLinks) -> Floats:

@@ -109,6 +109,8 @@ def _measured(solution: Solution, nearest: Ints | None = None) -> tuple[Floats, 
 
 def placed_links(solution: Solution) -> PlacedLinks:
     """The links of a solution."""
-    names = {name for ends in links_of(solution.mechanism).joints for name in ends}
-    centres = {name: solution.points[name].reshape(-1, 3) for name in names}
+
+    def centres() -> dict[str, Floats]:
+        return {name: points.reshape(-1, 3) for name, points in solution.points.items()}
+
     return PlacedLinks(solution.mechanism, solution._configurations, centres)

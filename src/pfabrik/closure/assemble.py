@@ -83,6 +83,14 @@ def assemble(closure: Closure, coordinates: Floats, values: Floats, *, has_start
     return best
 
 
+def nearest_values(closure: Closure, coordinates: Floats, values: Floats, *, has_start: bool) -> Closing:
+    """Configurations at the feasible values nearest to (n, n_a) that searches find; arguments as of `assemble`."""
+    poses = platform_poses(closure.mechanism, coordinates)
+    best = _locked(closure, coordinates, poses, values)
+    _project(closure, best, np.arange(len(values)), (coordinates, poses), values, has_start)
+    return best
+
+
 def _assemble_elsewhere(closure: Closure, best: Closing, rows: NDArray[np.intp], poses: Floats, values: Floats) -> None:
     """Assemble rows from home, or from random starts, nearest to their poses (n, 4, 4), and leave rows that fail."""
     home = np.zeros_like(best.coordinates[rows]), np.repeat(closure.mechanism.home_pose[None], len(rows), axis=0)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..batch import put
@@ -17,7 +18,7 @@ from ..motion.limited_coordinates import within_turns
 from ..options import Options
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
-from .assemble import assemble, forward_answers
+from .assemble import assemble, forward_answers, nearest_values
 from .attempts import Attempt, descents
 from .close import HELD, Closing, close, measure_configurations, platform_poses
 from .configurations import (
@@ -54,6 +55,27 @@ class ClosureEngine(Engine):
         begin = begin[is_valid] if len(begin) > 1 else np.repeat(begin, is_valid.sum(), axis=0)
         exact, has_start = made_exact(targets[is_valid]), start is not None
         return _answer(self.model, exact, begin, options, keep_mode, has_start).scatter(is_valid)
+
+    def nearest(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool = False,
+    ) -> Configurations:
+        """The nearest feasible configurations to targets (n, 4, 4) that searches find, one start for all or for each.
+
+        With `nearby` they stay around their starts; so they do with `keep_mode`.
+        """
+        begin, exact = coordinates_for(self.model, start, len(targets)), made_exact(targets)
+        closing = measure_configurations(self.model, begin)
+        holds = np.full(len(targets), HOLD_NOTHING)
+        every = np.arange(len(targets))
+        seeds, has_start = not (keep_mode or nearby), start is not None
+        _project(self.model, closing, holds, every, exact, [begin], options, seeds=seeds, has_start=has_start)
+        return to_answers(self.model, closing, exact, holds, options)
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -148,6 +170,12 @@ class ClosureEngine(Engine):
         closing = assemble(closure, coordinates, values, has_start=start is not None)
         return forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
 
+    def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
+        closure, coordinates = self.model.closure, coordinates_for(self.model, start, len(values))
+        closing = nearest_values(closure, coordinates, values, has_start=start is not None)
+        return forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
+
 
 def start_coordinates(model: Model, start: Configurations | None) -> Floats:
     """Joint coordinates of the start, (n, columns) or (1, columns).
@@ -176,13 +204,30 @@ def _answer(
     if len(unsolved):
         stays = keep_mode or follows_task(closure)
         starts = [start[unsolved]] if stays else [start[unsolved], closing.coordinates[unsolved]]
-        clipped = clip_targets(mechanism, targets[unsolved])
-        projections = projection_modes(closure, options.hold, options.rotation_length)
-        projected = project(closure, clipped, starts, projections, seeds=not keep_mode, has_start=has_start)
-        errors = model.task.errors(projected.closing.poses, targets[unsolved])
-        holds[unsolved] = held_parts(closure, projected.holds, *errors)
-        put(closing, unsolved, projected.closing)
+        _project(model, closing, holds, unsolved, targets, starts, options, seeds=not keep_mode, has_start=has_start)
     return to_answers(model, closing, targets, holds, options)
+
+
+def _project(
+    model: Model,
+    closing: Closing,
+    holds: Ints,
+    rows: NDArray[np.intp],
+    targets: Floats,
+    starts: Sequence[Floats],
+    options: Options,
+    *,
+    seeds: bool,
+    has_start: bool,
+) -> None:
+    """Write the projections of some rows, and what they hold, from several starts each; as of `project`."""
+    closure = model.path_closure
+    projections = projection_modes(closure, options.hold, options.rotation_length)
+    clipped = clip_targets(model.mechanism, targets[rows])
+    projected = project(closure, clipped, starts, projections, seeds=seeds, has_start=has_start)
+    errors = model.task.errors(projected.closing.poses, targets[rows])
+    holds[rows] = held_parts(closure, projected.holds, *errors)
+    put(closing, rows, projected.closing)
 
 
 def to_answers(model: Model, closing: Closing, targets: Floats, holds: Ints, options: Options) -> Configurations:

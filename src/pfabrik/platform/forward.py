@@ -78,6 +78,20 @@ def forward_kinematics(
     return rows, solution.q, solution.sides
 
 
+def project_values(
+    model: Model, values: Floats, start: Configurations | None, sides: Floats, tolerance: float
+) -> tuple[Rows, Floats, Floats]:
+    """The feasible configurations whose actuators are nearest to values (n, n_a); the rest as `forward_kinematics`."""
+    starts = home_start(model) if start is None else starts_at(model, start.rows.poses, sides)
+    rows, (wanted_values, *outputs) = _assembled_from(model, values, starts)
+    solution, every = Starts(rows.poses, *outputs), np.arange(len(values))
+    rows.status[:] = PENDING
+    _project(model, wanted_values, starts, every, rows, solution, anywhere=start is None)
+    is_near = (rows.status == PROJECTED) & (rows.measures[:, ACTUATOR_ERROR] <= tolerance)
+    rows.status[is_near] = REACHED
+    return rows, solution.q, solution.sides
+
+
 @derived
 def _starts_elsewhere(model: Model) -> Starts:
     """Home, then the seeds."""

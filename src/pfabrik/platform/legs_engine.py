@@ -27,13 +27,13 @@ from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, answer_coordinates, sides_at, start_coordinates_of
 from .coordinates import joint_coordinates
-from .forward import forward_kinematics
+from .forward import forward_kinematics, project_values
 from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, turns_repeatedly
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
-from .unreached import Request, Unreached, answer_unreached
+from .unreached import Request, Unreached, answer_unreached, project
 
 
 class LegsEngine(Engine):
@@ -122,6 +122,36 @@ class LegsEngine(Engine):
             if q_proximal is not None:
                 q_proximal[unsolved] = np.nan
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
+
+    def nearest(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool = False,
+    ) -> Configurations:
+        """The nearest feasible configurations to targets (n, 4, 4) that searches find, one start for all or for each.
+
+        With `nearby` they stay around their starts, with `keep_mode` in the working modes of these.
+        """
+        start_sides, rows = self._sides_of(start), new_rows(self._model, len(targets))
+        sides = np.repeat(start_sides, len(targets) // len(start_sides), axis=0)
+        start_poses = self._single.home if start is None else start.rows.poses
+        request = Request(self._model, options, keep_mode, nearby, start is not None)
+        unreached = Unreached(targets, start_poses, sides, np.full_like(sides, np.nan), rows)
+        project(request, unreached)
+        if start is not None:
+            count_turns(self._model, start.rows.actuators, rows)
+        unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
+        if len(unsolved):
+            begin = start if start is None or len(start) == 1 else start.at(unsolved)
+            fallback = self._joint_space.nearest(targets[unsolved], begin, options, keep_mode=keep_mode, nearby=nearby)
+            if len(unsolved) == len(targets):
+                return fallback
+            put(rows, unsolved, fallback.rows)
+        return self._answers(rows, unreached.sides, unreached.q_proximal, start, start_sides, unsolved, fallback)
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -287,6 +317,17 @@ class LegsEngine(Engine):
         if len(unsolved):
             block_start = start if start is None or len(start) == 1 else start.at(unsolved)
             fallback = self._joint_space.forward(values[unsolved], block_start, tolerance)
+            put(rows, unsolved, fallback.rows)
+        return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
+
+    def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
+        start_sides = self._sides_of(start)
+        rows, q_proximal, sides = project_values(self._model, values, start, start_sides, tolerance)
+        unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
+        if len(unsolved):
+            begin = start if start is None or len(start) == 1 else start.at(unsolved)
+            fallback = self._joint_space.nearest_forward(values[unsolved], begin, tolerance)
             put(rows, unsolved, fallback.rows)
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 

@@ -170,6 +170,17 @@ def _project(request: Request, unreached: Unreached) -> None:
     From a pose within `NEARLY` of its target, and from every pose where the task leaves some of it open, legs then try
     to reach the target exactly. A row within `NEARLY` that stays unreached, and has no certificate, is UNSURE.
     """
+    distances, rows, legs = project(request, unreached), unreached.rows, request.model.legs
+    is_near = distances <= NEARLY
+    if np.count_nonzero(is_near):
+        is_near &= ~(rows.certain & (rows.status == PROJECTED))
+        rows.status[is_near] = UNSURE
+    handle = (local_table if request.nearby else table_handle)(legs)
+    unreached.answer(distances < np.inf if legs.is_partial else is_near, partial(_reach_exactly, handle))
+
+
+def project(request: Request, unreached: Unreached) -> Floats:
+    """Answer rows by the nearest feasible poses alone; their distances (n,) [L], infinite where none is found."""
     model, options, keep_mode, nearby, has_start = request
     targets, start_poses, sides, q_proximal, rows = unreached
     n, starts = len(targets), starts_at(model, start_poses, sides[: len(start_poses)])
@@ -178,16 +189,10 @@ def _project(request: Request, unreached: Unreached) -> None:
     n_unsolved = nearest_poses(
         model, options, targets, starts, solution, seeds=not nearby, keep_mode=keep_mode, has_start=has_start
     )
-    if n_unsolved == n:
-        return
-    solved = slice(None) if n_unsolved == 0 else solution.distances < np.inf
-    sides[solved], q_proximal[solved] = solution.sides[solved], solution.q[solved]
-    is_near = solution.distances <= NEARLY
-    if np.count_nonzero(is_near):
-        is_near &= ~(rows.certain & (rows.status == PROJECTED))
-        rows.status[is_near] = UNSURE
-    legs = (local_table if nearby else table_handle)(model.legs)
-    unreached.answer(solution.distances < np.inf if model.legs.is_partial else is_near, partial(_reach_exactly, legs))
+    if n_unsolved < n:
+        solved = slice(None) if n_unsolved == 0 else solution.distances < np.inf
+        sides[solved], q_proximal[solved] = solution.sides[solved], solution.q[solved]
+    return solution.distances
 
 
 def _reach_exactly(legs: TableHandle, unreached: Unreached) -> None:

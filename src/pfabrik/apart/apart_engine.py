@@ -1,0 +1,186 @@
+"""The engine of machines with a clearance: answers of another engine, with links kept apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..closure.attempts import Attempt
+from ..closure.close import Closing
+from ..closure.closure_engine import ClosureEngine
+from ..closure.configurations import Configurations, steps_of
+from ..closure.engine_contract import Engine, InverseEngine
+from ..closure.projection import ProjectionMode
+from ..kernels.rows import FAILED, ITERATIONS, POSITION_ERROR, REACHED, ROTATION_ERROR
+from ..model import Model
+from ..options import Options
+from ..platform.answers import LegAnswers
+from ..platform.kept_links import keeps_links
+from ..platform.legs_engine import LegsEngine
+from ..poses import are_poses
+from ..tolerances import TOLERANCES
+from .link_distances import keeps_clearance
+from .placed_links import PlacedLinks
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class ApartEngine(Engine):
+    """Answers of an engine where they keep links apart, and of searches that keep them apart where they do not.
+
+    A nearest pose that keeps links apart without being made to is the nearest of those that do. So searches are made
+    for the other answers only.
+
+    Attributes
+    ----------
+    usual : the engine that knows nothing of links.
+    inverse : the engine that answers targets; the same, or that of the passes.
+    """
+
+    model: Model
+    usual: Engine
+    inverse: InverseEngine
+
+    @cached_property
+    def _search(self) -> LegsEngine | ClosureEngine:
+        """The engine whose searches keep links apart."""
+        if isinstance(self.usual, LegsEngine) and keeps_links(self.model):
+            return self.usual
+        return ClosureEngine(self.model)
+
+    def answer(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool = False,
+    ) -> Configurations:
+        """As `InverseEngine.answer`; with `nearby`, searches stay around the start."""
+        answers = self.inverse.answer(targets, start, options, keep_mode=keep_mode)
+        rows = self._too_near(answers)
+        if not len(rows):
+            return answers
+        begin, targets = _starts_of(start, rows), np.require(targets[rows], requirements=["C", "W"])
+        found = self._search.nearest(targets, begin, options, keep_mode=keep_mode, nearby=nearby)
+        if not keep_mode:
+            beside = self._search.nearest(targets, answers.at(rows), options, keep_mode=False, nearby=True)
+            found = _nearer(found, beside, self._distances(found, options) - self._distances(beside, options))
+        return _replaced(answers, rows, self._checked(found))
+
+    def follow(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        on_progress: Callable[[int, int], None] | None,
+    ) -> Configurations:
+        """As `InverseEngine.follow`. After a step whose links would be too near, ever more steps are taken at once."""
+        is_pose = are_poses(targets)
+        reports = steps_of(is_pose, on_progress)
+        targets = np.require(targets[is_pose], requirements=["C", "W"])
+        parts, done, count = list[Configurations](), 0, len(targets)
+        while done < len(targets):
+            answers = self.inverse.follow(targets[done : done + count], start, options, None)
+            rows = self._too_near(answers)
+            n_clear, count = (int(rows[0]), 1) if len(rows) else (len(answers), 2 * count)
+            if n_clear:
+                parts.append(answers if not len(rows) else answers.at(np.arange(n_clear)))
+            if len(rows):
+                before = parts[-1].at(np.array([len(parts[-1]) - 1])) if parts else start
+                target = targets[done + n_clear : done + n_clear + 1]
+                parts.append(self.answer(target, before, options, keep_mode=True, nearby=True))
+            start = parts[-1].at(np.array([len(parts[-1]) - 1]))
+            for _ in range(n_clear + min(len(rows), 1)):
+                done += 1
+                next(reports)
+        list(reports)
+        return _joined(parts, self.inverse.follow(targets[:0], start, options, None)).scatter(is_pose)
+
+    def attempts(
+        self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Iterator[Attempt]:
+        """As `InverseEngine.attempts`; last the searches that keep links apart, where they are needed."""
+        yield from self.inverse.attempts(target, start, options, keep_mode=keep_mode)
+        if len(self._too_near(self.inverse.answer(target, start, options, keep_mode=keep_mode))):
+            answer = self.answer(target, start, options, keep_mode=keep_mode)
+            distance = float(self._distances(answer, options)[0])
+            ending = "reached" if answer.rows.status[0] == REACHED else "nearest"
+            yield Attempt("links kept apart", "the start", int(answer.rows.counters[0, ITERATIONS]), distance, ending)
+
+    def advance(self, targets: Floats, start: Configurations) -> Configurations:
+        """As `Engine.advance`; FAILED where links would be too near."""
+        return self._checked(self.usual.advance(targets, start))
+
+    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """As `Engine.forward`."""
+        answers = self.usual.forward(values, start, tolerance)
+        rows = self._too_near(answers)
+        if not len(rows):
+            return answers
+        found = self._search.nearest_forward(values[rows], _starts_of(start, rows), tolerance)
+        return _replaced(answers, rows, self._checked(found))
+
+    def as_configurations(self, closing: Closing) -> Configurations:
+        """As `Engine.as_configurations`."""
+        return self.usual.as_configurations(closing)
+
+    def points(self, configurations: Configurations) -> Mapping[str, Floats]:
+        """As `Engine.points`."""
+        return self.usual.points(configurations)
+
+    def limit_multipliers(self, configurations: Configurations, targets: Floats, projection: ProjectionMode) -> Floats:
+        """As `Engine.limit_multipliers`; behind the cones are those of pairs of links."""
+        return self._search.limit_multipliers(configurations, targets, projection)
+
+    def _too_near(self, answers: Configurations) -> Rows:
+        """The rows whose links are nearer than the clearance."""
+        placed = PlacedLinks(self.model.mechanism, answers, lambda: self.usual.points(answers))
+        return np.flatnonzero(~keeps_clearance(placed))
+
+    def _checked(self, answers: Configurations) -> Configurations:
+        """The same answers, marked FAILED where links are too near."""
+        answers.rows.status[self._too_near(answers)] = FAILED
+        return answers
+
+    def _distances(self, answers: Configurations, options: Options) -> Floats:
+        """Distances of answers from their targets, (n,) [length]; infinite where there is none."""
+        lever = options.rotation_length or self.model.mechanism.rotation_length
+        measures = answers.rows.measures
+        distances = np.hypot(measures[:, POSITION_ERROR], lever * measures[:, ROTATION_ERROR])
+        distances[answers.rows.status >= FAILED] = np.inf
+        distances[self._too_near(answers)] = np.inf
+        return distances
+
+
+def _starts_of(start: Configurations | None, rows: Rows) -> Configurations | None:
+    return start if start is None or len(start) == 1 else start.at(rows)
+
+
+def _replaced(answers: Configurations, rows: Rows, others: Configurations) -> Configurations:
+    """Answers with others in some rows."""
+    if len(rows) == len(answers):
+        return others
+    return answers.with_others(rows, others) if isinstance(answers, LegAnswers) else answers.with_rows(rows, others)
+
+
+def _nearer(found: Configurations, others: Configurations, farther: Floats) -> Configurations:
+    """Answers, with others where these are nearer, by how much more than rounding."""
+    with np.errstate(invalid="ignore"):
+        rows = np.flatnonzero(farther > TOLERANCES.position)
+    return _replaced(found, rows, others.at(rows)) if len(rows) else found
+
+
+def _joined(parts: list[Configurations], none: Configurations) -> Configurations:
+    """Answers one after the other."""
+    if len(parts) < 2:
+        return parts[0] if parts else none
+    rows = type(none.rows)._make(np.concatenate(arrays) for arrays in zip(*(part.rows for part in parts), strict=True))
+    return Configurations(rows, np.concatenate([part.coordinates for part in parts]))
