@@ -34,6 +34,6 @@ def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
     deviations, shape = joint_vectors(mechanism, q, "q")
     closing = measure_configurations(model_of(mechanism), deviations)
     configurations = engine_of(mechanism).as_configurations(closing)
-    within = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
+    within = np.where(configurations.is_within_limits, Status.REACHED, Status.EXCEEDED)
     configurations.rows.status[:] = np.where(closing.gap <= CLOSED, within, Status.FAILED)
     return Solution(mechanism, configurations, shape)

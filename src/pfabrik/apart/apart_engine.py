@@ -16,15 +16,15 @@ from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, steps_of
 from ..closure.engine_contract import Engine, InverseEngine
 from ..closure.projection import ProjectionMode
-from ..kernels.rows import FAILED, ITERATIONS, POSITION_ERROR, REACHED, ROTATION_ERROR
+from ..kernels.rows import FAILED, ITERATIONS, LIMIT_EXCESS, POSITION_ERROR, REACHED, ROTATION_ERROR
 from ..model import Model
 from ..options import Options
 from ..platform.answers import LegAnswers
-from ..platform.kept_links import keeps_links
 from ..platform.legs_engine import LegsEngine
+from ..platform.links_of_legs import keeps_links
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
-from .link_distances import keeps_clearance
+from .link_distances import clearance_excess
 from .placed_links import PlacedLinks
 
 Rows = NDArray[np.intp]
@@ -129,8 +129,11 @@ class ApartEngine(Engine):
         return _replaced(answers, rows, self._checked(found))
 
     def as_configurations(self, closing: Closing) -> Configurations:
-        """As `Engine.as_configurations`."""
-        return self.usual.as_configurations(closing)
+        """As `Engine.as_configurations`; links that are too near count as limits that are exceeded."""
+        configurations = self.usual.as_configurations(closing)
+        measures, excess = configurations.rows.measures, clearance_excess(self._placed(configurations))
+        measures[:, LIMIT_EXCESS] = np.fmax(measures[:, LIMIT_EXCESS], excess)
+        return configurations
 
     def points(self, configurations: Configurations) -> Mapping[str, Floats]:
         """As `Engine.points`."""
@@ -142,8 +145,10 @@ class ApartEngine(Engine):
 
     def _too_near(self, answers: Configurations) -> Rows:
         """The rows whose links are nearer than the clearance."""
-        placed = PlacedLinks(self.model.mechanism, answers, lambda: self.usual.points(answers))
-        return np.flatnonzero(~keeps_clearance(placed))
+        return np.flatnonzero(clearance_excess(self._placed(answers)) > TOLERANCES.limit)
+
+    def _placed(self, configurations: Configurations) -> PlacedLinks:
+        return PlacedLinks(self.model.mechanism, configurations, lambda: self.usual.points(configurations))
 
     def _checked(self, answers: Configurations) -> Configurations:
         """The same answers, marked FAILED where links are too near."""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Mask
+from ..arrays import Floats, Ints
 from ..description.links import Links, links_of
+from ..kernels.clearance.link_records import PLATFORM
 from ..kernels.threads import in_blocks
-from ..tolerances import TOLERANCES
-from .placed_links import PlacedLinks
+from .placed_links import PlacedLinks, bodies_of_links
 
 ROWS_A_BLOCK = 4096
 """Rows of one call of a kernel, and of the tables of places that it takes."""
+
+ROWS_A_RUN = 1024
+"""Rows of one call of the kernel of capsules: their ends stay in the cache."""
 
 
 def least_distances(placed: PlacedLinks, nearest: Ints | None = None) -> tuple[Floats, Ints, Floats]:
@@ -28,7 +31,7 @@ def least_distances(placed: PlacedLinks, nearest: Ints | None = None) -> tuple[F
     n = len(placed)
     distances, pairs, points = np.full(n, np.inf), np.full(n, -1.0), np.full((n, 2, 3), np.nan)
     if nearest is None:
-        _measure_capsules(links, placed.ends(), distances, pairs)
+        _measure_capsules(links, placed, distances, pairs)
     which = pairs.astype(np.int64) if nearest is None else nearest.copy()
     if nearest is not None or links.n_capsules < len(links.pairs):
         first = len(links.pairs) if nearest is not None else links.n_capsules
@@ -37,11 +40,11 @@ def least_distances(placed: PlacedLinks, nearest: Ints | None = None) -> tuple[F
     return distances, which, points
 
 
-def keeps_clearance(placed: PlacedLinks) -> Mask:
-    """True for configurations whose links are nowhere nearer than the clearance, (n,); and for INVALID rows."""
+def clearance_excess(placed: PlacedLinks) -> Floats:
+    """By how much links are nearer than the clearance, (n,) [L]; negative where they are farther, NaN if INVALID."""
     mechanism = placed.mechanism
-    least = (mechanism.clearance or 0.0) - TOLERANCES.limit * mechanism.characteristic_length
-    return np.asarray(~(least_distances(placed)[0] < least))
+    excess: Floats = ((mechanism.clearance or 0.0) - least_distances(placed)[0]) / mechanism.characteristic_length
+    return excess
 
 
 def pair_distances(placed: PlacedLinks) -> Floats:
@@ -72,13 +75,17 @@ def _measure_solids(
     in_blocks(run, len(distances), ROWS_A_BLOCK)
 
 
-def _measure_capsules(links: Links, ends: Floats, distances: Floats, pairs: Floats) -> None:
-    """Lower distances (n,) by those of all pairs of capsules, whose ends are (s, 6, n)."""
+def _measure_capsules(links: Links, placed: PlacedLinks, distances: Floats, pairs: Floats) -> None:
+    """Lower distances (n,) by those of all pairs of capsules."""
     from ..kernels.clearance.capsules import capsule_clearance
 
+    mechanism, poses = placed.mechanism, placed.configurations.rows.poses
+    bodies, home = bodies_of_links(mechanism), np.ascontiguousarray(links.places[:, :2])
+    home[bodies == PLATFORM] -= mechanism.home_pose[:3, 3]
     rounds, capsules = links.sizes[:, 1].copy(), links.pairs[: links.n_capsules]
 
     def run(block: slice) -> None:
-        capsule_clearance(rounds, np.ascontiguousarray(ends[:, :, block]), capsules, distances[block], pairs[block])
+        ends = placed.ends(block)
+        capsule_clearance(rounds, home, bodies, poses[block], ends, capsules, distances[block], pairs[block])
 
-    in_blocks(run, len(distances), ROWS_A_BLOCK)
+    in_blocks(run, len(distances), ROWS_A_RUN)

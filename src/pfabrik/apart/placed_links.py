@@ -8,10 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..closure.configurations import Configurations
+from ..derived import derived
 from ..description.links import links_of
 from ..description.mechanism import Mechanism
+from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..motion.displacements import centres, displacements
 
 
@@ -23,7 +25,7 @@ class PlacedLinks:
     ----------
     configurations : with the poses of the platform; joint coordinates are read where links on inner bodies need them.
     centres_of : a function that gives the centres of joints by name, (n, 3) [length]: called where links run between
-        joints that are neither on the base nor on the platform.
+        joints, of which some are neither on the base nor on the platform.
     """
 
     mechanism: Mechanism
@@ -33,17 +35,18 @@ class PlacedLinks:
     def __len__(self) -> int:
         return len(self.configurations)
 
-    def ends(self) -> Floats:
-        """Ends of the axes of all capsules, (shapes, 6, n) [length]; other shapes are left out."""
-        links = links_of(self.mechanism)
-        ends = np.zeros((len(links.sizes), 6, len(self)))
-        moves = self._displacements(slice(None))
+    def ends(self, rows: slice) -> Floats:
+        """Ends of the axes of capsules on inner bodies, (shapes, 6, n) [length]; the rest is not filled."""
+        links, bodies = links_of(self.mechanism), bodies_of_links(self.mechanism)
+        ends = np.empty((len(links.sizes), 6, len(self.configurations.rows.status[rows])))
         for k, joints in enumerate(links.joints):
+            if bodies[k].max() < 0 or links.sizes[k, 0] != 0.0:
+                continue
             if joints:
                 for at, name in ((0, joints[0]), (3, joints[1])):
-                    ends[k, at : at + 3] = self._centres[name]
-            elif links.sizes[k, 0] == 0.0:
-                ends[k] = _moved(moves[k], links.places[k, :2]).reshape(-1, 6).T
+                    ends[k, at : at + 3] = self._centres[name][rows].T
+            else:
+                ends[k] = _moved(self._moves[k][rows], links.places[k, :2]).reshape(-1, 6).T
         return ends
 
     def places(self, rows: slice) -> Floats:
@@ -52,7 +55,7 @@ class PlacedLinks:
         places = np.zeros((len(self.configurations.rows.status[rows]), len(links.sizes), 4, 3))
         for k, joints in enumerate(links.joints):
             for at, name in enumerate(joints):
-                places[:, k, at] = self._centres[name].T[rows]
+                places[:, k, at] = self._centres[name][rows]
             if not joints:
                 n_points = 2 if links.sizes[k, 0] == 0.0 else 1
                 places[:, k, :n_points] = _moved(moves[k], links.places[k, :n_points])
@@ -60,22 +63,14 @@ class PlacedLinks:
         return places
 
     @cached_property
-    def _centres(self) -> dict[str, Floats]:
-        """The centres of the joints that links run between, (3, n) [length], or (3, 1) for those on the base."""
-        mechanism = self.mechanism
-        names = list(dict.fromkeys(name for joints in links_of(mechanism).joints for name in joints))
-        on_base = [name for name in names if mechanism.base in mechanism.joint(name).connects]
-        on_platform = [name for name in names if mechanism.end_effector in mechanism.joint(name).connects]
-        found = {name: np.array(mechanism.joint(name).at)[:, None] for name in on_base}
-        if on_platform and not mechanism.end_effector_is_joint:
-            offsets = np.array([mechanism.joint(name).at for name in on_platform]) - mechanism.home_pose[:3, 3]
-            points = np.concatenate([offsets, np.ones((len(offsets), 1))], axis=1)
-            poses = self.configurations.rows.poses[:, :3]
-            moved = (poses.reshape(-1, 4) @ points.T).reshape(len(poses), 3, -1)
-            found |= {name: moved[:, :, k].T for k, name in enumerate(on_platform)}
-        if len(found) < len(names):
-            found = {name: centre.T for name, centre in self.centres_of().items() if name in names} | found
-        return found
+    def _centres(self) -> Mapping[str, Floats]:
+        """The centres of joints, (n, 3) [length]."""
+        return self.centres_of()
+
+    @cached_property
+    def _moves(self) -> list[Floats]:
+        """Displacements of all rows, as of `_displacements`."""
+        return self._displacements(slice(None))
 
     def _displacements(self, rows: slice) -> list[Floats]:
         """Displacements (n, 4, 4) of the body of every shape that does not run between two joints; others have none.
@@ -94,6 +89,19 @@ class PlacedLinks:
             known = displacements(mechanism, self.configurations.coordinates[rows]) | known
         none = np.empty((0, 4, 4))
         return [none if ends else known[shape.body] for shape, ends in zip(mechanism.shapes, joints, strict=True)]
+
+
+@derived
+def bodies_of_links(mechanism: Mechanism) -> Ints:
+    """The bodies that both ends of every link are on, (shapes, 2): BASE, PLATFORM, or 0 for any other."""
+    numbers = {mechanism.base: BASE}
+    if not mechanism.end_effector_is_joint:
+        numbers[mechanism.end_effector] = PLATFORM
+    found = []
+    for shape, joints in zip(mechanism.shapes, links_of(mechanism).joints, strict=True):
+        ends = [mechanism.joint(name).connects for name in joints] or [(shape.body, shape.body)] * 2
+        found.append([min(numbers.get(body, 0) for body in end) for end in ends])
+    return np.array(found, np.int64)
 
 
 def placed_at(mechanism: Mechanism, configurations: Configurations) -> PlacedLinks:

@@ -224,7 +224,7 @@ def forward_answers(
     """Set status and actuator error of configurations that answer actuated values (n, n_a); the same object."""
     error = np.abs(actuator_errors(closure, closing.coordinates, values)).max(axis=1, initial=0.0)
     configurations.rows.measures[:, ACTUATOR_ERROR] = error
-    has_values, feasible = error <= tolerance, closing.feasible
+    has_values, feasible = error <= tolerance, (closing.gap <= CLOSED) & configurations.is_within_limits
     infeasible_status = np.where((closing.gap <= TOLERANCES.position) & has_values, EXCEEDED, FAILED)
     configurations.rows.status[:] = np.where(feasible, np.where(has_values, REACHED, PROJECTED), infeasible_status)
     return configurations

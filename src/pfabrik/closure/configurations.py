@@ -14,6 +14,7 @@ from ..batch import put, take
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from ..model import Model
 from ..motion.closure import Closure
+from ..tolerances import TOLERANCES
 from .close import Closing
 
 Places: TypeAlias = NDArray[np.intp] | slice
@@ -99,6 +100,11 @@ class Configurations:
             return self.coordinates[places]
         self._taken += len(places) + ROWS_A_CALL
         return self._coordinates(places) if self._taken < len(self) else self.coordinates[places]
+
+    @property
+    def is_within_limits(self) -> Mask:
+        """True for configurations that keep every limit, by their measures, (n,)."""
+        return np.asarray(self.rows.measures[:, LIMIT_EXCESS] <= TOLERANCES.limit)
 
     def at(self, places: NDArray[np.intp]) -> Configurations:
         """The configurations at some places, copied."""

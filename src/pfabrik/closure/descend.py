@@ -17,7 +17,7 @@ from ..motion.closure import Closure
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, close, closing_of, new_closed
 from .effort import steps_within
-from .kept_links import kept_links
+from .links_on_paths import links_on_paths
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
@@ -110,7 +110,7 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
 
     closed = new_closed(closure, coordinates, np.tile(np.eye(4), (len(coordinates), 1, 1)), 0.0)
     scratch = _scratch(closure)
-    n_limits = 2 * len(closure.scale) + len(closure.loops.cone_angles) + len(kept_links(closure.mechanism)[0].pairs)
+    n_limits = 2 * len(closure.scale) + len(closure.loops.cone_angles) + len(links_on_paths(closure.mechanism)[0].pairs)
     multipliers = np.zeros((len(coordinates), n_limits))
 
     def run(block: slice) -> None:
@@ -127,7 +127,7 @@ def _run(closure: Closure, coordinates: Floats, objective: Objective) -> tuple[C
 def _scratch(closure: Closure) -> Scratch[DescentScratch]:
     from ..kernels.closure.linearise_loops import new_descent_scratch
 
-    return Scratch(new_descent_scratch, closure.loops, *kept_links(closure.mechanism))
+    return Scratch(new_descent_scratch, closure.loops, *links_on_paths(closure.mechanism))
 
 
 def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:

@@ -96,7 +96,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),
     (join, tuple(_values("I2 i1"))),
-    (capsule_clearance, tuple(_values("F1 F3 I2 f1 f1"))),
+    (capsule_clearance, tuple(_values("F1 F3 I2 F3 f3 I2 f1 f1"))),
     (least_clearance, tuple(_values("F2 F4 I2 f1 f1 i1 f3"))),
     (prove, tuple(_values("i i"))),
     (walk_path, tuple(_values("F2 F1 F2 f3 f3"))),

@@ -10,7 +10,7 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
-from ..closure.close import close
+from ..closure.close import CLOSED, close
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
 from ..errors import InvalidArgument
@@ -100,7 +100,8 @@ def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
     rows, n = configurations.rows, len(configurations)
     if mechanism.end_effector_is_joint:
         rows.poses[:, :3, :3] = target[:3, :3]
-    rows.status[:] = np.where(closing.feasible, Status.REACHED, Status.EXCEEDED)
+    is_feasible = (closing.gap <= CLOSED) & configurations.is_within_limits
+    rows.status[:] = np.where(is_feasible, Status.REACHED, Status.EXCEEDED)
     position, rotation = model_of(mechanism).task.errors(rows.poses, np.repeat(target[None], n, axis=0))
     rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = position, rotation
     return Solution(mechanism, configurations, (n,))

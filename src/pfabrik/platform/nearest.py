@@ -20,7 +20,7 @@ from ..kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, HOLD_ORIENTATION, HOLD_P
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .kept_links import kept_links
+from .links_of_legs import links_of_legs
 from .nearest_pose import NearestPose, no_starts
 from .seeds import seeds_of
 
@@ -193,7 +193,7 @@ def limit_multipliers(model: Model, targets: Floats, configurations: Starts, pro
     multipliers = _multipliers(model, projection).weigh(targets, configurations)
     columns, ranges = len(column_joints(mechanism)), len(table.limited)
     cone_joints = [joint.name for joint in mechanism.joints if joint.cone is not None]
-    n_pairs = len(kept_links(model).pairs)
+    n_pairs = len(links_of_legs(model).pairs)
     weights = np.zeros((len(targets), 2 * columns + len(cone_joints) + n_pairs))
     weights[:, weights.shape[1] - n_pairs :] = multipliers[:, multipliers.shape[1] - n_pairs :]
     for bound in (0, 1):

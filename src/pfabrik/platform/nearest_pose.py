@@ -22,7 +22,7 @@ from ..kernels.threads import in_blocks
 from ..model import Model
 from ..tolerances import TOLERANCES
 from .carriages import carriages_along, proximal_coordinates, stays_there
-from .kept_links import kept_links
+from .links_of_legs import links_of_legs
 from .rotation import keeps_rotation, n_implied_rows, without_idle_legs
 from .table import OF_POINTING, search_table
 
@@ -89,7 +89,7 @@ class NearestPose:
             setting[name] = value
         setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
         along = stays_there(table) if driven is not None else carriages_along(table)
-        self._plan = Handle(MultistartPlan(pose_weights, setting, *seeds, along, kept_links(model)))
+        self._plan = Handle(MultistartPlan(pose_weights, setting, *seeds, along, links_of_legs(model)))
         self._no_values = np.zeros((0, len(self._legs.record.driven)))
         self._pointing_search: NearestPose | None = None
         if n_cones < len(cones):

@@ -3,32 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
 from .._jit import allocator, routine
 from ..vectors import Vec, dot, norm, put, scale, sub, vec
 from .least_clearance import clearance_of, middle_of, reach_of
-from .solids import CAPSULE, KIND, WIDTH, clamp
-
-
-class LinkLimits(NamedTuple):
-    """Links that are to be kept apart, and where they are.
-
-    A link moves with a body. Both ends of the axis of a capsule may move with bodies of their own, as those of a strut.
-    """
-
-    sizes: Floats  # (s, WIDTH) [L], as in `solids`
-    home: Floats  # (s, 4, 3): places at home [L]
-    bodies: Ints  # (s, 2): the body of each end, numbered by the engine
-    pairs: Ints  # (k, 2): two links each
-    least: Floats  # (1,): the clearance [L]
-    places: Floats  # (s, 4, 3): places [L]
-    moved: Floats  # (4, 3): space for the place of a link
-    points: Floats  # (2, 3): nearest points of the pair that was measured last [L]
-    pulls: Floats  # (4, 6): points at the ends of this pair's links, and forces there, as of `put_pulls`
+from .link_records import LinkLimits
+from .solids import CAPSULE, KIND, clamp
 
 
 @allocator
@@ -38,20 +20,6 @@ def new_link_limits(limits: LinkLimits) -> LinkLimits:
     return LinkLimits(
         limits.sizes, limits.home, limits.bodies, limits.pairs, limits.least, places, moved, points, pulls
     )
-
-
-NO_LINKS = LinkLimits(
-    np.zeros((0, WIDTH)),
-    np.zeros((0, 4, 3)),
-    np.zeros((0, 2), np.int64),
-    np.zeros((0, 2), np.int64),
-    np.zeros(1),
-    np.zeros((0, 4, 3)),
-    np.zeros((4, 3)),
-    np.zeros((2, 3)),
-    np.zeros((4, 6)),
-)
-"""Nothing to be kept apart."""
 
 
 @routine

@@ -43,7 +43,7 @@ from .linearise_loops import (
 )
 from .loops import BALL, Closed, Loops, Objective
 from .path_kinematics import State, copy_state, load_row, open_loops, store_row
-from .placed_links import add_pair_slope, place_links
+from .path_links import add_pair_slope, place_links
 from .pose_objective import pose_gradient
 
 

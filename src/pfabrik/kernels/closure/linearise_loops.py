@@ -9,7 +9,8 @@ import numpy as np
 
 from ...arrays import Floats, Records
 from .._jit import opener, routine
-from ..clearance.link_limits import NO_LINKS, LinkLimits, new_link_limits, pair_excess
+from ..clearance.link_limits import new_link_limits, pair_excess
+from ..clearance.link_records import NO_LINKS, LinkLimits
 from ..free_motions import (
     Elimination,
     FreeMotions,
@@ -34,7 +35,7 @@ from .path_kinematics import (
     pose_cone,
     walk_path,
 )
-from .placed_links import add_pair_slope, place_links
+from .path_links import add_pair_slope, place_links
 from .pose_objective import PoseGradient, pose_gradient
 
 

@@ -13,8 +13,8 @@ from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
 from .equations import PlatformState, evaluate_leg, has_proximal, length_row, put_leg_slopes
+from .leg_links import add_pair_slope, place_links
 from .limits import cone_slope, coordinate_slope, dead_point_slope
-from .placed_links import add_pair_slope, place_links
 from .search import SearchScratch, copy_platform_state, move, put_objective
 from .search_records import PlatformObjective
 

@@ -11,8 +11,8 @@ from ..legs.answer import deviation
 from ..legs.records import Table
 from ..vectors import dot, vec
 from .equations import PlatformState, evaluate_legs, put_slopes
+from .leg_links import add_pair_slope, place_links
 from .limits import cone_slope, coordinate_slope, dead_point_slope
-from .placed_links import add_pair_slope, place_links
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 

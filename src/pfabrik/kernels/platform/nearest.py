@@ -9,7 +9,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import opener, routine, search
-from ..clearance.link_limits import NO_LINKS, pair_excess
+from ..clearance.link_limits import pair_excess
+from ..clearance.link_records import NO_LINKS
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import limit_multipliers
@@ -36,8 +37,8 @@ from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
+from .leg_links import place_links
 from .linearise import linearise
-from .placed_links import place_links
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
 from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along

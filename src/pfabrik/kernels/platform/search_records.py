@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Records
-from ..clearance.link_limits import LinkLimits
+from ..clearance.link_records import LinkLimits
 from ..closure.loops import PoseObjective
 
 STRETCHED = 1e-4

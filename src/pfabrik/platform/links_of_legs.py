@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..closure.kept_links import link_limits
+from ..closure.links_on_paths import link_limits
 from ..decomposition.leg_forms import Rod
 from ..derived import derived
 from ..description.graph import welded
 from ..description.links import links_of
-from ..kernels.clearance.link_limits import NO_LINKS, LinkLimits
+from ..kernels.clearance.link_records import BASE, NO_LINKS, PLATFORM, LinkLimits
 from ..kernels.legs import records as K
-from ..kernels.platform.placed_links import BASE, PLATFORM
 from ..model import Model
 
 
@@ -23,7 +22,7 @@ def keeps_links(model: Model) -> bool:
 
 
 @derived
-def kept_links(model: Model) -> LinkLimits:
+def links_of_legs(model: Model) -> LinkLimits:
     """The links of a machine of legs whose places follow from poses and proximal joints; none without a clearance."""
     bodies = None if model.mechanism.clearance is None else _bodies(model)
     return NO_LINKS if bodies is None else link_limits(model.mechanism, np.array(bodies, np.int64))
@@ -60,7 +59,7 @@ def _numbers(model: Model) -> Iterator[tuple[str, int]]:
         return
     rigid = welded([joint for joint in mechanism.joints if joint.is_rigid], mechanism.base)
     for number, (form, leg) in enumerate(zip(table.forms, table.legs, strict=True)):
-        is_on_base = leg["kind"] == K.ROD and leg["frame"] == K.FROM_BASE and not leg["reversed"]
+        is_on_base = leg["frame"] == K.FROM_BASE and not leg["reversed"]
         if isinstance(form, Rod) and form.proximal is not None and is_on_base and not form.is_shared:
             yield rigid.get(form.proximal.outward, form.proximal.outward), number
     yield rigid.get(mechanism.base, mechanism.base), BASE

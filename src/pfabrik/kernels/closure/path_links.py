@@ -1,13 +1,14 @@
 """Links of any machine: where they are, and how their distances change with the joint coordinates.
 
-Their bodies are numbered by paths that lead to them from the base; a negative number is the base.
+Their bodies are numbered by the paths that lead to them from the base.
 """
 
 from __future__ import annotations
 
 from ...arrays import Floats
 from .._jit import routine
-from ..clearance.link_limits import LinkLimits, put_pulls
+from ..clearance.link_limits import put_pulls
+from ..clearance.link_records import LinkLimits
 from ..clearance.solids import CAPSULE, KIND
 from ..vectors import Vec, add, cross, dot, put, sub, turn, vec
 from .loops import SLIDE, Loops

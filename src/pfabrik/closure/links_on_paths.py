@@ -8,17 +8,14 @@ from ..arrays import Ints
 from ..derived import derived
 from ..description.links import bodies_of_ends, links_of
 from ..description.mechanism import Mechanism
-from ..kernels.clearance.link_limits import NO_LINKS, LinkLimits
-from ..kernels.clearance.solids import CAPSULE
+from ..kernels.clearance.link_records import BASE, NO_LINKS, LinkLimits
 from ..kernels.closure import loops as K
 from ..motion.loops import ways_to
 from ..tolerances import TOLERANCES
 
-BASE = -1
-
 
 @derived
-def kept_links(mechanism: Mechanism) -> tuple[LinkLimits, K.Loops]:
+def links_on_paths(mechanism: Mechanism) -> tuple[LinkLimits, K.Loops]:
     """The links of a mechanism with a clearance, and the ways from the base to their bodies; none without."""
     if mechanism.clearance is None:
         return NO_LINKS, ways_to(mechanism, ())
@@ -32,6 +29,8 @@ def kept_links(mechanism: Mechanism) -> tuple[LinkLimits, K.Loops]:
 
 def link_limits(mechanism: Mechanism, bodies: Ints) -> LinkLimits:
     """The links of a mechanism with a clearance, in L, that move with bodies of these numbers, (s, 2)."""
+    from ..kernels.clearance.solids import CAPSULE
+
     links, length = links_of(mechanism), mechanism.characteristic_length
     sizes, places = links.sizes.copy(), links.places.copy()
     sizes[:, 1:] /= length

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from ...arrays import Floats
 from .._jit import routine
-from ..clearance.link_limits import LinkLimits, put_pulls
+from ..clearance.link_limits import put_pulls
+from ..clearance.link_records import BASE, PLATFORM, LinkLimits
 from ..clearance.solids import CAPSULE, KIND
 from ..legs.endings import turned
 from ..legs.frames import CENTRE
 from ..legs.records import COSINE, CRANK, FROM_BASE, Q_PROXIMAL, SINE, Table
 from ..vectors import Vec, add, along, cross, dot, move, put, sub, turn, vec
 from .equations import LegEvaluation
-
-BASE, PLATFORM = -2, -1
 
 
 @routine
