@@ -7,7 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .answers.start_configuration import Start, start_of
+from .apart.link_distances import least_distances, pair_names
+from .apart.links_at_poses import follow_from_poses, links_at_poses
 from .arrays import Floats, Ints, shaped
+from .closure.configurations import Configurations
 from .closure.parasitic import has_parasitic_motion
 from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable
@@ -24,6 +27,9 @@ from .targets import Target, as_targets
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of the kernel for single rows, and of the kernel for blocks."""
 
+ROWS_AT_ONCE = 4096
+"""Rows whose links are placed and measured at once: these fit into the caches of a core."""
+
 UNKNOWN = -2
 """Binding of rows that `kernels.legs.margin_blocks` leaves unsolved."""
 
@@ -36,9 +42,11 @@ class Feasibility(NamedTuple):
     margin : the least margin of all limits, (...,): as of `margins` a share of the range, 1 in its middle or on the
         axis of a cone, 0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a share of its
         length; where a leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses.
+        Where the mechanism has a clearance and no other limit is exceeded, links count too: the rest of their distance
+        as a share of L, as of `margins`.
     binding : index in `limits` of the limit that has it, (...,); -1 where there is none.
     limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's proximal joint,
-        and "closed" of its first joint.
+        and "closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
     """
 
     margin: Any
@@ -82,7 +90,7 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"])
     table = model.legs
-    start_pose, sides = mechanism.home_pose[None].copy(), table.home_sides
+    start_pose, sides, configuration = mechanism.home_pose[None].copy(), table.home_sides, None
     if start is not None:
         configuration = start_of(mechanism, start, ())
         assert configuration is not None
@@ -90,7 +98,39 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
         sides = sides_at(model, configuration)
     poses, shape = as_targets(mechanism, targets)
     margin, binding = _margins(model, poses, start_pose, sides)
-    return Feasibility(shaped(margin, shape), shaped(binding, shape), _limits(table))
+    limits = _limits(table)
+    if mechanism.clearance is not None:
+        _lower_to_clearance(model, mechanism.clearance, poses, configuration, sides, margin, binding)
+        limits += tuple((name, "clearance") for name in pair_names(mechanism))
+    return Feasibility(shaped(margin, shape), shaped(binding, shape), limits)
+
+
+def _lower_to_clearance(
+    model: Model,
+    clearance: float,
+    poses: Floats,
+    start: Configurations | None,
+    sides: Floats,
+    margin: Floats,
+    binding: Ints,
+) -> None:
+    """Lower margins (n,) that are not negative to those of the nearest links, and write their pairs into `binding`."""
+    first_pair, kept = len(_limits(model.legs)), np.flatnonzero(margin >= 0.0)
+
+    def run(block: slice) -> None:
+        rows = kept[block]
+        placed, is_reached = links_at_poses(model, poses[rows], start, sides)
+        distances, pairs, _ = least_distances(placed)
+        room = (distances - clearance) / model.length
+        room[~is_reached] = -np.inf
+        lower = room < margin[rows]
+        margin[rows[lower]], binding[rows[lower]] = room[lower], first_pair + pairs[lower]
+
+    if follow_from_poses(model):
+        in_blocks(run, len(kept), ROWS_AT_ONCE)
+        return
+    for first in range(0, len(kept), ROWS_AT_ONCE):  # one after the other: each is solved on all cores
+        run(slice(first, first + ROWS_AT_ONCE))
 
 
 def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> tuple[Floats, Ints]:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..apart.link_distances import pair_distances_at, pair_names
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..motion.displacements import rate_units
 from ..motion.limited_coordinates import coned, ranges_of
 from ..tolerances import TOLERANCES
+
+Bound: TypeAlias = Literal["min", "max", "cone", "clearance"]
+"""Which limit of a joint; or the clearance of two links."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +26,9 @@ class ActiveLimit:
 
     Attributes
     ----------
-    joint, bound : which limit of which joint.
-    value, limit : the coordinate (or the angle at the cone) and its bound [length or rad].
+    joint, bound : which limit of which joint; of a clearance the two bodies that are as near: ``BC1–BC3``.
+    value, limit : the coordinate (or the angle at the cone, or the distance of the links) and its bound [length or
+        rad].
     coordinate : which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or
         cylindrical joint.
     multiplier : the most by which the answer comes nearer to its target per unit by which the limit is relaxed [length
@@ -33,7 +38,7 @@ class ActiveLimit:
     """
 
     joint: str
-    bound: Literal["min", "max", "cone"]
+    bound: Bound
     value: float
     limit: float
     multiplier: float | None = None
@@ -45,9 +50,10 @@ ALIKE = 0.999
 
 
 def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[ActiveLimit, ...]]:
-    """The limits that each row of joint coordinates (n, columns), deviations from home, lies on; ranges first.
+    """The limits that each row of joint coordinates (n, columns), deviations from home, lies on.
 
-    A rigid joint is always at its limits, and is listed only if it exceeds them.
+    Ranges come first, then cones, then pairs of links, the nearest first. A rigid joint is always at its limits, and is
+    listed only if it exceeds them.
     """
     limits: list[list[ActiveLimit]] = [[] for _ in coordinates]
     ranges = ranges_of(mechanism)
@@ -56,12 +62,20 @@ def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[Activ
     low, high = values - ranges.low <= near, ranges.high - values <= near
     for k, (joint, place) in enumerate(zip(ranges.joints, ranges.places, strict=True)):
         for row in np.flatnonzero(low[:, k] | high[:, k]):
-            bound: Literal["min", "max"] = "min" if low[row, k] else "max"
+            bound: Bound = "min" if low[row, k] else "max"
             limit = float((ranges.low if bound == "min" else ranges.high)[k])
             limits[row].append(ActiveLimit(joint.name, bound, float(values[row, k]), limit, None, place))
     for joint, angles, half_angle in coned(mechanism, coordinates):
         for row in np.flatnonzero(half_angle - angles <= TOLERANCES.active):
             limits[row].append(ActiveLimit(joint.name, "cone", float(angles[row]), half_angle))
+    clearance = mechanism.clearance
+    if clearance is not None and len(coordinates):
+        names, distances = pair_names(mechanism), pair_distances_at(mechanism, coordinates)
+        near_pairs = distances <= clearance + TOLERANCES.active * mechanism.characteristic_length
+        for row in np.flatnonzero(near_pairs.any(axis=1)):
+            pairs = np.flatnonzero(near_pairs[row])
+            for pair in pairs[np.argsort(distances[row, pairs], kind="stable")]:
+                limits[row].append(ActiveLimit(names[pair], "clearance", float(distances[row, pair]), clearance))
     return [tuple(row_limits) for row_limits in limits]
 
 
@@ -72,11 +86,14 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
 
     Parameters
     ----------
-    multipliers : (n, 2 columns + cones), as of `limit_multipliers`.
+    multipliers : (n, 2 columns + cones), as of `limit_multipliers`; with a clearance, (n, 2 columns + cones + pairs).
     """
     limits: list[list[ActiveLimit]] = [[] for _ in coordinates]
     n, units = coordinates.shape[1], rate_units(mechanism)
-    angles = coned(mechanism, coordinates) if (multipliers[:, 2 * n :] > TOLERANCES.holding).any() else []
+    first_pair = 2 * n + sum(joint.cone is not None for joint in mechanism.joints)
+    angles = coned(mechanism, coordinates) if (multipliers[:, 2 * n : first_pair] > TOLERANCES.holding).any() else []
+    has_pairs = (multipliers[:, first_pair:] > TOLERANCES.holding).any()
+    distances = pair_distances_at(mechanism, coordinates) if has_pairs else np.empty((0, 0))
     places = [(row, place) for row in range(len(multipliers)) for place in _largest_first(multipliers[row])]
     for row, place in places:
         coordinate_place = 0
@@ -87,7 +104,10 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
             name, coordinate_place, column = coordinate.joint.name, coordinate.place, coordinate.column
             unit = mechanism.characteristic_length / float(units[column])
             value, limit = float(coordinates[row, column]) + coordinate.home, coordinate.bounds[place % 2]
-            bound: Literal["min", "max", "cone"] = "max" if place % 2 else "min"
+            bound: Bound = "max" if place % 2 else "min"
+        elif place >= first_pair:
+            name, bound, unit = pair_names(mechanism)[place - first_pair], "clearance", 1.0
+            value, limit = float(distances[row, place - first_pair]), mechanism.clearance or 0.0
         else:
             joint, values, limit = angles[place - 2 * n]
             name, value, bound, unit = joint.name, float(values[row]), "cone", mechanism.characteristic_length
@@ -97,7 +117,7 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
 
 
 def has_passive_limits(mechanism: Mechanism, multipliers: Floats) -> bool:
-    """True if a limit of a passive joint is active in some row; multipliers as of `holding_limits`."""
+    """True if a limit of a passive joint, or a clearance, is active; multipliers as of `holding_limits`."""
     columns = [drive.column for drive in mechanism.drives]
     columns += [coordinate.column for coordinate in mechanism.coordinates if coordinate.joint.is_rigid]  # never listed
     is_passive = np.ones(multipliers.shape[1], bool)
@@ -119,14 +139,21 @@ def _largest_first(multipliers: Floats) -> list[int]:
 
 
 BINDING = np.dtype(
-    [("joint", "U64"), ("bound", "U4"), ("coordinate", "i8"), ("value", "f8"), ("limit", "f8"), ("multiplier", "f8")]
+    [("joint", "U64"), ("bound", "U9"), ("coordinate", "i8"), ("value", "f8"), ("limit", "f8"), ("multiplier", "f8")]
 )
 """A limit as a record of an array, for batches."""
 
 
+def _binding_of(longest: int) -> np.dtype[np.void]:
+    """`BINDING`, with room for names of this length."""
+    if 4 * longest <= BINDING["joint"].itemsize:
+        return BINDING
+    return np.dtype([("joint", f"U{longest}"), *((name, BINDING[name]) for name in (BINDING.names or ())[1:])])
+
+
 def binding_limits(rows: Sequence[tuple[ActiveLimit, ...]]) -> NDArray[np.void]:
     """The first limit of each row, (n,) records of `BINDING`; empty names and NaN where a row has none."""
-    records = np.zeros(len(rows), BINDING)
+    records = np.zeros(len(rows), _binding_of(max((len(limits[0].joint) for limits in rows if limits), default=0)))
     for name in ("value", "limit", "multiplier"):
         records[name] = np.nan
     for place, limits in enumerate(rows):

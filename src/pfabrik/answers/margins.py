@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..apart.link_distances import pair_distances, pair_names
+from ..apart.placed_links import placed_at
 from ..arrays import Floats, shaped
 from ..description.mechanism_html import card
 from ..frozen import FrozenMapping
@@ -38,6 +40,9 @@ def margins(solution: Solution) -> Margins:
     the two ranges of a universal or cylindrical joint the nearer bound counts. For a range with two equal bounds it is
     0 on them and infinite off them. NaN for INVALID rows.
 
+    Where the mechanism has a clearance c, every pair of links that may touch has a margin too, (d - c) / L, the rest of
+    their distance d as a share of the characteristic length L: ("BC1–BC3", "clearance"), with the names of both bodies.
+
     Raises
     ------
     InvalidArgument : the argument is no Solution.
@@ -56,6 +61,12 @@ def margins(solution: Solution) -> Margins:
             by_limit[joint.name, bound] = of_bound[place] if other is None else np.minimum(of_bound[place], other)
     for joint, angles, half_angle in coned(mechanism, q):
         by_limit[joint.name, "cone"] = (half_angle - angles) / half_angle
+    if mechanism.clearance is not None:
+        distances = pair_distances(placed_at(mechanism, solution._configurations))
+        room = (distances - mechanism.clearance) / mechanism.characteristic_length
+        for name, of_pair in zip(pair_names(mechanism), room.T, strict=True):
+            other = by_limit.get((name, "clearance"))
+            by_limit[name, "clearance"] = of_pair if other is None else np.minimum(of_pair, other)
     return Margins({key: shaped(margin, solution.shape) for key, margin in by_limit.items()})
 
 

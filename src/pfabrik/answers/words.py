@@ -136,13 +136,16 @@ def reasons(answer: Answer) -> list[str]:
     """Phrases for the limits that block a projected answer, the largest multiplier first, one per kind and value."""
     names: dict[tuple[str, str], list[str]] = {}
     for limit in answer._limits[0]:
-        is_plain = answer.mechanism.joint(limit.joint).type != "universal"  # length or angle: the bound's unit tells
+        # length or angle: the bound's unit tells
+        is_plain = limit.bound == "clearance" or answer.mechanism.joint(limit.joint).type != "universal"
         names.setdefault(in_words(limit, answer.mechanism), []).append(limit.joint if is_plain else name_of(limit))
     return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
 
 
 def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
-    """The kind of joint and the bound: ``("strut", "maximum 250 mm")``."""
+    """The kind of joint and the bound: ``("strut", "maximum 250 mm")``; no kind for a pair of bodies."""
+    if limit.bound == "clearance":
+        return "", f"clearance {limit.limit:.6g} {mechanism.length_unit}"
     joint = mechanism.joint(limit.joint)
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
     angle = math.degrees(limit.limit)
@@ -164,7 +167,12 @@ def name_of(limit: ActiveLimit) -> str:
 
 
 def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
-    """``strut B3 at its maximum 250 mm``, ``struts B1, B3 at their maximum 250 mm``, ``joint C1's cone at 45 deg``."""
+    """``strut B3 at its maximum 250 mm``, ``struts B1, B3 at their maximum 250 mm``, ``joint C1's cone at 45 deg``.
+
+    Of bodies, ``BC1–BC3, BC2–BC4 at their clearance 2 mm``.
+    """
+    if bound.startswith("clearance"):
+        return f"{', '.join(joints)} at their {bound}"
     subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"
     if bound.startswith("cone"):
         return (
@@ -174,8 +182,13 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
 
 def short_names(limits: Iterable[ActiveLimit]) -> str:
-    """Active limits for a cell of a table: ``B3 max; C1 cone``."""
-    return "; ".join(f"{name_of(limit)} {limit.bound}" for limit in limits)
+    """Active limits for a cell of a table: ``B3 max; C1 cone; BC1–BC3 too near``."""
+    return "; ".join(f"{name_of(limit)} {shown_bound(limit.bound)}" for limit in limits)
+
+
+def shown_bound(bound: str) -> str:
+    """A bound behind the name of its joint, or of two bodies: ``too near`` of these."""
+    return "too near" if bound == "clearance" else bound
 
 
 def exceeded(answer: Answer) -> list[ActiveLimit]:
@@ -185,8 +198,10 @@ def exceeded(answer: Answer) -> list[ActiveLimit]:
 
 def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:
     """True if the coordinate is beyond its bound by more than the tolerance."""
-    scale = mechanism.characteristic_length if is_length(limit, mechanism.joint(limit.joint)) else 1.0
-    excess = limit.limit - limit.value if limit.bound == "min" else limit.value - limit.limit
+    is_distance = limit.bound == "clearance" or is_length(limit, mechanism.joint(limit.joint))
+    scale = mechanism.characteristic_length if is_distance else 1.0
+    is_least = limit.bound in ("min", "clearance")
+    excess = limit.limit - limit.value if is_least else limit.value - limit.limit
     return excess > TOLERANCES.limit * scale
 
 

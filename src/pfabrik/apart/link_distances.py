@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..closure.configurations import Configurations, new_rows
+from ..derived import derived
 from ..description.links import Links, links_of
+from ..description.mechanism import Mechanism
 from ..kernels.clearance.link_records import PLATFORM
 from ..kernels.threads import in_blocks
-from .placed_links import PlacedLinks, bodies_of_links
+from ..model import model_of
+from ..motion.displacements import end_effector_pose
+from .placed_links import PlacedLinks, bodies_of_links, placed_at
 
 ROWS_A_BLOCK = 4096
 """Rows of one call of a kernel, and of the tables of places that it takes."""
@@ -56,6 +61,20 @@ def pair_distances(placed: PlacedLinks) -> Floats:
         _measure_solids(pairs[k : k + 1], 0, placed, of_pair, which, points)
         distances[:, k] = of_pair
     return distances
+
+
+def pair_distances_at(mechanism: Mechanism, coordinates: Floats) -> Floats:
+    """As `pair_distances`, at joint coordinates (n, columns), as deviations from home."""
+    rows = new_rows(model_of(mechanism), len(coordinates))
+    rows.poses[:] = end_effector_pose(mechanism, coordinates)
+    return pair_distances(placed_at(mechanism, Configurations(rows, coordinates)))
+
+
+@derived
+def pair_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """The names of the two bodies of every pair of links: ``BC1–BC3``; those of bodies with several links repeat."""
+    bodies = [shape.body for shape in mechanism.shapes]
+    return tuple(f"{bodies[first]}–{bodies[second]}" for first, second in links_of(mechanism).pairs.tolist())
 
 
 def _measure_solids(
