@@ -68,12 +68,36 @@ class ApartEngine(Engine):
         rows = self._too_near(answers)
         if not len(rows):
             return answers
+        if not keep_mode:
+            answers, rows = self._in_other_modes(answers, rows, targets, start)
+        if not len(rows):
+            return answers
         begin, targets = _starts_of(start, rows), np.require(targets[rows], requirements=["C", "W"])
         found = self._search.nearest(targets, begin, options, keep_mode=keep_mode, nearby=nearby)
         if not keep_mode:
             beside = self._search.nearest(targets, answers.at(rows), options, keep_mode=False, nearby=True)
             found = _nearer(found, beside, self._distances(found, options) - self._distances(beside, options))
         return _replaced(answers, rows, self._checked(found))
+
+    def _in_other_modes(
+        self, answers: Configurations, rows: Rows, targets: Floats, start: Configurations | None
+    ) -> tuple[Configurations, Rows]:
+        """Answers with some of the rows reached in other working modes; the rows that are left."""
+        is_left = np.ones(len(rows), bool)
+        is_reached = answers.rows.status[rows] == REACHED
+        if not isinstance(self._search, LegsEngine) or not is_reached.any():
+            return answers, rows
+        tried, begin = rows[is_reached], _starts_of(start, rows[is_reached])
+        for reached, others in self._search.in_other_modes(np.ascontiguousarray(targets[tried]), begin):
+            is_new = is_left[is_reached][reached]
+            is_new[self._too_near(others)] = False
+            if is_new.any():
+                places = tried[reached[is_new]]
+                answers = _replaced(answers, places, others.at(np.flatnonzero(is_new)))
+                is_left[np.isin(rows, places)] = False
+            if not is_left[is_reached].any():
+                break
+        return answers, rows[is_left]
 
     def follow(
         self,

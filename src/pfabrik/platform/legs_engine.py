@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
+from itertools import chain, combinations, islice
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +35,8 @@ from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, turns_repeatedly
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
-from .unreached import Request, Unreached, answer_unreached, project
+from .table import table_handle
+from .unreached import Request, Unreached, answer_unreached, project, reach_from_poses
 
 
 class LegsEngine(Engine):
@@ -122,6 +125,29 @@ class LegsEngine(Engine):
             if q_proximal is not None:
                 q_proximal[unsolved] = np.nan
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
+
+    def in_other_modes(
+        self, targets: Floats, start: Configurations | None
+    ) -> Iterator[tuple[NDArray[np.intp], LegAnswers]]:
+        """The answers of the closed forms to targets (n, 4, 4) in other working modes, those of few changed legs first.
+
+        Yields the rows that are reached in a mode, and their answers.
+        """
+        table, start_sides = self._table, self._sides_of(start)
+        two_sided = np.flatnonzero(table.home_sides[0])
+        start_poses = np.broadcast_to(self._single.home if start is None else start.rows.poses, targets.shape).copy()
+        for changed in _subsets(two_sided.tolist()):
+            sides, rows = (
+                np.repeat(start_sides, len(targets) // len(start_sides), axis=0),
+                new_rows(self._model, len(targets)),
+            )
+            sides[:, changed] *= -1.0
+            unreached = Unreached(targets, start_poses, sides, np.empty_like(sides), rows)
+            reach_from_poses(table_handle(table), start_poses, sides.copy(), unreached)
+            reached = np.flatnonzero(rows.status == REACHED)
+            if len(reached):
+                answers = self._answers(rows, sides, None, start, start_sides, np.empty(0, np.intp), None)
+                yield reached, cast(LegAnswers, answers.at(reached))
 
     def nearest(
         self,
@@ -386,3 +412,13 @@ class LegsEngine(Engine):
         if start is not None:
             count_turns(self._model, start.rows.actuators, rows)
         return True
+
+
+MOST_CHANGED = 64
+"""Most working modes that are looked through."""
+
+
+def _subsets(legs: list[int]) -> Iterator[list[int]]:
+    """The subsets of some legs but the empty one, the smallest first, up to `MOST_CHANGED`."""
+    every = chain.from_iterable(combinations(legs, n) for n in range(1, len(legs) + 1))
+    return (list(subset) for subset in islice(every, MOST_CHANGED))

@@ -145,7 +145,7 @@ def reach_from_seeds(seeds: Starts, request: Request, unreached: Unreached) -> M
         start_poses, end_sides = np.concatenate([poses] * n), np.concatenate([seeds.sides] * n)
         targets, rows = np.repeat(block.targets, k, axis=0), new_rows(request.model, n * k)
         candidates = Unreached(targets, start_poses, end_sides, np.empty_like(end_sides), rows)
-        _reach_from_poses(legs, start_poses, end_sides, candidates)
+        reach_from_poses(legs, start_poses, end_sides, candidates)
         is_reached = rows.status == REACHED
         is_reached[is_reached] = ~is_flipped(request.model.path_closure, rows.poses[is_reached])
         is_reached = is_reached.reshape(n, k)
@@ -197,10 +197,10 @@ def project(request: Request, unreached: Unreached) -> Floats:
 
 def _reach_exactly(legs: TableHandle, unreached: Unreached) -> None:
     """Reach targets exactly from the poses of their projections; rows not reached keep their outputs."""
-    _reach_from_poses(legs, unreached.rows.poses.copy(), unreached.sides.copy(), unreached)
+    reach_from_poses(legs, unreached.rows.poses.copy(), unreached.sides.copy(), unreached)
 
 
-def _reach_from_poses(legs: TableHandle, start_poses: Floats, end_sides: Floats, unreached: Unreached) -> None:
+def reach_from_poses(legs: TableHandle, start_poses: Floats, end_sides: Floats, unreached: Unreached) -> None:
     """Reach targets from poses (n, 4, 4) [length] on sides (n, legs); rows not reached keep their outputs."""
     targets, _, sides, q_proximal, rows = unreached
     status = np.empty_like(rows.status)

@@ -1,0 +1,291 @@
+"""Answers keep links apart, and nothing nearer to their targets does."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from pfabrik.closure.closure_engine import ClosureEngine
+from pfabrik.description.links import collisions_at_home
+from pfabrik.engine import engine_of
+from pfabrik.model import model_of
+from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.platform.links_of_legs import keeps_links
+from test_clearance import STRUTS, struts
+from test_compiled_and_interpreted import INTERPRETED
+
+Array = NDArray[np.float64]
+FREE = pf.Options(hold=None)
+COUNT = 4 if INTERPRETED else 40
+
+
+def around(machine: pf.Mechanism, count: int, length: float, angle: float, seed: int = 1) -> Array:
+    """Poses around home, in units of L and radians."""
+    rng = np.random.default_rng(seed)
+    poses = np.tile(machine.home_pose, (count, 1, 1))
+    poses[:, :3, 3] += length * machine.characteristic_length * rng.normal(size=(count, 3))
+    poses[:, :3, :3] = Rotation.from_rotvec(angle * rng.normal(size=(count, 3))).as_matrix()
+    return poses
+
+
+def thick_hexaglide(thickness: float = 20.0) -> pf.Mechanism:
+    machine = pf.load("hexaglide")
+    rods = [body for body in machine.bodies if body.startswith("rod")]
+    return machine.with_shapes([pf.Shape(rod, thickness=thickness) for rod in rods]).with_clearance(2)
+
+
+def between_joints(name: str, share: float) -> pf.Mechanism:
+    """A machine of the catalogue with capsules between the joints of all its links, and a ball on its platform."""
+    machine = pf.load(name)
+    length = share * machine.characteristic_length
+    shapes: list[pf.Shape] = []
+    for body in set(machine.bodies) - {machine.base, machine.end_effector}:
+        joints = [each for each in machine.joints if body in each.connects and each.at is not None]
+        if len(joints) == 2 and np.linalg.norm(np.subtract(*(np.array(each.at) for each in joints))) > length:
+            shapes.append(pf.Shape(body, thickness=length))
+    if not machine.end_effector_is_joint:
+        shapes.append(pf.Shape(machine.end_effector, "sphere", at=machine.reference_point, diameter=length))
+    shapes.sort(key=lambda shape: shape.body)
+    at_home: set[tuple[str, str]] = set()
+    for _ in range(len(shapes) ** 2):
+        try:
+            thick = machine.with_shapes(shapes, sorted(at_home))
+        except pf.errors.InvalidMechanism as error:
+            at_home |= {tuple(str(fault.found).split("'")[1:4:2]) for fault in error.faults}  # type: ignore[misc]
+            continue
+        distance = pf.clearance(pf.solve_ik(thick, thick.home_pose)).distance
+        return thick.with_clearance(float(min(0.02 * machine.characteristic_length, 0.5 * distance)))
+    raise AssertionError(name)
+
+
+def distances_from(targets: Array, answers: pf.Solution) -> Array:
+    """Distances from targets in units of L, rotations times the lever of the machine."""
+    machine = answers.mechanism
+    turned = Rotation.from_matrix(answers.pose[:, :3, :3] @ np.swapaxes(targets[:, :3, :3], 1, 2)).magnitude()
+    moved = np.linalg.norm(answers.pose[:, :3, 3] - targets[:, :3, 3], axis=1)
+    found: Array = np.hypot(moved, machine.rotation_length * turned) / machine.characteristic_length
+    return found
+
+
+# The nearest pose
+
+
+class Struts:
+    """The machine of `struts` written down once more: distances of its axes, and nearest poses by SLSQP."""
+
+    def __init__(self, machine: pf.Mechanism, apart: float) -> None:
+        self.length, self.lever, self.apart = machine.characteristic_length, machine.rotation_length, apart
+        self.base = np.array([machine.joint(f"A{k}").at for k in range(1, 7)])
+        self.platform = np.array([machine.joint(f"C{k}").at for k in range(1, 7)]) - machine.home_pose[:3, 3]
+        neighbours = {(0, 0)}
+        self.pairs = np.array([pair for pair in itertools.combinations(range(6), 2) if pair not in neighbours])
+        self.stroke = STRUTS["stroke"]
+
+    def room(self, x: Array) -> Array:
+        """What is left of strokes and of the distances of axes, in L."""
+        ends = x[:3] * self.length + Rotation.from_rotvec(x[3:]).apply(self.platform)
+        lengths = np.linalg.norm(ends - self.base, axis=1)
+        low, high = self.stroke  # type: ignore[misc]
+        i, j = self.pairs.T
+        p, d, q, e = self.base[i], (ends - self.base)[i], self.base[j], (ends - self.base)[j]
+        w, n = q - p, np.cross(d, e)
+        s = np.clip((np.cross(w, e) * n).sum(1) / (n * n).sum(1), 0, 1)
+        t = np.clip((s * (d * e).sum(1) - (w * e).sum(1)) / (e * e).sum(1), 0, 1)
+        s = np.clip((t * (d * e).sum(1) + (w * d).sum(1)) / (d * d).sum(1), 0, 1)
+        distances = np.linalg.norm(p + s[:, None] * d - q - t[:, None] * e, axis=1)
+        return np.concatenate([lengths - low, high - lengths, distances - self.apart]) / self.length
+
+    def nearest(self, target: Array, starts: int) -> float:
+        """The least distance that SLSQP finds from random starts."""
+        turned, rng, best = Rotation.from_matrix(target[:3, :3]), np.random.default_rng(0), np.inf
+
+        def square(x: Array) -> float:
+            turn = (Rotation.from_rotvec(x[3:]) * turned.inv()).magnitude()
+            return float(((x[:3] - target[:3, 3] / self.length) ** 2).sum() + (self.lever / self.length * turn) ** 2)
+
+        for _ in range(starts):
+            start = np.concatenate([[0, 0, 195 / self.length] + 0.6 * rng.uniform(-1, 1, 3), 0.6 * rng.normal(size=3)])
+            limits = [{"type": "ineq", "fun": self.room}]
+            found = minimize(square, start, method="SLSQP", constraints=limits, options={"ftol": 1e-14})
+            if self.room(found.x).min() > -1e-8:
+                best = min(best, float(np.sqrt(max(found.fun, 0.0))))
+        return best
+
+
+@pytest.mark.skipif(INTERPRETED, reason="takes minutes")
+def test_no_start_of_slsqp_comes_nearer() -> None:
+    machine = struts(20.0, clearance=2)
+    own, targets = Struts(machine, 22.0), around(machine, 25, 0.3, 0.8, seed=5)
+    answers = pf.solve_ik(machine, targets, options=FREE)
+    distances = distances_from(targets, answers)
+    held = [k for k, limits in enumerate(answers.active_limits) if any(each.bound == "clearance" for each in limits)]
+    assert len(held) >= 6
+    for k in held[:6]:
+        assert distances[k] <= own.nearest(targets[k], 20) + 1e-7
+
+
+@pytest.mark.campaign
+def test_no_start_of_slsqp_comes_nearer_in_many_tries() -> None:
+    machine = struts(20.0, clearance=2)
+    own, targets = Struts(machine, 22.0), around(machine, 60, 0.3, 0.8, seed=7)
+    answers = pf.solve_ik(machine, targets, options=FREE)
+    distances = distances_from(targets, answers)
+    for k in np.flatnonzero(np.asarray(answers.status) == pf.Status.PROJECTED):
+        assert distances[k] <= own.nearest(targets[k], 200) + 1e-7
+
+
+@pytest.mark.parametrize("machine", [struts(16.0, clearance=2), thick_hexaglide()], ids=["struts", "rails"])
+def test_searches_in_poses_and_in_joint_coordinates_agree(machine: pf.Mechanism) -> None:
+    engine, model = engine_of(machine.with_clearance(None)), model_of(machine)
+    assert isinstance(engine, LegsEngine) and keeps_links(model)
+    targets = around(machine, COUNT, 0.3, 0.8)
+    ends = [
+        pf.Solution(machine, each.nearest(targets, None, FREE, keep_mode=False), (COUNT,))
+        for each in (LegsEngine(model), ClosureEngine(model))
+    ]
+    one, other = (distances_from(targets, each) for each in ends)
+    assert np.count_nonzero(np.abs(one - other) > 1e-6) <= COUNT // 20
+    assert all(np.asarray(pf.clearance(each).distance).min() >= 2 - 1e-6 for each in ends)
+
+
+def test_a_multiplier_is_what_the_answer_gains_by_less_clearance() -> None:
+    machine = struts(20.0, clearance=2)
+    targets = around(machine, 60, 0.3, 0.8, seed=5)
+    answers, closer = (
+        pf.solve_ik(each, targets, options=FREE) for each in (machine, machine.with_clearance(2.0 - 1e-3))
+    )
+    gains = (distances_from(targets, answers) - distances_from(targets, closer)) * machine.characteristic_length / 1e-3
+    checked = 0
+    for limits, gain in zip(answers.active_limits, gains, strict=True):
+        multipliers = [each.multiplier for each in limits if each.bound == "clearance"]
+        if limits and len(multipliers) == 1:
+            assert gain == pytest.approx(multipliers[0], rel=0.02, abs=1e-3)
+            checked += 1
+    assert checked > 8
+
+
+# Every answer
+
+
+CATALOGUE = ("hexaglide", "delta", "reachy_mini", "agile_eye", "orthoglide", "nrpm", "panda", "rrr", "servo_hexapod")
+
+
+@pytest.mark.parametrize("name", CATALOGUE[:3] if INTERPRETED else CATALOGUE)
+def test_every_answer_keeps_links_apart(name: str) -> None:
+    machine = between_joints(name, 0.15)
+    free, least = machine.with_clearance(None), machine.clearance
+    assert least is not None
+    slack = 1e-9 * machine.characteristic_length
+    targets = around(machine, COUNT, 0.3, 0.5)
+    loose = pf.solve_ik(free, targets)
+    answers = pf.solve_ik(machine, targets)
+    forward = pf.solve_fk(machine, loose.actuators)
+    tracked = pf.track(machine, targets[: COUNT // 4])
+    for each in (answers, forward, tracked):
+        assert np.asarray(pf.clearance(each).distance).min() >= least - slack
+        assert np.max(each.limit_excess) <= 1e-9
+        assert set(np.asarray(each.status).tolist()) <= {pf.Status.REACHED, pf.Status.PROJECTED}
+        assert np.max(each.residual) <= 1e-8 * machine.characteristic_length
+    kept = np.asarray(pf.clearance(loose).distance) >= least
+    np.testing.assert_array_equal(np.asarray(answers.status)[kept], np.asarray(loose.status)[kept])
+
+
+def obstructed_five_bar() -> pf.Mechanism:
+    """A five-bar with a post beside one elbow: some targets are free of it with the elbow on the other side only."""
+    machine = pf.load("five_bar").without_limits()
+    links = [pf.Shape(body, thickness=8) for body in machine.bodies if body != machine.base]
+    return machine.with_shapes([*links, pf.Shape("base", "sphere", at=(0, 140, 150), diameter=70)]).with_clearance(2)
+
+
+def test_another_working_mode_answers_where_it_is_clear() -> None:
+    machine = obstructed_five_bar()
+    free = machine.with_clearance(None)
+    targets = machine.home_pose[:3, 3] + np.random.default_rng(2).normal(size=(4 * COUNT, 3)) * [0, 60, 60]
+    loose, answers = pf.solve_ik(free, targets), pf.solve_ik(machine, targets)
+    touching = (np.asarray(pf.clearance(loose).distance) < 2) & (np.asarray(loose.status) == pf.Status.REACHED)
+    kinds = set()
+    for k in np.flatnonzero(touching):
+        modes = [mode for mode in pf.working_modes(free, targets[k]) if mode.status == pf.Status.REACHED]
+        is_clear = any(pf.clearance(mode).distance >= 2 for mode in modes)
+        assert (answers[int(k)].status == pf.Status.REACHED) == is_clear
+        kinds.add(is_clear)
+    assert INTERPRETED or kinds == {True, False}
+    home = pf.solve_ik(machine, targets[touching], options=pf.Options(working_mode="keep"))
+    assert (np.asarray(home.status) == pf.Status.PROJECTED).all()
+
+
+def test_a_track_goes_past_what_it_cannot_reach_and_comes_back() -> None:
+    machine = thick_hexaglide()
+    poses = np.tile(machine.home_pose, (COUNT, 1, 1))
+    angles = 0.7 * np.sin(np.linspace(0, np.pi, COUNT))
+    poses[:, :3, :3] = Rotation.from_rotvec(np.outer(angles, [0, 0, 1])).as_matrix()
+    steps: list[tuple[int, int]] = []
+    tracked = pf.track(machine, poses, on_progress=lambda done, count: steps.append((done, count)))
+    status = np.asarray(tracked.status)
+    assert status[0] == status[-1] == pf.Status.REACHED and (status == pf.Status.PROJECTED).any()
+    assert steps[-1] == (COUNT, COUNT)
+    stopped = int(np.flatnonzero(status == pf.Status.PROJECTED)[0])
+    assert "at their clearance" in tracked[stopped].reason
+    np.testing.assert_allclose(tracked.actuators[-1], tracked.actuators[0], atol=1e-6)
+    apart = pf.track(machine.with_clearance(None), poses)
+    assert np.asarray(pf.clearance(apart).distance).min() < 2
+
+
+def moved_struts(R: Array, shift: Array, size: float) -> pf.Mechanism:
+    """The machine of struts turned, moved and scaled."""
+    thirds = Rotation.from_rotvec(np.outer(np.arange(3) * 2 * np.pi / 3, [0, 0, 1])).as_matrix()
+    own = {
+        name: np.concatenate([np.array(STRUTS[name]) @ third.T for third in thirds]) for name in ("base", "platform")
+    }
+    points = {name: (size * each @ R.T + shift).tolist() for name, each in own.items()}
+    low, high = STRUTS["stroke"]  # type: ignore[misc]
+    return pf.Mechanism.from_legs(
+        "U-P*-S",
+        **points,
+        stroke=(size * low, size * high),
+        reference_point=(size * R @ [0, 0, 195] + shift).tolist(),
+        thickness=20.0 * size,
+        clearance=2.0 * size,
+    )
+
+
+def test_answers_move_and_grow_with_the_machine() -> None:
+    machine, R = struts(20.0, clearance=2), Rotation.from_rotvec([0.3, -0.5, 0.9]).as_matrix()
+    targets = around(machine, COUNT, 0.3, 0.8, seed=5)
+    distances = distances_from(targets, pf.solve_ik(machine, targets, options=FREE))
+    for turn, move, size in ((R, np.array([30.0, -80.0, 12.0]), 1.0), (np.eye(3), np.zeros(3), 0.01)):
+        copy, there = moved_struts(turn, move, size), targets.copy()
+        there[:, :3, 3] = size * targets[:, :3, 3] @ turn.T + move
+        there[:, :3, :3] = turn @ targets[:, :3, :3] @ turn.T
+        found = distances_from(there, pf.solve_ik(copy, there, options=FREE))
+        assert np.count_nonzero(np.abs(found - distances) > 1e-6) <= COUNT // 20
+
+
+def test_configurations_whose_links_are_too_near_exceed_a_limit() -> None:
+    machine = thick_hexaglide()
+    free = machine.with_clearance(None)
+    touching = pf.solve_ik(free, turned_about_z(machine, 0.7))
+    found = pf.configuration(machine, touching.q)
+    assert pf.clearance(touching).distance < 2 and found.status == pf.Status.EXCEEDED
+    length = machine.characteristic_length
+    assert found.limit_excess == pytest.approx((2 - pf.clearance(touching).distance) / length, abs=1e-12)
+    assert [each.bound for each in found.active_limits] == ["clearance"] * len(found.active_limits)
+    assert pf.configuration(machine, pf.solve_ik(machine, machine.home_pose).q).status == pf.Status.REACHED
+
+
+def turned_about_z(machine: pf.Mechanism, angle: float) -> Array:
+    pose = machine.home_pose.copy()
+    pose[:3, :3] = Rotation.from_rotvec([0, 0, angle]).as_matrix()
+    return pose
+
+
+def test_machines_without_a_clearance_have_the_engine_they_had() -> None:
+    machine = thick_hexaglide()
+    assert type(engine_of(machine.with_clearance(None))) is LegsEngine
+    assert not list(collisions_at_home(machine))
