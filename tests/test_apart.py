@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from pfabrik.cli import main
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.description.links import collisions_at_home
 from pfabrik.engine import engine_of
@@ -289,3 +292,26 @@ def test_machines_without_a_clearance_have_the_engine_they_had() -> None:
     machine = thick_hexaglide()
     assert type(engine_of(machine.with_clearance(None))) is LegsEngine
     assert not list(collisions_at_home(machine))
+
+
+def test_a_track_tells_how_near_links_come_between_its_steps(tmp_path: Path) -> None:
+    """The tip passes a post: on its way to the other side, and not where it goes around."""
+    machine = pf.load("five_bar").without_limits()
+    links = [pf.Shape(body, thickness=8) for body in ("link2", "link3")]
+    post = pf.Shape("base", "sphere", at=(0, 0, 230), diameter=20)
+    machine = machine.with_shapes([*links, post]).with_clearance(2)
+    sides = np.array([[0, -40.0, 200.0], [0, -40.0, 230.0], [0, 40.0, 230.0], [0, 40.0, 200.0]])
+    tracked = pf.track(machine, sides)
+    assert (np.asarray(tracked.status) == pf.Status.REACHED).all() and tracked.passing is not None
+    fine = np.linspace(sides[1], sides[2], 2001)
+    nearest = np.asarray(pf.clearance(pf.solve_ik(machine.with_clearance(None), fine)).distance).min()
+    assert nearest == pytest.approx(-14.0, abs=0.05)
+    assert tracked.passing[2] == pytest.approx(nearest, abs=2e-3 * machine.characteristic_length)
+    ends = np.asarray(pf.clearance(tracked).distance)
+    np.testing.assert_allclose(tracked.passing[[0, 1, 3]], [ends[0], min(ends[:2]), min(ends[2:])], atol=1.0)
+    assert pf.track(machine.with_clearance(None), sides).passing is None
+    saved, path = tmp_path / "machine.toml", tmp_path / "path.csv"
+    pf.save(machine, saved)
+    path.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in sides), encoding="utf-8")
+    ran = CliRunner().invoke(main, ["track", str(saved), str(path), "-o", str(tmp_path / "out.csv")])
+    assert ran.exit_code == 1 and "on the way to target 3" in ran.output, ran.output

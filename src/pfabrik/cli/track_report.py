@@ -154,6 +154,10 @@ class Worst:
             self.place = f"target {begin + row} ({f'line {line}' if line else 'home'})"
 
 
+NEARLY_KEPT = 0.99
+"""Share of the clearance from which on it counts as kept between targets: straight ways cut the corners of a limit."""
+
+
 class Summary:
     """Counts, failures and the worst step of a path."""
 
@@ -162,7 +166,8 @@ class Summary:
         self._counts: Counter[pf.Status] = Counter()
         self._n_targets = 0
         self._farthest = 0.0
-        self._failed, self._jumps = TargetNumbers(), TargetNumbers()
+        self._failed, self._jumps, self._near = TargetNumbers(), TargetNumbers(), TargetNumbers()
+        self._nearest = math.inf
         self._too_fast = {name: TargetNumbers() for name in mechanism.actuator_names}
         self._fastest = dict.fromkeys(mechanism.actuator_names, 0.0)
         self._margin, self._tilt = Worst(), Worst()
@@ -175,6 +180,10 @@ class Summary:
         self._farthest = max(self._farthest, float(track.position_error[new].max()))
         self._failed.add((begin + np.flatnonzero(status >= pf.Status.FAILED)).tolist())
         self._jumps.add((begin + np.flatnonzero(track.jumps[new])).tolist())
+        if track.passing is not None:
+            is_near = track.passing[new] < NEARLY_KEPT * (self._mechanism.clearance or 0.0)
+            self._near.add((begin + np.flatnonzero(is_near)).tolist())
+            self._nearest = min(self._nearest, float(np.nanmin(track.passing[new], initial=math.inf)))
         if track.too_fast is not None and track.speeds is not None:
             self._add_speeds(track.too_fast[new], track.speeds[new], begin)
         self._margin.add(-margins.values[new], margins.names[new], begin, part.path.lines[new])
@@ -191,8 +200,9 @@ class Summary:
 
     @property
     def is_well(self) -> bool:
-        """True if all targets were reached, and no actuator has to be too fast."""
-        return self._counts[pf.Status.REACHED] == self._n_targets and not any(self._fastest.values())
+        """True if all targets were reached, links stay apart on the way, and no actuator has to be too fast."""
+        is_reached = self._counts[pf.Status.REACHED] == self._n_targets
+        return is_reached and not self._near.count and not any(self._fastest.values())
 
     def line(self) -> str:
         """The number of targets of each status, how far off they are, and where answers jump or are too fast."""
@@ -205,6 +215,9 @@ class Summary:
             parts.append(f"farthest from its target {self._farthest:.3g} {self._mechanism.length_unit}")
         if self._jumps.count:
             parts.append(f"{counted(self._jumps.count, 'jump')} ({self._jumps})")
+        if self._near.count:
+            nearest = f"{self._nearest:.3g} {self._mechanism.length_unit}"
+            parts.append(f"links come as near as {nearest} on the way to {self._near}")
         for drive in readouts(self._mechanism):
             if self._fastest[drive.name]:
                 fastest = float(drive.display(np.array(self._fastest[drive.name])))
