@@ -21,6 +21,7 @@ from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
 from in_c import IS_THERE, InC
 from in_placo import peer
+from kept_apart import kept_apart
 from maps import maps
 from passes import passes
 from proofs import proofs
@@ -219,6 +220,7 @@ def main() -> None:
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),
         *proofs(runs),
+        *kept_apart(runs),
         *maps(rng, min(runs, 5), 2000 if given.quick else 10_000),
         *viewer(min(runs, 5)),
         *([] if given.quick else start_up(5)),

@@ -36,8 +36,10 @@ def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Inverse
 
 @derived
 def _engine(model: Model) -> Engine:
-    usual = _usual(model)
-    return usual if model.mechanism.clearance is None else ApartEngine(model, usual, usual)
+    if model.mechanism.clearance is None:
+        return _usual(model)
+    usual = _usual(_without_clearance(model))
+    return ApartEngine(model, usual, usual)
 
 
 @derived
@@ -50,5 +52,11 @@ def _usual(model: Model) -> Engine:
 
 @derived
 def _reaching(model: Model) -> InverseEngine:
-    passes = ReachingEngine(model, _usual(model))
-    return passes if model.mechanism.clearance is None else ApartEngine(model, _usual(model), passes)
+    if model.mechanism.clearance is None:
+        return ReachingEngine(model, _usual(model))
+    free = _without_clearance(model)
+    return ApartEngine(model, _usual(free), ReachingEngine(free, _usual(free)))
+
+
+def _without_clearance(model: Model) -> Model:
+    return model_of(model.mechanism.with_clearance(None))

@@ -50,9 +50,7 @@ class ApartEngine(Engine):
     @cached_property
     def _search(self) -> LegsEngine | ClosureEngine:
         """The engine whose searches keep links apart."""
-        if isinstance(self.usual, LegsEngine) and keeps_links(self.model):
-            return self.usual
-        return ClosureEngine(self.model)
+        return LegsEngine(self.model) if self.model.has_legs and keeps_links(self.model) else ClosureEngine(self.model)
 
     def answer(
         self,
@@ -74,9 +72,6 @@ class ApartEngine(Engine):
             return answers
         begin, targets = _starts_of(start, rows), np.require(targets[rows], requirements=["C", "W"])
         found = self._search.nearest(targets, begin, options, keep_mode=keep_mode, nearby=nearby)
-        if not keep_mode:
-            beside = self._search.nearest(targets, answers.at(rows), options, keep_mode=False, nearby=True)
-            found = _nearer(found, beside, self._distances(found, options) - self._distances(beside, options))
         return _replaced(answers, rows, self._checked(found))
 
     def _in_other_modes(
@@ -135,7 +130,8 @@ class ApartEngine(Engine):
         yield from self.inverse.attempts(target, start, options, keep_mode=keep_mode)
         if len(self._too_near(self.inverse.answer(target, start, options, keep_mode=keep_mode))):
             answer = self.answer(target, start, options, keep_mode=keep_mode)
-            distance = float(self._distances(answer, options)[0])
+            lever, measures = options.rotation_length or self.model.mechanism.rotation_length, answer.rows.measures[0]
+            distance = float(np.hypot(measures[POSITION_ERROR], lever * measures[ROTATION_ERROR]))
             ending = "reached" if answer.rows.status[0] == REACHED else "nearest"
             yield Attempt("links kept apart", "the start", int(answer.rows.counters[0, ITERATIONS]), distance, ending)
 
@@ -179,15 +175,6 @@ class ApartEngine(Engine):
         answers.rows.status[self._too_near(answers)] = FAILED
         return answers
 
-    def _distances(self, answers: Configurations, options: Options) -> Floats:
-        """Distances of answers from their targets, (n,) [length]; infinite where there is none."""
-        lever = options.rotation_length or self.model.mechanism.rotation_length
-        measures = answers.rows.measures
-        distances = np.hypot(measures[:, POSITION_ERROR], lever * measures[:, ROTATION_ERROR])
-        distances[answers.rows.status >= FAILED] = np.inf
-        distances[self._too_near(answers)] = np.inf
-        return distances
-
 
 def _starts_of(start: Configurations | None, rows: Rows) -> Configurations | None:
     return start if start is None or len(start) == 1 else start.at(rows)
@@ -198,13 +185,6 @@ def _replaced(answers: Configurations, rows: Rows, others: Configurations) -> Co
     if len(rows) == len(answers):
         return others
     return answers.with_others(rows, others) if isinstance(answers, LegAnswers) else answers.with_rows(rows, others)
-
-
-def _nearer(found: Configurations, others: Configurations, farther: Floats) -> Configurations:
-    """Answers, with others where these are nearer, by how much more than rounding."""
-    with np.errstate(invalid="ignore"):
-        rows = np.flatnonzero(farther > TOLERANCES.position)
-    return _replaced(found, rows, others.at(rows)) if len(rows) else found
 
 
 def _joined(parts: list[Configurations], none: Configurations) -> Configurations:

@@ -8,9 +8,10 @@ import numpy as np
 
 from .._jit import allocator, routine
 from ..vectors import Vec, dot, norm, put, scale, sub, vec
+from .capsules import between_axes
 from .least_clearance import clearance_of, middle_of, reach_of
 from .link_records import LinkLimits
-from .solids import CAPSULE, KIND, clamp
+from .solids import CAPSULE, KIND, ROUND, clamp
 
 
 @allocator
@@ -30,8 +31,14 @@ def pair_excess(links: LinkLimits, pair: int, near: float) -> float:
     """
     i, j = links.pairs[pair, 0], links.pairs[pair, 1]
     sizes, other, place, other_place = links.sizes[i], links.sizes[j], links.places[i], links.places[j]
-    between = norm(sub(middle_of(sizes, place), middle_of(other, other_place)))
-    if links.least[0] + near <= between - reach_of(sizes, place) - reach_of(other, other_place):
+    farthest = links.least[0] + near
+    if sizes[KIND] == CAPSULE and other[KIND] == CAPSULE:
+        p, q, x, y = vec(place[0]), vec(place[1]), vec(other_place[0]), vec(other_place[1])
+        distance = between_axes(p, q, x, y) - sizes[ROUND] - other[ROUND]
+    else:
+        between = norm(sub(middle_of(sizes, place), middle_of(other, other_place)))
+        distance = between - reach_of(sizes, place) - reach_of(other, other_place)
+    if distance >= farthest:
         return -math.inf
     return links.least[0] - clearance_of(sizes, place, other, other_place, links.moved, links.points)
 

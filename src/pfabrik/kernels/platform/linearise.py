@@ -16,6 +16,9 @@ from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 
+NEAR_LINKS = 0.1
+"""Pairs of links that are farther than this beyond the clearance are left out of a programme [L]."""
+
 
 @routine
 def linearise(
@@ -110,6 +113,7 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
     offset, links = offset + kept_sides.shape[0], search.links
     if links.pairs.shape[0] > 0:
         place_links(table, search.links, search.leg_eval)
+    near = min(near, NEAR_LINKS)
     for pair in range(links.pairs.shape[0]):
         over = pair_excess(search.links, pair, near) + margin
         if over > -near:
