@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -14,7 +15,8 @@ import pytest
 import pfabrik as pf
 from in_mujoco import Model
 from machines import closure
-from pfabrik.errors import InvalidArgument, UnknownName
+from pfabrik.description.links import links_of
+from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.files.units import metres_of
 from pfabrik.interop import from_mjcf, to_mjcf, verify
 from pfabrik.interop.referee_configurations import reached_at_random
@@ -213,3 +215,129 @@ def test_names_that_clash_in_a_model_are_told_apart() -> None:
         model.model.eq(i).name for i in range(model.model.neq)
     }
     assert model.rank() == model.model.nv - pf.mobility(mechanism).mobility
+
+
+# Shapes
+
+
+def hexapod(stroke: tuple[float, float] | None = (155, 280), **more: object) -> pf.Mechanism:
+    """Six struts, a plate that leans, a box that is turned, a ball, and pairs that may touch."""
+    shapes = [
+        pf.Shape("platform", "disc", at=(0, 0, 200), axis=(0.1, 0.2, 1), diameter=60, thickness=6),
+        pf.Shape("base", "box", at=(10, 0, 60), size=(40, 30, 50), axes=((0.8, 0.6, 0), (-0.36, 0.48, 0.8))),
+        pf.Shape("base", "box", at=(0, 0, -30), size=(240, 200, 10)),
+        pf.Shape("base", "sphere", at=(-20, 5, 10), diameter=20),
+        pf.Shape("AB1", ends=((98, 28, 20), (99, 20, 40)), thickness=5),
+    ]
+    return pf.Mechanism.from_legs(
+        "U-P*-S",
+        base=[[100, 20, 0], [100, -20, 0]],
+        platform=[[40, 40, 195], [40, -40, 195]],
+        stroke=stroke,
+        copies={"count": 3, "axis": [0, 0, 1]},
+        reference_point=[0, 0, 195],
+        thickness=12,
+        shapes=shapes,
+        ignore=[("BC1", "BC4"), ("AB2", "BC5"), ("base", "platform")],
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def geometry(mechanism: pf.Mechanism) -> dict[tuple[float, ...], tuple[str, str, np.ndarray]]:
+    """Every shape by its place: its body, its kind, sizes and place; the ends of a capsule are in order."""
+    links, found = links_of(mechanism), {}
+    for shape, sizes, place in zip(mechanism.shapes, links.sizes, links.places.copy(), strict=True):
+        if shape.kind == "capsule":
+            place[:2] = sorted(place[:2].tolist(), key=lambda end: np.round(end, 6).tolist())
+        found[tuple(np.round(place[0], 6))] = (shape.body, shape.kind, np.concatenate([sizes, place.ravel()]))
+    return found
+
+
+def welded_with_balls() -> pf.Mechanism:
+    mechanism = closure.welded_tricept()
+    places = np.array(mechanism.reference_point) + [[0, 0, 500 + 99 * k] for k in range(len(mechanism.bodies))]
+    return mechanism.with_shapes(
+        pf.Shape(body, "sphere", at=at, diameter=7) for body, at in zip(mechanism.bodies, places, strict=True)
+    )
+
+
+@pytest.mark.parametrize("make", [hexapod, welded_with_balls])
+def test_shapes_and_pairs_that_may_touch_are_read_back(make: Callable[[], pf.Mechanism]) -> None:
+    mechanism = make()
+    found = from_mjcf(to_mjcf(mechanism), length_unit=mechanism.length_unit)
+    back, welded = geometry(found.mechanism), {"plinth": "base", "plate": "platform"}
+    assert set(back) == set(geometry(mechanism))
+    for place, (body, kind, numbers) in geometry(mechanism).items():
+        assert back[place][:2] == (welded.get(body, body), kind)
+        np.testing.assert_allclose(back[place][2], numbers, rtol=0, atol=1e-9)
+    assert found.mechanism.ignore == mechanism.ignore
+    again = from_mjcf(to_mjcf(found.mechanism), length_unit=mechanism.length_unit).mechanism
+    assert (set(geometry(again)), again.ignore) == (set(back), mechanism.ignore)
+    assert not any("touch nothing" in str(note) for note in found.notes)
+
+
+def test_shapes_are_read_back_from_a_model_to_which_something_that_touches_was_added() -> None:
+    table = '<worldbody><geom type="box" size="1 1 0.1" pos="0 0 -0.3"/>'
+    back = from_mjcf(to_mjcf(hexapod()).replace("<worldbody>", table), length_unit="mm").mechanism
+    assert len(back.shapes) == 12
+    assert set(geometry(hexapod())) < set(geometry(back))
+
+
+def test_a_clearance_is_read_back_with_the_struts_that_keep_it() -> None:
+    mechanism = hexapod(clearance=1.5)
+    back = from_mjcf(to_mjcf(mechanism), length_unit="mm").mechanism
+    assert back.clearance == pytest.approx(1.5, rel=1e-15)
+    assert sum(shape.between is not None for shape in back.shapes) == 6
+
+
+@pytest.mark.parametrize(
+    ("written", "edited"),
+    [('clearance" data="0.0015"', 'clearance" data="-1"'), ('strut.5" data="[', 'strut.5" data="{'), ("0.012", '"x"')],
+)
+def test_custom_elements_that_somebody_has_edited_are_refused_with_a_sentence(written: str, edited: str) -> None:
+    text = to_mjcf(hexapod(clearance=1.5)).replace("&quot;", "'").replace("'", "&quot;")
+    assert written in text
+    with pytest.raises(InvalidMechanism, match="custom text"):
+        from_mjcf(text.replace(written, edited.replace('"x"', "&quot;x&quot;"), 1), length_unit="mm")
+
+
+@pytest.mark.parametrize("stroke", [(100, 280), None])
+def test_a_strut_that_no_two_halves_are_has_no_geom_but_is_read_back(stroke: tuple[float, float] | None) -> None:
+    """Longer than twice the shortest, or of no range: two halves would stick out of the short one, or leave a gap."""
+    text = to_mjcf(hexapod(stroke))
+    model = Model.of(text).model
+    assert (np.array(model.geom_group) == 3).sum() == 5
+    assert len(from_mjcf(text, length_unit="mm").mechanism.shapes) == 11
+    assert (np.array(Model.of(to_mjcf(hexapod((141, 280)))).model.geom_group) == 3).sum() == 5 + 12
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("order", [("cylinder", "rod"), ("rod", "cylinder")])
+@pytest.mark.parametrize("home", [0.0, 30.0])
+def test_halves_are_the_strut_at_all_lengths_whichever_way_its_slide_counts(
+    sign: int, order: tuple[str, str], home: float
+) -> None:
+    """A point on the way from the one joint to the other is as deep in the two halves as in the strut."""
+    travel = sorted(sign * (1 if order[1] == "rod" else -1) * np.array([-40.0, 60.0]))
+    joints = [
+        pf.Joint("A", "universal", ("base", "cylinder"), at=(0, 0, 0), axes=((1, 0, 0), (0, 1, 0))),
+        pf.Joint("P", "prismatic", order, axis=(0, 0, sign), range=np.array(travel) + home, home=home, actuated=True),
+        pf.Joint("C", "spherical", ("rod", "platform"), at=(0, 0, 150)),
+        pf.Joint("D", "spherical", ("base", "platform"), at=(90, 0, 150)),
+    ]
+    with pytest.warns(pf.errors.MobilityWarning):
+        strut = pf.Shape("rod", thickness=10, between=("A", "C"))
+        mechanism = pf.Mechanism("strut", joints, "platform", (0, 0, 160), shapes=[strut])
+    model = Model.of(to_mjcf(mechanism))
+    geoms = [model.model.geom(f"strut_0_{side}").id for side in (1, 2)]
+    for value in (*travel, 0.0):
+        length = 150 + value * sign * (1 if order[1] == "rod" else -1)
+        model.data.qpos[model.model.joint("P").qposadr[0]] = (value + home) * 1e-3
+        mujoco.mj_kinematics(model.model, model.data)
+        middles = model.data.geom_xpos[geoms] * 1e3
+        halves = model.model.geom_size[geoms, 1] * 1e3
+        np.testing.assert_allclose(middles[:, :2], 0, atol=1e-9)
+        assert min(middles[:, 2] - halves) == pytest.approx(0, abs=1e-9)
+        assert max(middles[:, 2] + halves) == pytest.approx(length)
+        assert 2 * halves.sum() >= length - 1e-9
+        np.testing.assert_allclose(model.model.geom_size[geoms, 0], 0.005)

@@ -45,7 +45,8 @@ def words(context: click.Context, parameter: click.Parameter, value: str | None)
 def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any) -> int:
     """Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.
 
-    FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed.
+    FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed;
+    collision geometry becomes shapes of bodies.
     All that is left out or changed is told on stderr, by name.
     """
     refuse_existing(output, force)

@@ -46,9 +46,8 @@ def links_of(mechanism: Structure) -> Links:
     places = np.zeros((len(joints), 4, 3))
     for k, (shape, ends) in enumerate(zip(mechanism.shapes, joints, strict=True)):
         _put(shape, [mechanism.joint(name).at for name in ends], sizes[k], places[k])
-    touching = list(_pairs(mechanism, joints))
-    touching.sort(key=lambda pair: bool(sizes[list(pair), 0].any()))
-    pairs = np.array(touching, np.int64).reshape(-1, 2)
+    pairs = _pairs(mechanism, joints)
+    pairs = pairs[np.argsort(sizes[pairs, 0].any(axis=1), kind="stable")]
     n_capsules = int(np.count_nonzero(~sizes[pairs, 0].any(axis=1)))
     return Links(sizes, places, joints, pairs, n_capsules)
 
@@ -101,18 +100,20 @@ def _put(shape: Shape, ends: list[Any], sizes: Floats, place: Floats) -> None:
         place[1:] = x, y / np.linalg.norm(y), np.cross(x, y / np.linalg.norm(y))
 
 
-def _pairs(mechanism: Structure, ends: tuple[tuple[str, ...], ...]) -> Iterator[tuple[int, int]]:
-    """Pairs of shapes that may touch: not of one body, nor of two that share a joint, nor of two that are ignored.
+def _pairs(mechanism: Structure, ends: tuple[tuple[str, ...], ...]) -> Ints:
+    """Pairs of shapes that may touch, (k, 2): not of one body, nor of two that share a joint, nor of two ignored.
 
     Bodies that a fixed joint holds together are one. Joints in one place of one body are as one: so the two struts
     of a double ball joint share it.
     """
     rigid = welded([joint for joint in mechanism.joints if joint.is_rigid], mechanism.base)
     ignored = {frozenset(pair) for pair in mechanism.ignore}
-    own = [_bodies_of(mechanism, shape, names) for shape, names in zip(mechanism.shapes, ends, strict=True)]
+    of_shapes = [frozenset(_bodies_of(mechanism, *each)) for each in zip(mechanism.shapes, ends, strict=True)]
+    own = list(dict.fromkeys(of_shapes))  # many shapes may be of one body
     as_one = [{rigid.get(body, body) for body in bodies} for bodies in own]
     around = [_neighbours(mechanism, bodies, rigid) for bodies in as_one]
     near = TOLERANCES.home_slack * mechanism.characteristic_length
+    may_touch = np.zeros((len(own), len(own)), bool)
     for i, j in combinations(range(len(own)), 2):
         if as_one[i] & as_one[j] or any(frozenset((a, b)) in ignored for a in own[i] for b in own[j]):
             continue
@@ -122,7 +123,9 @@ def _pairs(mechanism: Structure, ends: tuple[tuple[str, ...], ...]) -> Iterator[
             for other, place in around[j]
         ):
             continue
-        yield i, j
+        may_touch[i, j] = may_touch[j, i] = True
+    index = [own.index(bodies) for bodies in of_shapes]
+    return np.argwhere(np.triu(may_touch[np.ix_(index, index)], 1))
 
 
 def _bodies_of(mechanism: Structure, shape: Shape, names: tuple[str, ...]) -> set[str]:
@@ -146,8 +149,6 @@ def _neighbours(mechanism: Structure, bodies: set[str], rigid: dict[str, str]) -
 
 def collisions_at_home(mechanism: Structure) -> Iterator[Fault]:
     """The pairs of links that overlap at home, or are nearer than the clearance, the worst first."""
-    from ..kernels.clearance.least_clearance import least_clearance
-
     links, least = links_of(mechanism), mechanism.clearance or 0.0
     if mechanism.clearance is not None and not 0 < len(links.pairs) <= MOST_PAIRS:
         found = (
@@ -156,6 +157,18 @@ def collisions_at_home(mechanism: Structure) -> Iterator[Fault]:
         expected = f"at most {MOST_PAIRS}: name others in `ignore`" if len(links.pairs) else "links with a thickness"
         yield Fault("clearance", found, expected)
         return
+    for distance, first, second in overlaps_at_home(mechanism):
+        how = f"{-distance:.4g} deep in" if distance < 0.0 else f"{distance:.4g} from"
+        found = f"'{mechanism.shapes[second].body}', which is {how} '{mechanism.shapes[first].body}' at home"
+        apart = f"that are at least {least:.4g} apart" if least > 0.0 else "that do not overlap"
+        yield Fault(f"body[{second}]", found, f"links {apart} at home; or name the pair in `ignore`")
+
+
+def overlaps_at_home(mechanism: Structure) -> list[tuple[float, int, int]]:
+    """Distances [length] at home of two shapes each that are nearer than the clearance, or overlap; the worst first."""
+    from ..kernels.clearance.least_clearance import least_clearance
+
+    links, least = links_of(mechanism), mechanism.clearance or 0.0
     clearance, nearest, points = np.empty(1), np.empty(1, np.int64), np.empty((1, 2, 3))
     scratch, places = np.zeros(1 + links.places[0].size), links.places[None]
     overlaps: list[tuple[float, int, int]] = []
@@ -164,8 +177,10 @@ def collisions_at_home(mechanism: Structure) -> Iterator[Fault]:
         least_clearance(links.sizes, places, pair[None], scratch, clearance, nearest, points)
         if clearance[0] < least - TOLERANCES.home_slack * mechanism.characteristic_length:
             overlaps.append((float(clearance[0]), int(pair[0]), int(pair[1])))
-    for distance, first, second in sorted(overlaps):
-        how = f"{-distance:.4g} deep in" if distance < 0.0 else f"{distance:.4g} from"
-        found = f"'{mechanism.shapes[second].body}', which is {how} '{mechanism.shapes[first].body}' at home"
-        apart = f"that are at least {least:.4g} apart" if least > 0.0 else "that do not overlap"
-        yield Fault(f"body[{second}]", found, f"links {apart} at home; or name the pair in `ignore`")
+    return sorted(overlaps)
+
+
+def bodies_of_shapes(mechanism: Structure) -> list[set[str]]:
+    """The bodies that each shape belongs to: of a strut both of its parts."""
+    shapes = zip(mechanism.shapes, links_of(mechanism).joints, strict=True)
+    return [_bodies_of(mechanism, shape, names) for shape, names in shapes]

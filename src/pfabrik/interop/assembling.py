@@ -6,7 +6,7 @@ import dataclasses
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, ClosedHome, OpenLoops, close_home
+from .collision import Collision
 from .digits import worst
+from .imported_shapes import with_collision
 from .notes import Note, noting
 from .opened import ROWS, OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies, with_cones
@@ -64,10 +66,20 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
         raise InvalidArgument("opened", type(opened).__name__, "an OpenMechanism")
     noted = list(notes)
     with noting(noted):
-        return _assembled(opened, noted)
+        home = closed(opened, noted)
+        mechanism = with_collision(home.mechanism, home.collision, noted)
+    return Imported(mechanism, home.gap, tuple(noted))
 
 
-def _assembled(opened: OpenMechanism, notes: list[Note]) -> Imported:
+class Assembled(NamedTuple):
+    """A mechanism without its shapes, how far its loops were open [length], and its collision geometry at home."""
+
+    mechanism: Mechanism
+    gap: float
+    collision: Collision
+
+
+def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     """Close the loops, make the geometry exact, then merge joints."""
     loops = OpenLoops(opened)
     gap = loops.gap(np.zeros(len(loops.low)))
@@ -76,10 +88,11 @@ def _assembled(opened: OpenMechanism, notes: list[Note]) -> Imported:
     joints = [*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home)]
     reference = _moved_reference(opened, loops.tree, home)
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
-    rigid, _ = merged_bodies(merged_balls(joints), opened.base, opened.end_effector)
+    rigid, stands_for = merged_bodies(merged_balls(joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
     simple = with_cones(combined(exact, {opened.base, opened.end_effector}, notes), opened.cones)
-    return Imported(_mechanism(opened, simple, reference, notes), gap * loops.length, tuple(notes))
+    collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
+    return Assembled(_mechanism(opened, simple, reference, notes), gap * loops.length, collision)
 
 
 def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> tuple[ClosedHome, OpenMechanism]:
@@ -191,6 +204,14 @@ def _moved_reference(opened: OpenMechanism, tree: Structure, home: ClosedHome) -
         return None
     motion = bodies[opened.end_effector][0]
     return np.asarray(motion[:3, :3] @ opened.reference_point + motion[:3, 3])
+
+
+def _moved_collision(opened: OpenMechanism, tree: Structure, home: ClosedHome) -> Collision:
+    """The collision geometry of the machine's bodies at the closed home."""
+    collision = opened.collision.on({opened.base, *tree.bodies})
+    if not collision.solids or not home.q.any():
+        return collision
+    return collision.moved({body: motion[0] for body, motion in displacements(tree, home.q[None]).items()})
 
 
 def _mechanism(

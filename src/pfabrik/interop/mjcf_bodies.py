@@ -18,6 +18,7 @@ from ..description.links import links_of
 from ..description.mechanism import Mechanism
 from ..motion.displacements import columns
 from .cuts import Branch, CutTree
+from .mjcf_struts import Half, halves_of, struts_of
 from .names import unique
 from .physics import Physics
 
@@ -84,6 +85,8 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
     for name in mechanism.bodies:
         elements[name].extend(_drawn(points[name], origins[name], physics))
         elements[name].extend(_thick(mechanism, name, origins[name], metres))
+    for half in halves_of(mechanism):
+        elements[half.body].append(_half(half, origins[half.body], metres))
     for site, body_name, point in _sites(mechanism, tree, names, metres):
         place = vector(point - origins[body_name])
         ET.SubElement(elements[body_name], "site", name=site, pos=place, size=repr(2.0 * THICKNESS * physics.length))
@@ -141,20 +144,16 @@ def _axes(mechanism: Mechanism, joint: Joint) -> Floats:
     return np.array([mechanism.home_axis(joint.name)] * len(KINDS[joint.type].coordinates))
 
 
-SLIDING = ("prismatic", "cylindrical")
-"""Joints whose centre rests on one of their bodies only."""
+UNTOUCHED = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "3"}
+"""Attributes of the geoms of shapes: they touch nothing and weigh nothing until told otherwise."""
 
 
 def _thick(mechanism: Mechanism, body: str, origin: Floats, metres: float) -> Iterator[ET.Element]:
-    """The shapes of a body as geoms of group 3, which touch nothing and weigh nothing until told otherwise.
-
-    Left out are capsules between joints of two bodies, as of a strut: their length changes, that of a geom does not.
-    """
-    links = links_of(mechanism) if mechanism.shapes else None
+    """The shapes of a body as geoms; those of struts, whose length changes, are written as halves."""
+    links, struts = (links_of(mechanism), struts_of(mechanism)) if mechanism.shapes else (None, {})
     for k, shape in enumerate(mechanism.shapes if links is not None else ()):
         assert links is not None
-        joints = [mechanism.joint(name) for name in links.joints[k]]
-        if shape.body != body or any(body not in each.connects or each.type in SLIDING for each in joints):
+        if shape.body != body or k in struts:
             continue
         places, size = links.places[k], np.array([0.5 * metres])
         attributes = {"pos": vector(places[0] * metres - origin)}
@@ -170,8 +169,13 @@ def _thick(mechanism: Mechanism, body: str, origin: Floats, metres: float) -> It
             attributes["zaxis"] = vector(places[1])
             size = size * [shape.diameter or 0.0, shape.thickness]
         kind = "cylinder" if shape.kind == "disc" else shape.kind
-        untouched = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "3"}
-        yield ET.Element("geom", {"type": kind, **attributes, "size": vector(size), **untouched})
+        yield ET.Element("geom", {"type": kind, **attributes, "size": vector(size), **UNTOUCHED})
+
+
+def _half(half: Half, origin: Floats, metres: float) -> ET.Element:
+    """The part of a strut that moves with one body, as a geom."""
+    ends, radius = vector((half.ends * metres - origin).ravel()), repr(half.radius * metres)
+    return ET.Element("geom", {"name": half.name, "type": "capsule", "fromto": ends, "size": radius, **UNTOUCHED})
 
 
 def _inertial(body: str, points: list[Floats], origin: Floats, physics: Physics) -> ET.Element:

@@ -40,8 +40,8 @@ TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
 MOST_COPIES = 1000
 """Most copies that `replicate` may make, of copies too."""
 
-UNNOTED = ("inertial", "light", "camera", "plugin")
-"""Elements inside bodies that nobody would look for in a mechanism."""
+UNNOTED = ("inertial", "light", "camera", "plugin", "geom")
+"""Elements inside bodies that nobody would look for in a mechanism, and geoms, which `mjcf_geoms` reads."""
 
 
 def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
@@ -61,8 +61,9 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
         elif section.tag == "actuator":
             plain.append(_actuators(section, notes))
         elif section.tag in ("tendon", "contact", "deformable", "sensor"):
-            nameless = Counter(child.tag for child in section if not child.get("name"))
-            names = (*filter(None, (child.get("name") for child in section)), *_counted(nameless))
+            others = [child for child in section if child.tag not in ("pair", "exclude")]
+            nameless = Counter(child.tag for child in others if not child.get("name"))
+            names = (*filter(None, (child.get("name") for child in others)), *_counted(nameless))
             if names:
                 notes.append(Note(f"{section.tag}s are left out", names))
         elif section.tag == "asset":
@@ -71,7 +72,7 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     counted = _counted(Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED}))
     if counted:
         notes.append(Note("left out, for they do not move anything", tuple(counted)))
-    springs = tuple(joint.get("name", "a joint") for joint in root.iter("joint") if _number(joint, "stiffness"))
+    springs = tuple(joint.get("name", "a joint") for joint in root.iter("joint") if number(joint, "stiffness"))
     if springs:
         notes.append(Note("springs are left out, of", springs))
     return plain
@@ -85,7 +86,7 @@ def _counted(tags: Counter[str]) -> list[str]:
 def _kept(element: ET.Element, omitted: Counter[str], tags: Sequence[str] = tuple(KEPT), copies: int = 1) -> ET.Element:
     """An element, with its attributes and descendants that belong to the kinematics."""
     if element.tag == "replicate":
-        copies *= max(1, int(_number(element, "count")))
+        copies *= max(1, int(number(element, "count")))
         if copies > MOST_COPIES:
             raise fault("replicate", f"{copies} copies", f"at most {MOST_COPIES}")
     kept = ET.Element(element.tag, _attributes(element))
@@ -135,7 +136,7 @@ def transmission_text(actuator: ET.Element) -> str:
     return f"{name} (through {' and '.join(driven)})" if driven else name
 
 
-def _number(element: ET.Element, key: str) -> float:
+def number(element: ET.Element, key: str) -> float:
     """The value of an attribute; 0 where it is none."""
     try:
         return float(element.get(key, "0").split()[0])

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree as ET
 
 from ..checks import require_names
+from ..description.form_faults import shown
 from ..description.joints import Cone
 from ..extras import require
 from .assembling import Imported
+from .collision import Collision
 from .driving import Rates
+from .mjcf_geoms import read_collision
 from .mjcf_model import MjcfModel
 from .mjcf_plain import plain_model, transmission_text
+from .mjcf_struts import is_half, read_struts
 from .mjcf_writing import NOTE
 from .notes import Note, noting
 from .opened import loops_by_name
 from .robots import Robot, mechanism_of
-from .xml_reading import read_xml
+from .xml_reading import fault, read_xml
 
 
 def from_mjcf(
@@ -38,7 +44,8 @@ def from_mjcf(
     ball, two between the same bodies a hinge, `weld` makes two bodies one; sites `closing_<name>_1` and
     `closing_<name>_2` meet in a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
     motion against the base does not depend on is left out. Loops that are open are closed by moving passive joints.
-    Base coordinates are those of the world at the configuration.
+    Base coordinates are those of the world at the configuration. Geoms that collide become shapes of their bodies; what
+    the file lets pass through each other, and what overlaps at home, may touch (`ignore`).
 
     Parameters
     ----------
@@ -78,7 +85,8 @@ def from_mjcf(
 
 def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
     """The model as a robot, with its loops."""
-    written, places = _written_by_us(root), model.places()
+    data, places = _own_notes(root), model.places()
+    written = _written_by_us(data)
     site = places.get(written.pop("reference_point", ""))
     if site is not None and written.get("end_effector") in places:
         places[written["end_effector"]] = (written["end_effector"], site[1])
@@ -95,8 +103,28 @@ def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
         roundings=model.roundings,
         couplings=tuple(model.couplings(notes)),
         undriven=_undriven(root),
+        collision=_collision(root, model, data, notes),
         **written,
     )
+
+
+def _collision(root: ET.Element, model: MjcfModel, data: dict[str, str], notes: list[Note]) -> Collision:
+    """The collision geometry of a model, with the struts and the clearance of one that `to_mjcf` wrote."""
+    collision = read_collision(root, model, bool(data), notes)
+    struts = dict(read_struts(data))
+    solids = [each for each in collision.solids if not is_half(each.name, struts)]
+    return replace(collision, solids=(*solids, *struts.values()), clearance=_clearance(data.get("clearance")))
+
+
+def _clearance(text: str | None) -> float | None:
+    """The clearance that a note tells of [m]."""
+    try:
+        clearance = None if text is None else float(text)
+    except ValueError:
+        clearance = math.nan
+    if clearance is not None and not 0.0 <= clearance < math.inf:
+        raise fault("custom text 'clearance'", shown(text), "a length in metres, 0 or more")
+    return clearance
 
 
 def _undriven(root: ET.Element) -> str:
@@ -110,10 +138,14 @@ def _undriven(root: ET.Element) -> str:
     return "no actuator of a joint"
 
 
-def _written_by_us(root: ET.Element) -> dict[str, Any]:
-    """The fields of a robot that `to_mjcf` wrote into custom elements, and its reference point."""
+def _own_notes(root: ET.Element) -> dict[str, str]:
+    """The custom elements that `to_mjcf` wrote, by their names without the prefix; empty where it did not."""
     texts = {text.get("name", ""): text.get("data", "") for text in root.iterfind("custom/text")}
-    data = {name.removeprefix(NOTE): text for name, text in texts.items() if name.startswith(NOTE)}
+    return {name.removeprefix(NOTE): text for name, text in texts.items() if name.startswith(NOTE)}
+
+
+def _written_by_us(data: dict[str, str]) -> dict[str, Any]:
+    """The fields of a robot that `to_mjcf` wrote into custom elements, and its reference point."""
     fields: dict[str, Any] = {key: data[key] for key in ("base", "end_effector", "reference_point") if key in data}
     if "task" in data:
         fields["task"] = tuple(data["task"].split())

@@ -17,6 +17,7 @@ from ..poses import as_floats
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
 from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit, vector
+from .mjcf_struts import strut_notes
 from .physics import STEP, Physics, physics
 
 NOTE = "pfabrik."
@@ -38,9 +39,10 @@ def to_mjcf(
     Lengths become metres, and every joint counts as it does in the mechanism: `qpos` of a hinge or slide is the
     coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a double of a
     body, of hardly any mass, welded to it. Sites are at all joints and at the reference point; actuated joints have
-    position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, but for those
-    of struts, whose length changes. Cones, which MuJoCo does not know, are in comments and in
-    custom elements, as are base, end effector and task, and highest speeds and accelerations.
+    position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, and
+    weigh nothing; a strut is two, of which one goes with each part, where these are as long as it is over all of its
+    range. Pairs of `ignore` are `exclude`. Cones, which MuJoCo does not know, are in comments and in custom elements,
+    as are base, end effector and task, highest speeds and accelerations, struts, and the clearance.
 
     Parameters
     ----------
@@ -86,6 +88,10 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
         ET.SubElement(custom, "text", name=NOTE + name, data=text)
     root.append(bodies(mechanism, tree, names, metres, physics))
     root.append(_equalities(tree, names, physics))
+    if mechanism.ignore:
+        contact = ET.SubElement(root, "contact")
+        for one, other in mechanism.ignore:
+            ET.SubElement(contact, "exclude", body1=one, body2=other)
     root.append(_servos(mechanism, metres, physics))
     home = " ".join(repr(float(drive.home) * si_unit(drive, metres)) for drive in mechanism.drives)
     ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home", ctrl=home)
@@ -121,6 +127,9 @@ def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[
         if joint.cone is not None:
             cone = joint.cone
             yield f"cone.{joint.name}", f"{vector(np.array(cone.axis))} {cone.half_angle!r} {cone.fixed_to}"
+    if mechanism.clearance is not None:
+        yield "clearance", repr(mechanism.clearance * metres)
+    yield from strut_notes(mechanism, metres)
 
 
 def _equalities(tree: CutTree, names: Names, physics: Physics) -> ET.Element:

@@ -16,6 +16,7 @@ from ..description.structure import Structure
 from ..errors import InvalidArgument
 from ..rotations import square_to
 from ..tolerances import TOLERANCES
+from .collision import NO_COLLISION, Collision
 from .digits import Rounding
 from .names import unique
 from .notes import Note
@@ -95,6 +96,7 @@ class OpenMechanism:
     cones : joint or loop -> the cone that limits it.
     roundings : joint or loop -> how far its digits put it from what was meant, at most [length, rad]; those that are
         not named are as the worst of those that are. Empty where nothing is known.
+    collision : the collision geometry [length].
     """
 
     name: str
@@ -107,6 +109,7 @@ class OpenMechanism:
     task: tuple[str, ...] | None = None
     cones: Mapping[str, Cone] = field(default_factory=dict)
     roundings: Mapping[str, Rounding] = field(default_factory=dict)
+    collision: Collision = NO_COLLISION
 
     def tree(self) -> Structure:
         """The joints alone, as a structure that can be moved."""

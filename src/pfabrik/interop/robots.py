@@ -16,10 +16,12 @@ from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
 from ..errors import InvalidArgument, UnknownName
 from ..files.units import metres_of
-from .assembling import Imported, assemble
+from .assembling import Imported, closed
+from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
 from .driving import Rates, require_drives, with_actuators
+from .imported_shapes import with_collision
 from .names import unique
 from .notes import Note
 from .opened import Loop, OpenMechanism
@@ -42,6 +44,7 @@ class Robot:
     roundings : joint or loop -> how exactly the digits of the file place it [m, rad]; other loops are as the worst.
     couplings : joints that follow others.
     undriven : what the file has in place of driven joints, for the refusal of a machine without any.
+    collision : its collision geometry [m].
     """
 
     name: str
@@ -58,6 +61,7 @@ class Robot:
     roundings: Mapping[str, Rounding] = field(default_factory=dict)
     couplings: Sequence[Coupling] = ()
     undriven: str = "none in the file"
+    collision: Collision = NO_COLLISION
 
 
 def mechanism_of(
@@ -87,11 +91,11 @@ def mechanism_of(
     opened = prune(_opened(rigid, base, tip, point, length_unit, task), notes)
     opened = with_coupled_drives(opened, rigid.joints, rigid.couplings, chosen or (), notes)
     require_drives(opened, robot.joints, robot.undriven)
-    imported = assemble(opened, notes)
-    notes = list(imported.notes)
-    mechanism = with_actuators(imported.mechanism, robot.order, robot.rates, metres)
+    home = closed(opened, notes)
+    mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres)
     mechanism = with_task(mechanism, task is not None, notes)
-    return dataclasses.replace(imported, mechanism=mechanism, notes=tuple(notes))
+    mechanism = with_collision(mechanism, home.collision, notes)
+    return Imported(mechanism, home.gap, tuple(notes))
 
 
 def _require_known(argument: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
@@ -183,6 +187,7 @@ def _with_merged_bodies(robot: Robot, base: str, tip: str) -> Robot:
         joints=[joint for joint in joints if joint.type != "fixed"],
         loops=[loop for loop in loops if loop.connects[0] != loop.connects[1]],
         cones=cones,
+        collision=robot.collision.merged(stands_for),
     )
 
 
@@ -220,6 +225,7 @@ def _opened(
         None if task is None else tuple(task),
         robot.cones,
         {name: Rounding(each.length / metres, each.angle) for name, each in roundings.items()},
+        robot.collision.in_unit(metres),
     )
 
 

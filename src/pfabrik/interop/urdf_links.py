@@ -47,9 +47,7 @@ class UrdfJoint:
     @property
     def frame(self) -> Floats:
         """The joint's frame at zero in that of its parent, (4, 4) [m]."""
-        frame = np.eye(4)
-        frame[:3, :3], frame[:3, 3] = from_rpy(numbers_in(self.rpy)), numbers_in(self.xyz)
-        return frame
+        return frame_at(self.xyz, self.rpy)
 
     @property
     def axis(self) -> Floats:
@@ -129,6 +127,13 @@ def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
     transmitted = dict.fromkeys(joint.get("name", "") for joint in root.iterfind("transmission/joint"))
     driven = [name for name in transmitted if name in link_of]
     return UrdfLinks(root.get("name", "mechanism"), roots[0], outward, frames, link_of, driven)
+
+
+def frame_at(xyz: str, rpy: str) -> Floats:
+    """A frame (4, 4) at three numbers [m], turned by roll, pitch and yaw [rad]."""
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = from_rpy(numbers_in(rpy)), numbers_in(xyz)
+    return frame
 
 
 def numbers_in(text: str) -> Floats:

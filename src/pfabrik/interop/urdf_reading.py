@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -19,6 +20,7 @@ from .loops_file import LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, noting
 from .opened import loops_by_name
 from .robots import Robot, mechanism_of
+from .urdf_collision import read_collision
 from .urdf_links import UrdfJoint, UrdfLinks, numbers_in, read_links
 from .xml_reading import read_xml
 
@@ -37,7 +39,8 @@ def from_urdf(
     """The mechanism in a robot description, with the loops that URDF cannot express.
 
     Home is the zero configuration, closed: where the description is open there, passive joints are moved until its
-    loops meet, within their ranges. Base coordinates are those of the root link.
+    loops meet, within their ranges. Base coordinates are those of the root link. Boxes, spheres, cylinders and capsules
+    of `collision` become shapes; links that overlap at home may touch (`ignore`).
 
     Parameters
     ----------
@@ -67,7 +70,7 @@ def from_urdf(
     with noting(notes):
         loops_file = read_loops(loops)
         links = read_links(element, loops_file.retyped)
-        robot = _robot(links, loops_file, notes)
+        robot = replace(_robot(links, loops_file, notes), collision=read_collision(element, links, notes))
         motors = [name for name in loops_file.actuated if name in links.link_of] or None
         drives = motors if actuated is None else actuated
         return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task)

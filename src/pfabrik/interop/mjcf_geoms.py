@@ -1,0 +1,168 @@
+"""The collision geometry of a MuJoCo model: those of its geoms that touch something, as solids of their bodies."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from ..arrays import Floats
+from .collision import EVERYTHING, MOST_SOLIDS, Collision, Solid, solid_shape
+from .mjcf_model import MjcfModel
+from .mjcf_plain import PLACE, number
+from .notes import Note
+
+SOLIDS = ("sphere", "capsule", "box", "cylinder")
+"""Types of geoms that have a shape here. One more, and it is read: `solid_shape` says what becomes of it."""
+
+UNBOUNDED = ("plane", "hfield")
+"""Types of geoms that are no part of a robot."""
+
+OWN_GROUP = 3
+"""The group of geoms that `to_mjcf` writes shapes in, and in which others keep what collides, too."""
+
+GEOM = ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *PLACE)
+KEPT: dict[str, tuple[str, ...]] = {
+    "compiler": ("angle", "eulerseq"),
+    "default": ("class",),
+    "worldbody": (),
+    "body": ("name", "childclass", *PLACE),
+    "frame": ("name", "childclass", *PLACE),
+    "replicate": ("count", "offset", "euler", "sep", "childclass"),
+    "geom": GEOM,
+}
+"""Elements of a model of geoms alone -> their attributes that are kept."""
+
+
+class Geom(NamedTuple):
+    """A geom of the file.
+
+    Attributes
+    ----------
+    kind : its type; "mesh" too where a primitive is fitted to one.
+    touches : True if it collides with something, by its bits or by a pair.
+    copies : how many `replicate` makes of it.
+    """
+
+    element: ET.Element
+    kind: str
+    touches: bool
+    group: str
+    copies: int
+
+
+def read_collision(root: ET.Element, model: MjcfModel, is_ours: bool, notes: list[Note]) -> Collision:
+    """The collision geometry of a model [m], at its configuration; notes say what is left out.
+
+    Geoms that touch nothing are there to be seen. But where all of them touch nothing, or where `to_mjcf` wrote the
+    model, those of group 3 are the collision geometry.
+
+    Parameters
+    ----------
+    model : the kinematics of the model, compiled; its bodies are those of the file.
+    """
+    named = [(pair.get("geom1", ""), pair.get("geom2", "")) for pair in root.iterfind("contact/pair")]
+    pairs = frozenset(frozenset(pair) for pair in named if all(pair))
+    paired = {name for pair in pairs for name in pair}
+    geoms = list(_geoms(root, paired))
+    by_group = is_ours or not any(geom.touches and geom.kind not in UNBOUNDED for geom in geoms)
+    colliding = [geom for geom in geoms if geom.touches or (by_group and geom.group == str(OWN_GROUP))]
+    if len(colliding) < len(geoms) and not is_ours:
+        notes.append(Note(f"geoms that touch nothing are left out ({len(geoms) - len(colliding)})"))
+    other = Counter(geom.kind for geom in colliding if geom.kind not in SOLIDS)
+    if other:
+        counts = tuple(f"{kind} ({count})" for kind, count in sorted(other.items()))
+        notes.append(Note("geoms of types that have no shape here are left out", counts))
+    chosen = {id(geom.element) for geom in colliding if geom.kind in SOLIDS}
+    count = sum(geom.copies for geom in colliding if geom.kind in SOLIDS)
+    if count > MOST_SOLIDS:
+        notes.append(Note(f"collision geometry is left out: {count} geoms, of which at most {MOST_SOLIDS} are read"))
+        return Collision()
+    excluded = tuple((each.get("body1", ""), each.get("body2", "")) for each in root.iterfind("contact/exclude"))
+    solids = _solids(root, chosen, model, notes) if chosen else ()
+    return Collision(tuple(each if each.name in paired else _with_bits(each) for each in solids), excluded, pairs)
+
+
+def _with_bits(solid: Solid) -> Solid:
+    """A solid that was chosen by its group as one that touches everything."""
+    is_without = solid.contype == 0 and solid.conaffinity == 0
+    return replace(solid, contype=EVERYTHING, conaffinity=EVERYTHING) if is_without else solid
+
+
+def _geoms(root: ET.Element, paired: set[str]) -> Iterator[Geom]:
+    """Yield the geoms of all bodies, with what they inherit from classes."""
+    classes: dict[str, Mapping[str, str]] = {"main": {}}
+    for section in root.iterfind("default"):
+        _read_classes(section, "main", classes)
+    waiting = [(section, "main", 1) for section in root.iterfind("worldbody")]
+    while waiting:
+        element, class_, copies = waiting.pop()
+        if element.tag == "replicate":
+            copies *= max(1, int(number(element, "count")))
+        for child in element:
+            if child.tag == "geom":
+                given = {**classes.get(child.get("class", class_), {}), **child.attrib}
+                is_mesh = "mesh" in given or given.get("type") in ("mesh", "sdf")
+                kind = "mesh" if is_mesh else "hfield" if "hfield" in given else given.get("type", "sphere")
+                bits = [given.get(key, "1").strip() for key in ("contype", "conaffinity")]
+                touches = bits != ["0", "0"] or given.get("name", "") in paired
+                yield Geom(child, kind, touches, given.get("group", "0").strip(), copies)
+            elif child.tag in ("body", "frame", "replicate"):
+                waiting.append((child, child.get("childclass", class_), copies))
+
+
+def _read_classes(section: ET.Element, parent: str, classes: dict[str, Mapping[str, str]]) -> None:
+    """Fill the attributes of geoms of a class and of the classes in it."""
+    name = section.get("class", parent)
+    attributes = {**classes.get(parent, {}), **classes.get(name, {})}
+    for geom in section.iterfind("geom"):
+        attributes |= geom.attrib
+    classes[name] = attributes
+    for inner in section.iterfind("default"):
+        _read_classes(inner, name, classes)
+
+
+def _copied(element: ET.Element, chosen: set[int], in_defaults: bool = False) -> ET.Element:
+    """An element of a model of geoms alone, with its descendants."""
+    known = KEPT[element.tag]
+    copy = ET.Element(element.tag, {key: value for key, value in element.attrib.items() if key in known})
+    for child in element:
+        if child.tag == "geom":
+            if in_defaults or id(child) in chosen:
+                copy.append(_copied(child, chosen))
+        elif child.tag in KEPT:
+            copy.append(_copied(child, chosen, in_defaults))
+    return copy
+
+
+def _solids(root: ET.Element, chosen: set[int], model: MjcfModel, notes: list[Note]) -> Iterator[Solid]:
+    """Yield the chosen geoms as solids: MuJoCo places them on their bodies, in a model without joints and meshes."""
+    mujoco = model.mujoco
+    plain = ET.Element("mujoco")
+    plain.extend(_copied(each, chosen, each.tag == "default") for each in root if each.tag in KEPT)
+    try:
+        geoms: Any = mujoco.MjModel.from_xml_string(ET.tostring(plain, encoding="unicode"))
+    except ValueError as error:
+        reason = str(error).replace("\n", " ").strip()
+        notes.append(Note(f"collision geometry is left out, for MuJoCo does not compile it ({reason})"))
+        return
+    for index in range(geoms.ngeom):
+        body = int(geoms.geom_bodyid[index])
+        kind = mujoco.mjtGeom(int(geoms.geom_type[index])).name.removeprefix("mjGEOM_").lower()
+        frame = _frame(model.data.xpos[body], model.data.xmat[body])
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, geoms.geom_quat[index])
+        shape = solid_shape(model.body(body), kind, geoms.geom_size[index], frame @ _frame(geoms.geom_pos[index], turn))
+        bits = int(geoms.geom_contype[index]), int(geoms.geom_conaffinity[index])
+        yield Solid(shape, shape.body, str(geoms.geom(index).name), *bits)
+
+
+def _frame(at: Floats, turn: Floats) -> Floats:
+    """A frame from its origin (3,) and its rotation (9,)."""
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = turn.reshape(3, 3), at
+    return frame
