@@ -102,7 +102,7 @@ class Extent:
 
 
 FULL = Extent(steps=361, targets=1000, repeats=31, searches=1000)
-QUICK = Extent(steps=73, targets=100, repeats=5, searches=8)
+QUICK = Extent(steps=73, targets=100, repeats=2, searches=6)
 
 
 @lru_cache(maxsize=1)

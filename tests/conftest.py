@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -14,9 +15,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")  # pictures open no window, whatever 
 os.environ.pop("COLUMNS", None)  # workers have that of a terminal, which output would be fitted to
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
-settings.register_profile(
-    "fixed", derandomize=True, deadline=None, database=None, max_examples=2 if INTERPRETED else 15
-)
+settings.register_profile("fixed", derandomize=True, deadline=None, database=None, max_examples=2 if INTERPRETED else 8)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile(os.environ.get("PFABRIK_HYPOTHESIS", "fixed"))
 
@@ -43,6 +42,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     for process in started:
         if process.wait():
             raise pytest.UsageError("the kernels do not compile")
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of tests stay to the end: the garbage collector need not look through them again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

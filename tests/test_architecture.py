@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 
@@ -44,14 +45,19 @@ def pattern(machine: str) -> re.Pattern[str]:
     return re.compile(rf"\b{written}\b" if machine in VOCABULARY else written, re.IGNORECASE)
 
 
+@cache
+def nodes(source: str) -> tuple[ast.AST, ...]:
+    """All nodes of a source text; parsed once for all tests."""
+    return tuple(ast.walk(ast.parse(source)))
+
+
 def data(path: Path) -> str:
     """The string constants of a source file that are not docstrings, one a line; of another file, all of it."""
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         return text
-    tree = ast.parse(text)
-    statements = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    constants = (node for node in ast.walk(tree) if isinstance(node, ast.Constant) and id(node) not in statements)
+    statements = {id(node.value) for node in nodes(text) if isinstance(node, ast.Expr)}
+    constants = (node for node in nodes(text) if isinstance(node, ast.Constant) and id(node) not in statements)
     return "\n".join(node.value for node in constants if isinstance(node.value, str))
 
 
@@ -96,7 +102,7 @@ def test_type_checkers_see_every_public_name_where_it_is() -> None:
 def modules_imported(place: str, source: str) -> Iterator[str]:
     """The modules of the package that a file imports relatively, as places: `kernels/legs/records`."""
     rooms = Path(place).parts[:-1]
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(source):
         if isinstance(node, ast.ImportFrom) and node.level:
             start = [*rooms[: len(rooms) - node.level + 1], *(node.module or "").split(".")]
             module = "/".join(part for part in start if part)
@@ -133,7 +139,7 @@ def shared_class_names(sources: dict[str, str]) -> dict[str, list[str]]:
     """The names that several classes have, each with the places of these classes."""
     places = defaultdict(list)
     for place, source in sources.items():
-        for node in ast.walk(ast.parse(source)):
+        for node in nodes(source):
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(place)
     return {name: same for name, same in places.items() if len(same) > 1}

@@ -74,7 +74,7 @@ def test_planar_3rpr_gains_and_loses_modes_at_the_published_strut_lengths(
         assert_same_poses(modes, [published.planar_pose(each, home) for each in SAUER.solutions(p)], atol=1e-7)
 
 
-@pytest.mark.parametrize("count", [2 if INTERPRETED else 8, pytest.param(100, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("count", [2 if INTERPRETED else 4, pytest.param(100, marks=pytest.mark.campaign)])
 def test_planar_3rpr_has_the_modes_of_its_sextic_whatever_its_lengths(count: int) -> None:
     mechanism, home = published.planar_3rpr(SAUER, PUBLISHED["sauer_p2_5"]["p"])
     rng = np.random.default_rng(1)

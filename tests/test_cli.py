@@ -1306,7 +1306,7 @@ def test_an_interrupted_demo_leaves_nothing_behind(tmp_path: Path) -> None:
     def interruptible() -> None:  # a shell starts what runs in its background with interrupts ignored
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    line = ("demo", "--steps", 200_000, "-o", tmp_path / "out")
+    line = ("demo", "--steps", 20_000, "-o", tmp_path / "out")
     with in_process(*line, stdout=subprocess.PIPE, preexec_fn=interruptible) as process:
         deadline = time.monotonic() + 5
         while not os.listdir(tmp_path) and time.monotonic() < deadline:
@@ -1391,7 +1391,7 @@ def test_a_signal_in_code_that_was_just_generated_has_its_own_exit_code(tmp_path
 
 
 def test_a_track_that_is_told_to_end_leaves_no_parts_of_files(tmp_path: Path) -> None:
-    (tmp_path / "path.csv").write_text("x,y,z\n" + "0,10,200\n5,10,201\n" * 200_000)
+    (tmp_path / "path.csv").write_text("x,y,z\n" + "0,10,200\n5,10,201\n" * 50_000)
     with in_process("track", "five_bar", "path.csv", "-o", "answers.csv", cwd=tmp_path) as process:
         deadline = time.monotonic() + 60
         while not list(tmp_path.glob(".*.part*")) and time.monotonic() < deadline:
@@ -1403,7 +1403,7 @@ def test_a_track_that_is_told_to_end_leaves_no_parts_of_files(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("after", [1.5, 2.5, 4.0])
+@pytest.mark.parametrize("after", [1.5, 4.0])
 def test_a_view_is_interrupted_at_any_moment(after: float) -> None:
     pytest.importorskip("viser")
 

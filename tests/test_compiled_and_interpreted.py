@@ -20,6 +20,7 @@ import pfabrik as pf
 from checks import INTERPRETED
 from copied import copied, copy_kernels
 from machines import machine
+from oracles import any_values
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels import ahead
 from pfabrik.kernels._shipped import COMPILES
@@ -27,7 +28,7 @@ from pfabrik.kernels._shipped import COMPILES
 TESTS = Path(__file__).parent
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 FEW = ("five_bar", "nrpm", "hexapod_rus", "serial_spherical", "serial_arm")
-MANY = (*FEW, "stewart", "tripod_prs", "mixed")
+MANY = (*FEW, "stewart", "tripod_prs", "mixed", "closure.four_bar_driven")
 """Machines that are compared, by legs, by reaching and on all joints: what the interpreter is quick with, and more."""
 
 SCRIPT = """
@@ -52,6 +53,8 @@ def answers(name: str) -> dict[str, np.ndarray]:
     mechanism = machine(name)
     targets = some_targets(mechanism, 4, share=0.05 if name in ("hexapod_rus", "mixed", "nrpm") else 0.2)
     targets[0] = mechanism.home_pose
+    if name == "serial_arm":  # on all joints, where the interpreter is quick within reach alone
+        targets = pf.solve_fk(mechanism, any_values(mechanism, 4, 0.3)).pose
     if name in ("five_bar", "stewart"):
         targets[3, :3, 3] += 5 * mechanism.characteristic_length
     answer = pf.solve_ik(mechanism, targets)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from functools import cache
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ HOLDS = ["orientation", *(pytest.param(hold, marks=pytest.mark.slow) for hold in
 
 
 @pytest.mark.skipif(INTERPRETED, reason="many searches")
-@pytest.mark.parametrize("count", [12, pytest.param(64, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("count", [8, pytest.param(64, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("hold", HOLDS)
 @pytest.mark.parametrize("name", names())
 def test_any_finite_target_has_an_honest_answer(name: str, hold: str | None, count: int) -> None:
@@ -97,7 +98,7 @@ def test_any_finite_actuator_values_have_an_honest_answer(name: str, count: int)
 @pytest.mark.parametrize("name", names())
 def test_a_row_alone_is_answered_as_in_a_batch_and_survives_being_stored(name: str) -> None:
     mechanism = machine(name)
-    rows, length = 2 if INTERPRETED else 6, mechanism.characteristic_length
+    rows, length = 2 if INTERPRETED else 4, mechanism.characteristic_length
     batches = {
         pf.solve_ik: any_targets(mechanism, rows, seed=2),
         pf.solve_fk: any_values(mechanism, rows, 1.2, seed=2),
@@ -137,6 +138,15 @@ def test_rows_that_are_none_are_named_or_marked_and_spoil_nothing(name: str) -> 
         assert pose_errors(mechanism, answer.pose[[0, 2, 4]], mechanism.home_pose).max() <= 1e-7
 
 
+@cache
+def five_answered(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Two targets that a machine of closed loops assembles at, three anywhere, and the statuses of all."""
+    mechanism = machine(f"closure.{name}")
+    assembled = pf.solve_fk(mechanism, any_values(mechanism, 2, 0.4)).pose
+    targets = np.concatenate([assembled, any_targets(mechanism, 3, seed=3)])
+    return targets, np.asarray(pf.solve_ik(mechanism, targets).status)
+
+
 @pytest.mark.skipif(INTERPRETED, reason="many searches")
 @pytest.mark.parametrize("change", ["reversed", "shuffled", "smaller", "larger"])
 @pytest.mark.parametrize("name", [each for each in closure.MACHINES if each not in ("agile_eye", "slider")])
@@ -147,13 +157,12 @@ def test_how_a_machine_is_described_does_not_change_what_it_reaches(name: str, c
         "shuffled": lambda machine: redescribed.relabelled(machine, np.random.default_rng(0), swaps=0.0)[0],
     }
     other = others.get(change, lambda machine: redescribed.scaled(machine, factor))(mechanism)
-    reached = pf.solve_fk(mechanism, any_values(mechanism, 2, 0.4)).pose
-    targets = np.concatenate([reached, any_targets(mechanism, 3, seed=3)])
+    targets, statuses = five_answered(name)
     moved = targets.copy()
     moved[:, :3, 3] *= factor
     answer = pf.solve_ik(other, moved)
     assert_honest(other, moved, answer)
-    assert np.array_equal(answer.status, pf.solve_ik(mechanism, targets).status)
+    assert np.array_equal(answer.status, statuses)
 
 
 # --- nearest ---------------------------------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ ON_THE_EDGE = 1e-8
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-def some_targets(mechanism: Mechanism, n: int = 2000, seed: int = 11) -> oracles.Array:
+def some_targets(mechanism: Mechanism, n: int = 1000, seed: int = 11) -> oracles.Array:
     return oracles.random_targets(mechanism, np.random.default_rng(seed), n // 20 if INTERPRETED else n)
 
 
@@ -62,7 +62,7 @@ def test_every_topology_has_an_example_is_told_from_its_sub_chains_and_says_wher
 @pytest.mark.parametrize("name", ["five_bar", "stewart"])
 def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     mechanism = pf.load(name)
-    wanted = some_targets(mechanism, 4000)
+    wanted = some_targets(mechanism, 2000)
     answer, expected = geometric.solve_ik(mechanism, wanted), oracles.solve_ik(mechanism, wanted)
     clear = abs(expected.margin) > ON_THE_EDGE
     np.testing.assert_array_equal(answer.reached[clear], expected.reached[clear])

@@ -18,7 +18,7 @@ from pfabrik import Mechanism, Solution, Status
 from pfabrik.model import model_of
 from pfabrik.platform.seeds import seeds_of
 
-ROWS = 2 if INTERPRETED else 12
+ROWS = 2 if INTERPRETED else 4
 NAMES = ["five_bar", "stewart", "nrpm", *MACHINES]
 # Where a pose does not decide the arrangement of a chain, the search has a choice, which may turn on the last bit.
 WITH_A_CHOICE = ("nrpm", "serial_planar", "serial_spherical")

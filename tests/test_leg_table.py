@@ -31,7 +31,7 @@ from pfabrik.platform.table import table_handle as legs_of
 SERVED = [name for name in pf.catalog() if not model_of(pf.load(name)).why_poses_do_not_suffice]
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]
 COMPLETED = [name for name in IN_FRONT if model_of(pf.load(name)).legs.task["unset"][0]]
-TARGETS = 300
+TARGETS = 150
 
 
 def table(name: str) -> LegTable:
@@ -155,7 +155,7 @@ def test_completed_poses_have_what_the_task_sets(name: str) -> None:
     assert rotation.max() <= 1e-12
 
 
-@pytest.mark.parametrize("name", ["delta", "prs", "agile_eye"])
+@pytest.mark.parametrize("name", ["g1_ankle", "prs", "agile_eye"])
 def test_a_start_keeps_its_working_mode(name: str) -> None:
     mechanism = machine(name).without_limits()
     home = pf.solve_ik(mechanism, mechanism.home_pose)

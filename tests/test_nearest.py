@@ -409,7 +409,7 @@ def room_of(mechanism: Mechanism, answer: Solution, name: str, bound: str) -> fl
     return (value - low if bound == "min" else high - value) / (high - low)
 
 
-@pytest.mark.parametrize(("n", "seed"), [(1 if INTERPRETED else 3, 4), pytest.param(25, 5, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(("n", "seed"), [(1 if INTERPRETED else 2, 4), pytest.param(25, 5, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_answers_come_nearer_as_their_limits_give_way(name: str, hold: str | None, n: int, seed: int) -> None:
     """Relaxing a limit gains no more than its multiplier says, tightening it costs no less; unnamed limits do nothing.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -36,6 +37,11 @@ if not INTERPRETED:  # where a target out of reach takes seconds
     }
 
 
+@cache
+def made(name: str) -> Mechanism:
+    return EVERY[name]()
+
+
 def any_targets(machine: Mechanism, n: int) -> np.ndarray:
     """Poses (n, 4, 4) from home to some L away, turned by any angle; the last is a million L away."""
     rng, home = np.random.default_rng(1), machine.home_pose
@@ -51,8 +57,8 @@ def any_targets(machine: Mechanism, n: int) -> np.ndarray:
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", EVERY)
 def test_limits_are_kept_and_loops_closed_for_any_target(name: str, way: str) -> None:
-    machine, options = EVERY[name](), WAYS[way]
-    targets = any_targets(machine, 4 if INTERPRETED else 16)
+    machine, options = made(name), WAYS[way]
+    targets = any_targets(machine, 4 if INTERPRETED else 8)
     answer = pf.solve_ik(machine, targets, options=options)
     assert np.isin(answer.status, (Status.REACHED, Status.PROJECTED)).all()
     assert gap_of_joints(machine, answer).max() <= 1e-9
@@ -64,8 +70,8 @@ def test_limits_are_kept_and_loops_closed_for_any_target(name: str, way: str) ->
 @pytest.mark.parametrize("name", ["stewart", "hexapod_rus", "planar_rrr"])
 def test_a_path_keeps_its_working_mode_and_goes_on_from_answer_to_answer(name: str) -> None:
     """Out of the workspace and back: the coordinates of all joints end where they began."""
-    machine = EVERY[name]()
-    way = np.sin(np.linspace(0.0, np.pi, 9 if INTERPRETED else 41))
+    machine = made(name)
+    way = np.sin(np.linspace(0.0, np.pi, 9 if INTERPRETED else 21))
     targets = np.repeat(machine.home_pose[None], len(way), axis=0)
     targets[:, 0, 3] += 1.2 * way * machine.characteristic_length
     ways = (Options.paper(), Options(projection="centroid"), Options.accelerated())

@@ -28,6 +28,8 @@ MACHINES = {
     "tricept": (("D", "E"), (0.2, 0.2, 20.0)),
     "ankle": (("ankle",), (0.2, 0.2)),
 }
+OFTEN = ("g1_ankle", "tricept")
+"""Two hinges with cranks, and three joints with struts: each of the others is like one of them."""
 
 
 def machine(name: str) -> pf.Mechanism:
@@ -60,7 +62,9 @@ def mapped(folder: Path, rows: np.ndarray, n_joints: int, n_actuators: int) -> t
 
 
 @needs_compilers
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize(
+    "name", [*OFTEN, *(pytest.param(n, marks=pytest.mark.campaign) for n in MACHINES if n not in OFTEN)]
+)
 def test_joints_to_actuators_and_back_is_where_it_began_and_power_is_conserved(name: str, tmp_path: Path) -> None:
     mechanism, (names, reach) = machine(name), MACHINES[name]
     path, n, n_a = joint_path(mechanism, names), len(reach), len(mechanism.actuator_names)

@@ -111,13 +111,13 @@ def check_actuators(name: str, made: ModuleType, number: Any, count: int, dtype:
 
 @pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
 def test_actuators_and_jacobians_are_the_library_s(name: str) -> None:
-    check_actuators(name, module(name), np.asarray, 200)
-    check_actuators(name, module(name), lambda poses: poses.astype(np.float32), 200, "float32")
+    check_actuators(name, module(name), np.asarray, 60)
+    check_actuators(name, module(name), lambda poses: poses.astype(np.float32), 60, "float32")
 
 
 @pytest.mark.parametrize("name", [*CATALOGUE, *OTHERS])
 def test_forward_kinematics_come_back_to_the_pose(name: str) -> None:
-    mechanism, (targets, solution), made = machine(name), known(name, 100), module(name)
+    mechanism, (targets, solution), made = machine(name), known(name, 60), module(name)
     actuators = made.to_actuators(targets)
     start = solution.pose.copy()
     start[:, :3, 3] += 1e-3 * mechanism.characteristic_length * np.random.default_rng(0).normal(size=(len(start), 3))
@@ -182,8 +182,8 @@ def test_any_leading_shape_is_taken_and_single_precision_stays(name: str) -> Non
 def test_nothing_is_ever_nan_and_the_margin_says_what_is_out_of_reach(name: str) -> None:
     mechanism, made = machine(name), module(name)
     random, size = np.random.default_rng(1), mechanism.characteristic_length
-    steps = random.uniform(-3.0, 3.0, (300, 3)) * size
-    wild = pf.pose(mechanism.home_pose[:3, 3] + steps, rotvec=random.uniform(-3.0, 3.0, (300, 3)))
+    steps = random.uniform(-3.0, 3.0, (100, 3)) * size
+    wild = pf.pose(mechanism.home_pose[:3, 3] + steps, rotvec=random.uniform(-3.0, 3.0, (100, 3)))
     with np.errstate(all="raise", under="ignore"):
         results = [*made.with_jacobian(wild), made.margins(wild), made.to_pose(made.to_actuators(wild))]
     assert all(np.isfinite(values).all() for values in results)

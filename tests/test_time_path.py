@@ -53,7 +53,7 @@ def limits(name: str) -> dict[str, float]:
     return {"speed": 0.4 * unit, "acceleration": 3.0 * unit}
 
 
-@pytest.mark.parametrize("turns", [1, 3])
+@pytest.mark.parametrize("turns", [pytest.param(1, marks=pytest.mark.campaign), 3])
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_time_is_that_of_toppra(name: str, turns: int) -> None:
     pytest.importorskip("toppra", reason="no toppra here: its wheels are for Linux")

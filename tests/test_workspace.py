@@ -446,7 +446,7 @@ def test_what_is_saved_can_be_read_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["stewart", "five_bar", "ankle_ups"])
 def test_a_picture_shows_every_limit_of_the_border(name: str) -> None:
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    found = pf.workspace(pf.load(name), resolution=8.0 if name == "stewart" else None)
+    found = pf.workspace(pf.load(name), resolution=16.0 if name == "stewart" else None)
     axes = found.plot()
     legend = axes.get_legend()
     assert legend is not None

@@ -66,25 +66,22 @@ def inside_targets(mechanism: Mechanism, rng: np.random.Generator, n: int, least
     return found[:n]
 
 
-def edge(margin: Callable[[Array], Array], farthest: Array, width: float) -> Array:
-    """Where margins that are positive at 0 and negative at `farthest` change sign, (n,), to within `width`.
+PARTS = 24
+"""Parts that `edge` cuts a bracket into."""
 
-    Brackets are halved ten times, then narrowed by false positions, aimed beside the root so that both ends close in;
-    every third step halves again, for margins that leap.
+
+def edge(margin: Callable[[Array], Array], farthest: Array, width: float) -> Array:
+    """Where margins (k, n) of distances (k, n) first change sign between 0 and `farthest`, (n,), to within `width`.
+
+    Brackets are cut into many parts, all of them measured in one call.
     """
-    low, high = np.zeros_like(farthest), farthest
-    at_low, at_high = margin(low), margin(high)
-    step = 0
+    low, high, rows = np.zeros_like(farthest), farthest, np.arange(len(farthest))
+    shares = np.linspace(0.0, 1.0, PARTS + 1)[:, None]
     while (high - low).max() > width:
-        share = 0.5 if step < 10 or step % 3 == 0 else at_low / (at_low - at_high)
-        middle = low + share * (high - low)
-        aside = np.minimum(0.4 * width, 0.5 * (high - low))
-        middle = np.clip(middle + np.where(share < 0.5, aside, -aside), low + 0.5 * aside, high - 0.5 * aside)
-        value = margin(middle)
-        inside = value >= 0.0
-        low, at_low = np.where(inside, middle, low), np.where(inside, value, at_low)
-        high, at_high = np.where(inside, high, middle), np.where(inside, at_high, value)
-        step += 1
+        places = low + shares * (high - low)
+        is_outside = margin(places[1:-1]) < 0.0
+        part = np.where(is_outside.any(axis=0), is_outside.argmax(axis=0), PARTS - 1)
+        low, high = places[part, rows], places[part + 1, rows]
     return 0.5 * (low + high)
 
 

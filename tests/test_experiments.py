@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import csv
 import json
 import os
@@ -17,12 +18,10 @@ import pytest
 import oracles
 import pfabrik as pf
 from paper import __main__ as command
-from paper import efficacy, robustness
 from paper.closest import nearest_distance
 from paper.feasible import model_of, worst_excess
 from paper.report import BEGIN, END, put_into
-from paper.study import QUICK, cases
-from paper.tables import write_csv
+from paper.study import cases
 
 ROOT = Path(__file__).parents[1]
 MACHINES = ("five_bar", "stewart", "nrpm")
@@ -30,19 +29,34 @@ SUMMARIES = ("efficacy.csv", "efficiency.csv", "robustness.csv")
 PAGE = f"# Title\n\nbefore\n\n{BEGIN}\nstale numbers\n{END}\n\nafter\n"
 
 
-def reproduce(folder: Path) -> subprocess.CompletedProcess[str]:
-    (folder / "page.md").write_text(PAGE, encoding="utf-8")
-    line = [sys.executable, "-m", "paper", "--quick", "-o", "out", "--page", "page.md"]
+LINE = ("--quick", "-o", "out", "--page", "page.md")
+STEPS = """
+import sys
+from pathlib import Path
+from paper import efficacy, robustness
+from paper.study import QUICK, cases
+from paper.tables import write_csv
+case, folder = cases()[0], Path(sys.argv[1])
+for part in (efficacy, robustness):
+    name = f"{part.__name__.removeprefix('paper.')}_{case.key}.csv"
+    write_csv(folder / name, part.steps(part.run(case, QUICK, lambda: None)))
+"""
+"""Writes two tables of the first machine."""
+
+
+def other_process(folder: Path, *line: str) -> None:
+    """Run Python in a folder, with the paper's experiments in its path."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(pf.__file__).parents[1])])}
-    return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    subprocess.run([sys.executable, *line], cwd=folder, env=environment, check=True)
 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where one quick run has written everything."""
+    """Where one quick run has written everything; in this process, where other tests have compiled the closed forms."""
     made = tmp_path_factory.mktemp("reproduce")
-    done = reproduce(made)
-    assert done.returncode == 0, done.stdout + done.stderr
+    (made / "page.md").write_text(PAGE, encoding="utf-8")
+    with contextlib.chdir(made):
+        assert command.main([*LINE]) == 0
     return made
 
 
@@ -150,19 +164,17 @@ def test_the_page_changes_between_its_marks_only(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_the_same_numbers_come_out_of_another_process(folder: Path, tmp_path: Path) -> None:
-    case = cases()[0]
-    found = {
-        f"efficacy_{case.key}.csv": efficacy.steps(efficacy.run(case, QUICK, lambda: None)),
-        f"robustness_{case.key}.csv": robustness.steps(robustness.run(case, QUICK, lambda: None)),
-    }
-    for name, numbers in found.items():
-        write_csv(tmp_path / name, numbers)
+    other_process(tmp_path, "-c", STEPS, ".")
+    names = {f"{part}_{cases()[0].key}.csv" for part in ("efficacy", "robustness")}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    for name in names:
         assert (tmp_path / name).read_bytes() == (folder / "out" / name).read_bytes(), name
 
 
 @pytest.mark.campaign
 def test_the_same_numbers_come_out_of_every_run(folder: Path, tmp_path: Path) -> None:
-    assert reproduce(tmp_path).returncode == 0
+    (tmp_path / "page.md").write_text(PAGE, encoding="utf-8")
+    other_process(tmp_path, "-m", "paper", *LINE)
     first = {path.name: path.read_bytes() for path in (folder / "out").glob("*.csv")}
     again = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*.csv")}
     assert first.keys() == again.keys()
