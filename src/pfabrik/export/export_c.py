@@ -44,8 +44,9 @@ def export_c(
     path : the file to write; whatever has this name is replaced, when the text is complete.
     precision : "double", or "float" for controllers without double precision in hardware.
     parts : "ik" from poses to actuators, completed where the task leaves something open; "limits" every limit, with the
-        number of the one exceeded most; "fk" from actuators to the pose, by Newton's method from a start; "rates" the
-        Jacobian, speeds of actuators, and torques of them and back.
+        number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
+        number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
+        "rates" the Jacobian, speeds of actuators, and torques of them and back.
     name : prefix of all names in the file; lower-case letters, digits and underscores.
     joints : names of joints in series from the base to the end effector: then there are functions of these too, and
         rates are by them.
@@ -53,7 +54,8 @@ def export_c(
     Raises
     ------
     UnsupportedMechanism : some chain is no leg in closed form, or one that has no code here; the message says which,
-        and why. Also where "fk" is asked for and the actuators leave the end effector free.
+        and why. Also where "fk" is asked for and the actuators leave the end effector free; and with "limits" and a
+        clearance where the place of a link follows from no leg.
     InvalidArgument : an unknown precision or part, or a name that is not allowed.
     """
     text = c_source(

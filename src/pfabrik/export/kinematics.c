@@ -20,6 +20,9 @@ typedef struct {
    not reach or close, or one of those below. */
 enum {
     PFK_LEG = 1000,
+#if CLEARANCE
+    PFK_PAIR = 10000,      /* + the number of a pair of links, the nearest: they are nearer than PFK_CLEARANCE */
+#endif
     PFK_NO_POSE = -1,      /* not finite, or not a rotation */
     PFK_NO_ACTUATORS = -2, /* not finite */
     PFK_OTHER_MODE = -3    /* closed, but not in the working mode of home */
@@ -48,9 +51,18 @@ void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTU
 /* Fills the slack of a whole pose in each of PFK_LIMITS limits, negative beyond it [length or rad]. */
 int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
 #endif
+#if CLEARANCE
+/* The least distance between two links of a whole pose, negative where they overlap, and the number of their pair, from
+   1; where it is less than PFK_CLEARANCE, PFK_PAIR + this number is returned. Nothing is written where legs do not
+   reach or close. */
+int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair);
+#endif
 #if FK
 /* The pose at given actuators, by Newton's method from `pose`, in at most 40 steps; `steps` may be 0, or is set to
    their number. Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
+#if CLEARANCE
+/* Where links are too near the pose is written too, and PFK_PAIR + the number of their pair returned. */
+#endif
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #endif
 #if JOINTS
@@ -64,6 +76,9 @@ int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_A
 #if TO_JOINTS
 /* Joint coordinates at which actuators are, by Newton's method from those in `joints`, in at most 40 steps; `steps` may
    be 0, or is set to their number. Limits are not checked. Nothing is written to `joints` unless 0 is returned. */
+#if CLEARANCE
+/* Where links are too near the coordinates are written too, and PFK_PAIR + the number of their pair returned. */
+#endif
 int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps);
 #endif
 #if RATES
@@ -104,6 +119,18 @@ enum {
     PFK_PARTS = 16, /* continuation steps to a target that is not completed at once */
     PFK_FK_STEPS = 40
 };
+#if SOLIDS
+#define PFK_GOLDEN 2.399963229728653 /* turns of this angle spread directions evenly */
+#define PFK_WAY_FIRST 0.3            /* first and last step to the way out of two discs [rad] */
+#define PFK_WAY_LAST 1e-8
+enum {
+    PFK_ROOT_STEPS = 200,  /* most of them to the nearest point of a line */
+    PFK_RIM = 32,          /* places on a rim */
+    PFK_RIM_HALVINGS = 60, /* of the angle between two of them */
+    PFK_WAYS = 64,         /* directions out of a solid */
+    PFK_WAY_HALVINGS = 40
+};
+#endif
 
 /* A rod is [proximal joint] + base ending + rigid or sliding rod + platform ending; a pivot is [slides] + one ending of
    no length; a redundant joint is a hinge or slide that other legs are on. A leg is read from the base to the platform;
@@ -178,6 +205,40 @@ typedef struct {
     int leg, is_platform_end;
     pfk_real axis[3], half_angle;
 } pfk_cone;
+#endif
+#if BODIES
+/* How a body moves: it slides along an axis or turns about it through a point, by a coordinate of a leg; or it keeps to
+   the line of a rod, and to the base end there or the platform end. */
+enum { PFK_SLIDES, PFK_TURNS, PFK_WITH_BASE_END, PFK_WITH_PLATFORM_END };
+/* A body that moves relative to another one, at home. The base is number 0, the platform 1, these follow. */
+typedef struct {
+    int on, moves, leg, place;
+    pfk_real sense, axis[3], point[3];
+} pfk_body;
+
+#endif
+#if CLEARANCE
+#if SOLIDS
+enum { PFK_CAPSULE, PFK_BOX, PFK_DISC };
+/* A capsule, a box or a disc, which is all that is no farther than `round` from its core. That of a capsule is its axis,
+   by both ends; of a box it has a centre, three unit axes, and half its edges; of a disc a centre, its unit axis, its
+   radius and half its height. */
+typedef struct {
+    int kind;
+    pfk_real round, half[3], at[4][3];
+} pfk_solid;
+#else
+/* A capsule: all that is no farther than `round` from its axis, by both ends. */
+typedef struct {
+    pfk_real round, at[2][3];
+} pfk_solid;
+#endif
+
+/* A link at home; the bodies that its first two points are on. */
+typedef struct {
+    int body[2];
+    pfk_solid home;
+} pfk_link;
 #endif
 
 #include "tables.h"
@@ -324,7 +385,7 @@ static inline void pfk_about(const pfk_real v[3], const pfk_real axis[3], pfk_re
         out[i] = cosine * v[i] + sine * out[i] + rest * axis[i];
 }
 
-#if TWISTS || PIVOTS || MOVES
+#if TWISTS || PIVOTS || MOVES || RATES
 static void pfk_about_angle(const pfk_real v[3], const pfk_real axis[3], pfk_real angle, pfk_real out[3])
 {
     pfk_about(v, axis, cos(angle), sin(angle), out);
@@ -1414,6 +1475,10 @@ const char *pfk_what(int code)
     if (code > 0 && code <= PFK_LIMITS)
         return pfk_limit_words[code - 1];
 #endif
+#if CLEARANCE
+    if (code > PFK_PAIR && code - PFK_PAIR <= PFK_PAIRS)
+        return pfk_pair_words[code - PFK_PAIR - 1];
+#endif
     if (code > PFK_LEG && code - PFK_LEG <= PFK_LEGS)
         return pfk_leg_words[code - PFK_LEG - 1];
     return "no code of this file";
@@ -1430,7 +1495,512 @@ static pfk_real pfk_angle_between(const pfk_real a[3], const pfk_real b[3])
 }
 
 #endif
+#if CLEARANCE
+#if BODIES
+/* Fills the displacement of a rod on what its base end is on, of points of its line and of directions along it: it may spin
+   about the line in any way. */
+static void pfk_place_line(const pfk_state *state, const pfk_body *own, const pfk_pose *on, pfk_pose *body)
+{
+    const pfk_leg *rod = &pfk_legs[own->leg];
+    const pfk_placed *placed = &state->leg[own->leg];
+    const int at_base_end = own->moves == PFK_WITH_BASE_END;
+    pfk_real end[3];
+    int i, j;
+    pfk_along(rod->base_end, at_base_end ? 0.0 : rod->length, rod->line, end);
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j)
+            body->R[i][j] = pfk_dot(on->R[i], placed->u) * rod->line[j];
+        body->p[i] = on->p[i] + pfk_dot(on->R[i], at_base_end ? placed->base_end : placed->platform_end)
+                     - pfk_dot(body->R[i], end);
+    }
+}
+
+#endif
+/* Fills the displacements of bodies from home: what is at x there is at R x + p. */
+static void pfk_place_bodies(const pfk_state *state, pfk_pose body[PFK_BODIES])
+{
+    const pfk_frame *frame = &state->frame[PFK_FROM_BASE];
+    int i, j;
+#if BODIES
+    int k;
+#endif
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j) {
+            body[0].R[i][j] = i == j ? 1.0 : 0.0;
+            body[1].R[i][j] = frame->R[i][j];
+        }
+        body[0].p[i] = 0.0;
+        body[1].p[i] = frame->p[i] - pfk_dot(frame->R[i], pfk_reference);
+    }
+#if BODIES
+    for (k = 2; k < PFK_BODIES; ++k) {
+        const pfk_body *own = &pfk_bodies[k - 2];
+        const pfk_pose *on = &body[own->on];
+        const pfk_real value = own->sense * state->leg[own->leg].value[own->place];
+        const pfk_real cosine = own->moves == PFK_TURNS ? cos(value) : 1.0;
+        const pfk_real sine = own->moves == PFK_TURNS ? sin(value) : 0.0;
+        body[k] = *on;
+        if (own->moves > PFK_TURNS) {
+            pfk_place_line(state, own, on, &body[k]);
+            continue;
+        }
+        for (i = 0; i < 3; ++i) {
+            if (own->moves == PFK_TURNS) {
+                pfk_about(on->R[i], own->axis, cosine, -sine, body[k].R[i]);
+                body[k].p[i] += pfk_dot(on->R[i], own->point) - pfk_dot(body[k].R[i], own->point);
+            } else {
+                body[k].p[i] += value * pfk_dot(on->R[i], own->axis);
+            }
+        }
+    }
+#endif
+}
+
+/* Fills the links at the state of the legs. */
+static void pfk_place_links(const pfk_state *state, pfk_solid solid[PFK_LINKS])
+{
+    pfk_pose body[PFK_BODIES];
+    int i, j, k;
+    pfk_place_bodies(state, body);
+    for (k = 0; k < PFK_LINKS; ++k) {
+        const pfk_link *link = &pfk_links[k];
+        solid[k] = link->home;
+        for (j = 0; j < 2; ++j) {
+            const pfk_pose *own = &body[link->body[j]];
+            for (i = 0; i < 3; ++i)
+                solid[k].at[j][i] = own->p[i] + pfk_dot(own->R[i], link->home.at[j]);
+        }
+#if SOLIDS
+        for (j = 1; j < 4 && link->home.kind != PFK_CAPSULE; ++j)
+            for (i = 0; i < 3; ++i)
+                solid[k].at[j][i] = pfk_dot(body[link->body[0]].R[i], link->home.at[j]);
+#endif
+    }
+}
+
+static pfk_real pfk_between_0_and_1(pfk_real x)
+{
+    return x < 0.0 ? 0.0 : (x > 1.0 ? 1.0 : x);
+}
+
+/* The square of the distance of two segments from p to q and from x to y. With d = q - p, e = y - x, w = x - p and n =
+   d x e the common perpendicular is at p + s d, s = (w x e) n / n^2: of nearly parallel segments that is more exact than by
+   d^2 e^2 - (d e)^2. Clamped s gives t, and clamped t gives s once more. */
+static pfk_real pfk_between_axes(const pfk_real p[3], const pfk_real q[3], const pfk_real x[3], const pfk_real y[3])
+{
+    pfk_real d[3], e[3], w[3], n[3], across[3], square, s, t;
+    pfk_along(q, -1.0, p, d);
+    pfk_along(y, -1.0, x, e);
+    pfk_along(x, -1.0, p, w);
+    pfk_cross(d, e, n);
+    pfk_cross(w, e, across);
+    square = pfk_dot(n, n);
+    s = pfk_between_0_and_1(pfk_dot(across, n) / (square > 0.0 ? square : 1.0));
+    square = pfk_dot(e, e);
+    t = pfk_between_0_and_1((s * pfk_dot(d, e) - pfk_dot(w, e)) / (square > 0.0 ? square : 1.0));
+    square = pfk_dot(d, d);
+    s = pfk_between_0_and_1((t * pfk_dot(d, e) + pfk_dot(w, d)) / (square > 0.0 ? square : 1.0));
+    pfk_along(w, t, e, w);
+    pfk_along(w, -s, d, w);
+    return pfk_dot(w, w);
+}
+
+#if SOLIDS
+static pfk_real pfk_clamp(pfk_real x, pfk_real most)
+{
+    return x < -most ? -most : (x > most ? most : x);
+}
+
+/* The point of a core that is nearest to x: x itself if it is inside. */
+static void pfk_nearest_in(const pfk_solid *own, const pfk_real x[3], pfk_real out[3])
+{
+    pfk_real offset[3], flat[3], along, size;
+    int k;
+    pfk_along(x, -1.0, own->at[0], offset);
+    pfk_copy(own->at[0], out);
+    if (own->kind == PFK_CAPSULE) {
+        pfk_along(own->at[1], -1.0, own->at[0], flat);
+        size = pfk_dot(flat, flat);
+        pfk_along(out, size > 0.0 ? pfk_between_0_and_1(pfk_dot(offset, flat) / size) : 0.0, flat, out);
+    } else if (own->kind == PFK_BOX) {
+        for (k = 0; k < 3; ++k)
+            pfk_along(out, pfk_clamp(pfk_dot(offset, own->at[1 + k]), own->half[k]), own->at[1 + k], out);
+    } else {
+        along = pfk_dot(offset, own->at[1]);
+        pfk_along(offset, -along, own->at[1], flat);
+        size = pfk_norm(flat);
+        pfk_along(out, size > own->half[0] ? own->half[0] / size : 1.0, flat, out);
+        pfk_along(out, pfk_clamp(along, own->half[1]), own->at[1], out);
+    }
+}
+
+/* The point of a core that is farthest along n. */
+static void pfk_farthest_in(const pfk_solid *own, const pfk_real n[3], pfk_real out[3])
+{
+    pfk_real flat[3], size;
+    int k;
+    pfk_copy(own->at[0], out);
+    if (own->kind == PFK_CAPSULE) {
+        if (pfk_dot(n, own->at[1]) > pfk_dot(n, out))
+            pfk_copy(own->at[1], out);
+    } else if (own->kind == PFK_BOX) {
+        for (k = 0; k < 3; ++k)
+            pfk_along(out, pfk_dot(n, own->at[1 + k]) > 0.0 ? own->half[k] : -own->half[k], own->at[1 + k], out);
+    } else {
+        pfk_along(n, -pfk_dot(n, own->at[1]), own->at[1], flat);
+        pfk_along(flat, -pfk_dot(flat, own->at[1]), own->at[1], flat); /* of n along the axis rounding is left */
+        size = pfk_norm(flat);
+        pfk_along(out, size > 0.0 ? own->half[0] / size : 0.0, flat, out);
+        pfk_along(out, pfk_dot(n, own->at[1]) > 0.0 ? own->half[1] : -own->half[1], own->at[1], out);
+    }
+}
+
+/* The k-th of the directions that shape a core: of a box 3, of others 1; 0 where there is none. */
+static int pfk_direction(const pfk_solid *own, int k, pfk_real out[3])
+{
+    pfk_real size;
+    pfk_copy(own->at[1 + k], out);
+    if (own->kind == PFK_BOX || (own->kind == PFK_DISC && k == 0))
+        return 1;
+    pfk_along(own->at[1], -1.0, own->at[0], out);
+    size = pfk_norm(out);
+    pfk_along(pfk_zero, own->kind == PFK_CAPSULE && k == 0 && size > 0.0 ? 1.0 / size : 0.0, out, out);
+    return own->kind == PFK_CAPSULE && k == 0 && size > 0.0;
+}
+
+/* Two unit vectors square to a unit vector, and to each other. */
+static void pfk_square_to(const pfk_real n[3], pfk_real first[3], pfk_real second[3])
+{
+    const pfk_real x = fabs(n[0]), y = fabs(n[1]), z = fabs(n[2]);
+    pfk_real axis[3] = {0.0, 0.0, 0.0};
+    axis[x <= y && x <= z ? 0 : (y <= z ? 1 : 2)] = 1.0;
+    pfk_cross(n, axis, first);
+    pfk_along(pfk_zero, 1.0 / pfk_norm(first), first, first);
+    pfk_cross(n, first, second);
+}
+
+/* cos(angle) u + sin(angle) v. */
+static void pfk_around(pfk_real angle, const pfk_real u[3], const pfk_real v[3], pfk_real out[3])
+{
+    pfk_along(pfk_zero, cos(angle), u, out);
+    pfk_along(out, sin(angle), v, out);
+}
+
+/* Of two cores: the square of the least distance so far, and the squares of the places that have it. */
+typedef struct {
+    pfk_real square, scale;
+} pfk_least;
+
+/* The distance of a point from a core, along a line: fills the slope of half its square. */
+static pfk_real pfk_off(const pfk_solid *other, const pfk_real x[3], const pfk_real line[3], pfk_real *slope)
+{
+    pfk_real off[3];
+    pfk_nearest_in(other, x, off);
+    pfk_along(x, -1.0, off, off);
+    *slope = pfk_dot(off, line);
+    return pfk_dot(off, off);
+}
+
+static void pfk_try_point(const pfk_real x[3], const pfk_solid *other, pfk_least *least)
+{
+    pfk_real y[3], gap[3], square;
+    pfk_nearest_in(other, x, y);
+    pfk_along(y, -1.0, x, gap);
+    square = pfk_dot(gap, gap);
+    if (square < least->square) {
+        least->square = square;
+        least->scale = pfk_dot(x, x) + pfk_dot(y, y);
+    }
+}
+
+/* The point of a segment that is nearest to a core: half the square of its distance is convex, its slope rises; the
+   root, between the ends or at one of them, by the false position of Illinois. */
+static void pfk_nearest_along(const pfk_real p[3], const pfk_real q[3], const pfk_solid *other, pfk_real x[3])
+{
+    pfk_real d[3], low = 0.0, high = 1.0, at_low, at_high, slope, t = 0.0, before;
+    int step, side = 0;
+    pfk_along(q, -1.0, p, d);
+    pfk_off(other, p, d, &at_low);
+    pfk_off(other, q, d, &at_high);
+    if (at_low >= 0.0 || at_high <= 0.0) {
+        pfk_copy(at_low >= 0.0 ? p : q, x);
+        return;
+    }
+    for (step = 0; step < PFK_ROOT_STEPS; ++step) {
+        before = t;
+        t = step % 4 < 3 ? high - at_high * (high - low) / (at_high - at_low) : 0.5 * (low + high);
+        pfk_along(p, t, d, x);
+        pfk_off(other, x, d, &slope);
+        if (!(slope < 0.0 || slope > 0.0) || !(t < before || t > before) || !(low < t && t < high))
+            break;
+        if (slope > 0.0) {
+            high = t;
+            at_high = slope;
+            at_low = side == 1 ? 0.5 * at_low : at_low;
+            side = 1;
+        } else {
+            low = t;
+            at_low = slope;
+            at_high = side == -1 ? 0.5 * at_high : at_high;
+            side = -1;
+        }
+    }
+    pfk_along(p, t, d, x);
+}
+
+static void pfk_try_line(const pfk_real p[3], const pfk_real q[3], const pfk_solid *other, pfk_least *least)
+{
+    pfk_real x[3];
+    pfk_nearest_along(p, q, other, x);
+    pfk_try_point(x, other, least);
+}
+
+/* Tries the point of a disc's rim that is nearest to a core: of places all around, refined by the slope's sign. */
+static void pfk_try_rim(const pfk_solid *own, const pfk_real centre[3], const pfk_solid *other, pfk_least *least)
+{
+    const pfk_real part = PFK_TURN / PFK_RIM;
+    pfk_real u[3], v[3], x[3], tangent[3], square, slope, nearest = PFK_FAR, middle = 0.0, low, high;
+    int k;
+    pfk_square_to(own->at[1], u, v);
+    pfk_along(pfk_zero, own->half[0], u, u);
+    pfk_along(pfk_zero, own->half[0], v, v);
+    for (k = 0; k < PFK_RIM; ++k) {
+        pfk_around((pfk_real)k * part, u, v, x);
+        pfk_along(centre, 1.0, x, x);
+        square = pfk_off(other, x, u, &slope);
+        if (square < nearest) {
+            nearest = square;
+            middle = (pfk_real)k * part;
+        }
+    }
+    low = middle - part;
+    high = middle + part;
+    for (k = 0; k < PFK_RIM_HALVINGS; ++k) {
+        middle = 0.5 * (low + high);
+        pfk_around(middle, u, v, x);
+        pfk_along(centre, 1.0, x, x);
+        pfk_around(middle + 0.25 * PFK_TURN, u, v, tangent);
+        pfk_off(other, x, tangent, &slope);
+        if (slope > 0.0)
+            high = middle;
+        else
+            low = middle;
+    }
+    pfk_try_point(x, other, least);
+}
+
+/* Tries the points of one core at which it may be nearest to another: on its lines and rims, or farthest along an axis
+   of the other, above a face of it; of two discs beside each other on the common perpendicular of their axes. */
+static void pfk_try_features(const pfk_solid *own, const pfk_solid *other, pfk_least *least)
+{
+    pfk_real axis[3], p[3], q[3], x[3], middle[3];
+    int i, j, k, sign;
+    if (own->kind == PFK_CAPSULE) {
+        pfk_try_line(own->at[0], own->at[1], other, least);
+        return;
+    }
+    if (other->kind == PFK_CAPSULE)
+        return; /* its line is tried against the whole of this core */
+    for (k = 0; k < 3; ++k)
+        for (sign = -1; pfk_direction(other, k, axis) && sign < 2; sign += 2) {
+            pfk_along(pfk_zero, (pfk_real)sign, axis, axis);
+            pfk_farthest_in(own, axis, x);
+            pfk_try_point(x, other, least);
+        }
+    for (k = 0; k < 12 && own->kind == PFK_BOX; ++k) { /* its edges along each axis */
+        i = (k / 4 + 1) % 3;
+        j = (k / 4 + 2) % 3;
+        pfk_along(own->at[0], k & 1 ? own->half[i] : -own->half[i], own->at[1 + i], middle);
+        pfk_along(middle, k & 2 ? own->half[j] : -own->half[j], own->at[1 + j], middle);
+        pfk_along(middle, -own->half[k / 4], own->at[1 + k / 4], p);
+        pfk_along(middle, own->half[k / 4], own->at[1 + k / 4], q);
+        pfk_try_line(p, q, other, least);
+    }
+    if (own->kind == PFK_BOX)
+        return;
+    pfk_along(own->at[0], -own->half[1], own->at[1], p);
+    pfk_along(own->at[0], own->half[1], own->at[1], q);
+    pfk_try_rim(own, q, other, least);
+    pfk_try_rim(own, p, other, least);
+    if (other->kind == PFK_DISC) {
+        pfk_nearest_along(p, q, other, x);
+        pfk_nearest_in(other, x, middle);
+        pfk_nearest_in(own, middle, x);
+        pfk_try_point(x, other, least);
+    }
+}
+
+/* Two cores that overlap; the unit vector along which the second has the shortest way out of the first, so far, and how
+   long it is. */
+typedef struct {
+    const pfk_solid *own, *other;
+    pfk_real n[3], out;
+} pfk_exit;
+
+static pfk_real pfk_overlap_along(const pfk_real n[3], const pfk_exit *found)
+{
+    pfk_real back[3], x[3], y[3];
+    pfk_along(pfk_zero, -1.0, n, back);
+    pfk_farthest_in(found->own, n, x);
+    pfk_farthest_in(found->other, back, y);
+    return pfk_dot(n, x) - pfk_dot(n, y);
+}
+
+/* Tries a direction of any length, either way round; 1 where it is shorter. */
+static int pfk_try_way(const pfk_real n[3], pfk_exit *found)
+{
+    const pfk_real length = pfk_norm(n);
+    pfk_real unit[3], overlap;
+    int sign, is_shorter = 0;
+    for (sign = 1; length > 1e-9 && sign > -2; sign -= 2) {
+        pfk_along(pfk_zero, (pfk_real)sign / length, n, unit);
+        overlap = pfk_overlap_along(unit, found);
+        if (overlap < found->out) {
+            found->out = overlap;
+            pfk_copy(unit, found->n);
+            is_shorter = 1;
+        }
+    }
+    return is_shorter;
+}
+
+/* Tries the best of all directions square to an axis: of places all around, refined by halved steps. */
+static void pfk_try_around(const pfk_real axis[3], pfk_exit *found)
+{
+    pfk_real u[3], v[3], n[3], least = PFK_FAR, at = 0.0, step = PFK_TURN / PFK_WAYS, angle, overlap;
+    int k;
+    pfk_square_to(axis, u, v);
+    for (k = 0; k < PFK_WAYS + 2 * PFK_WAY_HALVINGS; ++k) {
+        angle = k < PFK_WAYS ? (pfk_real)k * step : at + step;
+        pfk_around(angle, u, v, n);
+        overlap = pfk_overlap_along(n, found);
+        if (overlap < least) {
+            least = overlap;
+            at = angle;
+        }
+        if (k >= PFK_WAYS)
+            step *= (k - PFK_WAYS) % 2 == 0 ? -1.0 : -0.5;
+    }
+    pfk_around(at, u, v, n);
+    pfk_try_way(n, found);
+}
+
+/* By how much the second of two cores that overlap has to move out of the first, at least. The faces of the difference
+   of two boxes, or of a box and a line, are square to an axis of one or to one of each: the shortest way is one of these.
+   With discs the difference is also round: a ball within touches it on a face, or square to one of these axes, or, between
+   two rims, where it is curved both ways; never on an edge, which is sharp. */
+static pfk_real pfk_way_out(const pfk_solid *own, const pfk_solid *other)
+{
+    pfk_exit found = {own, other, {0.0, 0.0, 1.0}, 0.0};
+    pfk_real axis[2][3], u[3], v[3], n[3], step;
+    int i, j, k, is_shorter;
+    found.out = pfk_overlap_along(found.n, &found);
+    for (i = 0; i < 2; ++i)
+        for (k = 0; k < 3; ++k)
+            if (pfk_direction(i ? other : own, k, axis[0])) {
+                pfk_try_way(axis[0], &found);
+                pfk_square_to(axis[0], u, v);
+                pfk_try_way(u, &found);
+                if (own->kind == PFK_DISC || other->kind == PFK_DISC)
+                    pfk_try_around(axis[0], &found);
+                for (j = 0; j < 3 && i == 0; ++j)
+                    if (pfk_direction(other, j, axis[1])) {
+                        pfk_cross(axis[0], axis[1], n);
+                        pfk_try_way(n, &found);
+                    }
+            }
+    if (own->kind != PFK_DISC || other->kind != PFK_DISC)
+        return found.out;
+    for (k = 0; k < PFK_WAYS; ++k) { /* spread over half a sphere: each is tried both ways */
+        n[2] = ((pfk_real)k + 0.5) / PFK_WAYS;
+        n[0] = sqrt(1.0 - n[2] * n[2]) * cos(PFK_GOLDEN * (pfk_real)k);
+        n[1] = sqrt(1.0 - n[2] * n[2]) * sin(PFK_GOLDEN * (pfk_real)k);
+        pfk_try_way(n, &found);
+    }
+    for (step = PFK_WAY_FIRST; step > PFK_WAY_LAST; step *= is_shorter ? 1.0 : 0.5) {
+        is_shorter = 0;
+        for (k = 0; k < 8; ++k) {
+            pfk_square_to(found.n, u, v);
+            pfk_around(PFK_GOLDEN * (pfk_real)k, u, v, n);
+            pfk_along(found.n, step, n, n);
+            is_shorter |= pfk_try_way(n, &found);
+        }
+    }
+    return found.out;
+}
+
+/* The middle of a solid; how far it reaches from there. */
+static pfk_real pfk_reach_of(const pfk_solid *own, pfk_real middle[3])
+{
+    pfk_real half[3];
+    pfk_copy(own->at[0], middle);
+    pfk_copy(own->half, half);
+    if (own->kind == PFK_CAPSULE) {
+        pfk_along(own->at[1], -1.0, own->at[0], half);
+        pfk_along(pfk_zero, 0.5, half, half);
+        pfk_along(middle, 1.0, half, middle);
+    }
+    return pfk_norm(half) + own->round;
+}
+
+/* The distance of two cores; less than 0, by how much they overlap. */
+static pfk_real pfk_between_cores(const pfk_solid *own, const pfk_solid *other)
+{
+    pfk_least least = {PFK_FAR, 0.0};
+    pfk_try_features(own, other, &least);
+    pfk_try_features(other, own, &least);
+    if (least.square > PFK_CLOSED * PFK_CLOSED * least.scale)
+        return sqrt(least.square);
+    return -pfk_way_out(own, other);
+}
+
+#endif
+/* Fills the least distance between two links, negative where they overlap, and the number of their pair; 0, or PFK_PAIR +
+   this number where it is less than the clearance. */
+static int pfk_nearest(const pfk_state *state, pfk_real *least, int *pair)
+{
+    pfk_solid solid[PFK_LINKS];
+    pfk_real distance;
+#if SOLIDS
+    pfk_real from[3], to[3], reach;
+#endif
+    int k;
+    pfk_place_links(state, solid);
+    *least = PFK_FAR;
+    *pair = 1;
+    for (k = 0; k < PFK_PAIRS; ++k) {
+        const pfk_solid *own = &solid[pfk_pairs[k][0]], *other = &solid[pfk_pairs[k][1]];
+#if SOLIDS
+        if (own->kind != PFK_CAPSULE || other->kind != PFK_CAPSULE) {
+            reach = pfk_reach_of(own, from) + pfk_reach_of(other, to);
+            pfk_along(to, -1.0, from, to);
+            if (pfk_norm(to) - reach >= *least)
+                continue;
+            distance = pfk_between_cores(own, other);
+        } else
+#endif
+            distance = sqrt(pfk_between_axes(own->at[0], own->at[1], other->at[0], other->at[1]));
+        distance -= own->round + other->round;
+        if (distance < *least) {
+            *least = distance;
+            *pair = k + 1;
+        }
+    }
+    return *least >= PFK_CLEARANCE - PFK_KEPT * PFK_SIZE ? 0 : PFK_PAIR + *pair;
+}
+
+static int pfk_too_near(const pfk_state *state)
+{
+    pfk_real distance;
+    int pair;
+    return pfk_nearest(state, &distance, &pair);
+}
+
+#endif
 /* Fills the room that is left before every limit; 0, or the number of the one that is exceeded most. */
+#if CLEARANCE
+/* Where none is, PFK_PAIR + the number of the nearest pair of links, if it is too near. */
+#endif
 static int pfk_slacks(const pfk_state *state, pfk_real slack[])
 {
     pfk_real value, unit, worst = PFK_KEPT;
@@ -1454,7 +2024,11 @@ static int pfk_slacks(const pfk_state *state, pfk_real slack[])
             exceeded = i + 1;
         }
     }
+#if CLEARANCE
+    return exceeded ? exceeded : pfk_too_near(state);
+#else
     return exceeded;
+#endif
 }
 
 #endif
@@ -1616,7 +2190,22 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[])
 }
 
 #endif
-#if IK || FK || RATES
+#if CLEARANCE
+int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair)
+{
+    pfk_state state;
+    pfk_pose own = *pose;
+    int code;
+    if (pfk_make_exact(&own))
+        return PFK_NO_POSE;
+    code = pfk_rest(&own, &state);
+    if (code)
+        return PFK_LEG + code;
+    return pfk_nearest(&state, distance, pair);
+}
+
+#endif
+#if IK || FK
 /* The actuators at the state of the legs. */
 static void pfk_read(const pfk_state *state, pfk_real actuators[PFK_ACTUATORS])
 {
@@ -2103,7 +2692,11 @@ int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_J
     }
     for (j = 0; j < PFK_JOINTS; ++j)
         joints[j] = now[j];
+#if CLEARANCE
+    return pfk_too_near(&state);
+#else
     return 0;
+#endif
 }
 
 #endif
@@ -2160,7 +2753,11 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
         if (!(fabs(off) <= PFK_MODE_APART))
             return PFK_OTHER_MODE;
     }
+#if CLEARANCE
+    return pfk_too_near(&state);
+#else
     return 0;
+#endif
 }
 
 #endif
@@ -2170,10 +2767,16 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 #include <stdio.h>
 
 /* A pose, the actuators there, and whether those are within all limits. */
+#if CLEARANCE
+/* And the least distance between its links. */
+#endif
 typedef struct {
     pfk_pose target;
     pfk_real actuators[PFK_ACTUATORS];
     int kept;
+#if CLEARANCE
+    pfk_real distance;
+#endif
 } pfk_check;
 
 #include "checks.h"
@@ -2181,6 +2784,9 @@ typedef struct {
 int main(void)
 {
     pfk_real found[PFK_ACTUATORS], size;
+#if CLEARANCE
+    pfk_real distance;
+#endif
     pfk_pose pose;
     int i, j, code, wrong = 0;
     for (i = 0; i < PFK_CHECKS; ++i) {
@@ -2197,6 +2803,15 @@ int main(void)
                 ++wrong;
             }
         }
+#if CLEARANCE
+        if (code == 0) {
+            pfk_clearance(&pose, &distance, &j);
+            if (!(fabs(distance - pfk_checks[i].distance) <= PFK_EXACT * PFK_SIZE)) {
+                printf("pose %d, links: %.9g\n", i, (double)distance);
+                ++wrong;
+            }
+        }
+#endif
 #if FK
         if (code == 0) {
             pfk_pose back = pose;

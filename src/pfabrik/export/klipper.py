@@ -76,6 +76,8 @@ def _rotary_delta(mechanism: Mechanism, thighs: list[Thigh]) -> str:
 def _begun(mechanism: Mechanism, kind: str, more: Sequence[str] = ()) -> list[str]:
     """The head of the file: what Klipper does not know of the machine, and the kind of printer."""
     unknown = ["pins, steps and currents of the steppers", "limits of the rods' joints", *more]
+    if mechanism.clearance is not None:
+        unknown.append(f"the clearance between links, {mechanism.clearance:.9g} {comment(mechanism.length_unit)}")
     if mechanism.length_unit != "mm":
         unknown.append(f"lengths in {comment(mechanism.length_unit)}: it counts in mm")
     return [

@@ -26,13 +26,16 @@ def linuxcnc(mechanism: Mechanism) -> str:
     """HAL lines where one of LinuxCNC's own kinematics fits, else a module with the machine's kinematics.
 
     Hexapods of struts are genhexkins; deltas whose towers or thighs stand where it has them are lineardeltakins and
-    rotarydeltakins. A module is one file of C for halcompile.
+    rotarydeltakins. A module is one file of C for halcompile; machines with a clearance have one, because LinuxCNC's
+    own kinematics keep none.
 
     Raises
     ------
     UnsupportedMechanism : no legs in closed form.
     """
     machine, size = Machine(mechanism), mechanism.characteristic_length
+    if mechanism.clearance is not None:
+        return module(machine)
     struts = struts_of(machine)
     if struts is not None:
         return _genhexkins(mechanism, struts)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +18,7 @@ from ..kernels.legs import records as K
 from ..model import model_of
 from ..motion.mobility import generic_of
 from ..rotations import square_to
+from .exported_links import ExportedLinks, exported_links
 
 Number = float | Floats
 
@@ -102,6 +105,15 @@ class Machine:
         self.limited = [_coordinate(record, mechanism.coordinates[record["column"]].kind) for record in table.limited]
         self.driven = [_coordinate(record, mechanism.drives[record["column"]].kind) for record in drives]
         self.equations = sum(row_counts(table.legs)) + sum(leg.keeps_its_length for leg in self.legs)
+
+    @cached_property
+    def links(self) -> ExportedLinks | None:
+        """The links that stay apart; None of a machine without a clearance."""
+        return exported_links(self.mechanism)
+
+    def links_kept(self, parts: Sequence[str]) -> ExportedLinks | None:
+        """The links that the parts of a file keep apart: the clearance is one of its limits."""
+        return self.links if "limits" in parts else None
 
     @property
     def completes(self) -> bool:

@@ -39,7 +39,8 @@ def export_ros2_control(
     """Write a package of ROS 2 with a transmission between joints in series and the actuators.
 
     It has a `transmission_interface::Transmission` with its loader, the description of the plugin, CMakeLists.txt,
-    package.xml, the exported C, and a piece of URDF. Efforts conserve power; limits stay the controller's.
+    package.xml, the exported C, and a piece of URDF. Efforts conserve power; limits, the clearance between
+    links among them, stay the controller's.
 
     Parameters
     ----------

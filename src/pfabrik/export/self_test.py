@@ -32,11 +32,13 @@ CLEAR = 1e-3
 
 
 class Checks(NamedTuple):
-    """Targets (n, 4, 4), their actuators (n, n_a), and a mask of those within all limits (n,)."""
+    """Targets (n, 4, 4), their actuators (n, n_a), a mask of those within all limits (n,), and the least distances
+    between links (n,) [length], of a file that keeps them apart."""
 
     targets: Floats
     actuators: Floats
     kept: Mask
+    distances: Floats | None = None
 
 
 def checks_of(machine: Machine, limits: bool) -> Checks:
@@ -44,13 +46,18 @@ def checks_of(machine: Machine, limits: bool) -> Checks:
 
     Poses within limits are those alone that the file reaches without doubt: `feasibility` agrees.
     """
-    mechanism = machine.mechanism
+    mechanism = machine.mechanism.with_clearance(None)  # distances are measured
+    keeps_apart = limits and machine.links is not None
     targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
     targets[0] = mechanism.home_pose
     without_limits = mechanism.without_limits()
     targets = targets[~(np.asarray(feasibility(without_limits, targets).margin) < 0.0)]
     solution = solve_ik(without_limits, targets, options=KEEP)
     least = least_margins(mechanism, solution.q)
+    distances = _distances(solution) if keeps_apart else None
+    if distances is not None:
+        room = (distances - (machine.mechanism.clearance or 0.0)) / mechanism.characteristic_length
+        least = np.minimum(least, room)
     if machine.completes:
         margin = np.asarray(feasibility(mechanism, targets).margin)
         least[((least > 0.0) & (margin < 0.0)) | ~_are_unique(machine, targets, solution, least > 0.0)] = 0.0
@@ -59,7 +66,15 @@ def checks_of(machine: Machine, limits: bool) -> Checks:
     beyond = np.flatnonzero(is_reached & is_clear & (least < 0.0)) if limits else inside[:0]
     n_beyond = min(len(beyond), max(N_POSES // 5, N_POSES - len(inside)))
     chosen = np.concatenate([inside[: N_POSES - n_beyond], beyond[:n_beyond]])
-    return Checks(targets[chosen], solution.actuators[chosen], np.isin(chosen, inside))
+    apart = None if distances is None else distances[chosen]
+    return Checks(targets[chosen], solution.actuators[chosen], np.isin(chosen, inside), apart)
+
+
+def _distances(solution: Solution) -> Floats:
+    """The least distances between links, (n,) [length]."""
+    from ..clearance.clearance import clearance
+
+    return np.reshape(clearance(solution).distance, -1)
 
 
 def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside: Mask) -> Mask:
@@ -67,6 +82,7 @@ def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside
 
     The starts are home and, with implicit joints, the answers within limits where each actuator is least or most.
     """
+    mechanism = machine.mechanism.with_clearance(None)
     starts: list[Floats | None] = [None]
     if machine.has_implicit_joints and is_inside.any():
         actuators = solution.actuators[is_inside]
@@ -74,7 +90,7 @@ def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside
         starts += list(solution.q[rows])
     is_same = np.ones(len(targets), dtype=bool)
     for start in starts:
-        other = solve_ik(machine.mechanism, targets, start=start, options=KEEP)
+        other = solve_ik(mechanism, targets, start=start, options=KEEP)
         is_same &= (other.status != 0) | (
             machine.largest_difference(other.actuators, solution.actuators) <= AGREEMENT["double"]
         )

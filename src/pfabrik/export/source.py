@@ -93,6 +93,12 @@ def _header(machine: Machine, parts: Sequence[str], path: JointPath | None) -> s
         bounds += [(float(cone["half_angle"]), False) for cone in machine.cones]
         for place, ((joint, bound), (at, is_length)) in enumerate(zip(machine.limits, bounds, strict=True), 1):
             lines.append(f"{place:<9} {joint:<21} {bound} {at:.10g} {unit if is_length else 'rad'}")
+    if (links := machine.links_kept(parts)) is not None:
+        lines += ["", "pair      links that are at least this far apart"]
+        least = f"{links.clearance:.10g} {unit}"
+        lines += [f"{place:<9} {' and '.join(names):<33} {least}" for place, (*_, names) in enumerate(links.pairs, 1)]
+    elif mechanism.clearance is not None:
+        lines += ["", "Links may be too near: the clearance of the machine is kept where limits are."]
     lines += ["", "leg       joints"]
     lines += [f"{place:<9} {', '.join(leg.joints)}" for place, leg in enumerate(machine.legs, 1)]
     body = [f"   {comment(line)}".rstrip() for line in [*lines, "", *NOTICE.splitlines()]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from ..arrays import Floats, Record
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.legs import records as K
 from ..motion.joint_path import JointPath, PathMotion
+from .exported_links import ExportedLinks, angles_needed
+from .link_tables import link_tables
 from .machine_data import Coordinate, ExportedLeg, Machine
 from .self_test import Checks
-from .wording import ACCURACY, Precision, comment, literal, quoted
+from .wording import ACCURACY, Precision, comment, literal, table, words
 
 KINDS = {K.ROD: "PFK_ROD", K.PIVOT: "PFK_PIVOT", K.REDUNDANT: "PFK_REDUNDANT"}
 FRAMES = {K.FROM_BASE: "PFK_FROM_BASE", K.FROM_PLATFORM: "PFK_FROM_PLATFORM", K.FROM_ITSELF: "PFK_FROM_ITSELF"}
@@ -37,6 +39,9 @@ def features(machine: Machine, parts: Sequence[str], path: JointPath | None = No
         "YAW": completes and machine.rotations == 1,
         "TURNS": "ik" in parts and any(driven.may_turn for driven in machine.driven),
         "PIVOTS": any(record["kind"] == K.PIVOT for record in records),
+        "CLEARANCE": (links := machine.links_kept(parts)) is not None,
+        "BODIES": links is not None and len(links.motions) > 0,
+        "SOLIDS": links is not None and links.has_solids,
         "CONES": "limits" in parts and len(machine.cones) > 0,
         "TWISTS": any(record["twists"] for record in records),
         "COMPLETES": completes,
@@ -60,7 +65,12 @@ def machine_h(machine: Machine, parts: Sequence[str], path: JointPath | None = N
     counts = {"PFK_ACTUATORS": len(machine.driven), "PFK_LIMITS": limits}
     counts |= {} if path is None else {"PFK_JOINTS": len(path.coordinates)}
     counts |= {"PFK_RATES": 6 if path is None else len(path.coordinates)} if "rates" in parts else {}
-    return f"enum {{ {', '.join(f'{name} = {count}' for name, count in counts.items())} }};\n"
+    links = machine.links_kept(parts)
+    counts |= {} if links is None else {"PFK_PAIRS": len(links.pairs)}
+    constants = f"enum {{ {', '.join(f'{name} = {count}' for name, count in counts.items())} }};\n"
+    if links is None:
+        return constants
+    return f"#define PFK_CLEARANCE {literal(links.clearance)} /* least distance between links [length] */\n{constants}"
 
 
 def tables_h(
@@ -68,32 +78,38 @@ def tables_h(
 ) -> str:
     """Constants and tables for the routines, in the members of the structures that these declare."""
     lines, members = [*_numbers(machine, precision, parts, path)], _members(routines, "pfk_leg")
-    lines += _table(
+    links = machine.links_kept(parts)
+    lines += table(
         "pfk_leg pfk_legs[PFK_LEGS]",
-        (_leg(leg, _aimed(machine, place), members) for place, leg in enumerate(machine.legs)),
+        (_leg(leg, _aimed(machine, place, links), members) for place, leg in enumerate(machine.legs)),
     )
-    lines += _table("pfk_coordinate pfk_driven[PFK_ACTUATORS]", map(_coordinate, machine.driven))
+    lines += table("pfk_coordinate pfk_driven[PFK_ACTUATORS]", map(_coordinate, machine.driven))
     if path is not None:
-        lines += _table("pfk_joint pfk_joints[PFK_JOINTS]", (_joint(motion, path) for motion in path.motions))
+        lines += table("pfk_joint pfk_joints[PFK_JOINTS]", (_joint(motion, path) for motion in path.motions))
     if path is not None or "rates" in parts:
         lines += [f"static const pfk_real pfk_rate_units[] = {literal(rate_units(machine, path))};", ""]
     if "limits" in parts:
-        lines += _table("pfk_coordinate pfk_limited[]", map(_coordinate, machine.limited))
-        lines += _table("pfk_cone pfk_cones[]", map(_cone, machine.cones)) if len(machine.cones) else []
-        lines += _words("limit", [f"beyond a limit: joint {joint}, {bound}" for joint, bound in machine.limits])
+        lines += table("pfk_coordinate pfk_limited[]", map(_coordinate, machine.limited))
+        lines += table("pfk_cone pfk_cones[]", map(_cone, machine.cones)) if len(machine.cones) else []
+        lines += words("limit", [f"beyond a limit: joint {joint}, {bound}" for joint, bound in machine.limits])
+    if links is not None:
+        lines += link_tables(links)
     joints = [", ".join(leg.joints) for leg in machine.legs]
-    lines += _words("leg", [f"does not reach, or does not close: the leg of {each}" for each in joints])
+    lines += words("leg", [f"does not reach, or does not close: the leg of {each}" for each in joints])
     return "\n".join(lines)
 
 
 def checks_h(checks: Checks, exact: float) -> str:
     """Poses for the self-test, and the tolerance of actuators [L or rad]."""
     lines = [f"#define PFK_EXACT {literal(exact)}", f"enum {{ PFK_CHECKS = {len(checks.targets)} }};", ""]
+    distances = [""] * len(checks.targets)
+    if checks.distances is not None:
+        distances = [f", {literal(float(distance))}" for distance in checks.distances]
     rows = (
-        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, {int(kept)}}}"
-        for target, actuators, kept in zip(*checks, strict=True)
+        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, {int(kept)}{distance}}}"
+        for target, actuators, kept, distance in zip(*checks[:3], distances, strict=True)
     )
-    return "\n".join([*lines, *_table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
+    return "\n".join([*lines, *table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
 
 
 def rate_units(machine: Machine, path: JointPath | None) -> Floats:
@@ -147,22 +163,6 @@ def _numbers(
     yield ""
 
 
-def _table(declaration: str, rows: Iterable[str]) -> Iterator[str]:
-    yield f"static const {declaration} = {{"
-    yield ",\n".join(rows) or "    {0}"
-    yield "};"
-    yield ""
-
-
-def _words(name: str, words: Sequence[str]) -> Iterator[str]:
-    """Texts in rows of one width: pointers would have to be relocated when the file is loaded."""
-    texts = [quoted(text) for text in words] or ['""']
-    yield f"static const char pfk_{name}_words[][{max(map(len, texts)) - 1}] = {{"
-    yield from (f"    {text}," for text in texts)
-    yield "};"
-    yield ""
-
-
 def _members(routines: str, struct: str) -> dict[str, str]:
     """The members of a structure in the order of its declaration, with a zero of the type of each."""
     plain = re.sub(r"/\*.*?\*/", "", routines, flags=re.DOTALL)
@@ -176,15 +176,18 @@ def _members(routines: str, struct: str) -> dict[str, str]:
     return members
 
 
-def _aimed(machine: Machine, place: int) -> dict[str, int]:
-    """Of both ends of a leg: 1 where angles have limits, 2 where rates need them, for a driven hinge or a twist."""
+def _aimed(machine: Machine, place: int, links: ExportedLinks | None = None) -> dict[str, int]:
+    """Of both ends of a leg: 1 where angles have limits or place links, 2 where rates need them, for a driven hinge or
+    a twist."""
     record = machine.legs[place].record
     driven = [each.place for each in machine.driven if each.leg == place]
     aimed = {}
     for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
         is_driven = any(start <= each < start + 3 for each in driven)
         aimed[f"{end}_aimed"] = (
-            2 if is_driven or (record["twists"] and record[end] == K.CROSS) else int(record[f"{end}_aimed"])
+            2
+            if is_driven or (record["twists"] and record[end] == K.CROSS)
+            else int(record[f"{end}_aimed"] or (record["kind"] == K.ROD and angles_needed(links, place, start)))
         )
     return aimed
 

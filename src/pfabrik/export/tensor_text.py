@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..description.mechanism import Mechanism
 from .source import NOTICE, selected
 from .tensor_machine import TensorMachine
 from .tensor_tables import Rows, cones_of, counting_of, dimensions_of, nested, place_of
@@ -121,9 +122,18 @@ def _header(machine: TensorMachine, backend: str) -> str:
         "DIMENSIONS are the machine's, as it stands at home, in base coordinates. Every function takes them as one",
         "vector too: `parameters()`, or your own, with any leading shape, and with derivatives.",
         "",
+        *_without_clearance(mechanism),
         *NOTICE.splitlines(),
     ]
     return '"""' + "\n".join(comment(line).replace("\\", "/").replace('"', "'") for line in lines) + '\n"""'
+
+
+def _without_clearance(mechanism: Mechanism) -> list[str]:
+    """Lines that say that a clearance is not kept."""
+    if mechanism.clearance is None:
+        return []
+    least = f"{mechanism.clearance:.10g} {mechanism.length_unit}"
+    return [f"Links may be nearer than the machine's clearance, {least}: that is no limit of `margin`.", ""]
 
 
 def _tables(machine: TensorMachine, steps: Steps) -> Iterator[str]:

@@ -32,7 +32,8 @@ def export_tensors(
     Its functions take any leading shape, float64 or float32, and the device of what they are given; with PyTorch and
     JAX they have derivatives, by the machine's dimensions too. Actuators, Jacobians and margins come in closed form, in
     home's working mode; forward kinematics by a fixed number of Newton steps. No value and no derivative is NaN: at and
-    beyond a dead point values are clamped, and the margin says so.
+    beyond a dead point values are clamped, and the margin says so. A clearance between links is not kept, and is no
+    limit of the margins.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -78,3 +79,20 @@ def comment(text: str) -> str:
 def quoted(text: str) -> str:
     """A C string literal."""
     return '"' + comment(text).replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def table(declaration: str, rows: Iterable[str]) -> Iterator[str]:
+    """A table of rows, with one of zeros where there are none."""
+    yield f"static const {declaration} = {{"
+    yield ",\n".join(rows) or "    {0}"
+    yield "};"
+    yield ""
+
+
+def words(name: str, texts: Sequence[str]) -> Iterator[str]:
+    """Texts in rows of one width: pointers would have to be relocated when the file is loaded."""
+    quotes = [quoted(text) for text in texts] or ['""']
+    yield f"static const char pfk_{name}_words[][{max(map(len, quotes)) - 1}] = {{"
+    yield from (f"    {text}," for text in quotes)
+    yield "};"
+    yield ""

@@ -1,0 +1,175 @@
+"""How bodies follow from the pose and from coordinates of legs, as an exported file places them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..decomposition.leg_forms import LegForm, Rod
+from ..description.home_mobility import universal_axes
+from ..description.joints import Joint
+from ..description.links import links_of
+from ..description.mechanism import Mechanism
+from ..kernels.clearance.solids import CAPSULE, DISC, KIND
+from ..kernels.legs import records as K
+from ..model import model_of
+from ..tolerances import TOLERANCES
+
+BASE, PLATFORM, FIRST_MOVED = 0, 1, 2
+"""Numbers of bodies in the exported file: those that move with joint coordinates follow."""
+
+SLIDES, TURNS, WITH_BASE_END, WITH_PLATFORM_END = 0, 1, 2, 3
+"""How a body moves: by a coordinate of a leg, or along a rod, with one of its ends; see `pfk_body` in the C."""
+
+AT_ITS_FIRST_BODY = ("prismatic", "cylindrical")
+"""Types of joints whose centre is a point of their first body alone."""
+
+
+class Motion(NamedTuple):
+    """The motion of a body relative to another by one coordinate of a leg, or with the line of a rod.
+
+    Attributes
+    ----------
+    on : the number of the other body.
+    kind : a slide along the axis, a turn about it through the point; or with an end of a rod, along its line.
+    leg, place, sense : of the coordinate: the deviation from home is sense * value.
+    axis, point : at home, in base coordinates.
+    """
+
+    on: int
+    kind: int
+    leg: int
+    place: int
+    sense: float
+    axis: Floats
+    point: Floats
+
+
+class MovedBodies:
+    """The bodies whose places follow from the pose and from coordinates of legs, each numbered when it is needed."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.motions: list[Motion] = []
+        self._mechanism = mechanism
+        self._known = {int(record["column"]): record for record in model_of(mechanism).legs.known}
+        self._numbers = {mechanism.base: BASE}
+        if not mechanism.end_effector_is_joint:
+            self._numbers[mechanism.end_effector] = PLATFORM
+        self._columns = {(each.joint.name, each.place): each.column for each in mechanism.coordinates}
+        self._ways, self._lengths = self._shortest_ways()
+
+    def is_placed(self, body: str) -> bool:
+        """True if a body's place follows."""
+        return body in self._lengths
+
+    def of_centre(self, joint: Joint) -> int | None:
+        """The number of a body that has the centre of a joint as its point; None if none follows."""
+        mechanism = self._mechanism
+        if mechanism.end_effector_is_joint and joint.name == mechanism.end_effector:
+            return PLATFORM
+        bodies = joint.connects[:1] if joint.type in AT_ITS_FIRST_BODY and not joint.is_rigid else joint.connects
+        near = [body for body in bodies if self.is_placed(body)]
+        return self.number(min(near, key=self._lengths.__getitem__)) if near else None
+
+    def number(self, body: str) -> int:
+        """The number of a body; its motions are added where it has none yet."""
+        if body not in self._numbers:
+            before, joint = self._ways[body]
+            on = self.number(before)
+            for motion in self._motions(joint, before == joint.connects[0]):
+                self.motions.append(motion._replace(on=on))
+                on = FIRST_MOVED + len(self.motions) - 1
+            self._numbers[body] = on
+        return self._numbers[body]
+
+    def along_rod(self, solid: int) -> int | None:
+        """The number of a body that moves along the line of a rod as a solid on it does; None unless it is round there.
+
+        The rod may spin about its line in any way.
+        """
+        mechanism, links = self._mechanism, links_of(self._mechanism)
+        sizes, place = links.sizes[solid], links.places[solid]
+        table, body = model_of(mechanism).legs, mechanism.shapes[solid].body
+        near = TOLERANCES.alignment * mechanism.characteristic_length
+        for leg, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
+            kind = _end_with(form, body)
+            if kind is None or record["frame"] not in (K.FROM_BASE, K.FROM_PLATFORM):
+                continue
+            start, line = record["base_end_point"] * mechanism.characteristic_length, record["line"]
+            points = place[:2] if sizes[KIND] == CAPSULE else place[:1]
+            is_on_line = bool((np.linalg.norm(np.cross(points - start, line), axis=1) <= near).all())
+            is_round = sizes[KIND] == CAPSULE or (
+                sizes[KIND] == DISC and np.linalg.norm(np.cross(place[1], line)) <= TOLERANCES.alignment
+            )
+            if is_on_line and is_round:
+                return self._number_along(leg, kind, BASE if record["frame"] == K.FROM_BASE else PLATFORM)
+        return None
+
+    def _number_along(self, leg: int, kind: int, on: int) -> int:
+        motion = Motion(on, kind, leg, K.Q_PROXIMAL, 1.0, np.zeros(3), np.zeros(3))
+        for place, before in enumerate(self.motions):
+            if (before.leg, before.kind) == (leg, kind):
+                return FIRST_MOVED + place
+        self.motions.append(motion)
+        return FIRST_MOVED + len(self.motions) - 1
+
+    def _shortest_ways(self) -> tuple[dict[str, tuple[str, Joint]], dict[str, int]]:
+        """Of every body that follows: the body before it and the joint between them, and the number of coordinates."""
+        ways: dict[str, tuple[str, Joint]] = {}
+        lengths = dict.fromkeys(self._numbers, 0)
+        joints = [joint for joint in self._mechanism.joints if self._follows(joint)]
+        is_changed = True
+        while is_changed:
+            is_changed = False
+            for joint in joints:
+                for before, after in (joint.connects, joint.connects[::-1]):
+                    length = lengths.get(before, math.inf) + self._n_coordinates(joint)
+                    if length < lengths.get(after, math.inf):
+                        ways[after], lengths[after], is_changed = (before, joint), int(length), True
+        return ways, lengths
+
+    def _n_coordinates(self, joint: Joint) -> int:
+        return 0 if joint.is_rigid else len(self._places(joint))
+
+    def _places(self, joint: Joint) -> list[int]:
+        return [place for name, place in self._columns if name == joint.name]
+
+    def _follows(self, joint: Joint) -> bool:
+        """True if legs have all coordinates of a joint; they have none of a ball, nor of a joint cut at its centre."""
+        mechanism = self._mechanism
+        is_cut = mechanism.end_effector_is_joint and joint.name == mechanism.end_effector
+        known = all(self._columns[joint.name, place] in self._known for place in self._places(joint))
+        return joint.is_rigid or (known and not is_cut and joint.type != "spherical")
+
+    def _motions(self, joint: Joint, forward: bool) -> list[Motion]:
+        """The motions of a joint's second body relative to its first, or the other way round, outward."""
+        if joint.is_rigid:
+            return []
+        mechanism, places = self._mechanism, self._places(joint)
+        if joint.type == "universal":
+            axes, kinds = [*universal_axes(mechanism, joint)], [TURNS, TURNS]
+        else:
+            axes = [np.array(mechanism.home_axis(joint.name))] * len(places)
+            kinds = [SLIDES if joint.type == "prismatic" else TURNS, SLIDES][: len(places)]
+        point = np.array(mechanism.reference_point if joint.at is None else joint.at)
+        motions = []
+        for place, axis, kind in zip(places, axes, kinds, strict=True):
+            record = self._known[self._columns[joint.name, place]]
+            sense = float(record["sense"]) * (1.0 if forward else -1.0)
+            motions.append(Motion(BASE, kind, int(record["leg"]), int(record["place"]), sense, axis, point))
+        return motions if forward else motions[::-1]
+
+
+def _end_with(form: LegForm, body: str) -> int | None:
+    """The end of a rod that a body moves with, along the rod's line; None of other bodies."""
+    if not isinstance(form, Rod):
+        return None
+    slide = form.slide
+    if body == (slide.inward if slide is not None else form.base_ending.elements[-1].outward):
+        return WITH_BASE_END
+    if body == (slide.outward if slide is not None else form.platform_ending.elements[0].inward):
+        return WITH_PLATFORM_END
+    return None
