@@ -1,7 +1,7 @@
 """Reachy Mini: the head on six motors.
 
 For who programs the head of this robot, or another six-motor head. You learn how to get motor angles for a look, what
-the head can do, how to keep it within its limits, and how to follow a nod at the rate of the motors.
+the head can do, how to keep it within its limits and off the body, and how to follow a nod at the rate of the motors.
 """
 
 # The catalogue has the head, with the geometry and the ranges of its maker. Lengths are in metres, and a pose is that
@@ -56,6 +56,40 @@ for hold in ("orientation", "position"):
     each = pf.solve_ik(head, far, options=pf.Options(hold=hold))
     print(f"hold={hold!r}: {1e3 * each.position_error:.1f} mm, {np.degrees(each.rotation_error):.1f} deg off")
     print("   ", each.reason)
+
+# ## Keep the head off the body
+#
+# A look can be within the motors' ranges and yet push the head into the body. The catalogue's file says where both are
+# thick, by the solids of the maker's own collision check: two round plates and two boxes in the body, a lying cylinder
+# in the head. By itself that changes no answer; `pf.clearance` measures it:
+deep = look(pitch=30, up=-20)
+free = pf.solve_ik(head, deep)
+print(free.status.name, pf.clearance(free))
+
+# With a clearance it is a limit like all others. Here answers keep 5 mm. Orientation is kept, height gives way:
+careful = head.with_clearance(0.005)
+answer = pf.solve_ik(careful, deep)
+print(f"{answer.status.name}, {1e3 * answer.position_error:.1f} mm off: {answer.reason}")
+print(pf.clearance(answer))
+pf.plot(answer).figure.savefig("apart.png", dpi=110)
+
+# No target wedges the head. One that is 200 mm too low is answered, and a path that goes there comes back:
+dip = np.stack([look(pitch=5, up=-200 * np.sin(np.pi * t) ** 2) for t in np.linspace(0, 1, 61)])
+motion = pf.track(careful, dip)
+print(" ".join(pf.Status(each).name for each in motion.status[[0, 5, 30, 55, 60]]))
+print(f"lowest {1e3 * (motion.pose[:, 2, 3].min() - 0.177):.1f} mm, {int(motion.jumps.sum())} jumps")
+
+# The solids are simpler than the shells. The maker's model also has convex pieces of the shells. Of 2,346 random looks
+# that the motors can reach (up to 35 deg of roll and pitch, 55 of yaw, 50 mm down, 30 up):
+#
+# | clearance | of looks in which the shells touch, not refused | of looks in which they do not touch, refused |
+# |--:|--:|--:|
+# | 1 mm | 9.6 % | 4.9 % |
+# | 5 mm | 4.3 % | 15 % |
+# | 10 mm | 0.9 % | 39 % |
+#
+# Where that is not enough, give the pieces themselves, each a [mesh](../describing-a-mechanism.md#meshes). Rods, horns
+# and antennas are not among the solids.
 
 # ## A nod
 #

@@ -9,8 +9,9 @@ import numpy as np
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints
 from ..description.body_shapes import Shape
-from ..description.links import links_of
+from ..description.links import hulls_of, links_of
 from ..description.mechanism import Mechanism
+from ..meshes import MeshHull, middle_of
 from .clearance import clearance, placed_links
 
 AROUND, TO_POLE = 16, 4
@@ -36,7 +37,7 @@ class SolidMesh:
 
 def solids_of(mechanism: Mechanism, solution: Solution | None) -> tuple[SolidMesh, ...]:
     """The shapes of a mechanism at home, or of one answer, the nearest two marked."""
-    links = links_of(mechanism)
+    links, hulls = links_of(mechanism), hulls_of(mechanism)
     places = links.places if solution is None else placed_links(solution).places(slice(None))[0]
     nearest: list[int] = []
     overlaps = False
@@ -44,19 +45,21 @@ def solids_of(mechanism: Mechanism, solution: Solution | None) -> tuple[SolidMes
         measured = clearance(solution)
         nearest, overlaps = links.pairs[int(measured._nearest[0])].tolist(), float(measured.distance) < 0.0
     return tuple(
-        SolidMesh(shape.body, *mesh_of(shape, place), k in nearest, overlaps and k in nearest)
+        SolidMesh(shape.body, *mesh_of(shape, place, hulls.get(k)), k in nearest, overlaps and k in nearest)
         for k, (shape, place) in enumerate(zip(mechanism.shapes, places, strict=True))
     )
 
 
-def mesh_of(shape: Shape, place: Floats) -> tuple[Floats, Ints]:
-    """Vertices and faces of a shape; `place` as in `kernels.clearance.solids`, (4, 3)."""
+def mesh_of(shape: Shape, place: Floats, hull: MeshHull | None) -> tuple[Floats, Ints]:
+    """Vertices and faces of a shape; `place` as in `kernels.clearance.solids`, (4, 3); the hull of a mesh."""
     if shape.kind == "box":
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
         return place[0] + 0.5 * signs * np.array(shape.size) @ place[1:], BOX_FACES
     if shape.kind == "disc":
         radius, half = 0.5 * (shape.diameter or 0.0), 0.5 * shape.thickness
         return _turned(place[0], place[1], np.array([[-half, 0], [-half, radius], [half, radius], [half, 0]]))
+    if hull is not None:
+        return place[0] + (shape.scale or 1.0) * (hull.vertices - middle_of(hull)) @ place[1:], hull.triangles
     radius = 0.5 * (shape.thickness if shape.kind == "capsule" else shape.diameter or 0.0)
     line = place[1] - place[0]
     length = float(np.linalg.norm(line))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
@@ -14,6 +15,7 @@ from ..chains.serial_chain import is_chain
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
+from ..meshes import hull_of
 from ..model import model_of
 from ..tolerances import TOLERANCES
 from .fitted import line_width
@@ -209,12 +211,21 @@ def shape_table(mechanism: pf.Mechanism) -> str:
 
 def sizes(shape: pf.Shape) -> str:
     """The lengths of a shape: ``thickness 8``."""
+    if shape.file is not None:
+        return hull_in_words(shape)
     named = (("size", shape.size), ("diameter", shape.diameter), ("thickness", shape.thickness))
     return ", ".join(
         f"{name} {' x '.join(f'{part:.6g}' for part in (value if isinstance(value, tuple) else (value,)))}"
         for name, value in named
         if value is not None
     )
+
+
+def hull_in_words(shape: pf.Shape) -> str:
+    """The file of a mesh, how many vertices its hull has, and how much larger it is made: ``head.stl, 40 vertices``."""
+    hull = hull_of(shape.file or "")
+    larger = f", up to {(shape.scale or 1.0) * hull.margin:.2g} larger" if hull.margin else ""
+    return f"{os.path.basename(shape.file or '')}, {len(hull.vertices)} vertices{larger}"
 
 
 def parallelogram_table(mechanism: pf.Mechanism) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Ints
 from ..derived import derived
-from ..description.links import bodies_of_ends, links_of
+from ..description.links import bodies_of_ends, links_of, scaled_sizes
 from ..description.mechanism import Mechanism
 from ..kernels.clearance.link_records import BASE, NO_LINKS, LinkLimits
 from ..kernels.closure import loops as K
@@ -22,9 +22,8 @@ def links_on_paths(mechanism: Mechanism) -> tuple[LinkLimits, K.Loops]:
     ends = bodies_of_ends(mechanism)
     bodies = list(dict.fromkeys(body for each in ends for body in each if body != mechanism.base))
     numbers = {body: number for number, body in enumerate(bodies)} | {mechanism.base: BASE}
-    return link_limits(mechanism, np.array([[numbers[body] for body in each] for each in ends])), ways_to(
-        mechanism, bodies
-    )
+    limits = link_limits(mechanism, np.array([[numbers[body] for body in each] for each in ends]))
+    return limits, ways_to(mechanism, bodies)
 
 
 def link_limits(mechanism: Mechanism, bodies: Ints) -> LinkLimits:
@@ -32,8 +31,7 @@ def link_limits(mechanism: Mechanism, bodies: Ints) -> LinkLimits:
     from ..kernels.clearance.solids import CAPSULE
 
     links, length = links_of(mechanism), mechanism.characteristic_length
-    sizes, places = links.sizes.copy(), links.places.copy()
-    sizes[:, 1:] /= length
+    sizes, places = scaled_sizes(links, 1.0 / length), links.places.copy()
     is_capsule = sizes[:, 0] == CAPSULE
     places[:, 0] /= length
     places[is_capsule, 1] /= length

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast, get_args
 
 from numpy.typing import ArrayLike
 
 from .coercion import numbers, text, texts, unit_vector, unit_vectors
 from .joints import Vector, set_fields
 
-ShapeKind: TypeAlias = Literal["capsule", "sphere", "box", "disc"]
+ShapeKind: TypeAlias = Literal["capsule", "sphere", "box", "disc", "mesh"]
 SHAPE_KINDS: tuple[ShapeKind, ...] = get_args(ShapeKind)
 
 SHAPE_FIELDS: dict[ShapeKind, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -19,6 +20,7 @@ SHAPE_FIELDS: dict[ShapeKind, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "sphere": (("at", "diameter"), ()),
     "box": (("at", "size"), ("axes",)),
     "disc": (("at", "axis", "diameter", "thickness"), ()),
+    "mesh": (("file",), ("scale", "at", "axes")),
 }
 """What each shape needs, and what it may have beside."""
 
@@ -30,16 +32,20 @@ class Shape:
     Attributes
     ----------
     body : the body that it belongs to.
-    kind : "capsule" (a rod with round ends), "sphere", "box" or "disc" (a round plate, or a cylinder).
+    kind : "capsule" (a rod with round ends), "sphere", "box", "disc" (a round plate, or a cylinder) or "mesh", the
+        convex hull of a file of triangles. A part that is not convex is several meshes, one for each convex piece.
     thickness : diameter of a capsule; height of a disc [length].
     between : the two joints between whose centres the axis of a capsule runs: joints of the body, or of one that slides
         along it, as the two parts of a strut. By default the two joints of the body, where it has just two.
     ends : in place of joints, both ends of the axis of a capsule, points of the body.
-    at : centre of a sphere, box or disc.
+    at : centre of a sphere, box or disc; of a mesh where the origin of its file is, by default that of the base.
     diameter : of a sphere or disc.
     axis : of a disc.
     size : lengths of the edges of a box.
-    axes : directions of the first two edges of a box, square to each other; by default x and y.
+    axes : directions of the first two edges of a box, or of the x and y axes of a mesh's file, square to each other; by
+        default x and y.
+    file : of a mesh, the path of its file: STL, OBJ, PLY and others.
+    scale : of a mesh, what the numbers of its file are multiplied by; 1 by default.
     """
 
     body: str
@@ -52,6 +58,8 @@ class Shape:
     axis: Vector | None = None
     size: Vector | None = None
     axes: tuple[Vector, Vector] | None = None
+    file: str | None = None
+    scale: float | None = None
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
 
@@ -67,9 +75,20 @@ class Shape:
             axis: ArrayLike | None = None,
             size: ArrayLike | None = None,
             axes: ArrayLike | None = None,
+            file: str | os.PathLike[str] | None = None,
+            scale: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        plain = {name: numbers(getattr(self, name)) for name in ("thickness", "ends", "at", "diameter", "size")}
+        plain = {name: numbers(getattr(self, name)) for name in _NUMBERS}
         named = {"body": text(self.body), "kind": text(self.kind), "between": texts(self.between)}
+        named["file"] = _whole_path(self.file)
         set_fields(self, **plain, **named, axis=unit_vector(self.axis), axes=unit_vectors(self.axes))
+
+
+_NUMBERS = ("thickness", "ends", "at", "diameter", "size", "scale")
+
+
+def _whole_path(file: Any) -> Any:
+    """A path from the root, which stands for the same file wherever it is read; anything else as it is."""
+    return os.path.abspath(os.fspath(file)) if isinstance(file, str | os.PathLike) and os.fspath(file) else file

@@ -201,7 +201,7 @@ def _turned_shape(shape: Shape, axis: Vector, step: int, steps: int) -> Shape:
         return tuple(map(turn, value)) if isinstance(value, tuple) else value
 
     directions: Any = shape.axes
-    if shape.kind == "box" and directions is None:
+    if shape.kind in ("box", "mesh") and directions is None:
         directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     return dataclasses.replace(
         shape, at=turn(shape.at), axis=turn(shape.axis), ends=turn(shape.ends), axes=turn(directions)

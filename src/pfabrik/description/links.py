@@ -10,7 +10,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..derived import derived
-from ..errors import Fault
+from ..errors import Fault, InvalidMechanism
+from ..meshes import MeshHull, UnusableMesh, hull_of, middle_of, sizes_of
 from ..tolerances import TOLERANCES
 from .body_shapes import Shape
 from .graph import steps_from_base, welded
@@ -26,7 +27,8 @@ class Links(NamedTuple):
 
     Attributes
     ----------
-    sizes : (s, 5) [length]; places : at home, (s, 4, 3): see `kernels.clearance.solids`.
+    sizes : (s, 5), or longer rows where there are meshes [length]; places : at home, (s, 4, 3): see
+        `kernels.clearance.solids`.
     joints : names of the two joints that a capsule is between; empty for a shape that moves with its body.
     pairs : indices of two shapes each, (k, 2), those of two capsules first; n_capsules : how many these are.
     """
@@ -41,15 +43,51 @@ class Links(NamedTuple):
 @derived
 def links_of(mechanism: Structure) -> Links:
     """The links of a mechanism whose description has no faults."""
+    from ..kernels.clearance.solids import WIDTH
+
     joints = tuple(_joints_of(mechanism, shape) for shape in mechanism.shapes)
-    sizes = np.zeros((len(joints), 5))
+    hulls = hulls_of(mechanism)
+    rows = {k: sizes_of(hull, mechanism.shapes[k].scale or 1.0) for k, hull in hulls.items()}
+    sizes = np.zeros((len(joints), max([WIDTH, *map(len, rows.values())])))
     places = np.zeros((len(joints), 4, 3))
     for k, (shape, ends) in enumerate(zip(mechanism.shapes, joints, strict=True)):
-        _put(shape, [mechanism.joint(name).at for name in ends], sizes[k], places[k])
+        if k in rows:
+            sizes[k, : len(rows[k])] = rows[k]
+            _place_hull(shape, hulls[k], places[k])
+        else:
+            _put(shape, [mechanism.joint(name).at for name in ends], sizes[k], places[k])
     pairs = _pairs(mechanism, joints)
     pairs = pairs[np.argsort(sizes[pairs, 0].any(axis=1), kind="stable")]
     n_capsules = int(np.count_nonzero(~sizes[pairs, 0].any(axis=1)))
     return Links(sizes, places, joints, pairs, n_capsules)
+
+
+@derived
+def hulls_of(mechanism: Structure) -> dict[int, MeshHull]:
+    """The hulls of meshes, by the places of their shapes, as their files were when the mechanism was made."""
+    hulls = {}
+    for k, shape in enumerate(mechanism.shapes):
+        if shape.file is not None:
+            try:
+                hulls[k] = hull_of(shape.file)
+            except UnusableMesh as error:  # the file was changed since: of a mechanism that was copied, or sent
+                raise InvalidMechanism([Fault(f"body[{k}].file", error.found, error.expected)]) from None
+    return hulls
+
+
+def scaled_sizes(links: Links, scale: float) -> Floats:
+    """The sizes of links in another unit; how many parts a hull has, where its faces point, and what is beside an edge
+    stay."""
+    from ..kernels.clearance.solids import HULL, KIND, REACH, ROUND, VERTICES, A
+
+    sizes = links.sizes.copy()
+    for row in sizes:
+        if row[KIND] == HULL:
+            row[[ROUND, REACH]] *= scale
+            row[VERTICES : VERTICES + 3 * int(row[A])] *= scale
+        else:
+            row[ROUND:] *= scale
+    return sizes
 
 
 def has_pairs(mechanism: Structure) -> bool:
@@ -81,7 +119,7 @@ def bodies_of_ends(mechanism: Structure) -> list[tuple[str, str]]:
 
 
 def _put(shape: Shape, ends: list[Any], sizes: Floats, place: Floats) -> None:
-    """Fill the sizes and the place of a shape."""
+    """Fill the sizes and the place of a shape other than a mesh."""
     from ..kernels.clearance.solids import BOX, CAPSULE, DISC, KIND, ROUND, A, B
 
     if shape.kind == "capsule":
@@ -95,9 +133,22 @@ def _put(shape: Shape, ends: list[Any], sizes: Floats, place: Floats) -> None:
         sizes[KIND], sizes[A], sizes[B], place[1] = DISC, half, 0.5 * shape.thickness, shape.axis
     else:
         sizes[KIND], sizes[A : A + 3] = BOX, 0.5 * np.array(shape.size)
-        x, y = np.array(shape.axes or ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
-        y = y - (y @ x) * x
-        place[1:] = x, y / np.linalg.norm(y), np.cross(x, y / np.linalg.norm(y))
+        place[1:] = _axes_of(shape)
+
+
+def _place_hull(shape: Shape, hull: MeshHull, place: Floats) -> None:
+    """Fill the place of a mesh: the middle of its hull, and the axes of its file."""
+    axes = _axes_of(shape)
+    place[0] = np.array(shape.at or (0.0, 0.0, 0.0)) + (shape.scale or 1.0) * middle_of(hull) @ axes
+    place[1:] = axes
+
+
+def _axes_of(shape: Shape) -> Floats:
+    """The three axes of a box or a mesh, (3, 3), one a row."""
+    x, y = np.array(shape.axes or ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    y = y - (y @ x) * x
+    y = y / np.linalg.norm(y)
+    return np.array([x, y, np.cross(x, y)])
 
 
 def _pairs(mechanism: Structure, ends: tuple[tuple[str, ...], ...]) -> Ints:

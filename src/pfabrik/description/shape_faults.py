@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 from ..errors import Fault, near_miss
+from ..meshes import UnusableMesh, hull_of
 from ..tolerances import TOLERANCES
 from .body_shapes import SHAPE_FIELDS, SHAPE_KINDS, Shape
 from .form_faults import direction_faults, is_pair_of_names, number_faults, shown
@@ -48,14 +49,18 @@ def _form_faults(place: str, shape: Shape) -> Iterator[Fault]:
         yield Fault(f"{place}.shape", f"{shown(shape.kind)}{hint}", f"one of {', '.join(SHAPE_KINDS)}")
         return
     needed, optional = SHAPE_FIELDS[shape.kind]
+    found: list[Fault] = []
     for field in _FIELDS:
         value, where = getattr(shape, field), f"{place}.{field}"
         if value is None and field in needed:
-            yield Fault(where, "nothing", f"{_WORDS[field]}, for a {shape.kind}")
+            found.append(Fault(where, "nothing", f"{_WORDS[field]}, for a {shape.kind}"))
         elif value is not None and field not in needed + optional:
-            yield Fault(where, shown(value), f"nothing: a {shape.kind} has no {field}")
+            found.append(Fault(where, shown(value), f"nothing: a {shape.kind} has no {field}"))
         elif value is not None:
-            yield from _value_faults(where, field, value)
+            found += _value_faults(where, field, value)
+    yield from found
+    if not found and shape.kind == "mesh":
+        yield from _mesh_faults(f"{place}.file", shape)
     if shape.between is not None and shape.ends is not None:
         yield Fault(f"{place}.ends", "both `between` and `ends`", "one of them")
 
@@ -67,11 +72,12 @@ _WORDS = {
     "at": "three numbers, its centre",
     "size": "three numbers, the lengths of its edges",
     "axis": "three numbers, the direction of its axis",
+    "file": "the path of a mesh file",
 }
 
 
 def _value_faults(place: str, field: str, value: Any) -> Iterator[Fault]:
-    if field in ("thickness", "diameter", "size"):
+    if field in ("thickness", "diameter", "size", "scale"):
         count = 3 if field == "size" else 1
         faults = list(number_faults(place, value, count))
         yield from faults
@@ -81,6 +87,9 @@ def _value_faults(place: str, field: str, value: Any) -> Iterator[Fault]:
         yield from number_faults(place, value, 3)
     elif field == "axis":
         yield from direction_faults(place, value)
+    elif field == "file":
+        if not isinstance(value, str) or not value or "\0" in value:
+            yield Fault(place, shown(value), _WORDS["file"])
     elif field == "between":
         if not is_pair_of_names(value) or value[0] == value[1]:
             yield Fault(place, shown(value), "the names of two joints")
@@ -100,6 +109,13 @@ SQUARE = TOLERANCES.rotation_matrix
 
 def _edge_faults(place: str, value: Any, _: int) -> Iterator[Fault]:
     yield from direction_faults(place, value)
+
+
+def _mesh_faults(place: str, shape: Shape) -> Iterator[Fault]:
+    try:
+        hull_of(cast(str, shape.file))
+    except UnusableMesh as error:
+        yield Fault(place, error.found, error.expected)
 
 
 def shape_faults(mechanism: Structure) -> Iterator[Fault]:

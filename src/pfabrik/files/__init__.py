@@ -44,7 +44,7 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
     if not os.path.exists(path):  # unlike Path.exists, it also answers for paths that no system could have
         raise UnknownName("mechanism file or catalogue name", str(path), catalog())
     try:
-        return loads(_text(path), str(path))
+        return read_mechanism(_parsed(_text(path)), path.parent)
     except InvalidMechanism as error:
         raise InvalidMechanism(error.faults, str(path)) from None
 
@@ -72,11 +72,11 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism to a file that `load` turns into an equal one.
 
     The file is replaced as a whole or not at all. Copies, shorthands and expressions of the file that the mechanism
-    came from are kept if that has dimensions.
+    came from are kept if that has dimensions. Paths of meshes are written relative to the folder of the new file.
     """
     checked_mechanism(mechanism)
     with whole_path(path) as part:
-        part.write_bytes(dumps(mechanism).encode())
+        part.write_bytes(dumps(mechanism, Path(path).parent).encode())
 
 
 def _text(path: Path) -> str:

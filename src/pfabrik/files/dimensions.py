@@ -16,7 +16,7 @@ from ..errors import Fault, counted, near_miss
 
 TEXTS = (
     *("name", "type", "connects", "along", "chain", "fixed_to", "base", "end_effector", "units", "task", "schema"),
-    *("shape", "between", "ignore"),
+    *("shape", "file", "between", "ignore"),
 )
 """Keys whose strings are text. Of a leg, `base` has points: there, strings in lists are expressions."""
 

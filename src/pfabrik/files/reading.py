@@ -7,9 +7,11 @@ in a file as in a call.
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from ..description.body_shapes import Shape
@@ -49,17 +51,33 @@ Described = TypeVar("Described", bound=Structure)
 """A mechanism, or its structure, which is not checked."""
 
 
-def read_mechanism(table: Table) -> Mechanism:
+def read_mechanism(table: Table, folder: Path | None = None) -> Mechanism:
     """The mechanism of a parsed file; `InvalidMechanism` with every fault.
 
-    Faults of dimensions and expressions come first, then those of tables, then those of the whole.
+    Faults of dimensions and expressions come first, then those of tables, then those of the whole. Paths of meshes are
+    relative to the file's folder.
     """
+    table = with_paths(table, lambda file: os.path.abspath(os.path.join(folder or "", file)))
     if "dimensions" not in table:
         return _read(table, Mechanism)
     numbers_in, values = _with_numbers(table)
     mechanism = _read(numbers_in, Mechanism)
     set_fields(mechanism, _source=Source(table, values))
     return mechanism
+
+
+def with_paths(table: Table, change: Callable[[str], str]) -> Table:
+    """The table of a file with other paths of meshes."""
+    bodies = table.get("body")
+    if not isinstance(bodies, list):
+        return table
+    changed = [
+        {**body, "file": change(body["file"])}
+        if isinstance(body, dict) and isinstance(body.get("file"), str) and body["file"]
+        else body
+        for body in bodies
+    ]
+    return table | {"body": changed}
 
 
 def _with_numbers(table: Table) -> tuple[Table, dict[str, float]]:

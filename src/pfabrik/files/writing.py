@@ -3,41 +3,53 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 from ..description.mechanism import Joint, Mechanism, Shape
+from .reading import with_paths
 from .units import MEASURED, converted, exact_degrees, measured
 
 TABLES = ("joint", "leg", "body")
 """Keys of a file that are lists of tables, in their order."""
 
 
-def dumps(mechanism: Mechanism) -> str:
+def dumps(mechanism: Mechanism, folder: Path | None = None) -> str:
     """The text of a mechanism file that describes this mechanism, joint by joint, exactly.
 
     A machine that was read from a file with dimensions is written as that file has it, with its dimensions,
     expressions, copies and legs. Angles of others are written in degrees if that is the mechanism's unit and every
-    angle has exact degrees, else in radians.
+    angle has exact degrees, else in radians. Paths of meshes are relative to a folder, or whole without one.
     """
     source = mechanism.__dict__.get("_source")
     if source is not None:
-        return _as_read(source.table)
+        return _as_read(with_paths(source.table, lambda file: _path_from(file, folder)))
     degrees = mechanism.angle_unit == "deg" and all(exact_degrees(angle) is not None for angle in _angles(mechanism))
     convert = _degrees if degrees else float
     tables = ["\n".join(_head(mechanism, "deg" if degrees else "rad"))]
     tables += ["\n".join(["[[joint]]", *_joint(joint, convert)]) for joint in mechanism.joints]
-    tables += ["\n".join(["[[body]]", *_shape(shape)]) for shape in mechanism.shapes]
+    tables += ["\n".join(["[[body]]", *_shape(shape, folder)]) for shape in mechanism.shapes]
     return "\n\n".join(tables) + "\n"
 
 
-def _shape(shape: Shape) -> Iterator[str]:
+def _shape(shape: Shape, folder: Path | None) -> Iterator[str]:
     yield f"name = {_value(shape.body)}"
     yield f"shape = {_value(shape.kind)}"
     for field in dataclasses.fields(shape)[2:]:
-        if getattr(shape, field.name) is not None:
-            yield f"{field.name} = {_value(getattr(shape, field.name))}"
+        value = getattr(shape, field.name)
+        if value is not None:
+            yield f"{field.name} = {_value(_path_from(value, folder) if field.name == 'file' else value)}"
+
+
+def _path_from(file: str, folder: Path | None) -> str:
+    """The path of a file from a folder, or as it is without one, or where there is no way from there."""
+    try:
+        return file if folder is None else Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # on another drive
+        return file
 
 
 def _as_read(table: dict[str, Any]) -> str:

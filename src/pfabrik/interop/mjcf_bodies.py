@@ -149,11 +149,11 @@ UNTOUCHED = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "3"}
 
 
 def _thick(mechanism: Mechanism, body: str, origin: Floats, metres: float) -> Iterator[ET.Element]:
-    """The shapes of a body as geoms; those of struts, whose length changes, are written as halves."""
+    """The shapes of a body as geoms but meshes; those of struts, whose length changes, are written as halves."""
     links, struts = (links_of(mechanism), struts_of(mechanism)) if mechanism.shapes else (None, {})
     for k, shape in enumerate(mechanism.shapes if links is not None else ()):
         assert links is not None
-        if shape.body != body or k in struts:
+        if shape.body != body or k in struts or shape.kind == "mesh":
             continue
         places, size = links.places[k], np.array([0.5 * metres])
         attributes = {"pos": vector(places[0] * metres - origin)}

@@ -7,8 +7,9 @@ import math
 from ...arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, put, scale, sub, vec
+from .hulls import nearest_to_hull
 from .segments import between_segments, nearest_along
-from .solids import BOX, CAPSULE, DISC, KIND, A, B, direction_of, farthest_in, nearest_in, square_to
+from .solids import BOX, CAPSULE, DISC, HULL, KIND, A, B, direction_of, farthest_in, nearest_in, square_to
 
 # Places on a rim from which the nearest one is refined, and halvings of the angle between two of them.
 RIM, HALVINGS = 32, 60
@@ -27,6 +28,8 @@ def nearest_points(sizes: Floats, place: Floats, other: Floats, other_place: Flo
         put(points[1], along(x, t, sub(y, x)))
         gap = sub(vec(points[1]), vec(points[0]))
         return dot(gap, gap)
+    if sizes[KIND] == HULL or other[KIND] == HULL:
+        return nearest_to_hull(sizes, place, other, other_place, points)
     least = try_features(sizes, place, other, other_place, points, 0, math.inf)
     return try_features(other, other_place, sizes, place, points, 1, least)
 

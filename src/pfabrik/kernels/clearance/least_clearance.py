@@ -8,7 +8,8 @@ from ...arrays import Floats, Ints
 from .._jit import routine, search
 from ..vectors import Vec, add, along, copy_table, cross, dot, norm, put, scale, sub, vec
 from .cores import nearest_points
-from .solids import BOX, CAPSULE, DISC, KIND, ROUND, A, B, C, direction_of, farthest_in, square_to
+from .hull_overlap import way_out_of_hull
+from .solids import BOX, CAPSULE, DISC, HULL, KIND, REACH, ROUND, A, B, C, direction_of, farthest_in, square_to
 
 # Share of the size of coordinates below which two cores count as touching: their direction is rounding.
 TOUCHING = 1e-13
@@ -28,7 +29,7 @@ def least_clearance(
 
     Parameters
     ----------
-    sizes : of every solid, (s, WIDTH) [length].
+    sizes : of every solid, (s, WIDTH) or more [length], as in `solids`.
     places : where they are, (n, s, 4, 3) [length], as in `solids`.
     pairs : two solids each, (k, 2): the first `nearest` may already be among.
     scratch : the first pair to try, (1,), and space for the places of a solid, (3 per place,) behind it.
@@ -69,6 +70,8 @@ def reach_of(sizes: Floats, place: Floats) -> float:
     """How far a solid reaches from its middle."""
     if sizes[KIND] == CAPSULE:
         return 0.5 * norm(sub(vec(place[1]), vec(place[0]))) + sizes[ROUND]
+    if sizes[KIND] == HULL:
+        return sizes[REACH] + sizes[ROUND]
     return norm((sizes[A], sizes[B], sizes[C] if sizes[KIND] == BOX else 0.0)) + sizes[ROUND]
 
 
@@ -132,6 +135,16 @@ def way_out(sizes: Floats, place: Floats, other: Floats, other_place: Floats) ->
     the shortest way is one of these. With discs the difference is also round: a ball within touches it on a face, or
     square to one of these axes, or, between two rims, where it is curved both ways; never on an edge, which is sharp.
     """
+    if sizes[KIND] == HULL or other[KIND] == HULL:
+        is_first = sizes[KIND] == HULL
+        if is_first:
+            best = way_out_of_hull(sizes, place, other, other_place)
+        else:
+            best = scale(-1.0, way_out_of_hull(other, other_place, sizes, place))
+        if sizes[KIND] != DISC and other[KIND] != DISC:
+            return best
+        axis = direction_of(other, other_place, 0) if is_first else direction_of(sizes, place, 0)
+        return better_around(axis, best, sizes, place, other, other_place)
     best = (0.0, 0.0, 1.0)
     for k in range(3):
         axis, of_other = direction_of(sizes, place, k), direction_of(other, other_place, k)
