@@ -20,6 +20,7 @@ from pfabrik.engine import engine_of
 from pfabrik.model import model_of
 from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.platform.links_of_legs import keeps_links
+from pfabrik.skeleton import skeleton_of
 from test_clearance import STRUTS, struts
 from test_compiled_and_interpreted import INTERPRETED
 
@@ -315,3 +316,13 @@ def test_a_track_tells_how_near_links_come_between_its_steps(tmp_path: Path) -> 
     path.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in sides), encoding="utf-8")
     ran = CliRunner().invoke(main, ["track", str(saved), str(path), "-o", str(tmp_path / "out.csv")])
     assert ran.exit_code == 1 and "on the way to target 3" in ran.output, ran.output
+
+
+def test_the_pair_that_stops_an_answer_is_lit_up() -> None:
+    machine = thick_hexaglide()
+    answer = pf.solve_ik(machine, turned_about_z(machine, 0.7))
+    lit = {solid.body for solid in skeleton_of(answer).solids if solid.is_stopped}
+    stopping = answer.active_limits[0]
+    assert isinstance(stopping, pf.ActiveLimit) and stopping.bound == "clearance"
+    assert len(lit) == 2 and "–".join(sorted(lit)) in {each.joint for each in answer.active_limits}  # type: ignore[union-attr]
+    assert not any(solid.is_stopped for solid in skeleton_of(pf.solve_ik(machine, machine.home_pose)).solids)

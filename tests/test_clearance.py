@@ -556,7 +556,7 @@ def test_pictures_and_the_viewer_have_links_as_thick_as_they_are() -> None:
     length = float(np.linalg.norm(np.subtract(machine.joint("C1").at, machine.joint("A1").at)))
     assert abs(volume) == pytest.approx(np.pi * 36 * length + 4 / 3 * np.pi * 216, rel=0.05)
     assert sum(solid.is_nearest for solid in skeleton.solids) == 2
-    assert not any(solid.overlaps for solid in skeleton.solids)
+    assert not any(solid.is_stopped for solid in skeleton.solids)
     assert len(pf.plot(machine).collections) > len(pf.plot(pf.load("stewart")).collections)
 
 

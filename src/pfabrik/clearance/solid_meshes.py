@@ -12,6 +12,7 @@ from ..description.body_shapes import Shape
 from ..description.links import hulls_of, links_of
 from ..description.mechanism import Mechanism
 from ..meshes import MeshHull, middle_of
+from ..tolerances import TOLERANCES
 from .clearance import clearance, placed_links
 
 AROUND, TO_POLE = 16, 4
@@ -25,14 +26,15 @@ class SolidMesh:
     Attributes
     ----------
     vertices : (k, 3) [length]; faces : indices of three each, (m, 3).
-    is_nearest : True for the two links that are nearest to each other; overlaps : True where they overlap.
+    is_nearest : True for the two links that are nearest to each other.
+    is_stopped : True where these two are at the clearance or nearer; without a clearance, where they overlap.
     """
 
     body: str
     vertices: Floats
     faces: Ints
     is_nearest: bool = False
-    overlaps: bool = False
+    is_stopped: bool = False
 
 
 def solids_of(mechanism: Mechanism, solution: Solution | None) -> tuple[SolidMesh, ...]:
@@ -40,12 +42,14 @@ def solids_of(mechanism: Mechanism, solution: Solution | None) -> tuple[SolidMes
     links, hulls = links_of(mechanism), hulls_of(mechanism)
     places = links.places if solution is None else placed_links(solution).places(slice(None))[0]
     nearest: list[int] = []
-    overlaps = False
+    is_stopped = False
     if solution is not None and len(links.pairs):
         measured = clearance(solution)
-        nearest, overlaps = links.pairs[int(measured._nearest[0])].tolist(), float(measured.distance) < 0.0
+        nearest = links.pairs[int(measured._nearest[0])].tolist()
+        near = TOLERANCES.active * mechanism.characteristic_length if mechanism.clearance is not None else 0.0
+        is_stopped = float(measured.distance) < (mechanism.clearance or 0.0) + near
     return tuple(
-        SolidMesh(shape.body, *mesh_of(shape, place, hulls.get(k)), k in nearest, overlaps and k in nearest)
+        SolidMesh(shape.body, *mesh_of(shape, place, hulls.get(k)), k in nearest, is_stopped and k in nearest)
         for k, (shape, place) in enumerate(zip(mechanism.shapes, places, strict=True))
     )
 

@@ -47,7 +47,7 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
     Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints faces. The
     base is grey, the end effector blue, dashed lines are rails, and a cross marks the reference point. What holds an
     answer back, or what it exceeds, is orange, and named: "B3 max". Links with a thickness are drawn as they are, of an
-    answer the two that are nearest to each other darker, and orange if they overlap.
+    answer the two that are nearest to each other darker, and orange where they stop it, or overlap.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
     pen = pen_of(canvas, skeleton.mechanism)
     artists: list[Artist] = [each for part in skeleton.parts for each in _body(canvas, part, part.body in held, pen)]
     for solid in skeleton.solids:
-        colour = HELD if solid.overlaps else LINK
+        colour = HELD if solid.is_stopped else LINK
         alpha = NEAREST_ALPHA if solid.is_nearest else SOLID_ALPHA
         artists.append(canvas.solid(solid.vertices[solid.faces], facecolor=colour, alpha=alpha, zorder=0))
     for rail in skeleton.rails:

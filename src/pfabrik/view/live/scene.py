@@ -202,8 +202,8 @@ def _triangles(solid: SolidMesh, length: float) -> tuple[Any, Any]:
 
 
 def _colour_of_solid(solid: SolidMesh) -> tuple[int, int, int]:
-    """Dark for the two links that are nearest to each other, orange where they overlap, light elsewhere."""
-    return rgb(HELD if solid.overlaps else ACTUATED if solid.is_nearest else BASE)
+    """Dark for the two links that are nearest to each other, orange where they stop it or overlap, light elsewhere."""
+    return rgb(HELD if solid.is_stopped else ACTUATED if solid.is_nearest else BASE)
 
 
 def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:
