@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from in_mujoco import Model
+from pfabrik.answers.active_limits import ActiveLimit, binding_limits
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
 from pfabrik.files.units import metres_of
@@ -54,6 +55,27 @@ def around(machine: pf.Mechanism, count: int, length: float, angle: float) -> pf
     targets[:, :3, 3] += rng.uniform(-length, length, (count, 3))
     targets[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-angle, angle, (count, 3))).as_matrix() @ targets[:, :3, :3]
     return pf.solve_ik(machine, targets)
+
+
+def axes_of_struts(poses: Array) -> Array:
+    """Both ends of the axes of all struts of `struts` at poses, (n, 6, 2, 3), by their points alone."""
+    ends = []
+    for k in range(3):
+        turn = Rotation.from_euler("z", 120.0 * k, degrees=True).as_matrix()
+        for foot, head in zip(STRUTS["base"], STRUTS["platform"], strict=True):
+            local = turn @ np.array(head, float) - STRUTS["reference_point"]
+            moved = poses[:, :3, :3] @ local + poses[:, :3, 3]
+            ends.append(np.stack([np.broadcast_to(turn @ np.array(foot, float), moved.shape), moved], axis=1))
+    return np.stack(ends, axis=1)
+
+
+def distances_of_struts(poses: Array, thickness: float = 12.0) -> dict[str, Array]:
+    """The distances of all pairs of struts at poses, (n,), by the names of their bodies."""
+    axes = axes_of_struts(poses)
+    return {
+        f"BC{i + 1}–BC{j + 1}": by_cases(np.concatenate([axes[:, i], axes[:, j]], axis=1)) - thickness
+        for i, j in itertools.combinations(range(6), 2)
+    }
 
 
 def refused(make: object, *args: object, **kwargs: object) -> list[str]:
@@ -567,7 +589,7 @@ def test_the_command_says_how_far_apart_links_are(tmp_path: Path) -> None:
     assert "BC1       capsule" in shown or "BC1   capsule" in shown
     assert "at home BC" in shown
     ik = ["ik", str(file), "--position", "0", "0", "200", "--margins"]
-    assert "17.282 mm apart (no limit keeps it)" in CliRunner().invoke(main, ik).output
+    assert "17.282 mm apart (no clearance is kept)" in CliRunner().invoke(main, ik).output
     plain = json.loads(CliRunner().invoke(main, [*ik, "--json"]).output)
     assert plain["clearance"]["distance"] == pytest.approx(2 * 14.6410161514 - 12)
     assert "clearance" not in json.loads(CliRunner().invoke(main, ["ik", "stewart", *ik[2:], "--json"]).output)
@@ -582,3 +604,116 @@ def test_what_is_no_list_of_shapes_or_too_long_a_one_is_refused() -> None:
     assert "at most 300" in refused(pf.load("stewart").with_shapes, many)[0]
     assert "pairs of bodies" in refused(pf.load("stewart").with_shapes, (), ignore=7)[0]
     assert "two bodies" in refused(pf.load("stewart").with_shapes, (), ignore=["base"])[0]
+
+
+# As a limit
+
+
+def test_every_pair_of_links_has_a_margin_that_is_its_distance_beyond_the_clearance() -> None:
+    machine = struts(clearance=2.0)
+    answers = around(machine, 20, 20, 0.2)
+    found, length = pf.margins(answers), machine.characteristic_length
+    expected = distances_of_struts(answers.pose)
+    assert {name for name, bound in found if bound == "clearance"} == set(expected)
+    for name, distance in expected.items():
+        np.testing.assert_allclose(found[name, "clearance"], (distance - 2.0) / length, atol=1e-9)
+    assert not [limit for limit in pf.margins(around(struts(), 2, 20, 0.2)) if limit[1] == "clearance"]
+
+
+def test_feasibility_is_the_least_of_strokes_and_distances_and_what_solve_ik_reaches() -> None:
+    machine = struts(clearance=10.0)
+    n = 100 if INTERPRETED else 20_000
+    rng = np.random.default_rng(5)
+    turns = rng.uniform(-1.0, 1.0, (n, 3)) * [0.5, 0.5, 2.2]
+    targets = pf.pose(machine.home_pose[:3, 3] + rng.uniform(-30, 30, (n, 3)), rotvec=turns)
+    found = pf.feasibility(machine, targets)
+    free = np.asarray(pf.feasibility(machine.with_clearance(None), targets).margin)
+    distances = distances_of_struts(targets)
+    room = (np.stack(list(distances.values())) - 10.0) / machine.characteristic_length
+    expected = np.where(free < 0.0, free, np.minimum(free, room.min(axis=0)))
+    np.testing.assert_allclose(found.margin, expected, atol=1e-12)
+    by_links = np.flatnonzero((room.min(axis=0) < free - 1e-9) & (free >= 0.0))
+    assert len(by_links) > n // 20
+    named = [found.limits[place] for place in found.binding[by_links].tolist()]
+    assert [bound for _, bound in named] == ["clearance"] * len(named)
+    own = [distances[name][row] for (name, _), row in zip(named, by_links, strict=True)]
+    np.testing.assert_allclose(own, 10.0 + room[:, by_links].min(axis=0) * machine.characteristic_length, atol=1e-9)
+    rows = by_links[:: max(len(by_links) // 100, 1)]
+    reached = pf.solve_ik(machine, targets[rows], options=pf.Options(working_mode="keep"))
+    np.testing.assert_array_equal(reached.status == 0, expected[rows] >= 0.0)
+
+
+@pytest.mark.parametrize("name", ["delta", "hexaglide"])
+def test_feasibility_knows_links_on_inner_bodies_and_tasks_that_leave_something_open(name: str, tmp_path: Path) -> None:
+    machine = machine_named(name, tmp_path)
+    least = 0.9 * float(pf.clearance(pf.solve_ik(machine, machine.home_pose)).distance)
+    kept, length = machine.with_clearance(least), machine.characteristic_length
+    rng = np.random.default_rng(4)
+    n = 12 if INTERPRETED else 60
+    turns = rng.uniform(-0.2, 0.2, (n, 3)) * (name == "hexaglide")
+    targets = pf.pose(machine.home_pose[:3, 3] + 0.2 * length * rng.uniform(-1, 1, (n, 3)), rotvec=turns)
+    free, found = pf.feasibility(machine, targets), pf.feasibility(kept, targets)
+    distance = np.asarray(pf.clearance(pf.solve_ik(machine, targets, options=pf.Options(working_mode="keep"))).distance)
+    room = (distance - least) / length
+    expected = np.where(free.margin < 0.0, free.margin, np.minimum(free.margin, room))
+    np.testing.assert_allclose(found.margin, expected, atol=1e-9)
+    assert (expected < 0.0).any() and (room < free.margin).any()
+
+
+def test_links_that_are_nearer_than_the_clearance_are_active_and_exceeded_by_name() -> None:
+    machine = struts(clearance=10.0).without_limits()
+    target = pf.pose(machine.home_pose[:3, 3], rotvec=(0.0, 0.0, 2.2))
+    q = pf.solve_ik(machine.with_clearance(None), target).q
+    found = pf.configuration(machine, q)
+    expected = {name: float(d[0]) for name, d in distances_of_struts(target[None]).items() if d[0] < 10.0}
+    assert found.status == pf.Status.EXCEEDED
+    assert {limit.joint: pytest.approx(limit.value, abs=1e-9) for limit in found.active_limits} == expected
+    assert {(limit.bound, limit.limit) for limit in found.active_limits} == {("clearance", 10.0)}
+    worst = min(expected.values())
+    assert found.active_limits[0].value == pytest.approx(worst)
+    assert found.limit_excess == pytest.approx((10.0 - worst) / machine.characteristic_length)
+    assert str(found.binding["bound"]) == "clearance" and f"{found.binding['joint']}" in expected
+    assert "clearance of BC" in found.reason
+    assert found.to_dict()["active_limits"][0]["bound"] == "clearance"
+
+
+def test_an_answer_held_back_by_links_says_so_in_words() -> None:
+    machine = struts(clearance=10.0)
+    target = pf.pose(machine.home_pose[:3, 3], rotvec=(0.0, 0.0, 2.2))
+    found = pf.solve_ik(machine, target)
+    assert found.status == pf.Status.PROJECTED
+    assert {limit.joint for limit in found.active_limits} == {"BC1–BC4", "BC2–BC5", "BC3–BC6"}
+    assert found.reason.endswith("BC1–BC4, BC2–BC5, BC3–BC6 at their clearance 10 mm")
+    assert min(float(d[0]) for d in distances_of_struts(found.pose[None]).values()) == pytest.approx(10.0, abs=1e-5)
+    log = pf.search_log(machine, target)
+    assert log.answered_by == "links kept apart" and "come too near at the target" in str(log)
+
+
+@pytest.mark.slow
+def test_nothing_is_proved_of_a_machine_with_a_clearance() -> None:
+    machine = struts(clearance=2.0)
+    place = machine.home_pose[:3, 3]
+    region = pf.PoseRegion.box(place - 1.0, place + 1.0)
+    for ask in (
+        lambda: pf.certify(machine, region),
+        lambda: pf.largest(machine, "box", centre=place, extents=(1, 1, 1)),
+        lambda: pf.workspace(machine, fixed={"z": 195.0}, certified=True),
+    ):
+        with pytest.raises(UnsupportedMechanism, match="with_clearance"):
+            ask()
+    assert pf.certify(machine.with_clearance(None), region)
+
+
+def test_names_of_two_bodies_are_whole_however_long_they_are() -> None:
+    rows = [(ActiveLimit("a" * 60 + "–" + "b" * 60, "clearance", 1.0, 2.0),), ()]
+    assert binding_limits(rows)["joint"].tolist() == ["a" * 60 + "–" + "b" * 60, ""]
+
+
+def test_the_command_says_which_clearance_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text(dumps(struts(clearance=2.0)))
+    output = CliRunner().invoke(main, ["info", str(path)]).output
+    assert "clearance              2 mm kept between links" in output and "(the clearance kept is 2 mm)" in output
+    assert json.loads(CliRunner().invoke(main, ["info", "--json", str(path)]).output)["clearance"] == 2.0
+    table = CliRunner().invoke(main, ["ik", str(path), "--position", "0", "0", "195", "--margins"]).output
+    assert "BC1–BC4" in table and "clearance" in table

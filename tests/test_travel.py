@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import oracles
@@ -16,6 +17,7 @@ from checks import INTERPRETED
 from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.tolerances import TOLERANCES
+from test_clearance import distances_of_struts, struts
 
 BESIDE = 1e-8
 """How far before the end must be reached, and after it must not [L or rad]: it is told to 1e-9, closed forms tell
@@ -348,3 +350,20 @@ def test_a_limit_just_before_links_are_stretched_out_is_named() -> None:
     (reach,) = pf.travel(home_of(free.with_limits(p2=(-2.0, -2e-4))), along=Z)
     assert [(limit.joint, limit.bound) for limit in reach.stopped_by] == [("p2", "max")]
     assert reach.distance < stretched.distance
+
+
+def test_a_turn_stops_where_struts_come_too_near() -> None:
+    machine = struts(clearance=10.0)
+    home = machine.home_pose
+
+    def room(angle: float) -> float:
+        turned = pf.pose(home[:3, 3], rotvec=(0.0, 0.0, angle))
+        return min(float(distance[0]) for distance in distances_of_struts(turned[None]).values()) - 10.0
+
+    expected = brentq(room, 1.2, 2.4, xtol=1e-13)
+    (found,) = pf.travel(pf.solve_ik(machine, home), about=[0, 0, 1])
+    assert found.distance == pytest.approx(expected, abs=1e-7)
+    assert {limit.joint for limit in found.stopped_by} == {"BC1–BC4", "BC2–BC5", "BC3–BC6"}
+    assert "BC1–BC4 too near" in found.why
+    (free,) = pf.travel(pf.solve_ik(machine.with_clearance(None), home), about=[0, 0, 1])
+    assert free.distance > found.distance + 0.1

@@ -22,9 +22,10 @@ import pfabrik as pf
 from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument
-from pfabrik.workspace.border import MOTOR_COLOURS, group_of_limits, groups_of
+from pfabrik.workspace.border import LINK_COLOURS, MOTOR_COLOURS, group_of_limits, groups_of
 from pfabrik.workspace.patches import patches_of
 from pfabrik.workspace.verdicts import MapQuestion
+from test_clearance import distances_of_struts, struts
 
 Array = NDArray[np.float64]
 
@@ -591,3 +592,67 @@ def test_what_no_closed_form_answers_is_explored_to_the_workspace_of_what_it_nea
 
 class NoExecutor(Executor):
     """One that nothing is handed to."""
+
+
+# Links kept apart
+
+
+@pytest.mark.slow
+def test_a_border_is_where_links_are_as_near_as_they_may_be() -> None:
+    machine = struts(clearance=10.0)
+    found = pf.workspace(machine, over=["tilt_x", "yaw"], resolution=0.05)
+    limits = np.array([bound for _, bound in found.limits])[found.vertex_limit]
+    assert np.mean(limits == "clearance") > 0.9
+    poses = found.poses(found.vertices)
+    distances = distances_of_struts(poses)
+    least = np.min(list(distances.values()), axis=0)
+    np.testing.assert_allclose(least[limits == "clearance"], 10.0, atol=0.01)  # a thousandth of a cell, times 200 mm
+    assert (least > 10.0 - 1e-9).all()
+    names = [found.limits[place][0] for place in found.vertex_limit[limits == "clearance"].tolist()]
+    own = np.array(
+        [distances[name][row] for row, name in zip(np.flatnonzero(limits == "clearance"), names, strict=True)]
+    )
+    np.testing.assert_allclose(own, 10.0, atol=0.01)
+    groups = groups_of(found)
+    of_links = [group for group in groups if group.is_links]
+    assert {group.colour for group in of_links} <= set(LINK_COLOURS) and of_links
+    assert all("too near" in group.name and not group.is_motors for group in of_links)
+    assert "too near" in found._repr_html_()
+
+
+@pytest.mark.slow
+def test_a_map_that_explores_without_closed_forms_goes_round_an_obstacle() -> None:
+    machine = pf.load("panda")
+    length, at = machine.characteristic_length, np.array([406.9, 100.0, 697.0])
+    shapes = [
+        pf.Shape("link6", thickness=0.02 * length, between=("J6", "J7")),
+        pf.Shape(machine.base, "sphere", at=at, diameter=0.2 * length),
+    ]
+    kept = machine.with_shapes(shapes).with_clearance(0.02 * length)
+    place = {"z": float(machine.home_pose[2, 3])}
+    found = pf.workspace(kept, fixed=place, resolution=0.05 * length)
+    assert found.limits[[bound for _, bound in found.limits].index("clearance")][0] == "link6–base"
+    by_links = np.flatnonzero([found.limits[limit][1] == "clearance" for limit in found.vertex_limit])
+    assert len(by_links) > 8
+    points = pf.solve_ik(kept, found.poses(found.vertices[by_links])).points
+    first, second = points["J6"], points["J7"]
+    share = np.clip(((at - first) * (second - first)).sum(1) / ((second - first) ** 2).sum(1), 0.0, 1.0)
+    distance = np.linalg.norm(at - first - share[:, None] * (second - first), axis=1) - 0.11 * length
+    assert (distance > 0.02 * length - 1e-6).all()
+    assert np.median(distance) == pytest.approx(0.02 * length, abs=1e-3 * length)
+    assert distance.max() < 0.07 * length  # a cell: the arm is redundant, and answers may have another elbow
+    assert not found.contains([406.9, 100.0])
+
+
+@pytest.mark.slow
+def test_positions_in_any_orientation_keep_links_apart() -> None:
+    machine = struts(clearance=16.0)
+    found = pf.workspace(machine, fixed={"z": 195.0}, orientation="any", resolution=10.0)
+    free = pf.workspace(machine.with_clearance(None), fixed={"z": 195.0}, orientation="any", resolution=10.0)
+    assert found.size < free.size
+    points = np.random.default_rng(0).uniform(*found.bounds, (40, 2))
+    options = pf.Options(hold="position", working_mode="any")
+    answers = pf.solve_ik(machine, found.poses(points), options=options)
+    is_there = answers.position_error <= 1e-9 * machine.characteristic_length
+    np.testing.assert_array_equal(found.contains(points), is_there)
+    assert min(distance.min() for distance in distances_of_struts(answers.pose).values()) > 16.0 - 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 
 from .answers.start_configuration import Start, start_of
 from .apart.link_distances import least_distances, pair_names
-from .apart.links_at_poses import follow_from_poses, links_at_poses
+from .apart.links_at_poses import links_at_poses
 from .arrays import Floats, Ints, shaped
 from .closure.configurations import Configurations
 from .closure.parasitic import has_parasitic_motion
@@ -27,8 +27,8 @@ from .targets import Target, as_targets
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of the kernel for single rows, and of the kernel for blocks."""
 
-ROWS_AT_ONCE = 4096
-"""Rows whose links are placed and measured at once: these fit into the caches of a core."""
+ROWS_AT_ONCE = 16384
+"""Rows whose links are placed and measured at once: more would need much memory."""
 
 UNKNOWN = -2
 """Binding of rows that `kernels.legs.margin_blocks` leaves unsolved."""
@@ -116,21 +116,13 @@ def _lower_to_clearance(
 ) -> None:
     """Lower margins (n,) that are not negative to those of the nearest links, and write their pairs into `binding`."""
     first_pair, kept = len(_limits(model.legs)), np.flatnonzero(margin >= 0.0)
-
-    def run(block: slice) -> None:
-        rows = kept[block]
+    for rows in np.split(kept, range(ROWS_AT_ONCE, len(kept), ROWS_AT_ONCE)):
         placed, is_reached = links_at_poses(model, poses[rows], start, sides)
         distances, pairs, _ = least_distances(placed)
         room = (distances - clearance) / model.length
         room[~is_reached] = -np.inf
         lower = room < margin[rows]
         margin[rows[lower]], binding[rows[lower]] = room[lower], first_pair + pairs[lower]
-
-    if follow_from_poses(model):
-        in_blocks(run, len(kept), ROWS_AT_ONCE)
-        return
-    for first in range(0, len(kept), ROWS_AT_ONCE):  # one after the other: each is solved on all cores
-        run(slice(first, first + ROWS_AT_ONCE))
 
 
 def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> tuple[Floats, Ints]:

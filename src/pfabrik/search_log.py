@@ -18,6 +18,9 @@ from .model import model_of
 from .options import Options, checked_options
 from .targets import Target, as_targets
 
+KEPT_APART = "links kept apart"
+"""The phase that follows where links are nearer than the clearance."""
+
 
 @dataclass(frozen=True, repr=False)
 class SearchLog:
@@ -38,7 +41,12 @@ class SearchLog:
 
     @property
     def answered_by(self) -> str:
-        """The phase that gave the answer: the first one that ended at a feasible configuration."""
+        """The phase that gave the answer: the first one that ended at a feasible configuration.
+
+        Where links came too near there, it is the last one, which keeps them apart.
+        """
+        if self.attempts and self.attempts[-1].phase == KEPT_APART:
+            return KEPT_APART
         return next((each.phase for each in self.attempts if each.ending in ("reached", "nearest")), "none")
 
     def __str__(self) -> str:
@@ -66,6 +74,10 @@ class SearchLog:
         if self.blocked_by is None:
             return ""
         joint, bound, beyond = self.blocked_by
+        if bound == "clearance":
+            lacking = f"{beyond * self.solution.mechanism.characteristic_length:.4g}"
+            unit = self.solution.mechanism.length_unit
+            return f"in the working mode of the start {joint} come too near at the target, by {lacking} {unit}"
         return f"in the working mode of the start the target is beyond '{bound}' of {joint}, by {beyond:.4g}"
 
 

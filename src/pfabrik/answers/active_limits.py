@@ -71,7 +71,8 @@ def active_limits(mechanism: Mechanism, coordinates: Floats) -> list[tuple[Activ
     clearance = mechanism.clearance
     if clearance is not None and len(coordinates):
         names, distances = pair_names(mechanism), pair_distances_at(mechanism, coordinates)
-        near_pairs = distances <= clearance + TOLERANCES.active * mechanism.characteristic_length
+        length = mechanism.characteristic_length
+        near_pairs = distances <= max(clearance, TOLERANCES.apart * length) + TOLERANCES.active * length
         for row in np.flatnonzero(near_pairs.any(axis=1)):
             pairs = np.flatnonzero(near_pairs[row])
             for pair in pairs[np.argsort(distances[row, pairs], kind="stable")]:

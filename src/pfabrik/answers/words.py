@@ -183,12 +183,12 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
 def short_names(limits: Iterable[ActiveLimit]) -> str:
     """Active limits for a cell of a table: ``B3 max; C1 cone; BC1–BC3 too near``."""
-    return "; ".join(f"{name_of(limit)} {shown_bound(limit.bound)}" for limit in limits)
+    return "; ".join(limit_name(name_of(limit), limit.bound) for limit in limits)
 
 
-def shown_bound(bound: str) -> str:
-    """A bound behind the name of its joint, or of two bodies: ``too near`` of these."""
-    return "too near" if bound == "clearance" else bound
+def limit_name(joint: str, bound: str) -> str:
+    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 too near``."""
+    return f"{joint} {'too near' if bound == 'clearance' else bound}".strip()
 
 
 def exceeded(answer: Answer) -> list[ActiveLimit]:

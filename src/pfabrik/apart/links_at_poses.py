@@ -10,13 +10,14 @@ from ..arrays import Floats, Mask
 from ..closure.configurations import Configurations, new_rows
 from ..derived import derived
 from ..description.links import links_of
+from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..kernels.rows import PENDING, REACHED, Rows
 from ..model import Model
 from ..options import Options
 from ..platform.answers import LegAnswers, answer_coordinates, start_coordinates_of
 from ..platform.legs_engine import LegsEngine
 from ..platform.reach import reach
-from .placed_links import PlacedLinks
+from .placed_links import PlacedLinks, bodies_of_links
 
 NOWHERE = np.zeros(0, np.intp)
 NO_NUMBERS, NO_COUNTERS = np.zeros((0, 0)), np.zeros((0, 0), np.int64)
@@ -32,7 +33,7 @@ def links_at_poses(
     start : a single configuration; None for home.
     sides : of each leg there, (1, legs).
     """
-    if follow_from_poses(model):
+    if _follow_from_poses(model):
         reached = np.full(len(poses), REACHED)
         rows = Rows(reached, NO_COUNTERS, poses, NO_NUMBERS, NO_NUMBERS)
         return PlacedLinks(model.mechanism, Configurations(rows, NO_NUMBERS), dict), reached == REACHED
@@ -52,11 +53,8 @@ def links_at_poses(
 
 
 @derived
-def follow_from_poses(model: Model) -> bool:
-    """True if links follow from the pose of the platform alone: all end on it or on the base, and the task sets it."""
-    mechanism, joints = model.mechanism, links_of(model.mechanism).joints
-    ends = {mechanism.base, mechanism.end_effector}
-    alone = {shape.body for shape, names in zip(mechanism.shapes, joints, strict=True) if not names}
-    if model.legs.task["unset"][0] or mechanism.end_effector_is_joint or not alone <= ends:
-        return False
-    return all(ends.intersection(mechanism.joint(name).connects) for between in joints for name in between)
+def _follow_from_poses(model: Model) -> bool:
+    """True if links are capsules with their ends on the base and the platform, and the task sets the whole pose."""
+    links, bodies = links_of(model.mechanism), bodies_of_links(model.mechanism)
+    are_capsules = links.n_capsules == len(links.pairs)
+    return bool(are_capsules and not model.legs.task["unset"][0] and np.isin(bodies, (BASE, PLATFORM)).all())

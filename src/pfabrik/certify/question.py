@@ -27,6 +27,7 @@ from ..targets import Target, as_targets
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .pose_region import PoseRegion
+from .provable import require_no_clearance
 from .subdividing import Subdividing, first_cells, region_parameters, step_poses, track_parameters
 
 BUDGET = 200_000
@@ -63,10 +64,12 @@ def certify(
 
     Raises
     ------
-    UnsupportedMechanism : a chain has no closed form, or poses leave joints open; the message names them.
+    UnsupportedMechanism : a chain has no closed form, or poses leave joints open, and the message names them; or the
+        mechanism has a clearance, which nothing is proved of.
     InvalidArgument : a region over coordinates that the task does not set.
     """
     mechanism = _with_limits_of(checked_mechanism(mechanism), limits)
+    require_no_clearance(mechanism, "certified")
     model = model_of(mechanism)
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(

@@ -83,8 +83,8 @@ class Clearance:
 def clearance(solution: Solution) -> Clearance:
     """The least distance between links that have a thickness, and which links these are.
 
-    It is measured, and keeps nothing apart: no answer of any verb avoids that links touch. Links that share a joint,
-    parts of one body, and pairs in `ignore` are left out.
+    It is only measured: answers keep links apart where the mechanism has a `clearance`. Links that share a joint, parts
+    of one body, and pairs in `ignore` are left out.
 
     Raises
     ------

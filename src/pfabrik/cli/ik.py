@@ -43,7 +43,7 @@ def ik(
     A target out of reach gets the feasible answer nearest to it, with the limits that hold it back, the hardest first.
 
     A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit. Where links have a
-    thickness, a line says how far apart they are, which no limit keeps.
+    thickness, a line says how far apart they are, and the clearance that is kept.
 
     With --force, or --moment, it also says what the actuators exert to hold it: positive drives a coordinate up.
 

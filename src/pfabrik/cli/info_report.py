@@ -57,6 +57,7 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
             {name: value for name, value in dataclasses.asdict(shape).items() if value is not None}
             for shape in mechanism.shapes
         ],
+        "clearance": mechanism.clearance,
         "sub_chains": [
             {"notation": str(chain), "engine": shown_engine(mechanism), "why": why(mechanism)}
             for chain in pf.decompose(mechanism)
@@ -84,8 +85,15 @@ def summary(mechanism: pf.Mechanism) -> str:
             *in_columns("actuators              ", mechanism.actuator_names),
             *freedom(counted_mobility(mechanism)),
             f"characteristic length  {length:.6g} {mechanism.length_unit}",
+            *kept_clearance(mechanism),
         ]
     )
+
+
+def kept_clearance(mechanism: pf.Mechanism) -> list[str]:
+    """A line on the least distance that answers keep between links; none without."""
+    least = mechanism.clearance
+    return [] if least is None else [f"clearance              {least:.6g} {mechanism.length_unit} kept between links"]
 
 
 def in_columns(title: str, names: Sequence[str]) -> list[str]:

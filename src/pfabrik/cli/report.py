@@ -81,7 +81,7 @@ def margins_table(solution: pf.Solution) -> str:
 
 
 def clearance_line(solution: pf.Solution) -> list[str]:
-    """The least distance between links, where some have a thickness."""
+    """The least distance between links, where some have a thickness, and the clearance that is kept."""
     from ..description.links import has_pairs
 
     if not has_pairs(solution.mechanism):
@@ -90,9 +90,9 @@ def clearance_line(solution: pf.Solution) -> list[str]:
     first, second = apart.links
     unit, distance = solution.mechanism.length_unit, float(apart.distance)
     size = f"{plain(abs(distance), 1e-9)} {unit}"
-    return [
-        f"{first} and {second} {f'are {size} apart' if distance >= 0.0 else f'overlap by {size}'} (no limit keeps it)"
-    ]
+    least = solution.mechanism.clearance
+    kept = "no clearance is kept" if least is None else f"the clearance kept is {least:.6g} {unit}"
+    return [f"{first} and {second} {f'are {size} apart' if distance >= 0.0 else f'overlap by {size}'} ({kept})"]
 
 
 def print_modes(search: Callable[[], Modes], kind: str, header: Sequence[str], cells: ModeCells, as_json: bool) -> int:

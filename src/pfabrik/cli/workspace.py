@@ -221,12 +221,12 @@ def describe(space: pf.Workspace, shape: pf.Inscribed | None) -> str:
 
 def border_table(space: pf.Workspace) -> str:
     """The limits that form the border, each with its share."""
+    from ..answers.words import limit_name
     from ..workspace.sizes import kind_of
 
     limits = list(space.shares.items())
     rows = [
-        (f"{100.0 * share:.1f}%", " ".join(limit).strip(), kind_of(space, limit[0]))
-        for limit, share in limits[:MOST_LIMITS]
+        (f"{100.0 * share:.1f}%", limit_name(*limit), kind_of(space, limit[0])) for limit, share in limits[:MOST_LIMITS]
     ]
     table = aligned(["border", "formed by", "joint"], rows)
     n_more = len(limits) - len(rows)

@@ -13,6 +13,7 @@ from ..answers.solution import Solution
 from ..answers.start_configuration import Start, joint_vectors, start_of
 from ..arrays import Floats
 from ..certify.enclosure import Enclosure, enclose
+from ..certify.provable import require_no_clearance
 from ..checks import require_mapping, require_positive
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -88,6 +89,7 @@ def workspace(
     Raises
     ------
     InvalidArgument, UnknownName : coordinates or values that make no sense; a workspace that nothing ends.
+    UnsupportedMechanism : `certified`, of a machine without closed forms, or with a clearance.
     """
     begin = _start(checked_mechanism(mechanism), start)
     pose = mechanism.home_pose if begin is None else begin.pose
@@ -112,6 +114,7 @@ def _accuracy(question: MapQuestion, certified: Any) -> float:
     if certified is False or certified is None:
         return 0.0
     accuracy = ENCLOSED if certified is True else require_positive("certified", certified)
+    require_no_clearance(question.mechanism, "enclosed")
     expected = "False: sizes are proved of positions and tilts, at home's working mode"
     if question.start is not None or len(question.turns) > 1 or question.hold == "position":
         raise InvalidArgument("certified", f"{certified!r}, with a start, a tilt or any orientation", expected)

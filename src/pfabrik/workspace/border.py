@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..answers.words import limit_name
 from ..arrays import Ints
 
 if TYPE_CHECKING:
@@ -16,6 +17,9 @@ MOTOR_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#332288", "#7fbf3f")
 
 JOINT_COLOURS = ("#e69f00", "#cc79a7", "#882255", "#f0e442", "#a6761d")
 """Warm colours: limits of passive joints, ends of reach and of the map."""
+
+LINK_COLOURS = ("#d55e00", "#7a1f00", "#f4a582")
+"""Reds: links that are too near to each other."""
 
 REST = "#b0b0b0"
 """Colour of all other limits together."""
@@ -29,6 +33,7 @@ class Group(NamedTuple):
     limits : their indices among all limits.
     share : of the border that they form.
     is_motors : True if they are stops of driven joints.
+    is_links : True if they are clearances of links.
     """
 
     name: str
@@ -36,6 +41,7 @@ class Group(NamedTuple):
     limits: list[int]
     share: float
     is_motors: bool
+    is_links: bool = False
 
     @property
     def label(self) -> str:
@@ -46,12 +52,15 @@ class Group(NamedTuple):
 def groups_of(region: Region) -> list[Group]:
     """Limits grouped by colour: each has its own if there are colours enough; else joints that are copies share one.
 
-    Motors have cold colours, all else warm ones: these stops are changed in other ways.
+    Motors have cold colours, links that are too near reds, all else warm colours: these stops are changed in other
+    ways.
     """
     groups: list[Group] = []
     others: list[tuple[str, str]] = []
     for is_motors, colours in ((True, MOTOR_COLOURS), (False, JOINT_COLOURS)):
-        limits = [limit for limit in region.shares if is_actuated(region, limit[0]) == is_motors]
+        limits = [
+            limit for limit in region.shares if limit[1] != "clearance" and is_actuated(region, limit[0]) == is_motors
+        ]
         together: dict[tuple[str, str], list[tuple[str, str]]] = {}
         for joint, bound in limits:
             stem = joint if len(limits) <= len(colours) else joint.rstrip("0123456789")
@@ -61,8 +70,23 @@ def groups_of(region: Region) -> list[Group]:
             copies = sorted(joint[len(stem) :] for joint, _ in alike)
             groups.append(_group(region, f"{stem}{', '.join(copies)} {bound}".strip(), colour, alike, is_motors))
         others += [limit for _, alike in order[len(colours) :] for limit in alike]
+    groups += _groups_of_links(region)
     groups.sort(key=lambda group: -group.share)
     return [*groups, _group(region, f"{len(others)} other limits", REST, others, False)] if others else groups
+
+
+def _groups_of_links(region: Region) -> list[Group]:
+    """Pairs of links that are too near: each has its own colour; where there are more, the last is of all the rest."""
+    pairs = [limit for limit in region.shares if limit[1] == "clearance"]
+    n_alone = len(LINK_COLOURS) - (len(pairs) > len(LINK_COLOURS))
+    groups = [
+        _group(region, limit_name(*pair), colour, [pair], False)
+        for pair, colour in zip(pairs[:n_alone], LINK_COLOURS, strict=False)
+    ]
+    if pairs[n_alone:]:
+        name = f"{len(pairs) - n_alone} other pairs too near"
+        groups.append(_group(region, name, LINK_COLOURS[-1], pairs[n_alone:], False))
+    return [group._replace(is_links=True) for group in groups]
 
 
 def is_actuated(region: Region, joint: str) -> bool:

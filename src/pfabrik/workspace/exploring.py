@@ -12,11 +12,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..apart.link_distances import clearance_excess
+from ..apart.placed_links import placed_at
 from ..arrays import Floats, Mask
 from ..chains.chain_engine import ChainEngine
 from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows
+from ..description.mechanism import Mechanism
 from ..kernels.rows import REACHED
+from ..tolerances import TOLERANCES
 
 NEAR = 0.25
 """Longest step [L or rad]: a longer one may cross a singularity unnoticed."""
@@ -43,11 +47,23 @@ Tell = Callable[[int], None]
 class Explorer:
     """The configurations reached so far, and the search for points near them."""
 
-    def __init__(self, engine: ClosureEngine | ChainEngine, start: Configurations, pose: Floats, at: Floats) -> None:
-        """Begin with a configuration, moved to a pose (4, 4) at coordinates (d,) [L or rad]."""
-        self._engine, self._start = engine, start
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        engine: ClosureEngine | ChainEngine,
+        start: Configurations,
+        pose: Floats,
+        at: Floats,
+    ) -> None:
+        """Begin with a configuration, moved to a pose (4, 4) at coordinates (d,) [L or rad].
+
+        Parameters
+        ----------
+        mechanism : with its clearance, which the engine need not know.
+        """
+        self._mechanism, self._engine, self._start = mechanism, engine, start
         solution = engine.advance(pose[None], start)
-        known = solution.rows.status == REACHED
+        known = self._are_reached(solution)
         self._at, self._coordinates = [at[None][known]], [solution.coordinates[known]]
 
     def explore(self, poses: Floats, at: Floats, tell: Tell) -> tuple[Mask, Floats]:
@@ -79,12 +95,19 @@ class Explorer:
                 self._take(points, block, solutions)
                 tell(int(is_new.sum()))
 
+    def _are_reached(self, solutions: Configurations) -> Mask:
+        """Mask of solutions that are reached, with links as far apart as the clearance, if there is one."""
+        reached, mechanism = np.asarray(solutions.rows.status == REACHED), self._mechanism
+        if mechanism.clearance is not None:
+            reached &= clearance_excess(placed_at(mechanism, solutions)) <= TOLERANCES.limit
+        return reached
+
     def _as_answers(self, coordinates: Floats) -> Configurations:
         return Configurations(new_rows(self._engine.model, len(coordinates)), coordinates)
 
     def _take(self, points: _Points, rows: NDArray[np.intp], solutions: Configurations) -> None:
         """Record tries, and make starts of the configurations they reached."""
-        reached = np.asarray(solutions.rows.status == REACHED)
+        reached = self._are_reached(solutions)
         points.note(rows, reached, solutions.coordinates)
         new = reached & (points.distance[rows] > APART)
         if new.any():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.words import limit_name
 from ..arrays import Floats, Ints
 from ..drawing import SMALL, keep_apart
 from ..skeleton import skeleton_of
@@ -77,12 +78,13 @@ def plot(region: Region, ax: Axes | None = None) -> Axes:
 
 
 def _draw_key(axes: Any, groups: list[Group], d: int) -> None:
-    """The limits beside the axes: first stops of motors, then what else forms the border, each with its line."""
+    """The limits beside the axes: stops of motors, links that are too near, then all else, each with its line."""
     from matplotlib.lines import Line2D
 
     handles: list[Line2D] = []
-    for is_motors, title in ((True, "stops of motors"), (False, "passive joints, reach")):
-        of_kind = [group for group in groups if group.is_motors == is_motors]
+    kinds = ((True, False, "stops of motors"), (False, True, "links"), (False, False, "passive joints, reach"))
+    for is_motors, is_links, title in kinds:
+        of_kind = [group for group in groups if (group.is_motors, group.is_links) == (is_motors, is_links)]
         if of_kind:
             handles.append(Line2D([], [], linestyle="", label=title))
         for group in of_kind:
@@ -166,7 +168,7 @@ def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int]) 
         middle = int(np.searchsorted(along, 0.5 * along[-1]))
         outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(np.linalg.norm(steps[middle]), 1e-300)
         axes.annotate(
-            " ".join(region.limits[limit]).strip(),
+            limit_name(*region.limits[limit]),
             points[corners[middle]] + 0.5 * steps[middle],
             xytext=OFF * outward,
             textcoords="offset points",

@@ -10,15 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 from ..answers.solution import Solution
+from ..apart.link_distances import clearance_excess
+from ..apart.placed_links import PlacedLinks
 from ..arrays import Floats, Mask
-from ..batch import take_each
+from ..batch import take, take_each
+from ..closure.configurations import Places
 from ..closure.parasitic import has_other_assemblies
 from ..derived import derived
 from ..kernels.platform.search_records import PoseSolutions, Starts
-from ..kernels.rows import LIMIT_EXCESS, REACHED, RESIDUAL
+from ..kernels.rows import LIMIT_EXCESS, REACHED, RESIDUAL, Rows
 from ..model import Model
-from ..platform.answers import sides_at
+from ..platform.answers import LegAnswers, sides_at
 from ..platform.coordinates import joint_coordinates
+from ..platform.legs_engine import LegsEngine
+from ..platform.links_of_legs import keeps_links
 from ..platform.nearest import nearest_positions
 from ..platform.nearest_pose import home_start, starts_at
 from ..tolerances import TOLERANCES
@@ -26,8 +31,11 @@ from ..tolerances import TOLERANCES
 
 @derived
 def follows_positions(model: Model) -> bool:
-    """True if searches lead from one position to the next: all chains are legs, and one assembly has all targets."""
-    return model.has_legs and not has_other_assemblies(model.path_closure)
+    """True if searches lead from one position to the next: all chains are legs, and one assembly has all targets.
+
+    Searches must keep links apart too, if there is a clearance.
+    """
+    return model.has_legs and not has_other_assemblies(model.path_closure) and keeps_links(model)
 
 
 def start_at(model: Model, start: Solution | None) -> Starts:
@@ -67,9 +75,26 @@ def coordinates_nearest(model: Model, targets: Floats, starts: Starts, *, keep_m
 
 
 def _is_feasible(model: Model, solutions: PoseSolutions) -> Mask:
-    """Mask of solutions with loops closed and limits kept, as measured."""
+    """Mask of solutions with loops closed, limits kept and links apart, as measured."""
     is_closed = solutions.measures[:, RESIDUAL] <= TOLERANCES.position * model.length
-    return np.asarray(is_closed & (solutions.measures[:, LIMIT_EXCESS] <= TOLERANCES.limit))
+    is_feasible = np.asarray(is_closed & (solutions.measures[:, LIMIT_EXCESS] <= TOLERANCES.limit))
+    rows = np.flatnonzero(is_feasible & (solutions.distances < np.inf))
+    if model.mechanism.clearance is not None and len(rows):
+        placed = _placed_links(model, take(solutions, rows))
+        is_feasible[rows] = clearance_excess(placed) <= TOLERANCES.limit
+    return is_feasible
+
+
+def _placed_links(model: Model, solutions: PoseSolutions) -> PlacedLinks:
+    """The links of solutions."""
+    poses, actuators, sides, q = solutions.poses, solutions.actuators, solutions.sides, solutions.q
+    rows = Rows(solutions.status, solutions.counters, poses, actuators, solutions.measures)
+
+    def coordinates(places: Places) -> Floats:
+        return joint_coordinates(model, poses[places], actuators[places], sides[places], None, q[places])
+
+    answers = LegAnswers(rows, coordinates, sides, q)
+    return PlacedLinks(model.mechanism, answers, lambda: LegsEngine(model).points(answers))
 
 
 def _ends(model: Model, solutions: PoseSolutions, starts: Starts) -> Starts:

@@ -10,6 +10,8 @@ import numpy as np
 from ..answers.active_limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
+from ..apart.apart_engine import ApartEngine
+from ..apart.link_distances import pair_names
 from ..arrays import Floats, Ints, Mask
 from ..batch import take
 from ..chains.chain_engine import ChainEngine
@@ -76,6 +78,7 @@ class MapQuestion:
     def explorer(self) -> Explorer | None:
         """An explorer that begins at the start, where points are solved one by one by the closure engine; else None."""
         engine = engine_of(self.mechanism)
+        engine = engine.usual if isinstance(engine, ApartEngine) else engine
         if self.has_margins or self.hold == "position" or len(self.turns) > 1:
             return None
         if not isinstance(engine, ClosureEngine | ChainEngine):
@@ -85,7 +88,7 @@ class MapQuestion:
             configuration(self.mechanism, home)._configurations if self.start is None else self.start._configurations
         )
         at = self.space.start
-        return Explorer(engine, start, self.space.poses(at[None])[0], at / self._lengths)
+        return Explorer(self.mechanism, engine, start, self.space.poses(at[None])[0], at / self._lengths)
 
     def explored(self, points: Floats, explorer: Explorer, tell: Tell) -> tuple[Floats, Ints]:
         """Margins and bindings as of `measure`, by an explorer, from configurations that were reached before."""
@@ -206,4 +209,5 @@ def _known_limits(mechanism: Mechanism, has_margins: bool) -> Limits:
         return feasibility(mechanism, mechanism.home_pose).limits
     ranges = [(joint.name, bound) for joint in mechanism.joints if joint.range is not None for bound in ("min", "max")]
     cones = [(joint.name, "cone") for joint in mechanism.joints if joint.cone is not None]
-    return (*ranges, *cones, GEOMETRY)
+    pairs = () if mechanism.clearance is None else pair_names(mechanism)
+    return (*ranges, *cones, *((name, "clearance") for name in pairs), GEOMETRY)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..answers.words import limit_name
 from ..description.mechanism_html import card
 from ..description.sketch import HEIGHT, MARGIN, WIDTH
 from .border import REST, groups_of
@@ -24,9 +25,7 @@ def workspace_html(region: Region) -> str:
     for name, low, high, unit in zip(region.names, *region.bounds.tolist(), region.units, strict=True):
         factor, label = (180.0 / np.pi, "deg") if unit == "rad" else (1.0, unit)
         lines.append(f"{name} from {low * factor:.6g} to {high * factor:.6g} {label}")
-    rows = [
-        (f"{share:.1%}", " ".join(limit).strip(), kind_of(region, limit[0])) for limit, share in region.shares.items()
-    ]
+    rows = [(f"{share:.1%}", limit_name(*limit), kind_of(region, limit[0])) for limit, share in region.shares.items()]
     drawing = outline(region) if len(region.names) == 2 else ""
     return card(region.mechanism.name, lines, ("border", "formed by", "joint"), rows, drawing)
 
@@ -45,7 +44,7 @@ def outline(region: Region) -> str:
     for limit in np.unique(region.face_limit).tolist():
         ends = places[region.faces[region.face_limit == limit]]
         steps = "".join(f"M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}" for (x, y), (u, v) in ends.tolist())
-        title = escape(" ".join(region.limits[limit]).strip())
+        title = escape(limit_name(*region.limits[limit]))
         colour = colours.get(limit, REST)
         paths.append(f'<path d="{steps}" stroke="{colour}" stroke-width="2" fill="none"><title>{title}</title></path>')
     name = escape(f"{region.mechanism.name} over {', '.join(region.names)}")
