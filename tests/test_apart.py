@@ -326,3 +326,26 @@ def test_the_pair_that_stops_an_answer_is_lit_up() -> None:
     assert isinstance(stopping, pf.ActiveLimit) and stopping.bound == "clearance"
     assert len(lit) == 2 and "–".join(sorted(lit)) in {each.joint for each in answer.active_limits}  # type: ignore[union-attr]
     assert not any(solid.is_stopped for solid in skeleton_of(pf.solve_ik(machine, machine.home_pose)).solids)
+
+
+def test_the_centre_of_a_sliding_joint_moves_with_its_first_body() -> None:
+    """A carriage described before the rail that it is on: its capsule goes with it, in searches too."""
+    joints = [
+        pf.Joint("Z", "prismatic", ("base", "column"), actuated=True, axis=(0, 0, 1), range=(-5, 5)),
+        pf.Joint(
+            "P", "prismatic", ("carriage", "column"), actuated=True, at=(0, 0, 0), axis=(-1, 0, 0), range=(-60, 60)
+        ),
+        pf.Joint("R", "revolute", ("carriage", "tool"), actuated=True, at=(0, 0, 40), axis=(0, 1, 0), range=(-1, 1)),
+    ]
+    shapes = [
+        pf.Shape("carriage", thickness=10, between=("P", "R")),
+        pf.Shape("base", "sphere", at=(50, 0, 20), diameter=20),
+    ]
+    machine = pf.Mechanism("gantry", joints, "tool", (0, 0, 80), shapes=shapes)
+    moved = pf.solve_fk(machine, [0, 20, 0.0])
+    side = 1.0 if moved.pose[0, 3] > 0 else -1.0
+    assert pf.clearance(moved).distance == pytest.approx(50 - side * 20 - 5 - 10, abs=1e-9)
+    kept = machine.with_clearance(5)
+    answer = pf.solve_fk(kept, [0, side * 45, 0.0])
+    assert answer.status == pf.Status.PROJECTED
+    assert answer.actuators[1] == pytest.approx(side * 30, abs=1e-6)

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..closure.configurations import Configurations
 from ..derived import derived
-from ..description.links import links_of
+from ..description.links import bodies_of_centre, links_of
 from ..description.mechanism import Mechanism
 from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..motion.displacements import centres, displacements
@@ -99,7 +99,7 @@ def bodies_of_links(mechanism: Mechanism) -> Ints:
         numbers[mechanism.end_effector] = PLATFORM
     found = []
     for shape, joints in zip(mechanism.shapes, links_of(mechanism).joints, strict=True):
-        ends = [mechanism.joint(name).connects for name in joints] or [(shape.body, shape.body)] * 2
+        ends = [bodies_of_centre(mechanism.joint(name)) for name in joints] or [(shape.body,)] * 2
         found.append([min(numbers.get(body, 0) for body in end) for end in ends])
     return np.array(found, np.int64)
 

@@ -15,6 +15,7 @@ from ..meshes import MeshHull, UnusableMesh, hull_of, middle_of, sizes_of
 from ..tolerances import TOLERANCES
 from .body_shapes import Shape
 from .graph import steps_from_base, welded
+from .joints import Joint
 from .shape_faults import joints_with_centre, sliding_along
 from .structure import Structure
 
@@ -101,6 +102,11 @@ def _joints_of(mechanism: Structure, shape: Shape) -> tuple[str, ...]:
     return shape.between or tuple(joint.name for joint in joints_with_centre(mechanism, shape.body))
 
 
+def bodies_of_centre(joint: Joint) -> tuple[str, ...]:
+    """The bodies that the centre of a joint is a point of: the first one alone where the joint slides."""
+    return joint.connects[:1] if joint.type in ("prismatic", "cylindrical") else joint.connects
+
+
 def bodies_of_ends(mechanism: Structure) -> list[tuple[str, str]]:
     """The bodies that both ends of every shape move with: twice the same, but for capsules between two joints.
 
@@ -109,7 +115,7 @@ def bodies_of_ends(mechanism: Structure) -> list[tuple[str, str]]:
     steps = steps_from_base(mechanism)
 
     def nearest(name: str) -> str:
-        return min(mechanism.joint(name).connects, key=lambda body: steps[body])
+        return min(bodies_of_centre(mechanism.joint(name)), key=lambda body: steps[body])
 
     ends = (_joints_of(mechanism, shape) for shape in mechanism.shapes)
     return [

@@ -10,7 +10,7 @@ from ..closure.links_on_paths import link_limits
 from ..decomposition.leg_forms import Rod
 from ..derived import derived
 from ..description.graph import welded
-from ..description.links import links_of
+from ..description.links import bodies_of_centre, links_of
 from ..kernels.clearance.link_records import BASE, NO_LINKS, PLATFORM, LinkLimits
 from ..kernels.legs import records as K
 from ..model import Model
@@ -41,7 +41,7 @@ def _bodies(model: Model) -> list[tuple[int, int]] | None:
     def of_joint(name: str) -> int | None:
         if name == mechanism.end_effector and mechanism.end_effector_is_joint:
             return PLATFORM
-        known = [number for body in mechanism.joint(name).connects if (number := of_body(body)) is not None]
+        known = [number for body in bodies_of_centre(mechanism.joint(name)) if (number := of_body(body)) is not None]
         return known[0] if known else None
 
     for shape, joints in zip(mechanism.shapes, links.joints, strict=True):
