@@ -45,7 +45,8 @@ ax.axhline(0, color="0.4", linewidth=0.8)
 ax.set(xlabel="share of the path", ylabel="least distance between links [mm]")
 fig.savefig("path.png", dpi=150)
 
-# Pictures and the viewer draw links as thick as they are, the nearest two darker, and orange where they overlap.
+# Pictures and the viewer draw links as thick as they are, the nearest two darker, and orange where they overlap
+# or stop the machine.
 pf.plot(travelled[-1]).figure.savefig("overlap.png", dpi=150)
 
 # ## A clearance that is kept
@@ -59,11 +60,13 @@ print(pf.clearance(end))
 for limit in end.active_limits:
     print(limit.joint, limit.bound, round(limit.value, 4), f"multiplier {limit.multiplier:.3f}")
 
-# A path goes on as far as it can, and what stops a travel may be two rods. `margins` say how far every pair is from the
-# clearance, as a share of the machine's characteristic length.
+# A path goes on as far as it can, and what stops a travel may be two rods. Between its steps a machine moves too: `passing`
+# is the least distance on the straight way from the step before. `margins` say how far every pair is from the clearance,
+# as a share of the machine's characteristic length.
 followed = pf.track(kept, path)
 print(followed)
 print(f"least distance at a step: {np.min(pf.clearance(followed).distance):.3f} mm")
+print(f"least distance between steps: {np.min(followed.passing):.3f} mm")
 print(pf.travel(followed[150], along=[-31.5, -7.1, 15.7], about=[-0.142, 0.189, -0.378]))
 
 (pair, bound), margin = min(
