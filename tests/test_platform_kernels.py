@@ -11,20 +11,27 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from conftest import INTERPRETED
 from machines import closure, published
+from pfabrik.closure.links_on_paths import links_on_paths
 from pfabrik.decomposition.leg_table import LegTable
-from pfabrik.kernels.closure.loops import BASE_AXES, PoseObjective
+from pfabrik.kernels.clearance.link_limits import new_link_limits, pair_excess
+from pfabrik.kernels.clearance.link_records import NO_LINKS, LinkLimits
+from pfabrik.kernels.closure import path_links
+from pfabrik.kernels.closure.descend import move
+from pfabrik.kernels.closure.loops import BALL, BASE_AXES, PoseObjective
+from pfabrik.kernels.closure.path_kinematics import LAYOUT, new_equations, new_state
 from pfabrik.kernels.holding import limit_multipliers
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import forward as F
-from pfabrik.kernels.platform import limits
+from pfabrik.kernels.platform import leg_links, limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
 from pfabrik.kernels.platform.nearest import new_nearest_scratch
 from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
 from pfabrik.model import model_of
 from pfabrik.platform.carriages import stays_there
+from pfabrik.platform.links_of_legs import links_of_legs
 from pfabrik.platform.table import kernel_table
 
 pytestmark = [
@@ -121,7 +128,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     """The gradient from legs with multipliers, and what carries them, equals that from all legs."""
     mechanism, legs, table = table_of(name)
     rng = np.random.default_rng(1)
-    search, n = new_search_scratch(table, table.cones.shape[0]), E.count_unknowns(table)
+    search, n = new_search_scratch(table, table.cones.shape[0], NO_LINKS), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = random_configuration(mechanism, legs, rng).pose
@@ -144,6 +151,67 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
         lagrangian_gradient(table, 0, objective, state, search, full_gradient)
         np.testing.assert_allclose(gradient, full_gradient, rtol=0, atol=1e-12)
     assert min(n_involved) < len(table.legs)
+
+
+def with_thin_links(name: str) -> pf.Mechanism:
+    """A machine with a thin capsule between the joints of every link, a ball and a box on its base and platform."""
+    machine = pf.load(name)
+    length = machine.characteristic_length
+    shapes = [pf.Shape(machine.base, "box", at=(2 * length, 0, 0), size=(0.3 * length, 0.2 * length, 0.1 * length))]
+    if not machine.end_effector_is_joint:
+        shapes.append(pf.Shape(machine.end_effector, "sphere", at=machine.reference_point, diameter=1e-3 * length))
+    for body in machine.bodies:
+        centred = [joint for joint in machine.joints if body in joint.connects and joint.at is not None]
+        if body not in (machine.base, machine.end_effector) and len(centred) == 2:
+            shapes.append(pf.Shape(body, thickness=1e-3 * length))
+    return machine.with_shapes(shapes).with_clearance(1e-3 * length)
+
+
+def excesses_of(links: LinkLimits) -> np.ndarray:
+    return np.array([pair_excess(links, pair, np.inf) for pair in range(len(links.pairs))])
+
+
+@pytest.mark.parametrize("name", ["five_bar", "delta", "hexaglide"])
+def test_slopes_of_distances_of_links_are_their_differences(name: str) -> None:
+    """In the platform's pose with proximal joints, and in joint coordinates; on cranks, carriages and rods."""
+    mechanism, rng = with_thin_links(name), np.random.default_rng(4)
+    legs = model_of(mechanism).legs
+    table, links = kernel_table(legs), new_link_limits(links_of_legs(model_of(mechanism)))
+    assert len(links.pairs) > 2
+    leg_eval = E.new_leg_evaluation(table)
+
+    def at_poses(state: E.PlatformState) -> np.ndarray:
+        E.evaluate_legs(table, state, leg_eval)
+        leg_links.place_links(table, links, leg_eval)
+        return excesses_of(links)
+
+    state = random_configuration(mechanism, legs, rng)
+    slopes = np.zeros((len(links.pairs), E.count_unknowns(table)))
+    for pair, excess in enumerate(at_poses(state)):
+        pair_excess(links, pair, np.inf)
+        leg_links.add_pair_slope(table, links, pair, excess, 1.0, leg_eval, slopes[pair])
+    for unknown in range(slopes.shape[1]):
+        ends = [at_poses(moved(state, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
+        np.testing.assert_allclose(slopes[:, unknown], (ends[0] - ends[1]) / (2.0 * STEP), atol=1e-6)
+
+    limits_on_paths, ways = links_on_paths(mechanism)
+    links, eq, n = new_link_limits(limits_on_paths), new_equations(ways, LAYOUT), len(ways.lo)
+
+    def at_joints(step: np.ndarray) -> np.ndarray:
+        joints = new_state(ways)
+        joints.balls[ways.kinds == BALL, 0] = 1.0
+        move(ways, random, 1.0, joints)
+        move(ways, step, 1.0, joints)
+        path_links.place_links(ways, joints, eq, links)
+        return excesses_of(links)
+
+    random, slopes = 0.1 * rng.normal(size=n), np.zeros((len(links.pairs), n))
+    for pair, excess in enumerate(at_joints(np.zeros(n))):
+        pair_excess(links, pair, np.inf)
+        path_links.add_pair_slope(ways, links, pair, excess, 1.0, eq, slopes[pair])
+    for column in range(n):
+        ends = [at_joints(sign * STEP * np.eye(n)[column]) for sign in (1.0, -1.0)]
+        np.testing.assert_allclose(slopes[:, column], (ends[0] - ends[1]) / (2.0 * STEP), atol=1e-6)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -177,7 +245,7 @@ def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     table = model_of(published.planar_arm()).legs
     settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
     plan = MultistartPlan(
-        np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), stays_there(table)
+        np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), stays_there(table), NO_LINKS
     )
     scratch = new_nearest_scratch(kernel_table(table), plan)
     linear = scratch.search.first.linear
