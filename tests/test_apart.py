@@ -349,3 +349,16 @@ def test_the_centre_of_a_sliding_joint_moves_with_its_first_body() -> None:
     answer = pf.solve_fk(kept, [0, side * 45, 0.0])
     assert answer.status == pf.Status.PROJECTED
     assert answer.actuators[1] == pytest.approx(side * 30, abs=1e-6)
+
+
+def test_two_bodies_that_touch_in_several_places_are_named_once() -> None:
+    """A plate above two posts of one body, which both stop it."""
+    legs = {"base": [[100, 20, 0], [100, -20, 0]], "platform": [[40, 40, 195], [40, -40, 195]], "stroke": (100, 280)}
+    posts = [pf.Shape("base", "sphere", at=(side, 0, 60), diameter=40) for side in (-20, 20)]
+    plate = pf.Shape("platform", "disc", at=(0, 0, 190), axis=(0, 0, 1), diameter=60, thickness=4)
+    around = {"copies": {"count": 3, "axis": [0, 0, 1]}, "reference_point": [0, 0, 195]}
+    machine = pf.Mechanism.from_legs("U-P*-S", shapes=[*posts, plate], clearance=1, **legs, **around)  # type: ignore[arg-type]
+    answer = pf.solve_ik(machine, [0, 0, 60])
+    assert answer.pose[2, 3] == pytest.approx(60 + 20 + 1 + 7, abs=1e-6)
+    assert [each.joint for each in answer.active_limits] == ["base–platform"] * 2  # type: ignore[union-attr]
+    assert answer.reason == "base–platform at their clearance 1 mm"

@@ -60,9 +60,9 @@ print(pf.clearance(end))
 for limit in end.active_limits:
     print(limit.joint, limit.bound, round(limit.value, 4), f"multiplier {limit.multiplier:.3f}")
 
-# A path goes on as far as it can, and what stops a travel may be two rods. Between its steps a machine moves too: `passing`
-# is the least distance on the straight way from the step before. `margins` say how far every pair is from the clearance,
-# as a share of the machine's characteristic length.
+# A path goes on as far as it can, and what stops a travel may be two rods. Between its steps a machine moves too:
+# `passing` is the least distance on the straight way from the step before. `margins` say how far every pair is from
+# the clearance, as a share of the machine's characteristic length.
 followed = pf.track(kept, path)
 print(followed)
 print(f"least distance at a step: {np.min(pf.clearance(followed).distance):.3f} mm")

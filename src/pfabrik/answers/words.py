@@ -139,7 +139,7 @@ def reasons(answer: Answer) -> list[str]:
         # length or angle: the bound's unit tells
         is_plain = limit.bound == "clearance" or answer.mechanism.joint(limit.joint).type != "universal"
         names.setdefault(in_words(limit, answer.mechanism), []).append(limit.joint if is_plain else name_of(limit))
-    return [as_phrase(noun, joints, bound) for (noun, bound), joints in names.items()]
+    return [as_phrase(noun, list(dict.fromkeys(joints)), bound) for (noun, bound), joints in names.items()]
 
 
 def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
@@ -183,7 +183,7 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
 def short_names(limits: Iterable[ActiveLimit]) -> str:
     """Active limits for a cell of a table: ``B3 max; C1 cone; BC1–BC3 too near``."""
-    return "; ".join(limit_name(name_of(limit), limit.bound) for limit in limits)
+    return "; ".join(dict.fromkeys(limit_name(name_of(limit), limit.bound) for limit in limits))
 
 
 def limit_name(joint: str, bound: str) -> str:
