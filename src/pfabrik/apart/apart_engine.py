@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,16 @@ from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, steps_of
 from ..closure.engine_contract import Engine, InverseEngine
 from ..closure.projection import ProjectionMode
-from ..kernels.rows import FAILED, ITERATIONS, LIMIT_EXCESS, POSITION_ERROR, REACHED, ROTATION_ERROR
+from ..kernels.rows import (
+    FAILED,
+    HOLD_NOTHING,
+    ITERATIONS,
+    LIMIT_EXCESS,
+    POSITION_ERROR,
+    PROJECTED,
+    REACHED,
+    ROTATION_ERROR,
+)
 from ..model import Model
 from ..options import Options
 from ..platform.answers import LegAnswers
@@ -70,9 +79,19 @@ class ApartEngine(Engine):
             answers, rows = self._in_other_modes(answers, rows, targets, start)
         if not len(rows):
             return answers
-        begin, targets = _starts_of(start, rows), np.require(targets[rows], requirements=["C", "W"])
-        found = self._search.nearest(targets, begin, options, keep_mode=keep_mode, nearby=nearby)
-        return _replaced(answers, rows, self._checked(found))
+        for part, part_options in self._by_hold(answers, rows, options):
+            begin, part_targets = _starts_of(start, part), np.require(targets[part], requirements=["C", "W"])
+            found = self._search.nearest(part_targets, begin, part_options, keep_mode=keep_mode, nearby=nearby)
+            answers = _replaced(answers, part, self._checked(found))
+        return answers
+
+    def _by_hold(self, answers: Configurations, rows: Rows, options: Options) -> list[tuple[Rows, Options]]:
+        """The rows, and the options that they are searched with: those that can hold nothing anyhow are not to."""
+        gives_up = (answers.rows.status[rows] == PROJECTED) & (answers.rows.holds[rows] == HOLD_NOTHING)
+        if options.hold is None or self.inverse is not self.usual or not gives_up.any():
+            return [(rows, options)]
+        parts = (rows[~gives_up], options), (rows[gives_up], replace(options, hold=None))
+        return [part for part in parts if len(part[0])]
 
     def _in_other_modes(
         self, answers: Configurations, rows: Rows, targets: Floats, start: Configurations | None
