@@ -432,6 +432,127 @@ def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:
         assert code == 2 and "certify" in text
 
 
+# Links
+
+
+def struts(
+    thickness: float = 20.0, clearance: float | None = 4.0, size: float = 1.0, turn: float = 0.0
+) -> pf.Mechanism:
+    """Six struts with long strokes, so that links are what comes first; larger, and turned about z."""
+    c, s = np.cos(turn), np.sin(turn)
+    points = {
+        name: size * np.array(ends, float) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        for name, ends in (("base", [[100, 20, 0], [100, -20, 0]]), ("platform", [[40, 40, 195], [40, -40, 195]]))
+    }
+    return pf.Mechanism.from_legs(
+        "U-P*-S",
+        **points,  # type: ignore[arg-type]
+        stroke=(100.0 * size, 400.0 * size),
+        copies={"count": 3, "axis": [0, 0, 1]},
+        reference_point=[0, 0, 195 * size],
+        thickness=thickness * size,
+    ).with_clearance(None if clearance is None else clearance * size)
+
+
+def box_of_struts(half: float, degrees: float, size: float = 1.0) -> PoseRegion:
+    middle = np.array([0.0, 0.0, 195.0])
+    return PoseRegion.box(size * (middle - half), size * (middle + half), rotation=math.radians(degrees))
+
+
+def distances_of_axes(machine: pf.Mechanism, poses: np.ndarray) -> np.ndarray:
+    """Least distances of the axes of struts (n,) by their twelve ends: the least of a convex function on a square."""
+    base = np.array([machine.joint(f"A{k}").at for k in range(1, 7)])
+    platform = np.array([machine.joint(f"C{k}").at for k in range(1, 7)]) - machine.home_pose[:3, 3]
+    ends = poses[:, None, :3, 3] + np.einsum("nij,kj->nki", poses[:, :3, :3], platform)
+    least = np.full(len(poses), np.inf)
+    for i in range(6):
+        for j in range(i):
+            d, e, w = ends[:, i] - base[i], ends[:, j] - base[j], base[i] - base[j]
+            dd, ee, de = (d * d).sum(1), (e * e).sum(1), (d * e).sum(1)
+            s, t = np.full(len(poses), 0.5), np.full(len(poses), 0.5)
+            for _ in range(200):  # each in turn, until neither moves
+                before = s
+                s = np.clip((t * de - d @ w) / dd, 0.0, 1.0)
+                t = np.clip((s * de + e @ w) / ee, 0.0, 1.0)
+                if np.abs(s - before).max() < 1e-12:
+                    break
+            least = np.minimum(least, np.linalg.norm(w + s[:, None] * d - t[:, None] * e, axis=1))
+    return least
+
+
+def test_links_are_proved_apart_in_a_box_and_refuted_in_a_larger_one() -> None:
+    machine, rng = struts(), np.random.default_rng(0)
+    region = box_of_struts(25.0, 7.0)
+    proved = pf.certify(machine, region)
+    assert proved and proved.replay()
+    poses = random_poses(region, 50 if INTERPRETED else 100_000, rng)
+    assert (distances_of_axes(machine, poses) >= 24.0 + proved.margin * machine.characteristic_length).all()
+    assert (pf.solve_ik(machine, poses[:1000]).status == Status.REACHED).all()
+    # Legs alone leave more room.
+    wide = box_of_struts(30.0, 24.0)
+    assert pf.certify(machine.with_clearance(None), wide)
+    refuted = pf.certify(machine, wide)
+    refutation = refuted.refutation
+    assert refuted.verdict == "REFUTED" and refutation is not None
+    assert refutation.limit[1] == "clearance" and "–" in refutation.limit[0]
+    assert refutation.answer.status == Status.PROJECTED
+    away = distances_of_axes(machine, refutation.pose[None])[0] - 24.0
+    assert away < 0.0 and refutation.margin == pytest.approx(away / machine.characteristic_length, abs=1e-9)
+    assert [limit.bound for limit in refutation.answer.active_limits][:1] == ["clearance"]
+
+
+def test_a_proved_margin_of_links_is_near_the_least_one() -> None:
+    machine, region = struts(), box_of_struts(25.0, 7.0)
+    close = pf.certify(machine, region, tolerance=0.02 if INTERPRETED else 2e-3)
+    least = float(distances_of_axes(machine, random_poses(region, 20_000, np.random.default_rng(1))).min())
+    found = (least - 24.0) / machine.characteristic_length
+    assert close and close.margin <= close.least_found and close.margin <= found
+    assert close.least_found - close.margin <= (0.021 if INTERPRETED else 2.1e-3)
+
+
+@pytest.mark.parametrize(("half", "degrees"), [(25.0, 7.0), (30.0, 24.0)])
+def test_verdicts_on_links_do_not_depend_on_size_or_direction(half: float, degrees: float) -> None:
+    original = pf.certify(struts(), box_of_struts(half, degrees))
+    assert original.verdict != "OPEN"
+    assert pf.certify(struts(size=1e-3), box_of_struts(half, degrees, 1e-3)).verdict == original.verdict
+    away = np.array([500.0, -300.0, 50.0])
+    region = PoseRegion.box(*(away + [0, 0, 195.0] + [[-half] * 3, [half] * 3]), rotation=math.radians(degrees))
+    assert pf.certify(moved(struts(), np.eye(3), away), region).verdict == original.verdict
+
+
+def test_descents_of_the_distance_from_proved_boxes_stay_above_the_clearance() -> None:
+    machine, region = struts(), box_of_struts(30.0, 9.0)
+    certificate = pf.certify(machine, region)
+    assert certificate
+
+    def distance(point: np.ndarray) -> float:
+        return float(distances_of_axes(machine, region.pose(np.atleast_2d(point)))[0])
+
+    rng, units = np.random.default_rng(2), region.high - region.low
+    for _ in range(1 if INTERPRETED else 12):
+        start = rng.uniform(region.low, region.high)
+        bounds = list(zip(region.low / units, region.high / units, strict=True))
+        found = minimize(lambda x: distance(x * units), start / units, bounds=bounds, method="L-BFGS-B")
+        assert found.fun >= 24.0 + certificate.margin * machine.characteristic_length - 1e-9
+
+
+def test_a_track_on_which_links_come_too_near_between_two_steps_is_not_proved() -> None:
+    machine = struts()
+    region, rng = box_of_struts(50.0, 50.0), np.random.default_rng(3)
+    first, last = (region.pose(rng.uniform(region.low, region.high, (20_000, 6))) for _ in range(2))
+    middle = first.copy()  # of the turn between both
+    turn = Rotation.from_matrix(last[:, :3, :3] @ np.swapaxes(first[:, :3, :3], 1, 2)).as_rotvec()
+    middle[:, :3, :3] = Rotation.from_rotvec(0.5 * turn).as_matrix() @ first[:, :3, :3]
+    middle[:, :3, 3] = 0.5 * (first[:, :3, 3] + last[:, :3, 3])
+    at_ends = np.minimum(distances_of_axes(machine, first), distances_of_axes(machine, last))
+    too_near = np.flatnonzero((at_ends > 24.1) & (distances_of_axes(machine, middle) < 23.9))
+    pairs = np.stack([first[too_near], last[too_near]], axis=1)
+    reached = (np.asarray(pf.solve_ik(machine, pairs).status) == Status.REACHED).all(axis=1)
+    ends = pairs[reached][0]
+    assert (pf.solve_ik(machine, ends).status == Status.REACHED).all()
+    assert pf.certify(machine, ends).verdict != "PROVED"
+
+
 @pytest.mark.campaign
 def test_ten_million_random_poses_of_what_is_proved_are_feasible() -> None:
     rng, machine = np.random.default_rng(9), pf.load("stewart")

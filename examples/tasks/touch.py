@@ -87,5 +87,5 @@ for (joint, bound), share in list(with_it.shares.items())[:5]:
     print(f"{share:6.1%} {joint} {bound}")
 with_it.plot().figure.savefig("workspace.png", dpi=150, bbox_inches="tight")
 
-# Nothing is [proved](guaranteed.md) of a machine with a clearance yet: `certify` refuses it, and names
-# `with_clearance(None)`.
+# A [proof](guaranteed.md) over all poses of a region counts links too, where they are capsules or spheres; the sizes of
+# workspaces are only proved without them.

@@ -17,8 +17,9 @@ from ..description.task import task_of
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..feasibility import feasibility
 from ..ik import solve_ik
+from ..kernels.certify.link_rows import ROWS_A_PAIR
 from ..kernels.certify.pose_cells import CellParameters
-from ..kernels.certify.prove import BROKEN, DONE, SPENT
+from ..kernels.certify.prove import BREAKS, BROKEN, DONE, SPENT, TOO_SMALL
 from ..kernels.certify.subdivision import FOUND_MARGIN, LIMIT, N_OPEN, N_PROVED, N_STACK, PROVED_MARGIN
 from ..model import Model, model_of
 from ..poses import are_poses
@@ -26,12 +27,15 @@ from ..rotations import to_rotvec
 from ..targets import Target, as_targets
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
+from .links_over_cells import bounded_pairs, links_without_bounds
 from .pose_region import PoseRegion
-from .provable import require_no_clearance
 from .subdividing import Subdividing, first_cells, region_parameters, step_poses, track_parameters
 
 BUDGET = 200_000
 """Cells that are looked at by default: about a tenth of a second for six struts."""
+
+SAMPLES = 20_000
+"""Random poses of a region of which links are left open, that may refute it: some hundredths of a second."""
 
 MOST_DOUBTS = 16
 """Poses out of reach in home's working mode but reached in another, after which a region is left open."""
@@ -55,7 +59,7 @@ def certify(
     ----------
     region : a `PoseRegion`; or poses as of `solve_ik` (n, ...), or a Track, whose answers count: every pose between two
         of them, with the position on a line and the rotation about one axis.
-    limits : names of the joints whose limits count; default all.
+    limits : names of the joints whose limits count; default all. The clearance of links counts where there is one.
     tolerance : by how much the proved `margin` may be less than the least margin in the region, if the region is
         proved; by default it is only known to be positive.
     budget : number of cells to look at, at most.
@@ -64,12 +68,10 @@ def certify(
 
     Raises
     ------
-    UnsupportedMechanism : a chain has no closed form, or poses leave joints open, and the message names them; or the
-        mechanism has a clearance, which nothing is proved of.
+    UnsupportedMechanism : a chain has no closed form, or poses leave joints open; the message names them.
     InvalidArgument : a region over coordinates that the task does not set.
     """
     mechanism = _with_limits_of(checked_mechanism(mechanism), limits)
-    require_no_clearance(mechanism, "certified")
     model = model_of(mechanism)
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(
@@ -110,6 +112,11 @@ class _RegionQuestion:
             n_doubts += 1
             if n_doubts >= MOST_DOUBTS:
                 break
+        if result in (SPENT, TOO_SMALL) and not n_doubts and len(bounded_pairs(self.model)):
+            refutation = self._sampled()
+            if refutation is not None:
+                work.measures[FOUND_MARGIN] = min(work.measures[FOUND_MARGIN], refutation.margin)
+                return self._certificate(REFUTED, subdividing, "", refutation)
         if n_doubts:
             reason = reason or "some poses are reached in another working mode than home's"
         elif result != DONE:
@@ -164,25 +171,63 @@ class _RegionQuestion:
         if self.parameters.uncertain[0] > 0.0 and len(table.legs) and table.legs["has_rows"].any():
             return "with uncertain points, legs restrict the platform"
         unknown = joints_without_bounds(table)
-        return f"limits of {unknown} have no bounds over regions yet" if unknown else ""
+        if unknown:
+            return f"limits of {unknown} have no bounds over regions yet"
+        pair = links_without_bounds(model)
+        return f"the distance of the links {pair} has no bounds over regions yet" if pair else ""
 
     def _refuted(self, parameters: Floats, limit: int) -> Refutation | None:
         """The refutation by a pose that breaks the limit of a row; None if `solve_ik` reaches it."""
-        mechanism = self.model.mechanism
         if self.region is not None:
             units = np.array([self.model.length] * 3 + [1.0] * 3)
             pose = self.region.pose(parameters * units)
         else:
             assert self.poses is not None
-            pose = step_poses(model_of(mechanism), self.parameters, parameters[None, 1::-1])[0]
+            pose = step_poses(self.model, self.parameters, parameters[None, 1::-1])[0]
+        return self._refuted_by(pose, limit)
+
+    def _sampled(self) -> Refutation | None:
+        """The refutation by the worst of random poses, half of them on sides of the region; None if all are within
+        limits: links may be too near where the worst corners of cells keep them apart."""
+        rng = np.random.default_rng(0)
+        if self.region is not None:
+            low, high = self.region.low, self.region.high
+            points = rng.uniform(low, high, (SAMPLES, 6))
+            ends = np.where(rng.random(points.shape) < 0.5, low, high)
+            points[::2] = np.where(rng.random(points.shape) < 0.5, points, ends)[::2]
+            poses = self.region.pose(points[np.asarray(self.region.contains(points))])
+        else:
+            steps = rng.integers(len(self.parameters.steps), size=SAMPLES)
+            points = np.stack([steps.astype(float), rng.random(SAMPLES)], axis=1)
+            poses = step_poses(self.model, self.parameters, points)
+        if not len(poses):
+            return None
+        feasible = feasibility(self.model.mechanism, poses)
+        worst = int(np.argmin(feasible.margin))
+        return self._refuted_by(poses[worst], 0) if feasible.margin[worst] < -BREAKS else None
+
+    def _refuted_by(self, pose: Floats, limit: int) -> Refutation | None:
+        """The refutation by a pose; None if `solve_ik` reaches it."""
+        mechanism = self.model.mechanism
         answer = solve_ik(mechanism, pose)
         if answer.status != Status.PROJECTED:
             return None
         feasible = feasibility(mechanism, pose)
-        n_limits, binding = len(self.model.legs.limits), int(feasible.binding)
+        binding = int(feasible.binding)
         if binding < 0:  # a configuration that has no margins there: the limit that the search found broken
-            binding = limit if limit < n_limits else n_limits + (limit - n_limits) // 2
+            binding = self._place_of(limit)
         return Refutation(pose, feasible.limits[binding], float(feasible.margin), answer)
+
+    def _place_of(self, row: int) -> int:
+        """The index in `Feasibility.limits` of the limit of a row of the kernel."""
+        table = self.model.legs
+        n_limits, n_legs = len(table.limits), len(table.legs)
+        if row < n_limits:
+            return row
+        pair = (row - n_limits - 2 * n_legs) // ROWS_A_PAIR
+        if pair < 0:
+            return n_limits + (row - n_limits) // 2
+        return n_limits + 2 * n_legs + int(bounded_pairs(self.model)[pair])
 
 
 def _with_limits_of(mechanism: Mechanism, limits: Any) -> Mechanism:

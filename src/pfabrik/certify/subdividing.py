@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
+from ..kernels.certify.link_rows import no_cell_links
 from ..kernels.certify.pose_cells import BALL, BOX, CYLINDER, ROTATION_VECTOR, STEPS, TILT, CellParameters
 from ..kernels.certify.prove import ENCLOSE, prove
 from ..kernels.certify.subdivision import (
@@ -21,6 +22,7 @@ from ..kernels.handle import Handle
 from ..model import Model
 from ..platform.table import kernel_table, table_handle
 from ..rotations import from_rotvec, to_rotvec
+from .links_over_cells import cell_links
 from .pose_region import PoseRegion
 
 DEPTH = 256
@@ -104,7 +106,9 @@ class Subdividing:
         """
         table = model.legs
         sizes = (len(cells) + DEPTH, min(budget, most_proved), MOST_LEFT)
-        self.work: Subdivision = new_subdivision(kernel_table(table), parameters, table.home_sides[0].copy(), sizes)
+        self.work: Subdivision = new_subdivision(
+            kernel_table(table), parameters, table.home_sides[0].copy(), cell_links(model), sizes
+        )
         self.work.stack[: len(cells), :PROVED_LEGS] = cells
         self.work.stack[: len(cells), PROVED_LEGS] = 0.0
         self.work.counters[N_STACK], self.work.counters[BUDGET] = len(cells), budget
@@ -122,7 +126,7 @@ class Subdividing:
 
 
 class Enclosing:
-    """Shares of cells that are within all limits, by the kernel."""
+    """Shares of cells that are within all limits but the clearance of links, by the kernel."""
 
     def __init__(self, model: Model, parameters: CellParameters) -> None:
         self._model, self._parameters = model, parameters._replace(kinds=parameters.kinds.copy())
@@ -131,7 +135,10 @@ class Enclosing:
     def shares(self, cells: Floats) -> Floats:
         """Shares (n, 2), at least and at most; what is proved on each cell (n, N_COLUMNS) is noted in it."""
         table = self._model.legs
-        work = new_subdivision(kernel_table(table), self._parameters, table.home_sides[0].copy(), (0, 0, 1), len(cells))
+        sides = table.home_sides[0].copy()
+        work = new_subdivision(
+            kernel_table(table), self._parameters, sides, no_cell_links(), (0, 0, 1), n_shares=len(cells)
+        )
         work = work._replace(stack=cells)
         work.counters[N_STACK] = len(cells)
         handle = Handle(work)

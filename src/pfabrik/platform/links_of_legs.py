@@ -31,7 +31,16 @@ def links_of_legs(model: Model) -> LinkLimits:
 @derived
 def _bodies(model: Model) -> list[tuple[int, int]] | None:
     """The numbers of the bodies that both ends of every link move with; None where some have none."""
-    mechanism, found = model.mechanism, []
+    found = [
+        (first, second) for first, second in bodies_of_link_ends(model) if first is not None and second is not None
+    ]
+    return found if len(found) == len(bodies_of_link_ends(model)) else None
+
+
+@derived
+def bodies_of_link_ends(model: Model) -> list[tuple[int | None, int | None]]:
+    """The numbers of the bodies that both ends of every link move with; None for bodies that have none."""
+    mechanism = model.mechanism
     links, numbers = links_of(mechanism), dict(_numbers(model))
     rigid = welded([joint for joint in mechanism.joints if joint.is_rigid], mechanism.base)
 
@@ -44,12 +53,11 @@ def _bodies(model: Model) -> list[tuple[int, int]] | None:
         known = [number for body in bodies_of_centre(mechanism.joint(name)) if (number := of_body(body)) is not None]
         return known[0] if known else None
 
+    ends = []
     for shape, joints in zip(mechanism.shapes, links.joints, strict=True):
         first, second = map(of_joint, joints) if joints else (of_body(shape.body), of_body(shape.body))
-        if first is None or second is None:
-            return None
-        found.append((first, second))
-    return found
+        ends.append((first, second))
+    return ends
 
 
 def _numbers(model: Model) -> Iterator[tuple[str, int]]:

@@ -9,11 +9,12 @@ from .._jit import routine
 from ..legs.records import SHARED, Table
 from .affine_forms import ABOVE, BELOW, CENTRE, least, most
 from .half_spaces_of_cells import share_above
-from .limit_rows import margin_of, put_limits
+from .limit_rows import first_link_row, margin_of, put_limits
+from .link_rows import ROWS_A_PAIR, least_row_of_pair, put_link_ends, put_pair
 from .pose_cells import BALL, BOX, ROUNDING, TILT, CellParameters, put_cell
 from .subdivision import FOUND_MARGIN, GAP, HALF, PROVED_LEGS, PROVED_MARGIN, Subdivision
 
-# Legs of which a cell remembers that they are proved.
+# Legs and pairs of links of which a cell remembers that they are proved.
 MOST_BITS = 50
 
 
@@ -54,13 +55,23 @@ def unproved_row(table: Table, work: Subdivision, cell: Floats) -> int:
     put_cell(work.parameters, cell, rows.cell)
     proved, worst, least_margin, proved_margin = int(cell[PROVED_LEGS]), -1, math.inf, measures[PROVED_MARGIN]
     is_round = work.parameters.kinds[0] == TILT or work.parameters.kinds[1] != BOX
-    for k in range(table.legs.shape[0]):
+    n_legs, n_leg_rows, has_ends = table.legs.shape[0], first_link_row(table), False
+    for k in range(n_legs + work.links.pairs.shape[0]):
         bit = 1 << min(k, MOST_BITS)
-        if table.legs[k]["proximal"] == SHARED or (k < MOST_BITS and proved & bit != 0):
+        if (k < n_legs and table.legs[k]["proximal"] == SHARED) or (k < MOST_BITS and proved & bit != 0):
             continue
-        put_limits(table, work.sides, work.parameters.uncertain[0], k, n, rows)
+        first, end = 0, n_leg_rows
+        if k < n_legs:
+            put_limits(table, work.sides, work.parameters.uncertain[0], k, n, rows)
+        else:
+            if not has_ends:
+                put_link_ends(table, work.sides, work.parameters.uncertain[0], n, rows, work.links)
+                has_ends = True
+            put_pair(table, k - n_legs, margin, work.parameters.uncertain[0], n, rows, work.links)
+            first = n_leg_rows + ROWS_A_PAIR * (k - n_legs)
+            end = first + ROWS_A_PAIR
         is_proved, leg_margin = True, math.inf
-        for row in range(rows.rows.shape[0]):
+        for row in range(first, end):
             if rows.owners[row] != k:
                 continue
             value = least(rows.rows[row], n)
@@ -79,6 +90,19 @@ def unproved_row(table: Table, work: Subdivision, cell: Floats) -> int:
     cell[PROVED_LEGS] = float(proved)
     measures[PROVED_MARGIN] = proved_margin
     return worst
+
+
+@routine
+def put_row(table: Table, work: Subdivision, box: Floats, row: int) -> int:
+    """Fill the rows of the leg, or the pair of links, of a row over a box; the row, of a pair the lowest one."""
+    rows, n, owner, n_legs = work.rows, work.parameters.kinds[2], work.rows.owners[row], table.legs.shape[0]
+    put_cell(work.parameters, box, rows.cell)
+    if owner < n_legs:
+        put_limits(table, work.sides, work.parameters.uncertain[0], owner, n, rows)
+        return row
+    put_link_ends(table, work.sides, work.parameters.uncertain[0], n, rows, work.links)
+    put_pair(table, owner - n_legs, 0.0, work.parameters.uncertain[0], n, rows, work.links)
+    return least_row_of_pair(table, owner - n_legs, n, rows)
 
 
 @routine

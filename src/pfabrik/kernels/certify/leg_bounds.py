@@ -79,19 +79,30 @@ def new_bounds() -> LegBounds:
 def put_end(leg: Record, reference: Vec, cell: PoseCell, n: int, uncertain: float, end: Floats) -> None:
     """The platform end of a leg, in the body of its base end."""
     pose, sizes, point = cell.pose, cell.sizes, vec(leg["platform_end_point"])
+    if leg["frame"] == FROM_BASE:
+        put_platform_point(point, reference, cell, n, uncertain, end)
+        return
     p = (pose[0, 3], pose[1, 3], pose[2, 3])
-    is_reversed = leg["frame"] != FROM_BASE
-    lever = sub(point, p) if is_reversed else turn(pose, point)
+    lever = sub(point, p)
     reach = norm(lever)
-    error, away = sizes[CURVATURE] * reach, sizes[SHIFT] + sizes[CHORD] * reach
     for i in range(n):
-        velocity = moved_by(cell.motions[i], lever)
-        put(end[i], scale(-1.0, turned_back(pose, velocity)) if is_reversed else velocity)
-    if is_reversed:
-        error += sizes[CHORD] * sizes[SHIFT]
-        put(end[CENTRE], add(turned_back(pose, lever), reference))
-    else:
-        put(end[CENTRE], add(lever, p))
+        put(end[i], scale(-1.0, turned_back(pose, moved_by(cell.motions[i], lever))))
+    put(end[CENTRE], add(turned_back(pose, lever), reference))
+    error, away = sizes[CURVATURE] * reach + sizes[CHORD] * sizes[SHIFT], sizes[SHIFT] + sizes[CHORD] * reach
+    rounded = ROUNDING * (norm(p) + norm(point) + norm(reference) + away)
+    put_bounds(end, n, error + uncertain + rounded, away + uncertain + rounded)
+
+
+@routine
+def put_platform_point(point: Vec, reference: Vec, cell: PoseCell, n: int, uncertain: float, end: Floats) -> None:
+    """A point of the platform, given at home from the reference point."""
+    pose, sizes = cell.pose, cell.sizes
+    p, lever = (pose[0, 3], pose[1, 3], pose[2, 3]), turn(pose, point)
+    reach = norm(lever)
+    for i in range(n):
+        put(end[i], moved_by(cell.motions[i], lever))
+    put(end[CENTRE], add(lever, p))
+    error, away = sizes[CURVATURE] * reach, sizes[SHIFT] + sizes[CHORD] * reach
     rounded = ROUNDING * (norm(p) + norm(point) + norm(reference) + away)
     put_bounds(end, n, error + uncertain + rounded, away + uncertain + rounded)
 

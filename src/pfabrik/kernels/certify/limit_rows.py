@@ -1,7 +1,8 @@
 """Limits over a cell of poses: numbers that are positive where a limit is kept, one row each.
 
 Rows are in the order of `legs.feasibility`: two for each range, one for each cone (its cosine less that of the half
-angle), then two for the reach of each leg with a proximal joint.
+angle), then two for the reach of each leg with a proximal joint. Behind them are four for each pair of links
+(`link_rows`).
 """
 
 from __future__ import annotations
@@ -64,8 +65,8 @@ class LimitRows(NamedTuple):
     """Scratch memory: the forms of all limits over a cell."""
 
     rows: Floats  # (limits, 9)
-    owners: Ints  # (limits,): the leg of each row, or the one whose proximal joint it is on
-    spreads: Floats  # (legs, 6): how far each parameter moves a leg
+    owners: Ints  # (limits,): the leg of each row, or the one whose proximal joint it is on; of links, legs + pair
+    spreads: Floats  # (legs + pairs, 6): how far each parameter moves a leg, or two links from each other
     cell: PoseCell
     bounds: LegBounds
 
@@ -104,6 +105,12 @@ def put_limits(table: Table, sides: Floats, uncertain: float, k: int, n: int, ro
 def first_reach_row(table: Table) -> int:
     """Index of the first row on the reach of legs."""
     return 2 * table.limited.shape[0] + table.cones.shape[0]
+
+
+@routine
+def first_link_row(table: Table) -> int:
+    """Index of the first row on the distance of links."""
+    return first_reach_row(table) + 2 * table.legs.shape[0]
 
 
 @routine
@@ -253,6 +260,8 @@ def put_cones(table: Table, m: int, k: int, n: int, rows: LimitRows) -> None:
 @routine
 def margin_of(table: Table, row: int, value: float) -> float:
     """The relative margin of a limit, as of `feasibility`, from the value of its row; infinite where a rod reaches."""
+    if row >= first_link_row(table):
+        return value
     n_ranges = 2 * table.limited.shape[0]
     if row < n_ranges:
         coordinate = table.limited[row // 2]

@@ -1,8 +1,8 @@
 """Subdivision of a region of poses until every limit is proved to be kept, or a pose is found that breaks one.
 
-A cell on which a limit is not proved is halved along the parameter that moves its leg most; what is proved on a cell
-holds on its halves. Where a limit's linear part says that a corner breaks it, the pose there is measured, and the
-search descends from there to where the limit is broken most.
+A cell on which a limit is not proved is halved along the parameter that moves its leg, or its links, most; what is
+proved on a cell holds on its halves. Where a limit's linear part says that a corner breaks it, the pose there is
+measured, and the search descends from there to where the limit is broken most.
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ from ..legs.open_table import open_table
 from ..legs.records import Table
 from ..vectors import copy_row
 from .affine_forms import CENTRE
-from .cell_verdicts import centre_less_slopes, enclose_cell, unproved_row
-from .limit_rows import margin_of, put_limits
+from .cell_verdicts import centre_less_slopes, enclose_cell, put_row, unproved_row
+from .limit_rows import first_link_row, margin_of
 from .pose_cells import (
     N_PARAMETERS,
     STEPS,
     fit_into,
     is_beside,
-    put_cell,
 )
 from .subdivision import (
     BUDGET,
@@ -49,6 +48,8 @@ BREAKS = 2e-9
 SMALLEST = 1e-7
 # Steps of a descent, and the share of a cell's size below which it ends.
 DESCENT_STEPS, LEAST_STEP = 40, 1e-3
+# The first cells from which the distance of links is searched for its least.
+SEARCHED = 16
 
 
 @search
@@ -100,16 +101,27 @@ def prove(machine: int, subdivision: int) -> int:
 
 @routine
 def breaks_limit(table: Table, work: Subdivision, row: int, cell: Floats, corner: Floats) -> bool:
-    """True if the pose at a corner breaks the limit of a row; then the pose where it is broken most is noted."""
+    """True if the pose at a corner breaks the limit of a row; then the pose where it is broken most is noted.
+
+    Rows of links are below their distance away from the middle: there the search also descends from corners that keep
+    the limit, of the first cells and of some later ones.
+    """
     value = value_at(table, work, row, corner)
-    work.measures[FOUND_MARGIN] = min(work.measures[FOUND_MARGIN], margin_of(table, row, value))
-    if not value < -BREAKS:
+    if not value < -BREAKS and (row < first_link_row(table) or not is_searched(work.counters[N_CELLS])):
+        work.measures[FOUND_MARGIN] = min(work.measures[FOUND_MARGIN], margin_of(table, row, value))
         return False
     for i in range(N_PARAMETERS):
         work.pose[i] = corner[i]
-    descend(table, work, row, cell, value)
+    lowest = descend(table, work, row, cell, value)
+    work.measures[FOUND_MARGIN] = min(work.measures[FOUND_MARGIN], margin_of(table, row, lowest))
     work.counters[LIMIT] = row
-    return True
+    return lowest < -BREAKS
+
+
+@routine
+def is_searched(n_cells: int) -> bool:
+    """True for the first cells, then for so few that descents take less time than bounds."""
+    return n_cells <= SEARCHED or n_cells % (16 * SEARCHED) == 0
 
 
 @routine
@@ -136,29 +148,21 @@ def put_corner(work: Subdivision, cell: Floats, row: int, corner: Floats) -> Non
 
 @routine
 def value_at(table: Table, work: Subdivision, row: int, point: Floats) -> float:
-    """The value of a row at one pose; the half sizes of the point are set to zero."""
+    """The value of a row at one pose, of a pair of links that of their distance; the point's half sizes become zero."""
     for i in range(N_PARAMETERS):
         point[HALF + i] = 0.0
-    put_cell(work.parameters, point, work.rows.cell)
-    put_limits(
-        table, work.sides, work.parameters.uncertain[0], work.rows.owners[row], work.parameters.kinds[2], work.rows
-    )
-    value: float = work.rows.rows[row, CENTRE]
+    value: float = work.rows.rows[put_row(table, work, point, row), CENTRE]
     return value
 
 
 @routine
-def descend(table: Table, work: Subdivision, row: int, cell: Floats, value: float) -> None:
-    """Move the noted pose to where a limit is broken most, by corners of cells that shrink where none is worse."""
+def descend(table: Table, work: Subdivision, row: int, cell: Floats, value: float) -> float:
+    """Move the noted pose to where a row is least, by corners of cells that shrink where none is lower; the value."""
     size, point = 1.0, work.cells[1]
     for _ in range(DESCENT_STEPS):
         for i in range(N_PARAMETERS):
             point[i], point[HALF + i] = work.pose[i], size * cell[HALF + i]
-        put_cell(work.parameters, point, work.rows.cell)
-        put_limits(
-            table, work.sides, work.parameters.uncertain[0], work.rows.owners[row], work.parameters.kinds[2], work.rows
-        )
-        put_corner(work, point, row, point)
+        put_corner(work, point, put_row(table, work, point, row), point)
         tried = value_at(table, work, row, point)
         if tried < value:
             for i in range(N_PARAMETERS):
@@ -168,6 +172,7 @@ def descend(table: Table, work: Subdivision, row: int, cell: Floats, value: floa
             size *= 0.5
         if size < LEAST_STEP:
             break
+    return value
 
 
 @routine

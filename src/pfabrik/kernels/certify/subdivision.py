@@ -12,6 +12,7 @@ from ..legs.open_table import SAMPLE
 from ..legs.records import SHARED, Table
 from .leg_bounds import new_bounds
 from .limit_rows import LimitRows
+from .link_rows import ROWS_A_PAIR, CellLinks, no_cell_links
 from .pose_cells import N_PARAMETERS, CellParameters, new_cell
 
 # Counters: cells on the stack, proved, left open, looked at; the limit that a pose breaks; cells to look at, at most.
@@ -19,7 +20,7 @@ N_STACK, N_PROVED, N_OPEN, N_CELLS, LIMIT, BUDGET, N_COUNTERS = 0, 1, 2, 3, 4, 5
 # Measures: a proved lower bound of the margin; the least margin of the poses measured; a cell is proved where its
 # margin is at least that less this gap, or, if it is infinite, where the margin is positive.
 PROVED_MARGIN, FOUND_MARGIN, GAP, N_MEASURES = 0, 1, 2, 3
-# Columns of a cell: middle, half sizes, the set of legs that are proved on it, as bits.
+# Columns of a cell: middle, half sizes, the set of legs, then pairs of links, that are proved on it, as bits.
 HALF, PROVED_LEGS, N_COLUMNS = 6, 12, 13
 
 
@@ -37,24 +38,34 @@ class Subdivision(NamedTuple):
     pose: Floats  # (6,): parameters of the pose that breaks a limit
     cells: Floats  # (3, N_COLUMNS): scratch
     rows: LimitRows
+    links: CellLinks
 
 
-def new_rows(table: Table) -> LimitRows:
-    """Allocate the rows of a machine."""
-    n_legs, first_cone = len(table.legs), 2 * len(table.limited)
-    first_reach = first_cone + len(table.cones)
+def new_rows(table: Table, n_pairs: int = 0) -> LimitRows:
+    """Allocate the rows of a machine, with as many pairs of links."""
+    n_legs = len(table.legs)
     leaders = np.arange(n_legs)
     for k in range(1, n_legs):
         leaders[k] = leaders[k - 1] if table.legs["proximal"][k] == SHARED else k
     owners = np.concatenate(
-        [np.repeat(leaders[table.limited["leg"]], 2), leaders[table.cones["leg"]], np.repeat(leaders, 2)]
+        [
+            np.repeat(leaders[table.limited["leg"]], 2),
+            leaders[table.cones["leg"]],
+            np.repeat(leaders, 2),
+            np.repeat(n_legs + np.arange(n_pairs), ROWS_A_PAIR),
+        ]
     )
-    rows = np.zeros((first_reach + 2 * n_legs, 9))
-    return LimitRows(rows, owners.astype(np.int64), np.zeros((n_legs, N_PARAMETERS)), new_cell(), new_bounds())
+    rows, spreads = np.zeros((len(owners), 9)), np.zeros((n_legs + n_pairs, N_PARAMETERS))
+    return LimitRows(rows, owners.astype(np.int64), spreads, new_cell(), new_bounds())
 
 
 def new_subdivision(
-    table: Table, parameters: CellParameters, sides: Floats, sizes: tuple[int, int, int], n_shares: int = 0
+    table: Table,
+    parameters: CellParameters,
+    sides: Floats,
+    links: CellLinks,
+    sizes: tuple[int, int, int],
+    n_shares: int = 0,
 ) -> Subdivision:
     """Allocate a subdivision; `sizes` are the numbers of cells of the stack, proved and left open."""
     return Subdivision(
@@ -68,7 +79,8 @@ def new_subdivision(
         np.full(N_MEASURES, np.inf),
         np.zeros(N_PARAMETERS),
         np.zeros((3, N_COLUMNS)),
-        new_rows(table),
+        new_rows(table, len(links.pairs)),
+        links,
     )
 
 
@@ -79,5 +91,5 @@ def no_parameters() -> CellParameters:
     )
 
 
-open_subdivision = opener(new_subdivision(SAMPLE, no_parameters(), np.zeros(1), (1, 1, 1), 1))
+open_subdivision = opener(new_subdivision(SAMPLE, no_parameters(), np.zeros(1), no_cell_links(), (1, 1, 1), 1))
 """The subdivision at the address of a `Handle`."""
