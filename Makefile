@@ -12,6 +12,8 @@ KERNELS := $(shell find src/pfabrik/kernels building -name '*.py' -o -name '*.c'
 # parallel.
 export OPENBLAS_NUM_THREADS := 1
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
+# Tests start many processes, and pytest rewrites every assertion: compiled files are kept, whatever the user's settings.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo reproduce docs test test-tensors test-fast test-interpreted campaign check bench clean
 
