@@ -25,7 +25,7 @@ from test_controllers import STUBS
 from test_export_c import COMPILERS, STRICT, compiled, flat, needs_compiler, slack_of
 
 Array = np.ndarray
-SANITIZED = ("-std=c99", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+SANITIZED = ("-std=c99", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 KEEP = pf.Options(working_mode="keep")
 PAIR = 10_000
 EXACT = {"double": 1e-12, "float": 1e-5}
