@@ -148,15 +148,15 @@ def five_answered(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.skipif(INTERPRETED, reason="many searches")
-@pytest.mark.parametrize("change", ["reversed", "shuffled", "smaller", "larger"])
+@pytest.mark.parametrize("change", ["reversed and smaller", "shuffled and larger"])
 @pytest.mark.parametrize("name", [each for each in closure.MACHINES if each not in ("agile_eye", "slider")])
 def test_how_a_machine_is_described_does_not_change_what_it_reaches(name: str, change: str) -> None:
-    mechanism, factor = machine(f"closure.{name}"), {"smaller": 1e-3, "larger": 1e6}.get(change, 1.0)
-    others = {
-        "reversed": redescribed.reversed_joints,
-        "shuffled": lambda machine: redescribed.relabelled(machine, np.random.default_rng(0), swaps=0.0)[0],
-    }
-    other = others.get(change, lambda machine: redescribed.scaled(machine, factor))(mechanism)
+    mechanism, factor = machine(f"closure.{name}"), 1e-3 if "smaller" in change else 1e6
+    if "reversed" in change:
+        other = redescribed.reversed_joints(mechanism)
+    else:
+        other = redescribed.relabelled(mechanism, np.random.default_rng(0), swaps=0.0)[0]
+    other = redescribed.scaled(other, factor)
     targets, statuses = five_answered(name)
     moved = targets.copy()
     moved[:, :3, 3] *= factor
