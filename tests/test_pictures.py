@@ -226,7 +226,7 @@ def test_no_text_of_a_workspace_hides_another(name: str, monkeypatch: pytest.Mon
 def test_no_text_of_a_map_of_singularities_hides_another(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = pf.load(name)
     length = machine.characteristic_length
-    found = pf.singularity_map(machine, pf.workspace(machine, resolution=0.08 * length), resolution=0.16 * length)
+    found = pf.singularity_map(machine, pf.workspace(machine, resolution=0.12 * length), resolution=0.24 * length)
     assert faults(found.plot().figure, monkeypatch) == []
 
 
