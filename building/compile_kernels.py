@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT / "src"))
 SPLIT = ("legs.", "platform.")
 """Kernels of two processes: these share little with the others, and take about as long."""
 
-LEVELLED = ("legs.answer_blocks", "legs.margins_in_blocks")
+LEVELLED = ("legs.answer_blocks", "legs.margins_in_blocks", "clearance.capsule_clearance")
 """Kernels whose loops are vectors: compiled for each level of processors. On all others a level has no effect."""
 
 UNABLE = 3

@@ -127,8 +127,7 @@ def test_segments_are_as_far_apart_as_the_cases_of_their_quadratic_programme_say
     ends = random_segments(np.random.default_rng(0), ROWS)
     found, nearest = np.full(ROWS, np.inf), np.full(ROWS, -1.0)
     by_shape = np.ascontiguousarray(ends.reshape(ROWS, 2, 6).transpose(1, 2, 0))
-    home, inner, poses = np.zeros((2, 2, 3)), np.zeros((2, 2), np.int64), np.zeros((ROWS, 4, 4))
-    capsule_clearance(np.zeros(2), home, inner, poses, by_shape, np.array([[0, 1]]), found, nearest)
+    capsule_clearance(np.zeros(2), by_shape, np.array([[0, 1]]), found, nearest)
     np.testing.assert_allclose(
         found, by_cases(ends), rtol=0, atol=1e-12 if np.finfo(np.longdouble).nmant > 60 else 1e-9
     )

@@ -96,7 +96,7 @@ def _measure_solids(
 
 def _measure_capsules(links: Links, placed: PlacedLinks, distances: Floats, pairs: Floats) -> None:
     """Lower distances (n,) by those of all pairs of capsules."""
-    from ..kernels.clearance.capsules import capsule_clearance
+    from ..kernels.clearance.capsules import capsule_clearance, place_ends
 
     mechanism, poses = placed.mechanism, placed.configurations.rows.poses
     bodies, home = bodies_of_links(mechanism), np.ascontiguousarray(links.places[:, :2])
@@ -105,6 +105,7 @@ def _measure_capsules(links: Links, placed: PlacedLinks, distances: Floats, pair
 
     def run(block: slice) -> None:
         ends = placed.ends(block)
-        capsule_clearance(rounds, home, bodies, poses[block], ends, capsules, distances[block], pairs[block])
+        place_ends(home, bodies, poses[block], ends)
+        capsule_clearance(rounds, ends, capsules, distances[block], pairs[block])
 
     in_blocks(run, len(distances), ROWS_A_RUN)

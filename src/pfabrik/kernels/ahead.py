@@ -12,7 +12,7 @@ from ._shipped import COMPILES, name_of
 from .certify.prove import prove
 from .chains.answer_chains import nearest_in_chains, reach_in_chains, walk_chains
 from .chains.chain_records import ChainAim, ChainAnswers
-from .clearance.capsules import capsule_clearance
+from .clearance.capsules import capsule_clearance, place_ends
 from .clearance.least_clearance import least_clearance
 from .closure.close import close
 from .closure.descend import nearest_configuration
@@ -96,7 +96,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),
     (join, tuple(_values("I2 i1"))),
-    (capsule_clearance, tuple(_values("F1 F3 I2 F3 f3 I2 f1 f1"))),
+    (place_ends, tuple(_values("F3 I2 F3 f3"))),
+    (capsule_clearance, tuple(_values("F1 F3 I2 f1 f1"))),
     (least_clearance, tuple(_values("F2 F4 I2 f1 f1 i1 f3"))),
     (prove, tuple(_values("i i"))),
     (walk_path, tuple(_values("F2 F1 F2 f3 f3"))),

@@ -12,33 +12,34 @@ from .segments import between_segments
 
 
 @kernel
-def capsule_clearance(
-    rounds: Floats,
-    home: Floats,
-    bodies: Ints,
-    poses: Floats,
-    ends: Floats,
-    pairs: Ints,
-    clearances: Floats,
-    nearest: Floats,
-) -> None:
-    """Lower the least clearances of poses by those of pairs of capsules.
+def place_ends(home: Floats, bodies: Ints, poses: Floats, ends: Floats) -> None:
+    """Fill the ends of the axes of capsules that are on the base or the platform.
 
     Parameters
     ----------
-    rounds : radii, (s,) [length].
     home : ends of their axes, (s, 2, 3) [length], of a sphere twice the same: of those on the platform from its
         reference point, along its axes.
     bodies : that the ends are on, (s, 2): BASE, PLATFORM or others.
     poses : of the platform, (n, 4, 4) [length].
-    ends : ends of the axes, (s, 6, n) [length]: of those on other bodies they are given, the rest is filled.
-    pairs : two capsules each, (k, 2).
-    clearances, nearest : least clearances so far, infinite at first, and the places of the pairs that have them, (n,).
+    ends : ends of the axes, (s, 6, n) [length]; those on other bodies are left.
     """
     for i in range(bodies.shape[0]):
         for e in range(2):
             if bodies[i, e] == PLATFORM or bodies[i, e] == BASE:
                 place_end(home[i, e], bodies[i, e], poses, ends[i, 3 * e : 3 * e + 3])
+
+
+@kernel
+def capsule_clearance(rounds: Floats, ends: Floats, pairs: Ints, clearances: Floats, nearest: Floats) -> None:
+    """Lower the least clearances of poses by those of pairs of capsules.
+
+    Parameters
+    ----------
+    rounds : radii, (s,) [length].
+    ends : ends of their axes, (s, 6, n) [length], of a sphere twice the same.
+    pairs : two capsules each, (k, 2).
+    clearances, nearest : least clearances so far, infinite at first, and the places of the pairs that have them, (n,).
+    """
     for k in range(pairs.shape[0]):
         one, other, size = ends[pairs[k, 0]], ends[pairs[k, 1]], rounds[pairs[k, 0]] + rounds[pairs[k, 1]]
         for row in range(ends.shape[2]):
