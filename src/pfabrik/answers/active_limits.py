@@ -17,7 +17,7 @@ from ..motion.limited_coordinates import coned, ranges_of
 from ..tolerances import TOLERANCES
 
 Bound: TypeAlias = Literal["min", "max", "cone", "clearance"]
-"""Which limit of a joint; or the clearance of two links."""
+"""A limit of a joint, or the clearance of two links."""
 
 
 @dataclass(frozen=True)

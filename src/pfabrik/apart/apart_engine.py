@@ -190,7 +190,7 @@ class ApartEngine(Engine):
         return PlacedLinks(self.model.mechanism, configurations, lambda: self.usual.points(configurations))
 
     def _checked(self, answers: Configurations) -> Configurations:
-        """The same answers, marked FAILED where links are too near."""
+        """Mark answers FAILED where links are too near; the answers."""
         answers.rows.status[self._too_near(answers)] = FAILED
         return answers
 

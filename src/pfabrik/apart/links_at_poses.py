@@ -1,4 +1,4 @@
-"""Where links are at poses that the legs' closed forms reach."""
+"""Places of links at poses that the legs' closed forms reach."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How near links come to each other between two configurations, while the platform moves straight."""
+"""Least distances of links between two configurations, while the platform moves straight."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from .link_distances import least_distances
 from .placed_links import PlacedLinks
 
 FINE = 1e-3
-"""How exactly the least distance is found, where it is less than the clearance [L]."""
+"""Error of the least distance, where it is less than the clearance [L]."""
 
 HALVINGS = 10
 """Most halvings of the way."""
 
 
 class Places(NamedTuple):
-    """Where links are at one end of each way: poses, least distances, and places as in `PlacedLinks.places`."""
+    """Links at one end of each way: poses, least distances, and places as in `PlacedLinks.places`."""
 
     poses: Floats  # (n, 4, 4) [length]
     distances: Floats  # (n,) [length]
