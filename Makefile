@@ -62,6 +62,7 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict src paper tests/typing
 	$(BIN)/lint-imports
+	$(BIN)/python building/budget.py
 
 bench: $(STAMP) $(MODULE)
 	@$(BIN)/python benchmarks/run.py
