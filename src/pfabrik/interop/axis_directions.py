@@ -93,8 +93,18 @@ def bundles_of(axes: Sequence[Axis], slack: float) -> list[Bundle]:
     slack : what two directions may differ by besides their roundings [rad].
     """
     bundles = [_bundle(axes, members) for members in _parallel(axes, slack)]
+    for bundle in bundles:
+        _turn_to_base(bundle, slack)
     _make_square(bundles, slack)
     return bundles
+
+
+def _turn_to_base(bundle: Bundle, slack: float) -> None:
+    """Turn a bundle onto the axis of the base that it is along up to rounding: tasks and targets count along these."""
+    place = int(np.abs(bundle.along).argmax())
+    axis = np.sign(bundle.along[place]) * np.eye(3)[place]
+    if np.linalg.norm(bundle.along - axis) <= bundle.stiff + slack:
+        bundle.along, bundle.stiff = axis, 0.0
 
 
 def _parallel(axes: Sequence[Axis], slack: float) -> list[list[int]]:
