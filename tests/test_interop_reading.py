@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -744,6 +745,73 @@ def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_can
         from_urdf(MIMIC.replace("mimic", "x"), base="arm", end_effector="fore")
     with pytest.raises(InvalidMechanism, match="no transmission"):
         from_urdf(MIMIC.replace("transmission", "x").replace("mimic", "x"), end_effector="fore")
+
+
+NO_LOOPS = """
+<sensor name="camera"><parent link="upper"/><child link="rod"/></sensor><disable_collisions link1="upper" link2="rod"/>
+<ros2_control name="upper" type="system"><joint name="A"/><link>rod</link></ros2_control><frame name="tool" link="rod"/>
+<gazebo reference="upper"><material>rod</material><sensor name="rod"><collision>upper</collision></sensor></gazebo>
+<gazebo><plugin name="p"><bodyName>upper</bodyName><frameName>rod</frameName></plugin></gazebo>
+<gazebo><joint name="ground" type="fixed"><parent>world</parent><child>base</child></joint></gazebo>"""
+"""Elements that close no loop, though some name two links."""
+
+OPEN = """
+<robot name="open" xmlns:drake="http://drake.mit.edu"><link name="base"/><link name="upper"/><link name="rod"/>
+  <joint name="A" type="continuous"><parent link="base"/><child link="upper"/></joint>
+  <joint name="D" type="continuous"><parent link="base"/><child link="rod"/><origin xyz=".1 0 0"/></joint>
+  <transmission name="t"><joint name="A"/></transmission>{}</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("element", "named"),
+    [
+        ('<loop_joint name="C"><link1 link="upper"/><link2 link="rod"/></loop_joint>', "<loop_joint> 'C'"),
+        ('<drake:ball_constraint><a name="upper"/><b name="rod"/></drake:ball_constraint>', "<ball_constraint>"),
+        ('<constraint links="upper, rod" type="point"/>', "<constraint>"),
+        ("<gazebo><joint name='C'><parent>upper</parent><child>rod</child></joint></gazebo>", "<gazebo><joint> 'C'"),
+        ("<gazebo><joint name='C'><parent>a::upper</parent><child>a::rod</child></joint></gazebo>", "<joint> 'C'"),
+        ('<mujoco><equality><connect body1="upper" body2="rod"/></equality></mujoco>', "<equality><connect>"),
+    ],
+)
+def test_what_binds_two_links_and_is_not_read_is_refused_by_its_name(element: str, named: str) -> None:
+    assert len(from_urdf(OPEN.format(NO_LOOPS), end_effector="upper").mechanism.joints) == 1
+    with pytest.raises(InvalidMechanism, match=r"bond of .* not read; expected the loop in a file of loops") as caught:
+        from_urdf(OPEN.format(NO_LOOPS + element), end_effector="upper")
+    assert len(caught.value.faults) == 1 and named in str(caught.value)
+    if "a::" not in element:  # told in a file of loops it is read
+        loops = {"loops": [{"name": "C", "links": ["rod", "upper"], "at": [[0, 0, 0.2], [0.1, 0, 0.2]]}]}
+        closed = from_urdf(OPEN.format(NO_LOOPS + element), loops, end_effector="upper").mechanism
+        assert {joint.name for joint in closed.joints} == {"A", "C", "D"}
+
+
+def test_import_says_what_check_says_of_the_file_that_it_wrote(tmp_path: Path) -> None:
+    limits = '<limit lower="-30" upper="30" effort="1" velocity="1"/></joint><joint name="D"'
+    (tmp_path / "robot.urdf").write_text(
+        OPEN.format("").replace('</joint>\n  <joint name="D"', limits).replace("continuous", "revolute", 1)
+    )
+    command = ["import", str(tmp_path / "robot.urdf"), "--end-effector", "upper", "-o", str(tmp_path / "machine.toml")]
+    _, _, err = run(*command)
+    said = [line for line in run("check", str(tmp_path / "machine.toml"))[2].splitlines() if "note: " in line]
+    assert any("were degrees meant" in line for line in said)
+    assert set(said) <= set(err.splitlines())
+    assert "were degrees meant" in run(*command, "--force", "--json")[1]
+
+
+@pytest.mark.parametrize(
+    ("old", "bond", "named"),
+    [
+        ("{equality}", '<tendon name="e" tendon1="cable"/>', "equality <tendon> 'e'"),
+        ('name="cable"', 'name="cable" range="-1 1"', "tendon <fixed> 'cable'"),
+        ("<tendon>", '<default><tendon limited="true" range="0 1"/></default><tendon>', "tendon <fixed> 'cable'"),
+        ("<tendon>", '<bonds><bond body1="a" body2="c"/></bonds><tendon>', "<bonds><bond>"),
+    ],
+)
+def test_a_bond_of_a_model_that_is_not_read_is_refused_by_its_name(old: str, bond: str, named: str) -> None:
+    text = GEARS.replace(old, bond).format(equality="", actuator='<motor joint="qa"/>')
+    with pytest.raises(InvalidMechanism, match=re.escape(named)):
+        from_mjcf(text, end_effector="c")
+    if named.startswith("equality"):
+        assert from_mjcf(text.replace('"e"', '"e" active="false"'), end_effector="c").mechanism
 
 
 def test_frames_that_are_called_closing_close_loops_as_a_second_file_does() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
 
     FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed;
     collision geometry becomes shapes of bodies.
-    All that is left out or changed is told on stderr, by name.
+    All that is left out or changed is told on stderr, by name, with the remarks of `check` on what came out.
     """
     refuse_existing(output, force)
     check_outputs([("-o", output)], [file])
@@ -58,7 +59,12 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
             complain(remark)
         raise
     from ..files import dumps
+    from ..interop.notes import Note
+    from .check_remarks import remarks_on
 
+    said = [*map(str, model.notes)]
+    remarks = [Note(remark) for remark in remarks_on(model.mechanism) if not remark.startswith(tuple(said))]
+    model = dataclasses.replace(model, notes=(*model.notes, *remarks))
     name = "".join(letter for letter in file.name if letter.isprintable())
     text = f"# imported from {name}; to compare: pfabrik verify THIS --original {name}\n\n{dumps(model.mechanism)}"
     if as_json:

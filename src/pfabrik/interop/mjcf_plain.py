@@ -6,7 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
+from ..errors import InvalidMechanism
 from .notes import Note
+from .unread_loops import unread_loops
 from .xml_reading import fault
 
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
@@ -40,6 +42,9 @@ TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
 MOST_COPIES = 1000
 """Most copies that `replicate` may make, of copies too."""
 
+STILL = ("option", "size", "visual", "statistic", "custom", "extension", "include")
+"""Sections that neither move nor hold anything."""
+
 UNNOTED = ("inertial", "light", "camera", "plugin", "geom")
 """Elements inside bodies that nobody would look for in a mechanism, and geoms, which `mjcf_geoms` reads."""
 
@@ -62,12 +67,18 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
             plain.append(_actuators(section, notes))
         elif section.tag in ("tendon", "contact", "deformable", "sensor"):
             others = [child for child in section if child.tag not in ("pair", "exclude")]
+            for child in others if section.tag == "tendon" else []:
+                _require_unlimited(child, root)
             nameless = Counter(child.tag for child in others if not child.get("name"))
             names = (*filter(None, (child.get("name") for child in others)), *_counted(nameless))
             if names:
                 notes.append(Note(f"{section.tag}s are left out", names))
         elif section.tag == "asset":
             omitted.update(child.tag for child in section)
+        elif section.tag not in STILL:
+            bodies = {body.get("name", "") for body in root.iter("body")} | {"world"}
+            for each in unread_loops(section, bodies, "world", (), "connect, weld or joint of an equality"):
+                raise InvalidMechanism([each])
     compiler.attrib |= {"boundmass": "1", "boundinertia": "1"}  # what moves has a mass; which one does not matter
     counted = _counted(Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED}))
     if counted:
@@ -112,9 +123,22 @@ def _equalities(section: ET.Element, notes: list[Note]) -> ET.Element:
     for child in section:
         if child.tag in ("connect", "weld", "joint"):
             kept.append(ET.Element(child.tag, _attributes(child, f"{child.tag} of equality")))
-        else:
+        elif child.get("active") == "false":
             notes.append(Note(f"an equality of a {child.tag} is left out", (child.get("name", "without a name"),)))
+        else:
+            place = f"equality <{child.tag}> '{child.get('name', '')}'"
+            raise fault(place, "a bond that is not read", "connect, weld or joint, or a model without it")
     return kept
+
+
+def _require_unlimited(tendon: ET.Element, root: ET.Element) -> None:
+    """Refuse a tendon whose length is limited: it holds its joints or bodies together."""
+    defaults = [each for each in root.iter("default") if each.get("class", "main") == tendon.get("class", "main")]
+    said = {key: text for each in defaults for kind in each.iterfind("tendon") for key, text in kind.attrib.items()}
+    said |= tendon.attrib
+    if said.get("limited", "auto") == "true" or ("range" in said and said.get("limited") != "false"):
+        place = f"tendon <{tendon.tag}> '{tendon.get('name', '')}'"
+        raise fault(place, "a limit of its length, which is not read", "connect, weld or joint, or a model without it")
 
 
 def _actuators(section: ET.Element, notes: list[Note]) -> ET.Element:

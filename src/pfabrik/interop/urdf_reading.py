@@ -7,19 +7,22 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
+from ..errors import InvalidMechanism
 from .assembling import Imported
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .driving import Rates
 from .loops_file import LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, noting
-from .opened import loops_by_name
+from .opened import Loop, loops_by_name
 from .robots import Robot, mechanism_of
+from .unread_loops import unread_loops
 from .urdf_collision import read_collision
 from .urdf_links import UrdfJoint, UrdfLinks, numbers_in, read_links
 from .xml_reading import read_xml
@@ -71,9 +74,20 @@ def from_urdf(
         loops_file = read_loops(loops)
         links = read_links(element, loops_file.retyped)
         robot = replace(_robot(links, loops_file, notes), collision=read_collision(element, links, notes))
+        _require_read_loops(element, links, robot.loops)
         motors = [name for name in loops_file.actuated if name in links.link_of] or None
         drives = motors if actuated is None else actuated
         return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task)
+
+
+def _require_read_loops(element: ET.Element, links: UrdfLinks, loops: Sequence[Loop]) -> None:
+    """Refuse elements beside links and joints that bind two links, unless a file of loops says how."""
+    known = {frozenset(loop.connects) for loop in loops}
+    parts = [part for each in element for part in (each if each.tag in ("link", "joint") else [each])]
+    remedy = "the loop in a file of loops (--loops), or a description without this element"
+    faults = [fault for part in parts for fault in unread_loops(part, links.frames, links.root, known, remedy)]
+    if faults:
+        raise InvalidMechanism(faults)
 
 
 def _robot(links: UrdfLinks, loops_file: LoopsFile, notes: list[Note]) -> Robot:
