@@ -19,6 +19,7 @@ from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
 from .model import model_of
+from .motion.tilt_axis import along_tilt, tilt_axis
 from .options import Options, checked_options
 from .poses import DOUBLE
 from .targets import Target
@@ -68,6 +69,7 @@ class Solver:
         self.status = Status.INVALID
         self._solution: Solution | None = None
         self._was_forward = False
+        self._has_tilt_axis = tilt_axis(mechanism) is not None
         self._clear()
 
     def ik(self, target: Target) -> Status:
@@ -82,7 +84,7 @@ class Solver:
         InvalidArgument : as of `solve_ik`; then `status` is INVALID.
         """
         if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE:
-            self._target[0] = target
+            self._target[0] = along_tilt(self.mechanism, target[None])[0] if self._has_tilt_axis else target
             if self._reach is not None and not self._reach():
                 self._solution, self._was_forward, self.status = None, False, Status.REACHED
                 return Status.REACHED

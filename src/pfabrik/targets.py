@@ -15,6 +15,7 @@ from .errors import InvalidArgument
 from .kernels.rows import INVALID
 from .motion.displacements import columns
 from .motion.joint_path import path_of
+from .motion.tilt_axis import along_tilt
 from .options import Options
 from .poses import DOUBLE, SupportsMatrix, as_floats, as_poses, what_is_wrong
 
@@ -23,7 +24,7 @@ Target: TypeAlias = ArrayLike | SupportsMatrix | Mapping[str, ArrayLike]
 
 
 def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int, ...]]:
-    """Targets as poses (n, 4, 4), C-contiguous, and the batch shape they came in.
+    """Targets as poses (n, 4, 4), C-contiguous, and the batch shape they came in; tilts as of `along_tilt`.
 
     Raises
     ------
@@ -32,13 +33,13 @@ def as_targets(mechanism: Mechanism, target: Target) -> tuple[Floats, tuple[int,
     """
     checked_mechanism(mechanism)
     if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE and target.flags.carray:
-        return target[None], ()
+        return along_tilt(mechanism, target[None]), ()
     if isinstance(target, Mapping):
         return _from_joints(mechanism, target)
     poses, shape = as_poses(target)
     if not any(task_of(mechanism).axes) and np.shape(cast(Any, target)) == (*shape, 3):
         raise InvalidArgument("target", "positions", f"poses: the task of '{mechanism.name}' has no position")
-    return poses, shape
+    return along_tilt(mechanism, poses), shape
 
 
 def carrying_joint(mechanism: Mechanism) -> str | None:

@@ -24,6 +24,7 @@ from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
 from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
+from .motion.tilt_axis import tilt_axis
 from .poses import as_floats
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
@@ -219,7 +220,8 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
     if is_at_limit and not has_dependent_coordinates(mechanism):
         return ""
     motions, axes = motions_at(mechanism, end._coordinates), list(task.axes)
-    about = task.turning_axes(end.pose) if len(motions) > 3 else np.zeros((0, 3))
+    turning = task.turning_axes(end.pose) if tilt_axis(mechanism) is None else np.eye(3)
+    about = turning if len(motions) > 3 else np.zeros((0, 3))
     able = np.concatenate([motions[:3][axes], about @ motions[3:] if len(about) else motions[:0]])
     blocked = np.concatenate([velocity[axes], about @ turn])
     remainder = blocked - able @ np.linalg.lstsq(able, blocked, rcond=TOLERANCES.alignment)[0]
@@ -245,14 +247,18 @@ def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floa
 
 def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, default: bool) -> Floats:
     """Checked axes of rotation, unit vectors (n, 3)."""
-    task = task_of(mechanism)
+    task, only = task_of(mechanism), tilt_axis(mechanism)
     rotations = task.rotations
     if about is None:
-        chosen = task.turning_axes(solution.pose) if default else np.zeros((0, 3))
+        turning = task.turning_axes(solution.pose) if only is None else only[None]
+        chosen = turning if default else np.zeros((0, 3))
         return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
     axes = _directions("about", about)
     off = np.abs(axes[:, :2]).max(axis=1, initial=0.0) > TOLERANCES.alignment
     _require_task(mechanism, "about", axes, off if rotations == 1 else np.full(len(axes), rotations == 0))
+    if only is not None:  # meant, if typed to a few digits
+        is_only = np.linalg.norm(np.cross(axes, only), axis=1) <= TOLERANCES.file_angle
+        axes[is_only] = np.sign(axes[is_only] @ only)[:, None] * only
     return axes
 
 

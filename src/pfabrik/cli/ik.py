@@ -11,8 +11,9 @@ import pfabrik as pf
 
 from ..answers.aligned_text import aligned
 from ..answers.aligned_text import plain as plain_number
+from ..tolerances import TOLERANCES
 from .arguments import MECH, TargetOptions, load, note_left_out, note_unused_projection, projecting, targeted
-from .printing import json_option, print_answer
+from .printing import json_option, note, print_answer
 
 if TYPE_CHECKING:
     from ..description.joints import Vector
@@ -58,6 +59,7 @@ def ik(
     mechanism = load(mech)
     pose = target.of(mechanism)
     note_left_out(ignored(mechanism, target), mechanism)
+    note_only_tilt(mechanism, pose)
     if list_all:
         note_unused_projection("--all")
         return print_working_modes(mechanism, pose, as_json)
@@ -73,6 +75,17 @@ def ik(
 
     print_answer(as_json, lambda: as_object(solution, with_margins, held), in_words)
     return 0 if solution else 1
+
+
+def note_only_tilt(mechanism: pf.Mechanism, target: Target) -> None:
+    """Note what does not count of a tilt where the end effector tilts about one axis alone."""
+    from ..motion.tilt_axis import tilt_axis
+    from ..targets import as_poses, as_targets
+    from .info_report import vector
+
+    axis = tilt_axis(mechanism)
+    if axis is not None and abs(as_targets(mechanism, target)[0] - as_poses(target)[0]).max() > TOLERANCES.alignment:
+        note(f"of the tilt only the angle about {vector(axis)} counts, about which alone the end effector tilts")
 
 
 def ignored(mechanism: pf.Mechanism, target: TargetOptions) -> Iterator[str]:

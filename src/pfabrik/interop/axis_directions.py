@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from ..arrays import Floats
+from ..tolerances import TOLERANCES
 from .digits import Rounding
 
 ROUNDED = 1e-14
@@ -100,10 +101,11 @@ def bundles_of(axes: Sequence[Axis], slack: float) -> list[Bundle]:
 
 
 def _turn_to_base(bundle: Bundle, slack: float) -> None:
-    """Turn a bundle onto the axis of the base that it is along up to rounding: tasks and targets count along these."""
+    """Turn a bundle onto the axis of the base that it is along up to rounding, for targets count along these; by no more
+    than counts as parallel: then it is not turned against what else its body carries."""
     place = int(np.abs(bundle.along).argmax())
     axis = np.sign(bundle.along[place]) * np.eye(3)[place]
-    if np.linalg.norm(bundle.along - axis) <= bundle.stiff + slack:
+    if np.linalg.norm(bundle.along - axis) <= min(bundle.stiff, TOLERANCES.alignment) + slack:
         bundle.along, bundle.stiff = axis, 0.0
 
 

@@ -99,7 +99,7 @@ def _roundings_of_hinges(opened: OpenMechanism, joints: Sequence[Joint]) -> Iter
 def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: float, locked: Set[int]) -> list[Rounding]:
     """The rounding of every joint; where nothing is known, that of the worst digits of files."""
     coarsest = worst(known.values()) if known else Rounding(TOLERANCES.file_gap * size, TOLERANCES.file_angle)
-    aligned = Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment) if known else NOTHING
+    aligned = Rounding(TOLERANCES.alignment * size, TOLERANCES.file_angle) if known else NOTHING
     roundings = []
     for index, joint in enumerate(joints):
         rounding, most = known.get(joint.name, coarsest), coarsest if index in locked else aligned

@@ -16,6 +16,7 @@ from ..description.task import task_of
 from ..errors import InvalidArgument, UnknownName
 from ..motion.displacements import columns, home_coordinates
 from ..motion.mobility import generic_of
+from ..motion.tilt_axis import tilt_axis
 from ..poses import SupportsMatrix, is_rotation
 from ..rotations import from_rotvec
 from ..targets import as_targets, carrying_joint
@@ -24,7 +25,8 @@ from ..tolerances import TOLERANCES
 POSITIONS = ("x", "y", "z")
 TURNS = ("tilt_x", "tilt_y", "yaw")
 """Rotations: a tilt vector in the base's x, y plane, about which the platform is turned by its length [rad], after a
-twist about z. R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held."""
+twist about z. R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held. Of an end effector that
+tilts about one axis alone, the tilt about x or y that is nearer to it is the angle about this axis."""
 
 MOST = 3
 """Largest number of coordinates of a workspace."""
@@ -81,7 +83,11 @@ class Space:
         poses[:, :3, 3] = np.stack([value[name] for name in POSITIONS], axis=1)
         if any(value[name].any() for name in TURNS):
             none = np.zeros(len(coordinates))
-            tilted = from_rotvec(np.stack([value["tilt_x"], value["tilt_y"], none], axis=1))
+            tilts = np.stack([value["tilt_x"], value["tilt_y"], none], axis=1)
+            axis = tilt_axis(self.mechanism)
+            if axis is not None:  # a tilt is an angle about it
+                tilts = (tilts @ np.sign(axis))[:, None] * axis
+            tilted = from_rotvec(tilts)
             poses[:, :3, :3] = tilted @ from_rotvec(np.stack([none, none, value["yaw"]], axis=1)) @ self.rotation
         else:
             poses[:, :3, :3] = self.rotation
@@ -147,7 +153,10 @@ def free_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
             f"an end effector of which {', '.join(places)} change in {rank} directions, across the axes of the base",
             "a base frame turned so that it moves along its axes",
         )
+    axis = tilt_axis(mechanism)
     turned = moves[3:] if len(moves) > 3 else np.zeros(3, bool)
+    if axis is not None:
+        turned = np.arange(3) == np.abs(axis[:2]).argmax()
     return (*places, *compress(TURNS, np.logical_and(task.turns, turned)))
 
 

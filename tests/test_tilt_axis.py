@@ -1,0 +1,98 @@
+"""End effectors that tilt about one axis alone: in any plane a tilt is measured along that freedom, and by it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from machines.redescribed import moved
+from pfabrik.interop import from_mjcf
+from rounded_files import Hinge, Linkage, model_text
+
+UPRIGHT = Rotation.from_rotvec([np.pi / 2, 0.0, 0.0]).as_matrix()
+TURNS = [Rotation.from_rotvec(vector).as_matrix() for vector in ([0.0, 0.0, 0.7], [0.4, -0.5, 0.9], [0.5, 0.3, -0.4])]
+"""Rotations of the base: with the first a plane stays upright, with the others it leans."""
+
+BODIES, AT = ("world", "thigh", "shank", "foot"), np.array([[0.0, 0.0, 0.0], [0.1, 0.0, -0.3], [0.0, 0.0, -0.6]])
+
+
+def hinges(turn: np.ndarray) -> list[Hinge]:
+    """A leg of three hinges in a plane, turned."""
+    ends = zip(("hip", "knee", "ankle"), BODIES[:-1], BODIES[1:], AT, strict=True)
+    return [Hinge(name, parent, child, turn @ at, turn @ [0.0, 1.0, 0.0]) for name, parent, child, at in ends]
+
+
+def arm(turn: np.ndarray) -> pf.Mechanism:
+    joints = [
+        pf.Joint(each.name, "revolute", each[1:3], each.at, axis=each.axis, actuated=True, range=(-1.0, 1.0))
+        for each in hinges(turn)
+    ]
+    return pf.Mechanism("arm", joints, "foot", turn @ [0.05, 0.0, -0.65], "world", task=("x", "z", "tilt"))
+
+
+def platform(turn: np.ndarray) -> pf.Mechanism:
+    return moved(pf.load("rrr"), turn @ UPRIGHT, np.zeros(3))._with(task=("x", "z", "tilt"))
+
+
+def off_the_plane(poses: np.ndarray, axis: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Poses whose z axis has another part along an axis, and the same direction across it."""
+    targets = poses.copy()
+    for target in targets:
+        z = target[:3, 2] + rng.uniform(-0.7, 0.7) * axis
+        first = np.cross(z, rng.normal(size=3))
+        first, z = first / np.linalg.norm(first), z / np.linalg.norm(z)
+        target[:3, :3] = np.stack([first, np.cross(z, first), z], axis=1)
+    return targets
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), *TURNS], ids=["base", "upright", "leaning", "further"])
+@pytest.mark.parametrize("build", [arm, platform])
+def test_what_of_a_tilt_is_off_the_only_freedom_does_not_count(
+    build: Callable[[np.ndarray], pf.Mechanism], turn: np.ndarray
+) -> None:
+    machine, rng = build(turn), np.random.default_rng(3)
+    values = np.linspace(0.0, 1.0, 12)[:, None] * rng.uniform(-0.1, 0.1, 3) + rng.uniform(-1e-3, 1e-3, (12, 3))
+    known = pf.solve_fk(machine, values + [drive.home for drive in machine.drives])
+    assert all(known)
+    targets = off_the_plane(known.pose, turn @ [0.0, 1.0, 0.0], rng)
+    start, solver = pf.solve_ik(machine, machine.home_pose), pf.Solver(machine)
+    for answers in (
+        pf.solve_ik(machine, targets),
+        pf.solve_ik(machine, targets, start=start),
+        pf.track(machine, targets),
+    ):
+        assert all(answers)
+        assert answers.actuators == pytest.approx(known.actuators, abs=1e-6)
+        assert np.asarray(answers.rotation_error) == pytest.approx(0.0, abs=1e-9)
+    assert (pf.feasibility(machine, targets).margin >= 0.0).all()
+    assert solver.ik(np.ascontiguousarray(targets[5])) == pf.Status.REACHED
+    assert solver.actuators == pytest.approx(known.actuators[5], abs=1e-6)
+    leant = [reach for reach in pf.travel(start).reaches if reach.kind == "about"]
+    level = [
+        reach
+        for reach in pf.travel(pf.solve_ik(build(np.eye(3)), build(np.eye(3)).home_pose)).reaches
+        if reach.kind == "about"
+    ]
+    assert sorted(each.distance for each in leant) == pytest.approx(sorted(each.distance for each in level), rel=1e-3)
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), *TURNS], ids=["base", "upright", "leaning", "further"])
+@pytest.mark.parametrize("digits", [6, 7])
+def test_a_model_of_a_few_digits_answers_typed_angles_as_the_exact_one(turn: np.ndarray, digits: int) -> None:
+    linkage = Linkage(hinges(turn), ["hip", "knee", "ankle"], "foot", 3)
+    exact, rounded = (
+        from_mjcf(model_text(linkage, count), end_effector="foot", task=["x", "z", "tilt"]).mechanism
+        for count in (17, digits)
+    )
+    targets = pf.pose(
+        np.array(exact.reference_point) + [[0.02, 0.0, 0.03]] * 3, rpy=[[0, 5, 0], [4, 0, 0], [3, -6, 20]], degrees=True
+    )
+    one, other = (pf.solve_ik(each, targets) for each in (exact, rounded))
+    assert all(one) and all(other)
+    assert other.actuators == pytest.approx(one.actuators, abs=1e-5 if digits == 7 else 1e-4)
+    if turn is not TURNS[0] and np.allclose(turn, np.eye(3)):
+        assert all(np.abs(joint.axis).tolist() == [0.0, 1.0, 0.0] for joint in rounded.joints)
