@@ -31,8 +31,8 @@ FIRST_REACH = {True: 2.5, False: 1.5}
 """Extent of the first grid to each side [L or rad], by whether closed forms give margins."""
 
 
-def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[BorderMesh, BorderMesh, Parts]:
-    """The border at cells of size `step`, (d,), the border at cells twice as large, and the connected parts."""
+def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[BorderMesh, Parts]:
+    """The border at cells of size `step`, (d,), and the connected parts."""
     space, exact = question.space, question.has_margins
     lattice = (PositionLattice if question.follows_positions else Lattice)(space.start, step, measure)
     unit = np.where(space.is_angle, 1.0, question.mechanism.characteristic_length)
@@ -41,7 +41,7 @@ def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[Bor
     reach = math.ceil(FIRST_REACH[exact] / (widest * 2**levels))
     cells = refined(lattice, levels, max(reach, 2))
     mesh = without_ties(question, mesh_of(lattice, cells.border))
-    return mesh, mesh_of(lattice, cells.coarser), Parts(lattice, cells)
+    return mesh, Parts(lattice, cells)
 
 
 def step_of(question: MapQuestion, resolution: float | None) -> Floats:
@@ -61,7 +61,7 @@ def step_of(question: MapQuestion, resolution: float | None) -> Floats:
 
 def sliced(
     question: MapQuestion, fixed: Mapping[str, float], resolution: Floats | float
-) -> tuple[MapQuestion, Floats, BorderMesh, BorderMesh, Parts]:
+) -> tuple[MapQuestion, Floats, BorderMesh, Parts]:
     """A question with further coordinates fixed, the size of the smallest cells, and the result of `searched`."""
     space = question.space.with_fixed(fixed)
     kept = [question.space.names.index(name) for name in space.names]

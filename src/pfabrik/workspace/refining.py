@@ -68,10 +68,9 @@ class Cells(NamedTuple):
 
 
 class Refined(NamedTuple):
-    """Cells at the border, the smallest and those of twice their width, and cells all within, of any size."""
+    """Cells at the border, the smallest, and cells all within, of any size."""
 
     border: Cells
-    coarser: Cells
     within: tuple[Cells, ...]
 
 
@@ -85,15 +84,12 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
     """
     cells = _first(lattice, levels, reach)
     within: list[Cells] = []
-    coarser = cells
     while True:
         cells = _with_neighbours(lattice, cells.at(cells.touched | cells.thin))
         inside = cells.inside
         crossed = cells.touched & ~inside
-        if cells.width == 2:
-            coarser = cells.at(crossed)
         if cells.width == 1:
-            return Refined(cells.at(crossed), coarser, (*within, cells.at(inside)))
+            return Refined(cells.at(crossed), (*within, cells.at(inside)))
         divided = ~inside
         divided[inside] = cells.at(inside).thin
         within.append(cells.at(~divided))

@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
 from ..poses import as_floats
 from .parts import Parts
-from .surface import BorderMesh
+from .surface import BorderMesh, closeness
 from .verdicts import Limits, MapQuestion
 
 EXPONENTS = {1: "", 2: "²", 3: "³"}
@@ -25,11 +25,10 @@ class Region:
         question: MapQuestion,
         resolution: Floats,
         mesh: BorderMesh,
-        coarser: BorderMesh,
         parts: Parts,
         part: int | None = None,
     ) -> None:
-        self._question, self._mesh, self._coarser, self._parts, self._part = question, mesh, coarser, parts, part
+        self._question, self._mesh, self._parts, self._part = question, mesh, parts, part
         self.mechanism, self.names, self.units = question.mechanism, question.space.names, question.space.units
         self.vertices, self.faces, self.vertex_limit = mesh.vertices, mesh.faces, mesh.limits
         self.resolution = resolution
@@ -50,10 +49,10 @@ class Region:
         """Area or volume [`size_unit`]; of a tilt and a length, say, their product."""
         return self._mesh.size
 
-    @property
+    @cached_property
     def uncertainty(self) -> float:
-        """Difference of `size` from the size at twice the resolution [`size_unit`]."""
-        return abs(self._mesh.size - self._coarser.size)
+        """The most that `size` is off where nothing is smaller than a cell [`size_unit`]."""
+        return self._mesh.error(self.resolution, closeness(self._question))
 
     @property
     def size_unit(self) -> str:

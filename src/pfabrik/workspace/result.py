@@ -44,13 +44,12 @@ class Workspace(Region):
         """The connected components, each a workspace of its own: that of the start first, then by size."""
         if self._part is not None:
             return (self,)
-        labels, coarse = (self._parts.labels[mesh.inner] for mesh in (self._mesh, self._coarser))
+        labels = self._parts.labels[self._mesh.inner]
         components = []
         for part in range(self._parts.count):
             mesh = self._mesh.among(labels == part)
             if len(mesh.faces):
-                coarser = self._coarser.among(coarse == part)
-                components.append(Workspace(self._question, self.resolution, mesh, coarser, self._parts, part))
+                components.append(Workspace(self._question, self.resolution, mesh, self._parts, part))
         start = self._start_part
         return tuple(sorted(components, key=lambda each: (each._part != start, -each.size)))
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def in_words(region: Region, *, degrees: bool = True) -> str:
-    """The size of a workspace, to the digit that is uncertain: "4,970,000 ± 2,000 mm³".
+    """The size of a workspace, to the digit that is uncertain, and a bound of its error: "4,970,000 ± 9,000 mm³".
 
     Parameters
     ----------
@@ -20,7 +20,9 @@ def in_words(region: Region, *, degrees: bool = True) -> str:
     if degrees:
         factor = math.degrees(1.0) ** region.units.count("rad")
         size, uncertainty, unit = factor * size, factor * uncertainty, unit.replace("rad", "deg")
-    return f"{rounded(size, uncertainty)} ± {rounded(uncertainty, uncertainty)} {unit}"
+    digit = 10.0 ** math.floor(math.log10(uncertainty)) if uncertainty > 0.0 else 1.0
+    bound = digit * math.ceil(uncertainty / digit + 0.5 * (uncertainty > 0.0))  # holds for the rounded size too
+    return f"{rounded(size, uncertainty)} ± {rounded(bound, uncertainty)} {unit}"
 
 
 def kind_of(region: Region, name: str) -> str:

@@ -17,9 +17,18 @@ import numpy as np
 from ..arrays import Floats, Ints, Mask
 from .refining import Cells
 from .sampled_lattice import Lattice
+from .verdicts import MapQuestion
 
 CLOSE, CLOSE_ONE_BY_ONE = 1e-3, 1e-2
 """Accuracy of vertices, where closed forms give margins and elsewhere [steps of the lattice]."""
+
+STEEPEST = 5.0
+"""Slope of a face to its neighbour beyond which a corner is no longer taken to be longer."""
+
+LEAST_WIDTH = 0.05
+"""Width of a face below which its direction is uncertain, so that it tells less of how the border bends [cells]."""
+
+TINY = 1e-300
 
 Edge: TypeAlias = tuple[int, int]
 Face: TypeAlias = tuple[Edge, ...]
@@ -63,6 +72,33 @@ class BorderMesh(NamedTuple):
             return np.asarray(np.linalg.norm(sides[:, 0], axis=1))
         return np.asarray(0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1))
 
+    def error(self, step: Floats, close: float) -> float:
+        """The most that `size` may be off, for a border whose features are as large as cells, (d,), or larger.
+
+        Between its vertices, a border that bends one way is on the outer side of each face and on the inner sides of
+        its neighbours, extended: in a plane, within a triangle on the segment of length l with base angles t1 and t2,
+        whose area is at most l² (tan t1 + tan t2) / 8. In space this is integrated along the edges of triangles, whose
+        width falls to 0 beside an edge. Vertices are up to `close` of a cell too far inside.
+        """
+        if not len(self.faces):
+            return 0.0
+        d, scaled = len(step), self._replace(vertices=self.vertices / step)
+        ends, places = scaled.vertices[self.faces], np.arange(d)
+        along = ends[:, 1:] - ends[:, :1]
+        normals = along[:, 0, ::-1] * (1.0, -1.0) if d == 2 else np.cross(along[:, 0], along[:, 1])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+        sides = np.sort(np.stack([self.faces[:, np.roll(places, -k)[: d - 1]] for k in places], axis=1), axis=2)
+        order = np.lexsort(sides.reshape(-1, d - 1).T).reshape(-1, 2)  # both faces beside each edge
+        cosines = np.einsum("ei,ei->e", *normals[order.T // d])
+        slopes = np.minimum(np.sqrt(np.maximum(1.0 - cosines**2, 0.0)) / np.maximum(cosines, TINY), STEEPEST)
+        lengths = np.ones((len(sides), d))
+        if d == 3:
+            lengths = np.linalg.norm(scaled.vertices[sides[..., 0]] - scaled.vertices[sides[..., 1]], axis=2)
+        widths = ((d - 1) * scaled.face_sizes[:, None] / np.maximum(lengths, TINY)).ravel()[order]
+        squares = (widths**2 * np.minimum(widths[:, ::-1] / LEAST_WIDTH, 1.0)).sum(axis=1)
+        bent = lengths.ravel()[order[:, 0]] @ (slopes * squares) / (4.0 * d)
+        return float((bent + close * scaled.face_sizes.sum()) * np.prod(step))
+
     def among(self, chosen: Mask) -> BorderMesh:
         """The faces all of whose vertices, (v,), are chosen, and these alone."""
         faces = self.faces[chosen[self.faces].all(axis=1)]
@@ -75,7 +111,7 @@ class BorderMesh(NamedTuple):
 def mesh_of(lattice: Lattice, cells: Cells) -> BorderMesh:
     """The mesh of the border through cells that it does not leave."""
     ends, faces = crossed_edges(cells, len(lattice.points))
-    vertices, limits, inner = _vertices(lattice, ends, faces, cells.width)
+    vertices, limits, inner = _vertices(lattice, ends, faces)
     return BorderMesh(vertices, faces, limits, inner)
 
 
@@ -143,11 +179,16 @@ def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
             yield edges[leaving % 4], edges[k - 1]
 
 
-def _vertices(lattice: Lattice, ends: Ints, faces: Ints, width: int) -> tuple[Floats, Ints, Ints]:
+def closeness(question: MapQuestion) -> float:
+    """How far inside the border vertices are at most [cells]."""
+    return CLOSE if question.has_margins else CLOSE_ONE_BY_ONE
+
+
+def _vertices(lattice: Lattice, ends: Ints, faces: Ints) -> tuple[Floats, Ints, Ints]:
     """The crossings of the border with edges, their limits, and the ends within; (e, ...) each."""
     sides = np.concatenate([faces[:, (k, (k + 1) % faces.shape[1])] for k in range(faces.shape[1])])
     within, every = (lattice.margins[ends[1]] >= 0.0).astype(np.int64), np.arange(ends.shape[1])
     inner = ends[within, every]
-    close = (CLOSE if lattice.measure.question.has_margins else CLOSE_ONE_BY_ONE) / width
+    close = closeness(lattice.measure.question)
     points, limits = lattice.crossings(np.stack([inner, ends[1 - within, every]]), sides, close)
     return points, limits, inner
