@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument
-from pfabrik.workspace.singular import _locus
+from pfabrik.workspace.locus import locus
 from pfabrik.workspace.singular_slices import Field, slices_of
 
 Array = NDArray[np.float64]
@@ -99,8 +99,8 @@ def test_slices_cut_the_locus_where_it_is() -> None:
     places = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     step = np.full(3, 0.1)
     values = np.linalg.norm(places * step, axis=1) - 1.0
-    vertices, faces = _locus(places, values)
-    slices = slices_of(Field(places * step, step, np.abs(values)), vertices * step, faces)
+    vertices, faces = locus(places, places * step, values)
+    slices = slices_of(Field(places * step, step, np.abs(values)), vertices, faces)
     assert len(slices) == 4
     for each in slices:
         radius = np.sqrt(1.0 - each.level**2)
@@ -115,7 +115,7 @@ def test_slices_stand_across_the_locus() -> None:
     """A plane square to z is seen in slices across x or y; across z it would fill one of them, or none."""
     steps = np.arange(-5, 6)
     places = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
-    vertices, faces = _locus(places, places[:, 2] - 0.5)
+    vertices, faces = locus(places, places, places[:, 2] - 0.5)
     slices = slices_of(Field(places.astype(float), np.ones(3), np.ones(len(places))), vertices, faces)
     assert {each.axis for each in slices} == {1}
     assert all(each.locus[..., 1] == pytest.approx(0.5) for each in slices)

@@ -21,13 +21,12 @@ from ..ik import solve_ik
 from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
+from .locus import drawn_to_border, locus
 from .numbering import Numbering
 from .parts import connected
-from .refining import Cells
 from .result import Workspace
-from .sampled_lattice import codes, corners
+from .sampled_lattice import codes
 from .singular_picture import plot_map, plot_track
-from .surface import crossed_edges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -186,17 +185,23 @@ def singularity_map(
     places = _places(over, step)
     with telling("singularities", on_progress) as tell:
         reached, measures, signs = _measured(over, places * step + question.space.start, tell)
-    places = places[reached]
-    signed = np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel)
-    vertices, faces = _locus(places, signed)
+        places = places[reached]
+        outer, border = drawn_to_border(over, places, step)
+        at_border, *there = _measured(over, border, tell)
+    points, signed = places * step + question.space.start, _signed(measures, signs)
+    vertices, faces = locus(
+        np.concatenate([places, outer[at_border]]),
+        np.concatenate([points, border[at_border]]),
+        np.concatenate([signed, _signed(*there)]),
+    )
     return SingularityMap(
         workspace=over,
         step=step,
-        points=places * step + question.space.start,
+        points=points,
         measures=measures,
         signs=signs,
         parts=_parts(places, signed),
-        locus_vertices=vertices * step + question.space.start,
+        locus_vertices=vertices,
         locus_faces=faces,
     )
 
@@ -211,6 +216,11 @@ def _along(track: Track) -> SingularityTrack:
 
 def _of(answers: Solution) -> tuple[Singularity, Floats]:
     return singularity(answers), parallel_signs(answers.mechanism, answers._coordinates)
+
+
+def _signed(measures: Singularity, signs: Floats) -> Floats:
+    """The parallel measure, signed where signs have a meaning."""
+    return np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel)
 
 
 def _step(over: Workspace, resolution: float | None) -> Floats:
@@ -260,18 +270,6 @@ def _joined(blocks: list[Singularity]) -> Singularity:
     return Singularity(
         **numbers, kinds=[kinds for block in blocks for kinds in cast(list[tuple[str, ...]], block.kinds)]
     )
-
-
-def _locus(places: Ints, signed: Floats) -> tuple[Floats, Ints]:
-    """The zero set of a signed measure of lattice places (n, d): vertices (v, d) in steps, and faces (f, d)."""
-    numbering = Numbering()
-    numbering.number(codes(places))
-    around = numbering.find(codes(places[:, None] + corners(places.shape[1])))
-    whole = (around >= 0).all(axis=1)
-    cells = Cells(codes(places[whole]), 1, around[whole], signed[around[whole]])
-    (first, last), faces = crossed_edges(cells.at(cells.touched & ~cells.inside), len(places))
-    share = signed[first] / np.where(signed[first] == signed[last], 1.0, signed[first] - signed[last])
-    return np.asarray(places[first] + share[:, None] * (places[last] - places[first]), np.float64), faces
 
 
 def _parts(places: Ints, signed: Floats) -> Ints:
