@@ -15,7 +15,7 @@ export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 # Tests start many processes, and pytest rewrites every assertion: compiled files are kept, whatever the user's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo reproduce docs test test-tensors test-fast test-interpreted campaign check bench clean
+.PHONY: demo reproduce docs test test-processors test-tensors test-fast test-interpreted campaign check bench clean
 
 demo: $(READY) $(MODULE)
 	@$(BIN)/pfabrik demo
@@ -36,6 +36,11 @@ ROUTINES := tests/test_kernels.py tests/test_quadratic.py tests/test_platform_ke
 test: $(STAMP) $(MODULE)
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(ROUTINES)
 	@$(BIN)/python -m pytest -n auto --dist worksteal
+
+# The programs of the pages again, with the linear algebra of other processors.
+test-processors: $(STAMP) $(MODULE)
+	@for core in Haswell Zen Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
+		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal tests/test_docs.py || exit 1; done
 
 test-fast: $(STAMP) $(MODULE)
 	@$(BIN)/python -m pytest -m "not slow and not campaign"

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo, whole: pip install '.[dev]'", exc_type=ImportError)
 
 LED = 15
 """Steps in which driven joints are led to their values."""

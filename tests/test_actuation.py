@@ -6,12 +6,11 @@ import dataclasses
 from functools import cache
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, mujoco
 from pfabrik import Actuation, Joint, Mechanism, Status
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
 

@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-import mujoco
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -16,7 +15,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, mujoco
 from pfabrik.answers.active_limits import ActiveLimit, binding_limits
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import tempfile
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -158,11 +159,23 @@ def flat(poses: np.ndarray) -> np.ndarray:
     return np.concatenate([poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)], axis=1)
 
 
+@lru_cache
+def needs_whole(compiler: str, *options: str) -> None:
+    """Skip where a compiler is there, but not all that it needs for these options: clang without its sanitizers."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, program = Path(folder, "whole.c"), Path(folder, "whole")
+        source.write_text("#include <math.h>\nint main(void) { return 0; }\n")
+        built = subprocess.run([compiler, *options, str(source), "-o", str(program)], capture_output=True, text=True)
+        if built.returncode or subprocess.run([str(program)], capture_output=True).returncode:
+            pytest.skip(f"{compiler} {' '.join(options)} builds no program that runs here: {built.stderr[-200:]}")
+
+
 def compiled(folder: Path, text: str, compiler: str, *options: str, driver: Path | None = DRIVER) -> Path:
     """A program of an exported text, compiled without one warning."""
     exported, program = folder / "exported.c", folder / "program"
     exported.write_text(text)
     given = ["-std=c99", *options] if not any(each.startswith("-std") for each in options) else list(options)
+    needs_whole(compiler, *given)
     source = [f'-DEXPORTED="{exported}"', str(driver)] if driver else ["-DPFK_SELF_TEST", str(exported)]
     run = subprocess.run(
         [compiler, *given, *STRICT, *source, "-o", str(program), "-lm"], capture_output=True, text=True

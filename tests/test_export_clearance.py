@@ -307,7 +307,7 @@ def test_any_choice_of_parts_with_links_compiles_without_a_warning(parts: Any, t
         assert subprocess.run(command, capture_output=True, text=True).stderr == ""
 
 
-@pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler here")
+@pytest.mark.skipif(not all(map(shutil.which, ("g++", "gcc", "nm"))), reason="no gcc, g++ and nm here")
 def test_the_file_with_links_is_cpp_too_and_needs_mathematics_alone(tmp_path: Path) -> None:
     program = compiled(tmp_path, text_of("solids"), "g++", "-std=c++11", "-xc++", driver=None)
     assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from in_mujoco import mujoco
 from test_compiled_and_interpreted import INTERPRETED
 
 Array = NDArray[np.float64]

@@ -10,13 +10,12 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, mujoco
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import Imported, Loop, OpenMechanism, assemble, from_mjcf, from_urdf, verify

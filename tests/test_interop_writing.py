@@ -8,12 +8,11 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, mujoco
 from machines import closure
 from pfabrik.description.links import links_of
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -302,3 +303,11 @@ def test_joints_of_all_rows_one_by_one_are_found_about_once(counted: list[int]) 
     apart = np.array([row.q for row in whole])
     assert len(counted) < 20 and sum(counted) < 2 * len(targets)
     np.testing.assert_allclose(apart, whole.q, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", pf.catalog())
+def test_what_is_shown_of_an_answer_has_no_digits_of_rounding(name: str) -> None:
+    mechanism = pf.load(name)
+    answer = pf.solve_fk(mechanism, [1e-3 + drive.home for drive in mechanism.drives])
+    shown = [answer._repr_html_(), pf.margins(answer)._repr_html_(), str(pf.search_log(mechanism, answer.pose))]
+    assert [text for text in shown if re.search(r"(?<!&lt; )(?<!< )\b\d(\.\d+)?e-(1[2-9]|[23]\d)", text)] == []

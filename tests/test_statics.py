@@ -7,7 +7,6 @@ import itertools
 import warnings
 from functools import cache
 
-import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, mujoco
 from machines import closure
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
 from pfabrik.files.units import metres_of

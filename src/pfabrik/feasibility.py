@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .answers.aligned_text import plain
 from .answers.start_configuration import Start, start_of
 from .apart.link_distances import least_distances, pair_names
 from .apart.links_at_poses import links_at_poses
@@ -23,6 +24,7 @@ from .model import Model, model_of
 from .platform.answers import sides_at
 from .platform.table import table_handle
 from .targets import Target, as_targets
+from .tolerances import TOLERANCES
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
 """Rows of one call of the kernel for single rows, and of the kernel for blocks."""
@@ -59,12 +61,18 @@ class Feasibility(NamedTuple):
         if not np.ndim(self.margin):
             limit = self.limits[int(bindings[0])] if bindings[0] >= 0 else ("-", "-")
             words = "feasible" if margins[0] >= 0.0 else "not feasible"
-            return card("Feasibility", [words], ("joint", "bound", "margin"), [(*limit, f"{margins[0]:.4g}")], "")
+            return card(
+                "Feasibility",
+                [words],
+                ("joint", "bound", "margin"),
+                [(*limit, plain(margins[0], TOLERANCES.active, ".4g"))],
+                "",
+            )
         n_feasible = int(np.count_nonzero(margins >= 0.0))
         lines = [f"batch of shape {np.shape(self.margin)}", f"{n_feasible} of {counted(len(margins), 'row')} feasible"]
         places, counts = np.unique(bindings[bindings >= 0], return_counts=True)
         rows = [
-            (*self.limits[place], str(count), f"{float(np.nanmin(margins[bindings == place])):.4g}")
+            (*self.limits[place], str(count), plain(np.nanmin(margins[bindings == place]), TOLERANCES.active, ".4g"))
             for count, place in sorted(zip(counts.tolist(), places.tolist(), strict=True), reverse=True)
         ]
         return card("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows, "")

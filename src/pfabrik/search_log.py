@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .answers.aligned_text import aligned
+from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .closure.attempts import Attempt
@@ -17,6 +17,7 @@ from .ik import keeps_mode, solve_ik
 from .model import model_of
 from .options import Options, checked_options
 from .targets import Target, as_targets
+from .tolerances import TOLERANCES
 
 KEPT_APART = "links kept apart"
 """The phase that follows where links are nearer than the clearance."""
@@ -63,9 +64,10 @@ class SearchLog:
 
     def _table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """The header and the cells of the attempts."""
+        least = TOLERANCES.position * self.solution.mechanism.characteristic_length
         header = ("phase", "start", "steps", f"distance [{self.solution.mechanism.length_unit}]", "ending")
         return header, [
-            (each.phase, each.start, str(each.steps), f"{each.distance:.6g}".replace("nan", "-"), each.ending)
+            (each.phase, each.start, str(each.steps), plain(each.distance, least).replace("nan", "-"), each.ending)
             for each in self.attempts
         ]
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
+
+from ..tolerances import TOLERANCES
 
 
 def aligned(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -30,6 +33,17 @@ def starts_like_a_number(cell: str) -> bool:
     return True
 
 
-def plain(value: float, smallest: float) -> str:
-    """A number with six digits; 0 if its magnitude is not above `smallest`."""
-    return f"{value:.6g}" if abs(value) > smallest else "0"
+def plain(value: float, smallest: float, form: str = ".6g") -> str:
+    """A number with six digits, or as `form` says; 0 if its magnitude is not above `smallest`."""
+    return "0" if abs(value) <= smallest else format(value, form)
+
+
+def error_text(value: float, form: str, scale: float = 1.0) -> str:
+    """An error as a number, or ``< 1e-12`` where it is rounding, whose digits differ between processors.
+
+    Parameters
+    ----------
+    scale : size of what is computed, in the unit of `value`: rounding leaves a share of it.
+    """
+    least = 10.0 ** math.ceil(math.log10(TOLERANCES.implied * scale) - 1e-9)
+    return f"< {least:g}" if abs(value) < least else format(value, form)

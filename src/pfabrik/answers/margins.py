@@ -11,6 +11,7 @@ from ..description.mechanism_html import card
 from ..frozen import FrozenMapping
 from ..motion.limited_coordinates import coned, ranges_of
 from ..tolerances import TOLERANCES
+from .aligned_text import plain
 from .solution import Solution, checked_solution
 
 
@@ -21,7 +22,10 @@ class Margins(FrozenMapping[tuple[str, str], float | Floats]):
         """Every limit, the nearest first, for notebooks; of a batch, the least margin of each."""
         least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
         order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
-        rows = [(*limit, "-" if np.isnan(least[limit]) else f"{least[limit]:.4g}") for limit in order]
+        rows = [
+            (*limit, "-" if np.isnan(least[limit]) else plain(least[limit], TOLERANCES.active, ".4g"))
+            for limit in order
+        ]
         is_one = all(np.ndim(margin) == 0 for margin in self.values())
         return card("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows, "")
 

@@ -9,7 +9,8 @@ import numpy as np
 from ..description.mechanism_html import bound_text, card
 from ..description.readouts import readouts
 from ..description.sketch import sketch
-from .words import as_sentence
+from .aligned_text import error_text, plain
+from .words import as_sentence, loop_gap
 
 if TYPE_CHECKING:
     from .answer_fields import Answer
@@ -32,14 +33,16 @@ def _facts(answer: Answer, is_valid: bool) -> list[str]:
     """Status, errors and residual, a line each; of an INVALID answer the status only."""
     if not is_valid:
         return [str(answer.status).lower()]
-    unit, rotation_error = answer.mechanism.length_unit, np.degrees(answer.rotation_error)
-    errors = f"position error {answer.position_error:.3g} {unit}, rotation error {rotation_error:.3g} deg"
-    return [as_sentence(answer), errors, f"residual {answer.residual:.2g} {unit}"]
+    unit, length = answer.mechanism.length_unit, answer.mechanism.characteristic_length
+    position = error_text(float(answer.position_error), ".3g", length)
+    rotation = error_text(float(np.degrees(answer.rotation_error)), ".3g", np.degrees(1.0))
+    errors = f"position error {position} {unit}, rotation error {rotation} deg"
+    return [as_sentence(answer), errors, f"residual {loop_gap(answer)}"]
 
 
 def _actuators(answer: Answer) -> list[tuple[str, ...]]:
     """Name, value, bounds and unit of each actuator."""
     return [
-        (readout.name, f"{float(readout.display(value)):.6g}", *map(bound_text, readout.limits), readout.unit)
+        (readout.name, plain(float(readout.display(value)), 1e-9), *map(bound_text, readout.limits), readout.unit)
         for readout, value in zip(readouts(answer.mechanism), answer.actuators, strict=True)
     ]

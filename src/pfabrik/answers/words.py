@@ -15,6 +15,7 @@ from ..description.readouts import readouts
 from ..model import model_of
 from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from ..tolerances import TOLERANCES
+from .aligned_text import error_text
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism
@@ -124,12 +125,14 @@ def actuator_distance(answer: Answer, values: Floats) -> str:
     worst: dict[str, float] = {}
     for readout, error in zip(readouts(answer.mechanism), np.abs(answer.actuators - values), strict=True):
         worst[readout.unit] = max(float(readout.display(error)), worst.get(readout.unit, 0.0))
-    return "actuators up to " + " and ".join(f"{error:.3g} {unit}" for unit, error in worst.items() if error > 0.0)
+    off = [f"{error_text(error, '.3g')} {unit}" for unit, error in worst.items() if error > 0.0]
+    return f"actuators up to {' and '.join(off)}"
 
 
 def loop_gap(answer: Answer) -> str:
     """The largest loop gap with its unit."""
-    return f"{float(answer.residual):.1g} {answer.mechanism.length_unit}"
+    mechanism = answer.mechanism
+    return f"{error_text(float(answer.residual), '.1g', mechanism.characteristic_length)} {mechanism.length_unit}"
 
 
 def reasons(answer: Answer) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..answers.aligned_text import error_text
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from .linear_fit import LinearFit
@@ -168,16 +169,16 @@ class Calibration:
     def __repr__(self) -> str:
         open_ = len(self.names) - int(self.determined.sum())
         left = f", {open_} undetermined" if open_ else ""
-        counts = f"{len(self.names)} parameters{left}, rms {self.rms:.3g}"
+        counts = f"{len(self.names)} parameters{left}, rms {self._size(self.rms)}"
         return f"<Calibration of '{self._parameters.mechanism.name}': {counts}>"
 
     def _repr_html_(self) -> str:
         """A table of the parameters, for notebooks."""
-        return as_html(self._parameters.mechanism.name, self.parameters, self._facts)
+        return as_html(self._parameters.mechanism, self.parameters, self._facts)
 
     def table(self) -> str:
         """The parameters as text, a line each; then what is left, what is open, and what does not fit."""
-        return as_text(self.parameters, self._facts)
+        return as_text(self._parameters.mechanism, self.parameters, self._facts)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain numbers, lists and dicts, ready for JSON."""
@@ -191,16 +192,21 @@ class Calibration:
             "worst_rows": [each._asdict() for each in self.worst_rows[:MOST_SUSPECTS]],
         }
 
+    def _size(self, rms: float) -> str:
+        """A root mean square in words."""
+        least, length = min(self.measurements.sigma.values(), default=1.0), self.mechanism.characteristic_length
+        return error_text(rms, ".3g", max(length, 1.0) / least if self.measurements.sigma else length)
+
     @property
     def _facts(self) -> list[str]:
         """What is left, what is open, and what does not fit, a sentence each."""
         unit = self._parameters.mechanism.length_unit
         if self.measurements.sigma:
             unit = "standard deviations" if self.measurements.has_deviations else "weighted"
-        left_out = f", {self.rms_left_out:.3g} where the others predict" if self.rms_left_out > 0.0 else ""
+        left_out = f", {self._size(self.rms_left_out)} where the others predict" if self.rms_left_out > 0.0 else ""
         suspects = [each for each in self.worst_rows[:MOST_SUSPECTS] if each.residual > SUSPICIOUS]
         return [
-            f"rms {self.rms_before:.3g} before, {self.rms:.3g} after{left_out} [{unit}]",
+            f"rms {self._size(self.rms_before)} before, {self._size(self.rms)} after{left_out} [{unit}]",
             *self.undetermined,
             *(
                 f"{each.quantity} {each.row + 1} does not fit: off by {each.residual:.1f} standard deviations"

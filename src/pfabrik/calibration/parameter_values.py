@@ -6,8 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ..answers.aligned_text import aligned
+from ..answers.aligned_text import aligned, error_text
+from ..answers.aligned_text import plain as shown
+from ..description.mechanism import Mechanism
 from ..description.mechanism_html import card
+from ..tolerances import TOLERANCES
 
 HEADER = ("parameter", "described", "calibrated", "deviation", "unit", "")
 
@@ -47,14 +50,14 @@ class Suspect(NamedTuple):
     residual: float
 
 
-def as_text(parameters: Sequence[ParameterValue], facts: Sequence[str]) -> str:
+def as_text(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> str:
     """A line for each parameter, then facts."""
-    return "\n".join([aligned(HEADER, map(_cells, parameters)), "", *facts])
+    return "\n".join([aligned(HEADER, (_cells(each, mechanism) for each in parameters)), "", *facts])
 
 
-def as_html(name: str, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> str:
+def as_html(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> str:
     """A table of the parameters of a machine, for notebooks."""
-    return card(name, list(facts), HEADER, [_cells(each) for each in parameters], "")
+    return card(mechanism.name, list(facts), HEADER, [_cells(each, mechanism) for each in parameters], "")
 
 
 def as_numbers(parameters: Sequence[ParameterValue]) -> list[dict[str, Any]]:
@@ -67,15 +70,16 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _cells(each: ParameterValue) -> tuple[str, ...]:
+def _cells(each: ParameterValue, mechanism: Mechanism) -> tuple[str, ...]:
     degrees = each.unit == "rad"
     factor = math.degrees(1.0) if degrees else 1.0
+    size = factor if degrees else mechanism.characteristic_length
     deviation = "open" if math.isinf(each.deviation) else "-" if math.isnan(each.deviation) else ""
     return (
         each.name,
-        f"{each.described * factor:.9g}",
-        f"{each.value * factor:.9g}",
-        deviation or f"{each.deviation * factor:.2g}",
+        shown(each.described * factor, TOLERANCES.implied * size, ".9g"),
+        shown(each.value * factor, TOLERANCES.implied * size, ".9g"),
+        deviation or error_text(each.deviation * factor, ".2g", size),
         "deg" if degrees else each.unit,
         "" if each.determined else "not determined",
     )

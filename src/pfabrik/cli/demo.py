@@ -15,7 +15,7 @@ import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned
+from ..answers.aligned_text import aligned, error_text
 from ..extras import require
 from ..telling import telling
 from .outputs import check_outputs, new_folder, picture, real, whole_folder
@@ -112,16 +112,16 @@ def write(run: Run, folder: Path) -> None:
 def row(run: Run) -> tuple[str, ...]:
     """One line of the table; the worst of the run in every column."""
     solution = run.solution
-    unit = solution.mechanism.length_unit
+    unit, size = solution.mechanism.length_unit, solution.mechanism.characteristic_length
     counts = Counter(solution.status.tolist())
     return (
         solution.mechanism.name,
         str(counts[pf.Status.REACHED]),
         str(counts[pf.Status.PROJECTED]),
         str(counts[pf.Status.FAILED] + counts[pf.Status.INVALID]),
-        f"{solution.position_error.max():.3g} {unit}",
-        f"{solution.residual.max():.1e} {unit}",
-        f"{solution.limit_excess.max():.1e}",
+        f"{error_text(solution.position_error.max(), '.3g', size)} {unit}",
+        f"{error_text(solution.residual.max(), '.1e', size)} {unit}",
+        error_text(solution.limit_excess.max(), ".1e"),
         f"{1e3 * run.seconds / len(solution):.3f} ms",
     )
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned
+from ..answers.aligned_text import aligned, error_text
 from ..chains.serial_chain import is_chain
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
@@ -129,7 +129,9 @@ def freedom(counted: pf.Mobility | None) -> list[str]:
 def nearly_free(motion: pf.NearlyFree) -> str:
     """A motion that the loops hardly resist: its joints, its singular value, and if it was counted."""
     counted = "counted" if motion.singular_value <= TOLERANCES.alignment else "not counted"
-    return f"{', '.join(motion.joints)}: singular value {motion.singular_value:.1e}, {counted} as a motion"
+    return (
+        f"{', '.join(motion.joints)}: singular value {error_text(motion.singular_value, '.1e')}, {counted} as a motion"
+    )
 
 
 def joint_table(mechanism: pf.Mechanism) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 import pfabrik as pf
 
+from ..answers.aligned_text import plain
 from ..answers.words import short_names
 from ..arrays import Floats
 from ..cells import CsvWriter
@@ -20,6 +21,7 @@ from ..description.readouts import readouts
 from ..errors import counted
 from ..paths.along import Extremes
 from ..rotations import to_rpy
+from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from ..paths.follow import TrackPart
@@ -228,7 +230,8 @@ class Summary:
         """The step with the least margin, and the one where a rod is tilted most; empty where there is neither."""
         parts = []
         if self._margin.name:
-            parts.append(f"worst step: {self._margin.place}, margin {-self._margin.value:.3g} of {self._margin.name}")
+            margin = plain(-self._margin.value, TOLERANCES.active, ".3g")
+            parts.append(f"worst step: {self._margin.place}, margin {margin} of {self._margin.name}")
         if self._tilt.name:
             degrees = math.degrees(self._tilt.value)
             parts.append(f"largest tilt: {degrees:.3g} deg of {self._tilt.name} at {self._tilt.place}")

@@ -11,6 +11,7 @@ import click
 
 import pfabrik as pf
 
+from ..answers.aligned_text import error_text
 from ..errors import counted
 from .arguments import MECH, load
 from .printing import json_option, print_answer
@@ -70,23 +71,27 @@ def describe(mechanism: pf.Mechanism, verification: Verification) -> str:
     """A verification for people."""
     from ..interop.verifying import FAR
 
-    name, unit, original, went = mechanism.name, mechanism.length_unit, verification.original, verification.travelled
+    name, unit, size = mechanism.name, mechanism.length_unit, mechanism.characteristic_length
+    original, went = verification.original, verification.travelled
     if not verification.poses:
         return f"{name}: no pose was reached"
     rows = [
-        ("largest loop gap", f"{verification.loop_gap:.1e} {unit}"),
-        ("largest position difference", f"{verification.position_difference:.1e} {unit}"),
-        ("largest rotation difference", f"{verification.rotation_difference:.1e} rad"),
+        ("largest loop gap", f"{error_text(verification.loop_gap, '.1e', size)} {unit}"),
+        ("largest position difference", f"{error_text(verification.position_difference, '.1e', size)} {unit}"),
+        ("largest rotation difference", f"{error_text(verification.rotation_difference, '.1e')} rad"),
     ]
     if original is not None:
         nearest, least = f"{original.position_tolerance:.1e}", f"{original.rotation_tolerance:.1e}"
         rows += [
             ("original file", "agrees" if original else "does not agree"),
-            ("its own loops, left open by", f" {original.loop_gap:.1e} {unit}, of {nearest}"),
-            ("position difference from it", f"{original.position_difference:.1e} {unit}, of {nearest}"),
-            ("rotation difference from it", f"{original.rotation_difference:.1e} rad, of {least}"),
+            ("its own loops, open by", f"{error_text(original.loop_gap, '.1e', size)} {unit}, of {nearest}"),
+            (
+                "position difference from it",
+                f"{error_text(original.position_difference, '.1e', size)} {unit}, of {nearest}",
+            ),
+            ("rotation difference from it", f"{error_text(original.rotation_difference, '.1e')} rad, of {least}"),
         ]
-    shift = f"{went.position / mechanism.characteristic_length:.2g} L ({went.position:.3g} {unit})"
+    shift = f"{went.position / size:.2g} L ({went.position:.3g} {unit})"
     rows += [
         ("actuators went through", ", ".join(span(drive, went.drives[drive.name], unit) for drive in mechanism.drives)),
         ("end effector went up to", f"{shift}, {math.degrees(went.rotation):.2g} deg"),

@@ -84,6 +84,7 @@ class ClosureEngine(Engine):
         closure, begin = self._closure, start_coordinates(self.model, start)
         closing = reach(closure, target, begin, platform_poses(self.model.mechanism, begin), keep_mode)
         is_reached, gap, excess = closing.feasible[0], closing.gap[0], closing.excess[0]
+        gap, excess = (part if part > TOLERANCES.limit else 0.0 for part in (gap, excess))  # else rounding
         ending = "reached" if is_reached else f"gap {gap:.3g} L, {excess:.3g} beyond a limit"
         steps = int(closing.iterations[0])
         yield Attempt("loops closed on the target", "the start", steps, 0.0 if is_reached else np.nan, ending)

@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.aligned_text import plain
 from ..answers.solution import Solution
 from ..arrays import Floats
 from ..description.form_faults import shown
@@ -108,7 +109,7 @@ class Modes(Sequence[Solution]):
 
 def _values(columns: Sequence[Readout], mode: Solution) -> list[str]:
     """The actuators of a mode in the units that people read."""
-    return [f"{float(each.display(value)):.6g}" for each, value in zip(columns, mode.actuators, strict=True)]
+    return [plain(float(each.display(value)), 1e-9) for each, value in zip(columns, mode.actuators, strict=True)]
 
 
 class Clusters:
