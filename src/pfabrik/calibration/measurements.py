@@ -72,7 +72,7 @@ class Measurements:
         if self.orientation is not None:
             _check_rotations(self.orientation)
         self.height = None if height is None else _of_shape("height", height, (n,))
-        self.distances = _pairs(distances, n)
+        self.distances = _pairs(distances, self.actuators)
         self.joints = {name: _of_shape(f"joints['{name}']", v, (n,)) for name, v in (joints or {}).items()}
         self.sigma = _sigmas(sigma)
         self.has_deviations = bool(self.sigma) and absolute_sigma
@@ -153,16 +153,21 @@ def _check_rotations(orientations: Floats) -> None:
         raise InvalidArgument("orientation", "a matrix that is not a rotation", "R^T R = I and det R = 1", rows=bad[:5])
 
 
-def _pairs(distances: ArrayLike | None, n: int) -> Floats:
+def _pairs(distances: ArrayLike | None, actuators: Floats) -> Floats:
     if distances is None:
         return np.zeros((0, 3))
     expected = "(row, row, distance), shape (d, 3)"
     array = np.array(as_floats("distances", distances, expected), float)
     if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
         raise InvalidArgument("distances", f"shape {array.shape}" if array.ndim != 2 else "other values", expected)
-    rows = array[:, :2]
+    rows, n = array[:, :2], len(actuators)
     if (rows != rows.astype(int)).any() or (rows < 0).any() or (rows >= n).any() or (array[:, 2] <= 0.0).any():
         raise InvalidArgument("distances", "a row that does not exist, or no distance", f"rows 0 to {n - 1}, above 0")
+    first, second = rows.astype(int).T
+    same = np.flatnonzero((actuators[first] == actuators[second]).all(axis=1))
+    if len(same):
+        found = f"a distance between rows {first[same[0]]} and {second[same[0]]}, a row or its readings twice"
+        raise InvalidArgument("distances", found, "rows with different readings, which are apart")
     return array
 
 
