@@ -15,7 +15,7 @@ from ..errors import InvalidArgument, UnknownName
 from ..extras import require
 from ..poses import as_floats
 from .calibration import Calibration
-from .linear_fit import RANK, LinearFit
+from .linear_fit import RANK, LinearFit, decomposed
 from .measured_residuals import Fit, Residuals, residuals, slopes_of, whitened
 from .measurements import Measurements
 from .parameters import Free, Parameters, parameters
@@ -93,8 +93,8 @@ class _Problem:
 
         base, values, rank = self.own.values, self.own.values, 0
         for _ in range(MOST_RANKS):
-            _, sizes, right = np.linalg.svd(self._jacobian(values), full_matrices=False)
-            kept = right[sizes > RANK * sizes.max(initial=0.0)]
+            _, sizes, right = decomposed(self._jacobian(values))
+            kept = right[: len(sizes)][sizes > RANK * sizes.max(initial=0.0)]
             if len(kept) == rank:
                 break
             rank, basis = len(kept), self.own.scales[:, None] * kept.T
@@ -103,17 +103,17 @@ class _Problem:
                 return self._residual(base + basis @ y)
 
             def derivative(y: Floats, basis: Floats = basis, kept: Floats = kept) -> Floats:
-                return np.asarray(self._jacobian(base + basis @ y) @ kept.T)
+                return np.einsum("mp,kp->mk", self._jacobian(base + basis @ y), kept)  # not by threads of a BLAS
 
             begin = kept @ ((values - base) / self.own.scales)
             found = least_squares(
                 residual,
                 begin,
                 derivative,
-                method="trf",
+                method="lm",
                 xtol=TOLERANCE,
                 ftol=TOLERANCE,
-                gtol=None,
+                gtol=TOLERANCE,
                 max_nfev=MOST_STEPS,
             )
             values = base + basis @ found.x

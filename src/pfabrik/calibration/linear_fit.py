@@ -33,8 +33,7 @@ class LinearFit:
 
     @cached_property
     def _decomposed(self) -> tuple[Floats, Floats, Floats]:
-        left, values, right = np.linalg.svd(self.jacobian, full_matrices=True)
-        return left, values, right
+        return decomposed(self.jacobian)
 
     @cached_property
     def rank(self) -> int:
@@ -48,18 +47,27 @@ class LinearFit:
 
     @cached_property
     def variance(self) -> float:
-        """Variance of a residual: 1 if deviations are given, else what is left over; NaN if nothing is."""
+        """Variance of a residual: what is left over, and no less than 1 if deviations are given.
+
+        Where nothing is left over it is not known: infinite, but for deviations that are given.
+        """
+        left_over = float(self.residual @ self.residual) / self.spare if self.spare else np.inf
         if self.has_sigma:
-            return 1.0
-        spare = len(self.residual) - self.rank
-        return float(self.residual @ self.residual) / spare if spare > 0 else float("nan")
+            return max(1.0, left_over) if self.spare else 1.0
+        return left_over
+
+    @property
+    def spare(self) -> int:
+        """Number of residuals beyond what is determined by them."""
+        return len(self.residual) - self.rank
 
     @cached_property
     def covariance(self) -> Floats:
         """Of the scaled parameters, (p, p), within the directions that are determined."""
         _, values, right = self._decomposed
         kept = right[: self.rank] / values[: self.rank, None]
-        return np.asarray(kept.T @ kept * self.variance)
+        shared = kept.T @ kept
+        return shared * np.where(shared == 0.0, 0.0, self.variance) if np.isinf(self.variance) else shared * self.variance
 
     @cached_property
     def leverages(self) -> Floats:
@@ -72,7 +80,7 @@ class LinearFit:
         left = self._decomposed[0][:, : self.rank]
         numbers = np.unique(self.groups)
         raw, student = np.full(len(numbers), np.nan), np.full(len(numbers), np.nan)
-        total, spare = float(self.residual @ self.residual), len(self.residual) - self.rank
+        total = float(self.residual @ self.residual)
         for k, number in enumerate(numbers):
             rows = np.flatnonzero(self.groups == number)
             room = np.eye(len(rows)) - left[rows] @ left[rows].T
@@ -84,8 +92,34 @@ class LinearFit:
             predicted = vectors[:, seen] @ (parts / values[seen])
             raw[k] = float(np.sqrt(np.mean(predicted**2)))
             explained = float(parts @ (parts / values[seen]))
-            others = spare - int(seen.sum())
+            others = self.spare - int(seen.sum())
             scale = 1.0 if self.has_sigma else (total - explained) / others if others > 0 else float("nan")
             if scale > 0.0:
                 student[k] = float(np.sqrt(explained / seen.sum() / scale))
         return numbers, raw, student
+
+
+def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
+    """The singular value decomposition of a matrix (m, p): (m, k), (k,), and all (p, p) on the right.
+
+    By routines that leave matrices of this size to one thread: those of a BLAS wait for each other longer than they
+    compute.
+    """
+    from scipy.linalg import svd
+
+    turned, triangle = _by_triangles(matrix)
+    left, values, right = svd(triangle, lapack_driver="gesvd")
+    return np.einsum("mk,kr->mr", turned, left), values, right
+
+
+def _by_triangles(matrix: Floats) -> tuple[Floats, Floats]:
+    """Q (m, k) and R (k, p) of a matrix (m, p), by pieces twice as high as wide."""
+    m, p = matrix.shape
+    if m <= 2 * p:
+        turned, triangle = np.linalg.qr(matrix)
+        return turned, triangle
+    pieces = np.zeros((-(-m // (2 * p)), 2 * p, p))
+    pieces.reshape(-1, p)[:m] = matrix
+    turned, triangles = np.linalg.qr(pieces)
+    before, triangle = _by_triangles(triangles.reshape(-1, p))
+    return (turned @ before.reshape(-1, p, before.shape[1])).reshape(-1, before.shape[1])[:m], triangle

@@ -173,7 +173,7 @@ def _summed(screws: Floats, weights: Floats, passes: Floats) -> Floats:
     """
     n, ways, (p, joints, numbers) = len(screws), len(passes), weights.shape
     along = passes[:, None, :, None] * weights  # (ways, p, joints, 9)
-    flat = np.moveaxis(screws, -1, 1).reshape(6 * n, joints * numbers)
+    flat = np.moveaxis(screws, -1, 1).reshape(n, 6, joints * numbers)  # one by one: a BLAS takes no threads for these
     sums = (flat @ along.reshape(ways * p, joints * numbers).T).reshape(n, 6, ways, p)
     return np.asarray(np.swapaxes(sums, 1, 2).reshape(n, 6 * ways, p))
 
