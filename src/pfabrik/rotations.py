@@ -176,3 +176,19 @@ def random_quaternions(n: int, rng: np.random.Generator) -> Floats:
     """Unit quaternions (n, 4), scalar last, uniform over all rotations."""
     q = np.roll(rng.normal(size=(n, 4)), -1, axis=1)
     return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
+
+
+def turning(vectors: Floats) -> Floats:
+    """Angular velocity by the rate of a rotation vector v of length a, (n, 3, 3): I + (1 - cos a)/a^2 V + c V^2.
+
+    c = (a - sin a) / a^3; V is the cross product by v.
+    """
+    a = np.linalg.norm(vectors, axis=1)[:, None, None]
+    V = (vectors @ CROSSED).reshape(-1, 3, 3)
+    large = np.maximum(a, SMALL_ANGLE)
+    c = np.where(a > SMALL_ANGLE, (large - np.sin(large)) / large**3, 1.0 / 6.0 - a * a / 120.0)
+    return np.asarray(np.eye(3) + 0.5 * np.sinc(a / (2.0 * np.pi)) ** 2 * V + c * (V @ V))
+
+
+SMALL_ANGLE = 1e-2
+"""Angle [rad] below which the series of c is used, from which digits cancel otherwise."""

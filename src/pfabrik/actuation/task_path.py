@@ -13,7 +13,7 @@ from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
 from ..description.task import Task, task_of
 from ..motion.mobility import generic_of
-from ..rotations import CROSSED, from_rotvec, to_rotvec, yaws
+from ..rotations import CROSSED, from_rotvec, to_rotvec, turning, yaws
 from ..tolerances import TOLERANCES
 
 TURNS = {3: ("rx", "ry", "rz"), 2: ("tilt_x", "tilt_y"), 1: ("yaw",), 0: ()}
@@ -122,10 +122,10 @@ class TaskPath:
             rows[:, row, axis] = 1.0
         first = sum(task.axes)
         if task.rotations == 3:
-            rows[:, first:, 3:] = np.linalg.inv(_turning(to_rotvec(poses[:, :3, :3])))
+            rows[:, first:, 3:] = np.linalg.inv(turning(to_rotvec(poses[:, :3, :3])))
         elif task.rotations:
             z = poses[:, :3, 2]
-            tilts = _turning(np.pad(_tilts(z), ((0, 0), (0, 1))))[:, :, :2]
+            tilts = turning(np.pad(_tilts(z), ((0, 0), (0, 1))))[:, :, :2]
             across = -(z @ CROSSED).reshape(-1, 3, 3)
             of_tilt = np.linalg.pinv(across @ tilts) @ across
             if task.rotations == 2:
@@ -147,19 +147,3 @@ def _tilts(z: Floats) -> Floats:
     angles = np.arctan2(sines, z[:, 2])
     factors = np.divide(angles, sines, out=np.ones_like(angles), where=sines > 0.0)
     return np.asarray(factors[:, None] * np.stack([-z[:, 1], z[:, 0]], axis=1))
-
-
-def _turning(vectors: Floats) -> Floats:
-    """Angular velocity by the rate of a rotation vector v of length a, (n, 3, 3): I + (1 - cos a)/a^2 V + c V^2.
-
-    c = (a - sin a) / a^3; V is the cross product by v.
-    """
-    a = np.linalg.norm(vectors, axis=1)[:, None, None]
-    V = (vectors @ CROSSED).reshape(-1, 3, 3)
-    large = np.maximum(a, SMALL)
-    c = np.where(a > SMALL, (large - np.sin(large)) / large**3, 1.0 / 6.0 - a * a / 120.0)
-    return np.asarray(np.eye(3) + 0.5 * np.sinc(a / (2.0 * np.pi)) ** 2 * V + c * (V @ V))
-
-
-SMALL = 1e-2
-"""Angle [rad] below which the series of c is used, from which digits cancel otherwise."""

@@ -11,6 +11,7 @@ import numpy as np
 from ..answers.aligned_text import error_text
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
+from .instrument import INSTRUMENT
 from .linear_fit import LinearFit
 from .measurements import Measurements
 from .parameter_values import ParameterValue, Suspect, as_html, as_numbers, as_text, plain
@@ -27,6 +28,9 @@ LEAST_NOISE = 1e-5
 """Error that measurements of unknown quality are taken to have at least [L], to say what they determine: 10 um of 1 m.
 Simulated ones have none, and would seem to determine what no instrument shows."""
 
+LIKELY = 0.95
+"""Probability with which noise is no larger than it is taken to be, where few values are left over to tell it by."""
+
 MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
 """Measurements that are named as not fitting: the most, and from how many standard deviations."""
 
@@ -40,7 +44,8 @@ class Calibration:
     Attributes
     ----------
     values : calibrated, (p,), in the order of `names`.
-    deviations : standard deviations, (p,); infinite where the data leave a parameter open.
+    deviations : standard deviations, (p,); infinite where the data leave a parameter open, or nothing is left to say how
+        good they are. Residuals larger than `sigma` make them larger.
     determined : which parameters the measurements determine, (p,).
     rank : how many directions of parameters they determine.
     rms_before, rms : root mean square of the residuals with the machine as described, and calibrated: in standard
@@ -98,16 +103,36 @@ class Calibration:
     @cached_property
     def determined(self) -> Mask:
         closed = _parts(self._data.open_directions) <= OPEN
-        spread = np.sqrt(np.diag(self._data.covariance) * self._caution)
-        return np.asarray(closed & ~(spread > WEAK))
+        spread = np.sqrt(np.diag(self._data.cofactors) * self._cautious_variance)
+        return np.asarray(closed & (spread <= WEAK) & (not self._is_exhausted))
+
+    @property
+    def _is_exhausted(self) -> bool:
+        """True if nothing says how good the measurements are: no deviations, and no more values than parameters."""
+        return not self._data.spare and not self.measurements.has_deviations
+
+    @property
+    def doubt(self) -> str:
+        """Why these values may be wrong as a whole, in a sentence: the fit explains little; "" if nothing says so."""
+        known, length = self.measurements.has_deviations, self._parameters.mechanism.characteristic_length
+        if not self.rms > (SUSPICIOUS if known else np.inf if self.measurements.sigma else WEAK * length):
+            return ""
+        off = f"{self.rms:.3g} {'standard deviations' if known else self._parameters.mechanism.length_unit}".strip()
+        held = [name for name, moves in zip(INSTRUMENT, self._parameters.moves.any(axis=(0, 2)), strict=True) if not moves]
+        also = f": free {' or '.join(map(repr, held))} too?" if held else ""
+        return f"no values were found that explain these measurements, which they miss by {off} rms{also}"
 
     @cached_property
-    def _caution(self) -> float:
-        """Factor on variances, to say what is determined by measurements of unknown quality."""
-        if self.measurements.sigma:
-            return 1.0
-        least = (LEAST_NOISE * self._parameters.mechanism.characteristic_length) ** 2
-        return float(max(1.0, least / max(self._data.variance, 1e-300)))
+    def _cautious_variance(self) -> float:
+        """Variance of a residual, to say what is determined: of few that are left over, the most that may be."""
+        from scipy.special import chdtri
+
+        if self.measurements.has_deviations:
+            return self._data.variance
+        spare = self._data.spare
+        most = float(self._data.variance * spare / chdtri(spare, LIKELY)) if spare else 0.0
+        length = self._parameters.mechanism.characteristic_length
+        return most if self.measurements.sigma else max(most, (LEAST_NOISE * length) ** 2)
 
     @property
     def parameters(self) -> tuple[ParameterValue, ...]:
@@ -124,12 +149,16 @@ class Calibration:
     @property
     def undetermined(self) -> tuple[str, ...]:
         """What the measurements leave open, in words: one sentence for parameters that change together."""
-        return tuple(_sentences(self.names, self._open_directions(), self.determined))
+        directions = self._open_directions()
+        if not self._is_exhausted:
+            return tuple(_sentences(self.names, directions, self.determined))
+        sentence = "no more values are measured than are free: how good they are is not known, and nothing is determined without sigma"
+        return (*_sentences(self.names, directions, _parts(directions) <= OPEN), sentence)
 
     def _open_directions(self) -> Floats:
         """Directions that are open, and those in which a parameter's deviation is too large."""
         _, values, right = self._data._decomposed
-        spread = np.sqrt(self._data.variance * self._caution) / values[: self._data.rank]
+        spread = np.sqrt(self._cautious_variance) / values[: self._data.rank]
         weak = np.flatnonzero(spread > WEAK)
         return np.concatenate([right[: self._data.rank][weak], self._data.open_directions])
 
@@ -188,6 +217,7 @@ class Calibration:
             "rms": plain(self.rms),
             "rms_left_out": plain(self.rms_left_out),
             "rank": self.rank,
+            "doubt": self.doubt,
             "undetermined": list(self.undetermined),
             "worst_rows": [each._asdict() for each in self.worst_rows[:MOST_SUSPECTS]],
         }
@@ -207,6 +237,7 @@ class Calibration:
         suspects = [each for each in self.worst_rows[:MOST_SUSPECTS] if each.residual > SUSPICIOUS]
         return [
             f"rms {self._size(self.rms_before)} before, {self._size(self.rms)} after{left_out} [{unit}]",
+            *([self.doubt] if self.doubt else []),
             *self.undetermined,
             *(
                 f"{each.quantity} {each.row + 1} does not fit: off by {each.residual:.1f} standard deviations"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -41,7 +42,8 @@ def calibrate(
 
     Measured values minus those of the machine with other parameters, over their standard deviations, are made small by
     SciPy's `least_squares` with exact derivatives. Directions of parameters that change no measurement stay as
-    described, and are reported: a small residual is no proof of a parameter.
+    described, and are reported: a small residual is no proof of a parameter. A frame and a target of the instrument that
+    may vary are aligned first, in closed form. A fit that misses the measurements by far warns: see `Calibration.doubt`.
 
     Parameters
     ----------
@@ -70,8 +72,10 @@ def calibrate(
     row_weights = _weights(weights, measurements.rows)
     fit.begin(start)
     problem = _Problem(own, fit, expected, row_weights)
-    values = problem.solved()
-    return problem.result(values)
+    found = problem.result(problem.solved())
+    if found.doubt:
+        warnings.warn(f"'{mechanism.name}': {found.doubt}", stacklevel=2)
+    return found
 
 
 class _Problem:
@@ -84,14 +88,15 @@ class _Problem:
         self.places = [own.names.index(name) for name in priors]
         self.prior_values = np.array([value for value, _ in priors.values()])
         self.prior_sigmas = np.array([sigma for _, sigma in priors.values()])
-        self.before = self._blocks(own.values)
+        self.base = fit.aligned_values()
+        self.before = self._blocks(self.base)
         self.factors = whitened(self.before, fit.measurements.sigma, fit.length, weights)
 
     def solved(self) -> Floats:
         """The values that fit best, (p,); in directions that nothing determines, those as described."""
         from scipy.optimize import least_squares
 
-        base, values, rank = self.own.values, self.own.values, 0
+        base, values, rank = self.base, self.base, 0
         for _ in range(MOST_RANKS):
             _, sizes, right = decomposed(self._jacobian(values))
             kept = right[: len(sizes)][sizes > RANK * sizes.max(initial=0.0)]
@@ -111,6 +116,7 @@ class _Problem:
                 begin,
                 derivative,
                 method="lm",
+                x_scale=FIRST_STEP,
                 xtol=TOLERANCE,
                 ftol=TOLERANCE,
                 gtol=TOLERANCE,
@@ -154,6 +160,9 @@ class _Problem:
         rows[np.arange(len(self.places)), self.places] = self.own.scales[self.places] / self.prior_sigmas
         return rows
 
+
+FIRST_STEP = 1e-2
+"""A hundredth of the longest first step, in parameters' scales: farther, a machine is another or cannot be assembled."""
 
 MOST_RANKS, MOST_STEPS = 3, 60
 """How often directions are chosen, and the most steps for each choice: a drawing needs one and five."""

@@ -56,24 +56,24 @@ class LinearFit:
             return max(1.0, left_over) if self.spare else 1.0
         return left_over
 
-    @property
+    @cached_property
     def spare(self) -> int:
-        """Number of residuals beyond what is determined by them."""
-        return len(self.residual) - self.rank
+        """Number of residuals beyond what is determined by them; what has no weight does not count."""
+        return int((self.jacobian.any(axis=1) | (self.residual != 0.0)).sum()) - self.rank
+
+    @cached_property
+    def cofactors(self) -> Floats:
+        """Covariance of the scaled parameters, (p, p), within the directions that are determined, by the variance."""
+        _, values, right = self._decomposed
+        kept = right[: self.rank] / values[: self.rank, None]
+        return np.asarray(kept.T @ kept)
 
     @cached_property
     def covariance(self) -> Floats:
         """Of the scaled parameters, (p, p), within the directions that are determined."""
-        _, values, right = self._decomposed
-        kept = right[: self.rank] / values[: self.rank, None]
-        shared = kept.T @ kept
-        return shared * np.where(shared == 0.0, 0.0, self.variance) if np.isinf(self.variance) else shared * self.variance
-
-    @cached_property
-    def leverages(self) -> Floats:
-        """Diagonal of the projection on predictions, (m,)."""
-        left = self._decomposed[0][:, : self.rank]
-        return np.asarray(np.einsum("mk,mk->m", left, left))
+        if np.isinf(self.variance):
+            return np.where(self.cofactors == 0.0, 0.0, np.copysign(np.inf, self.cofactors))
+        return np.asarray(self.cofactors * self.variance)
 
     def left_out(self) -> tuple[Ints, Floats, Floats]:
         """Measurements, and the root mean square residual of each from what the others predict, also studentised."""

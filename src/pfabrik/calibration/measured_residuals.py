@@ -21,6 +21,7 @@ from ..model import model_of
 from ..motion.displacements import home_coordinates
 from ..options import Options
 from ..rotations import to_rotvec
+from .instrument import aligned, seen
 from .measurements import Measurements
 from .parameters import Parameters
 from .sensitivity import GeometrySlopes, require_closed
@@ -66,7 +67,9 @@ class Fit:
         ------
         InvalidArgument : rows at which it cannot be.
         """
-        if start is None:
+        if start is None and self.parameters.moves.any():
+            self._start = None  # measured poses are those of another frame
+        elif start is None:
             self._start = self._near_measured_poses()
         else:
             deviations = np.reshape(start.q, (-1, start.q.shape[-1])) - home_coordinates(start.mechanism)
@@ -84,6 +87,18 @@ class Fit:
         self._start = start_of(self.machine, deviations + home_coordinates(self.machine), solution.shape)
         self._assembled(values)
 
+    def _places(self, values: Floats) -> Floats:
+        """The frame and the target of the instrument at values (p,), (2, 6)."""
+        return np.einsum("p,pkx->kx", values, self.parameters.moves)
+
+    def aligned_values(self) -> Floats:
+        """The values of the machine as described, (p,), with the frame and the target that fit it best."""
+        own, moves = self.parameters, self.parameters.moves
+        if not moves.any():
+            return own.values
+        poses = np.asarray(self._assembled(own.values)[1].pose)
+        return own.values + np.einsum("kx,pkx->p", aligned(poses, self.measurements, moves.any(axis=0), self.length), moves)
+
     def _near_measured_poses(self) -> Configurations | None:
         """Configurations at the measured poses, where these are whole."""
         given = self.measurements
@@ -100,7 +115,7 @@ class Fit:
         key = values.tobytes()
         if self._last is None or self._last[0] != key:
             model = model_of(self.machine).with_geometry(*self.parameters.geometry(values))
-            mechanism, readings = model.mechanism, self.measurements.actuators
+            mechanism, readings = model.mechanism, self.measurements.actuators * self.parameters.factors_at(values)
             found = engine_of(mechanism).forward(readings, self._start, Options().actuator_tolerance)
             solution = Solution(mechanism, found, (len(readings),))
             self._last = key, mechanism, solution
@@ -121,9 +136,12 @@ class Fit:
                 self._start = copy(solution._configurations)  # a copy has its coordinates, which are of this geometry
             changes = self.parameters.slopes(values)
             first = GeometrySlopes(mechanism, q - home_coordinates(mechanism), changes)
-            twists, rates = first.at_held_actuators()
+            moved = self.measurements.actuators[:, :, None] * self.parameters.factors.T
+            twists, rates = first.at_held_actuators(moved)
             require_closed(first.opened, self.parameters)
             rates += changes.home.T
+        if self.parameters.moves.any():
+            poses, twists = seen(poses, twists, self._places(values), self.parameters.moves)
         blocks = list(self._blocks(poses, q, twists, rates))
         if slopes:
             self._last_slopes = values.tobytes(), blocks

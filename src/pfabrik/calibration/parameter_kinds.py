@@ -13,9 +13,10 @@ from ..description.geometry import Geometry, geometry_of
 from ..description.mechanism import Joint, Mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..tolerances import TOLERANCES
+from .instrument import INSTRUMENT
 from .shifts import DrivenRods, Shift
 
-KINDS = ("points", "axes", "offsets", "lengths")
+KINDS = ("points", "axes", "offsets", "lengths", "frame", "tool", "scale")
 
 _NUMBERED = re.compile(r"^(.*?)(\d+)$")
 
@@ -28,6 +29,8 @@ class Candidates:
     - "axes": the direction of every axis of a file, as turns about base axes, `A1.rx` [rad].
     - "offsets": what is to be added to the reading of an actuator, `B1.offset` [length or rad].
     - "lengths": of the rods on an actuated joint of the base, `A1.rod` [length].
+    - "frame", "tool": of the instrument, `frame.x` [length] to `frame.rz` [rad]; none where a joint has this name.
+    - "scale": the factor on the reading of an actuator, `B1.scale`.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -38,6 +41,7 @@ class Candidates:
     def of_kind(self, kind: str) -> list[Shift]:
         """The shifts of a kind."""
         made = {"points": self._points, "axes": self._axes, "offsets": self._offsets, "lengths": self._lengths}
+        made |= {"frame": lambda: self._moves(0), "tool": lambda: self._moves(1), "scale": self._scale}
         return list(made[kind]())
 
     def _points(self) -> Iterator[Shift]:
@@ -68,6 +72,21 @@ class Candidates:
         for drive in self.mechanism.drives:
             shift = self._none(f"{drive.name}.offset", 0.0, is_angle=drive.kind == "angle")
             shift.home[drive.column] = 1.0
+            yield shift
+
+    def _moves(self, which: int) -> Iterator[Shift]:
+        name, is_point = INSTRUMENT[which], self.mechanism.end_effector_is_joint
+        if name in {joint.name for joint in self.mechanism.joints} or (which == 1 and is_point):
+            return
+        for place, what in enumerate(("rx", "ry", "rz", "x", "y", "z")):
+            shift = self._none(f"{name}.{what}", 0.0, is_angle=place < 3)
+            shift.moves[which, place] = 1.0
+            yield shift
+
+    def _scale(self) -> Iterator[Shift]:
+        for drive in self.mechanism.drives:
+            shift = replace(self._none(f"{drive.name}.scale", 1.0, is_angle=False), scale=1.0)
+            shift.factors[drive.column] = 1.0
             yield shift
 
     def _lengths(self) -> Iterator[Shift]:
@@ -127,7 +146,8 @@ class Candidates:
         """A shift that changes nothing yet."""
         shape, columns = (len(self.mechanism.joints), 3), len(self.geometry.home)
         scale = 1.0 if is_angle else self.length
-        return Shift(name, float(value), scale, is_angle, np.zeros(shape), np.zeros(shape), np.zeros(columns))
+        nothing = (np.zeros(size) for size in (shape, shape, columns, (2, 6), columns))
+        return Shift(name, float(value), scale, is_angle, *nothing)
 
 
 def tied(mechanism: Mechanism, shifts: Sequence[Shift]) -> list[Shift]:
@@ -149,6 +169,7 @@ def tied(mechanism: Mechanism, shifts: Sequence[Shift]) -> list[Shift]:
             made.append(shift)
         elif number == 1:
             points, turns, home = shift.points.copy(), shift.turns.copy(), shift.home.copy()
+            factors = shift.factors.copy()
             rods = list(shift.rods)
             first = numbers[owner.partition("[")[0]]
             for k, rotation in rotations[stem].items():
@@ -157,11 +178,14 @@ def tied(mechanism: Mechanism, shifts: Sequence[Shift]) -> list[Shift]:
                 turns[other] = rotation @ shift.turns[first]
                 if what == "offset":
                     home[columns[f"{stem}{k}{rest}"]] = 1.0
+                if what == "scale":
+                    factors[columns[f"{stem}{k}{rest}"]] = 1.0
                 if what == "rod":
                     rods += by_name[f"{stem}{k}.rod"].rods
             _check_equal(mechanism, shift, [by_name.get(f"{stem}{k}{rest}.{what}") for k in rotations[stem]])
             name = f"{stem}{rest}.{what}"
-            made.append(replace(shift, name=name, points=points, turns=turns, home=home, rods=tuple(rods)))
+            own = {"points": points, "turns": turns, "home": home, "factors": factors}
+            made.append(replace(shift, name=name, rods=tuple(rods), **own))
     return made
 
 

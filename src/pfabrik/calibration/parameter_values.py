@@ -21,7 +21,7 @@ class ParameterValue(NamedTuple):
     Attributes
     ----------
     value, described : calibrated, and of the machine as described, in `unit`.
-    deviation : standard deviation; infinite where the data leave it open, NaN where nothing is left to estimate it by.
+    deviation : standard deviation; infinite where the data leave it open, or nothing is left to estimate it by.
     prior : what it was expected to be, or None.
     determined : True if the measurements alone determine it.
     """
@@ -74,7 +74,7 @@ def _cells(each: ParameterValue, mechanism: Mechanism) -> tuple[str, ...]:
     degrees = each.unit == "rad"
     factor = math.degrees(1.0) if degrees else 1.0
     size = factor if degrees else mechanism.characteristic_length
-    deviation = "open" if math.isinf(each.deviation) else "-" if math.isnan(each.deviation) else ""
+    deviation = "open" if math.isinf(each.deviation) else ""
     return (
         each.name,
         shown(each.described * factor, TOLERANCES.implied * size, ".9g"),

@@ -21,7 +21,7 @@ from .parameter_kinds import KINDS, Candidates, tied
 from .shifts import Shift, ShiftedGeometry, with_own_axes
 
 Free: TypeAlias = str | Sequence[str] | None
-"""Kinds ("dimensions", "points", "axes", "lengths", "offsets") and names of parameters, dimensions or joints."""
+"""Kinds ("dimensions", "points", "axes", "lengths", "offsets", "frame", "tool", "scale") and names of parameters, dimensions or joints."""
 
 STEP = 1e-5
 """Step of central differences of a geometry, in a parameter's scale: truncation and rounding both leave 1e-10."""
@@ -37,6 +37,8 @@ class Parameters:
     values : of the machine as described, (p,), in `units`.
     units : the mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
     scales : changes that would be noticed, (p,): L, 1 rad, or the size of a dimension.
+    moves : derivatives of the instrument's frame and target, a rotation vector and a place each, (p, 2, 6).
+    factors : derivatives of the factors on the actuators' readings, (p, n_a).
     """
 
     def __init__(self, mechanism: Mechanism, dimensions: Sequence[str], candidates: Candidates, shifts: list[Shift]):
@@ -45,11 +47,15 @@ class Parameters:
         self.names = (*dimensions, *(shift.name for shift in shifts))
         self.units = (
             *("" for _ in dimensions),
-            *("rad" if shift.is_angle else mechanism.length_unit for shift in shifts),
+            *("rad" if s.is_angle else "" if s.factors.any() else mechanism.length_unit for s in shifts),
         )
         own = [mechanism.dimensions[name] for name in dimensions]
         self.values = _read_only(np.array([*own, *(shift.value for shift in shifts)]))
         self.scales = _read_only(np.array([*(abs(value) or 1.0 for value in own), *(s.scale for s in shifts)]))
+        n, drives = len(dimensions), [drive.column for drive in mechanism.drives]
+        self.moves = np.concatenate([np.zeros((n, 2, 6)), [shift.moves for shift in shifts] or np.zeros((0, 2, 6))])
+        factors = [shift.factors[drives] for shift in shifts] or np.zeros((0, len(drives)))
+        self.factors = np.concatenate([np.zeros((n, len(drives))), factors])
 
     def __len__(self) -> int:
         return len(self.names)
@@ -119,6 +125,10 @@ class Parameters:
         """The geometry at values (p,), unchecked."""
         return Geometry(*(array[0] for array in self._geometries(values[None])))
 
+    def factors_at(self, values: Floats) -> Floats:
+        """Coordinates of actuators by what they read, (n_a,), at values (p,)."""
+        return np.asarray(1.0 + (values - self.values) @ self.factors)
+
     def slopes(self, values: Floats) -> Geometry:
         """Derivatives of the geometry by the parameters at values (p,): every array with the parameters in front."""
         steps = STEP * self.scales
@@ -153,6 +163,9 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
         - "axes": directions of axes, as turns about base axes, "A1.rx" [rad];
         - "offsets": of the actuators' zeros, "B1.offset", added to a reading [length or rad];
         - "lengths": of rods on actuated joints of the base, "A1.rod" [length];
+        - "frame": of the base as an instrument sees it, "frame.x" [length] to "frame.rz" [rad], place and rotation vector;
+        - "tool": of its target on the platform, "tool.x" to "tool.rz", from the reference point;
+        - "scale": factors on the actuators' readings, "B1.scale";
         - the name of a dimension, of a joint (all its points), or of one parameter.
 
         By default the dimensions, or, of a machine without any, points and offsets.
@@ -208,7 +221,7 @@ def _choose(
         dimensions += independent
     elif name in independent:
         dimensions.append(name)
-    elif name in KINDS:
+    elif name in KINDS and name not in {joint.name for joint in mechanism.joints}:
         shifts += candidates.of_kind(name)
     else:
         kind = "lengths" if name.endswith(".rod") else None

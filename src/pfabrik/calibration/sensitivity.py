@@ -61,6 +61,8 @@ def sensitivity(solution: Solution, parameters: Parameters) -> Sensitivity:
     mechanism = checked_solution(solution).mechanism
     if not isinstance(parameters, Parameters) or parameters.mechanism != mechanism:
         raise InvalidArgument("parameters", "those of another machine", f"parameters of '{mechanism.name}'")
+    if parameters.moves.any() or parameters.factors.any():
+        raise InvalidArgument("parameters", "those of an instrument or of readings", "parameters of the machine alone")
     q = np.reshape(solution.q, (-1, len(mechanism.coordinate_names)))
     if not np.isfinite(q).all():
         raise InvalidArgument("solution", "a row that is INVALID", "configurations")
@@ -127,11 +129,18 @@ class GeometrySlopes:
         self.opened = np.zeros(len(self.zeros))
         """How far loops are from closing per unit of a parameter, (p,) [L or rad]; 0 until it is computed."""
 
-    def at_held_actuators(self) -> tuple[Floats, Floats]:
-        """Twists (n, 6, p), and rates of all coordinates (n, c, p), per unit of every parameter [length, rad]."""
+    def at_held_actuators(self, moved: Floats | None = None) -> tuple[Floats, Floats]:
+        """Twists (n, 6, p), and rates of all coordinates (n, c, p), per unit of every parameter [length, rad].
+
+        Parameters
+        ----------
+        moved : how far parameters move actuators that read the same, (n, n_a, p) [rad or length]; by default not.
+        """
         n, _, columns = self.loops.shape
         rates = np.zeros((n, columns, len(self.zeros)))
         rates[:, self.drives] = -self.zeros.T
+        if moved is not None:
+            rates[:, self.drives] += moved / self.units[self.drives, None]
         passive = np.setdiff1d(np.arange(columns), self.drives)
         wanted = -(self.openings + self.loops[:, :, self.drives] @ rates[:, self.drives])
         rates[:, passive] = solved(self.loops[:, :, passive], wanted)

@@ -29,6 +29,8 @@ class Shift:
     points : changes of centres, (joints, 3).
     turns : rotation vectors of the joints' axes, (joints, 3).
     home : changes of coordinates at home, (columns,).
+    moves : changes of the instrument's frame and target, a rotation vector and a place each, (2, 6).
+    factors : changes of the factors on readings, (columns,).
     rods : numbers of the rods whose length it sets.
     """
 
@@ -39,6 +41,8 @@ class Shift:
     points: Floats
     turns: Floats
     home: Floats
+    moves: Floats
+    factors: Floats
     rods: tuple[int, ...] = ()
 
 

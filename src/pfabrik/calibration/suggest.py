@@ -55,7 +55,7 @@ def suggested(
     if criterion not in CRITERIA:
         raise InvalidArgument("criterion", repr(criterion), " or ".join(CRITERIA))
     solution = _feasible(mechanism, seed)
-    actuators = solution.actuators
+    actuators = solution.actuators / parameters.factors_at(values)
     if len(actuators) < n:
         raise InvalidArgument("n", str(n), f"at most {len(actuators)}: so many feasible configurations were found")
     rows = _measured_rows(parameters, values, measured, solution)
@@ -84,7 +84,7 @@ def _measured_rows(parameters: Parameters, values: Floats, given: Measurements, 
     k = len(solution)
     zero = np.zeros(k)
     like = Measurements(
-        solution.actuators,
+        solution.actuators / parameters.factors_at(values),
         position=np.zeros((k, 3)) if given.position is not None or len(given.distances) else None,
         orientation=None if given.orientation is None else np.tile(np.eye(3), (k, 1, 1)),
         height=None if given.height is None else zero,
