@@ -8,6 +8,7 @@ from ..arrays import Floats
 from ..batch import put
 from ..closure.close import HELD, close
 from ..decomposition.leg_table import LegTable
+from ..derived import derived
 from ..model import Model
 from ..motion.closure import Closure
 from ..motion.limited_coordinates import within_turns
@@ -15,6 +16,9 @@ from ..tolerances import TOLERANCES
 from .table import reading_scratch, reading_table
 
 NO_ROWS, NO_SLOPES = np.zeros((0, 0)), np.zeros((0, 0, 0))
+
+EXACT = 1e-14
+"""Gap to which joints are closed [L or rad]: Jacobians at coordinates with a gap of 1e-13 show it."""
 
 RESTARTS = 24
 """Random restarts for joints that no closed form gives and that do not close from their start."""
@@ -47,7 +51,7 @@ def joint_coordinates(
         return coordinates
     read_coordinates(table, poses, sides, coordinates, q_proximal)
     closure.put_actuators(coordinates, actuators)
-    coordinates = _closed(closure, poses, actuators, coordinates)
+    coordinates = _closed(closure, _known_columns(table), poses, actuators, coordinates)
     if start is not None:
         angles = np.setdiff1d(table.known["column"][table.known["turns"] == 1], closure.actuated)
         coordinates[:, angles] += 2.0 * np.pi * np.round((start - coordinates)[:, angles] / (2.0 * np.pi))
@@ -55,11 +59,25 @@ def joint_coordinates(
     return coordinates
 
 
-def _closed(closure: Closure, poses: Floats, actuators: Floats, start: Floats) -> Floats:
-    """Close the loops at fixed poses and actuators, from joint coordinates (n, columns)."""
+@derived
+def _known_columns(table: LegTable) -> frozenset[int]:
+    """Columns of the coordinates that closed forms give."""
+    return frozenset(table.known["column"].tolist())
+
+
+def _closed(closure: Closure, known: frozenset[int], poses: Floats, actuators: Floats, start: Floats) -> Floats:
+    """Close the loops at fixed poses and actuators, from joint coordinates (n, columns).
+
+    Known coordinates stay while the other joints follow: if all moved at once, a passive leg could close in its other
+    branch, whose limits nobody has checked. Only rows that are still open, near dead points, then close with all free.
+    """
     locked = closure.driven
     platform = (*HELD[:3], *((0.0,) * 3)) if closure.mechanism.end_effector_is_joint else HELD
-    closing = close(closure, start, poses, locked=locked, platform=platform)
+    closing = close(closure, start, poses, locked=locked | known, platform=platform, closeness=EXACT)
+    still_open = np.flatnonzero(closing.gap > EXACT)
+    if len(still_open):
+        begin = closing.coordinates[still_open], poses[still_open]
+        put(closing, still_open, close(closure, *begin, locked=locked, platform=platform, closeness=EXACT))
     rng = np.random.default_rng(0)
     for _ in range(RESTARTS):
         unsolved = np.flatnonzero(closing.gap > TOLERANCES.position)
