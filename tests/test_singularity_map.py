@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pfabrik as pf
+from oracles.annuli import within
 from pfabrik.errors import InvalidArgument
 from pfabrik.workspace.locus import locus
 from pfabrik.workspace.singular_slices import Field, slices_of
@@ -44,6 +45,37 @@ def test_a_five_bar_is_singular_where_its_forearms_are_in_line(free_five_bar: pf
     assert np.median(np.abs(on)) < 0.01
     assert np.abs(on).max() < 0.1  # between points 6 mm apart, near a stretched arm
     assert (np.asarray(found.measures.parallel)[np.abs(sines) > 0.2] > 0.02).all()
+
+
+def rods_in_a_plane(points: Array) -> Array:
+    """The volume that an Orthoglide's rods span, as a share of a cube's, (n,): 0 where they are in a plane."""
+    length = 310.582854123025
+    along = np.sqrt(length**2 - (points**2).sum(axis=1, keepdims=True) + points**2)  # NaN where a rod does not reach
+    rods = np.repeat(-points[:, None], 3, axis=1)
+    rods[:, range(3), range(3)] = along
+    return np.asarray(np.linalg.det(rods) / length**3)
+
+
+def test_the_locus_goes_as_far_as_the_workspace() -> None:
+    """Within the five-bar's reach, and in the three cylinders of an Orthoglide, wherever the closed form is 0."""
+    crank, forearm = np.hypot(66.0, 88.0), np.hypot(116.0, 87.0)
+    rings = [(y, 0.0, abs(crank - forearm), crank + forearm) for y in (-50.0, 50.0)]
+    random = np.random.default_rng(0)
+    for name, options, step, closed_form in (
+        ("five_bar", {"resolution": 5.0}, 5.0, lambda at: np.where(within(rings, at), forearms_cross(at), np.nan)),
+        ("orthoglide", {"resolution": 25.0}, 35.0, rods_in_a_plane),
+    ):
+        space = pf.workspace(pf.load(name).without_limits(), **options)
+        found = pf.singularity_map(space.mechanism, space, resolution=step)
+        begins = random.uniform(*space.bounds, (200_000, len(space.names)))
+        with np.errstate(invalid="ignore"):
+            near, far = (closed_form(begins + by) for by in (0.0, 0.1 * step))
+            zeros = begins[near * far < 0.0]
+            on = closed_form(found.locus_vertices)
+        assert len(zeros) > 100
+        far_off = [np.linalg.norm(found.locus_vertices - point, axis=1).min() for point in zeros]
+        assert max(far_off) < step
+        assert np.nanmedian(np.abs(on)) < 0.01
 
 
 def test_parts_have_one_sign_each(free_five_bar: pf.Workspace) -> None:

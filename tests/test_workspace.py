@@ -505,6 +505,24 @@ def test_limits_that_are_met_together_do_not_alternate() -> None:
         assert margins[f"BL{leg}", "cone"] == pytest.approx(margins[f"BR{leg}", "cone"], abs=1e-6)
 
 
+@pytest.mark.parametrize("name", ["delta", "linear_delta", "orthoglide", "rps", "five_bar"])
+def test_of_limits_met_together_the_first_binds(name: str) -> None:
+    """Equal to 1e-9 of their ranges; in blocks of poses, and one by one."""
+    machine = pf.load(name)
+    found = pf.workspace(machine, resolution=0.08 * machine.characteristic_length)
+    points = found.vertices[np.random.default_rng(5).integers(len(found.vertices), size=400)]
+    poses = found.poses(points + 0.02 * (found.bounds.mean(axis=0) - points))
+    answers = pf.solve_ik(machine, poses)
+    margins = pf.margins(answers[np.asarray(answers.status) == pf.Status.REACHED])
+    told = pf.feasibility(machine, poses[np.asarray(answers.status) == pf.Status.REACHED])
+    order = sorted(margins, key=told.limits.index)
+    values = np.stack([np.asarray(margins[limit]) for limit in order])
+    first = (values <= values.min(axis=0) + 1e-9).argmax(axis=0)
+    assert len(first) > 100
+    assert [told.limits[place] for place in told.binding] == [order[place] for place in first]
+    np.testing.assert_allclose(told.margin, values.min(axis=0), atol=1.1e-9)
+
+
 def test_the_border_is_divided_where_one_motor_takes_over_from_another() -> None:
     """At the dividing points two limits have no room left; at the vertices beside them only one of the two has none."""
     found = pf.workspace(pf.load("five_bar"), resolution=8.0)

@@ -18,7 +18,6 @@ from .position_lattice import PositionLattice
 from .refining import refined
 from .sampled_lattice import Lattice
 from .surface import BorderMesh, mesh_of
-from .ties import without_ties
 from .verdicts import MapQuestion
 
 FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
@@ -40,8 +39,7 @@ def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[Bor
     levels = max(1, round(math.log2(FIRST_CELLS[len(step), exact] / widest)))
     reach = math.ceil(FIRST_REACH[exact] / (widest * 2**levels))
     cells = refined(lattice, levels, max(reach, 2))
-    mesh = without_ties(question, mesh_of(lattice, cells.border))
-    return mesh, Parts(lattice, cells)
+    return mesh_of(lattice, cells.border), Parts(lattice, cells)
 
 
 def step_of(question: MapQuestion, resolution: float | None) -> Floats:

@@ -11,7 +11,7 @@ from .result import Workspace
 from .sampled_lattice import codes, corners
 from .surface import crossed_edges
 
-HALVINGS = 10
+HALVINGS = 7
 """How often the way from a point within reach to one beyond is halved towards the border."""
 
 

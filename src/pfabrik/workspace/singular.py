@@ -187,7 +187,7 @@ def singularity_map(
         reached, measures, signs = _measured(over, places * step + question.space.start, tell)
         places = places[reached]
         outer, border = drawn_to_border(over, places, step)
-        at_border, *there = _measured(over, border, tell)
+        at_border, *there = _measured(over, border, None)
     points, signed = places * step + question.space.start, _signed(measures, signs)
     vertices, faces = locus(
         np.concatenate([places, outer[at_border]]),

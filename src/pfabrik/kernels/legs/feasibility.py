@@ -34,18 +34,21 @@ def relative_margin(distance: float, half_range: float) -> float:
 
 @routine
 def least_margin(limited: Records, cones: Records, values: Floats) -> tuple[float, int]:
-    """The least relative margin of all limits, and its index: two per range, then the cones; -1 if none."""
+    """The least relative margin of all limits, and its index: two per range, then the cones; -1 if none.
+
+    Of margins that are equal to `KEPT`, as those of both rods of a parallelogram, the first is taken.
+    """
     least, binding = math.inf, -1
     for i in range(limited.shape[0]):
         lo, hi, value = limited[i]["lo"], limited[i]["hi"], deviation(limited[i], values)
         below, above = relative_margin(value - lo, 0.5 * (hi - lo)), relative_margin(hi - value, 0.5 * (hi - lo))
-        if min(below, above) < least:
-            least, binding = min(below, above), 2 * i + (1 if above < below else 0)
+        if min(below, above) < least - KEPT:
+            least, binding = min(below, above), 2 * i + (1 if above < below - KEPT else 0)
     for i in range(cones.shape[0]):
         leg_values, place = values[cones[i]["leg"]], cones[i]["place"]
         angle = angle_between(vec(cones[i]["axis"]), (leg_values[place], leg_values[place + 1], leg_values[place + 2]))
         margin = relative_margin(cones[i]["half_angle"] - angle, cones[i]["half_angle"])
-        if margin < least:
+        if margin < least - KEPT:
             least, binding = margin, 2 * limited.shape[0] + i
     return least, binding
 
@@ -97,12 +100,12 @@ def feasibility(
                 put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
                 for k in range(n_legs):
                     margin = reach_margin(legs[k], scratch.values[k])
-                    if margin < -NEARLY_CLOSED and margin < least:
+                    if margin < -NEARLY_CLOSED and margin < least - KEPT:
                         least, binding = margin, n_limits + k
                     margin = -max(
                         largest_constraint(legs, scratch.rows, k), largest_pointing_error(legs[k], scratch.values[k])
                     )
-                    if margin < -NEARLY_CLOSED and margin < least:
+                    if margin < -NEARLY_CLOSED and margin < least - KEPT:
                         least, binding = margin, n_limits + n_legs + k
             if parts == 1 or least > margins[row]:
                 margins[row], bindings[row] = least, binding

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
-from .answer import CLOSED, NEARLY_CLOSED
+from .answer import CLOSED, KEPT, NEARLY_CLOSED
 from .blocks import counting_range, fill_rod, fill_sides, project_on_cone_axis, wrap_between
 from .columns import (
     BLOCK,
@@ -30,6 +30,9 @@ from .columns import (
 from .feasibility import relative_margin
 from .open_table import open_table
 from .records import CARRIAGE, CRANK, HINGE, NO_PROXIMAL, SHARED, SLIDE
+
+# Difference up to which cosines of one group are equal, so that margins are to `KEPT`, but beside the axis of a cone.
+SAME = 1e-12
 
 # Binding of a row that blocks cannot measure: its pose is still to be completed, or a rod there has no direction.
 UNKNOWN = -2
@@ -53,11 +56,11 @@ def clear_margins(n_cones: int, n: int, S: Floats) -> None:
 
 @routine
 def track_margin(column: int, limit: int, n: int, S: Floats) -> None:
-    """Lower LEAST to the margin in a row, and note its limit."""
+    """Lower LEAST to the margin in a row, and note its limit; of margins equal to `KEPT` the first stays."""
     for i in range(n):
         margin, before, binding = S[column, i], S[LEAST, i], S[BINDING, i]
-        S[BINDING, i] = float(limit) if margin < before else binding
-        S[LEAST, i] = margin if margin < before else before
+        S[BINDING, i] = float(limit) if margin < before - KEPT else binding
+        S[LEAST, i] = margin if margin < before - KEPT else before
 
 
 @routine
@@ -70,10 +73,10 @@ def track_bounds(coordinate: Record, limit: int, n: int, S: Floats) -> None:
     for i in range(n):
         value = wrap_between(sense * S[place, i] + shift, lowest, highest)
         below, above, before, binding = value - lo, hi - value, S[LEAST, i], S[BINDING, i]
-        nearer = float(limit + 1) if above < below else float(limit)
+        nearer = float(limit + 1) if above < below - KEPT * half_range else float(limit)
         margin = relative_margin(above if above < below else below, half_range)
-        S[BINDING, i] = nearer if margin < before else binding
-        S[LEAST, i] = margin if margin < before else before
+        S[BINDING, i] = nearer if margin < before - KEPT else binding
+        S[LEAST, i] = margin if margin < before - KEPT else before
 
 
 @routine
@@ -84,8 +87,8 @@ def track_cosine(cone: Record, proximal: Record, limit: int, n: int, S: Floats) 
     for i in range(n):
         before, holder = S[least, i], S[least + 1, i]
         cosine = S[VALUE, i] * S[INVERSE, i]
-        S[least + 1, i] = float(limit) if cosine < before else holder
-        S[least, i] = cosine if cosine < before else before
+        S[least + 1, i] = float(limit) if cosine < before - SAME else holder
+        S[least, i] = cosine if cosine < before - SAME else before
 
 
 @routine
@@ -98,8 +101,8 @@ def track_cone_group(cones: Records, c: int, n: int, S: Floats) -> None:
         square = (1.0 - cosine) * (1.0 + cosine)
         angle = arctangent(math.sqrt(square if square > 0.0 else 0.0), cosine)
         margin = (half_angle - angle) * scale
-        S[BINDING, i] = holder if margin < before else binding
-        S[LEAST, i] = margin if margin < before else before
+        S[BINDING, i] = holder if margin < before - KEPT else binding
+        S[LEAST, i] = margin if margin < before - KEPT else before
 
 
 @routine
