@@ -137,7 +137,8 @@ class Track(Solution):
         jumps = np.zeros(self.shape, bool)
         actuators = _scaled(self.mechanism, self.actuators).max(axis=1, initial=0.0)
         moves = np.maximum(_moves(self.mechanism, self.pose), actuators)
-        expected = np.maximum(SUSPICIOUS * _moves(self.mechanism, self.targets), LEAST)
+        asked = np.where((self.status == Status.INVALID)[:, None, None], np.nan, self.targets)
+        expected = np.maximum(SUSPICIOUS * _moves(self.mechanism, asked), LEAST)
         for row in np.flatnonzero(moves > expected).tolist():
             # with stretched links, substeps may bend them to the right side in one of the two directions only
             steps = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
