@@ -46,7 +46,7 @@ class Feasibility(NamedTuple):
         length; where a leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses.
         Where the mechanism has a clearance and no other limit is exceeded, links count too: the rest of their distance
         as a share of L, as of `margins`.
-    binding : index in `limits` of the limit that has it, the first of those equal to 1e-9, (...,); -1 where there is none.
+    binding : index in `limits` of the limit that has it, (...,), the first of those equal to 1e-9; -1 if there is none.
     limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's proximal joint,
         and "closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
     """

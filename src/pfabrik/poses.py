@@ -162,7 +162,8 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
 def are_poses(targets: Floats) -> Mask:
     """Which of (n, 4, 4) arrays are poses, (n,)."""
     finite = np.asarray(np.isfinite(targets).all(axis=(1, 2)))
-    R = np.clip(np.where(finite[:, None, None], targets, np.eye(4))[:, :3, :3], -2.0, 2.0)  # squares of more may overflow
+    R = np.where(finite[:, None, None], targets, np.eye(4))[:, :3, :3]
+    R = np.clip(R, -2.0, 2.0)  # so that no square overflows
     error = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
     last = np.abs(targets[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0)
     near = TOLERANCES.rotation_matrix

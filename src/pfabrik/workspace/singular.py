@@ -187,12 +187,12 @@ def singularity_map(
         reached, measures, signs = _measured(over, places * step + question.space.start, tell)
         places = places[reached]
         outer, border = drawn_to_border(over, places, step)
-        at_border, *there = _measured(over, border, None)
+        at_border, measures_there, signs_there = _measured(over, border, None)
     points, signed = places * step + question.space.start, _signed(measures, signs)
     vertices, faces = locus(
         np.concatenate([places, outer[at_border]]),
         np.concatenate([points, border[at_border]]),
-        np.concatenate([signed, _signed(*there)]),
+        np.concatenate([signed, _signed(measures_there, signs_there)]),
     )
     return SingularityMap(
         workspace=over,
@@ -220,7 +220,7 @@ def _of(answers: Solution) -> tuple[Singularity, Floats]:
 
 def _signed(measures: Singularity, signs: Floats) -> Floats:
     """The parallel measure, signed where signs have a meaning."""
-    return np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel)
+    return np.asarray(np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel))
 
 
 def _step(over: Workspace, resolution: float | None) -> Floats:

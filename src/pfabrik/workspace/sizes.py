@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def in_words(region: Region, *, degrees: bool = True) -> str:
-    """The size of a workspace, to the digit that is uncertain, and a bound of its error: "4,970,000 ± 9,000 mm³".
+    """The size of a workspace, to the digit that is uncertain, and a bound of its error: "4,970,000 ± 3,000 mm³".
 
     Parameters
     ----------
