@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import csv
 import dataclasses
@@ -792,14 +793,45 @@ def test_names_of_machines_and_kinds_are_completed(line: str, found: list[str]) 
 
 def test_dimensions_of_a_starting_file_are_options(run: Callable[..., Result], tmp_path: Path) -> None:
     assert (
-        run("new", "linear-delta", "--rod", "300", "--platform-radius=30", "--lowest", "-5", "-o", "my.toml").exit_code
+        run(
+            "new",
+            "linear-delta",
+            "--arm-length",
+            "300",
+            "--platform-radius=30",
+            "--position-endstop",
+            "-5",
+            "-o",
+            "my.toml",
+        ).exit_code
         == 0
     )
     machine, usual = pf.load("my.toml"), loads(template("linear-delta"))
-    assert machine == usual.with_dimensions(rod=300, platform_radius=30, lowest=-5)
+    assert machine == usual.with_dimensions(arm_length=300, platform_radius=30, position_endstop=-5)
     upper, lower = (np.array(machine.joint(name).at) for name in ("UpperL1", "LowerL1"))
     assert np.linalg.norm(upper - lower) == pytest.approx(300)
     assert run("new", "hexapod").stdout == template("6-UPS")
+
+
+@pytest.mark.parametrize("given", [{}, {"--crank": 90, "--forearm": 160}, {"--crank": 130, "--crank-angle": 110}])
+def test_elbows_of_a_starting_file_stop_before_they_are_stretched_or_folded(
+    run: Callable[..., Result], given: dict[str, float]
+) -> None:
+    """The angle between crank and forearm, measured on the points of the joints, is 40 and 170 degrees at the stops."""
+    machine = loads(run("new", "5-bar", *(str(word) for pair in given.items() for word in pair)).stdout)
+    shaft, elbow, tip = (np.array(machine.joint(name).at) for name in ("MotorL", "ElbowL", "Tip"))
+    crank, forearm = elbow - shaft, tip - elbow
+    bend = math.degrees(math.acos(crank @ forearm / (np.linalg.norm(crank) * np.linalg.norm(forearm))))
+    assert np.degrees(machine.joint("ElbowL").range) + 170.0 == pytest.approx([bend, bend + 170.0 - 40.0])
+    assert machine.joint("ElbowR").range == pytest.approx(-np.array(machine.joint("ElbowL").range)[::-1])
+
+
+def test_a_starting_file_of_a_printer_has_klipper_s_words(run: Callable[..., Result], tmp_path: Path) -> None:
+    settings = {"delta_radius": 105.5, "arm_length": 262.25, "position_endstop": 141.75}
+    options = [str(word) for name, value in settings.items() for word in ("--" + name.replace("_", "-"), value)]
+    run("new", "linear-delta", *options, "-o", "my.toml")
+    written = dict(re.findall(r"^(\w+): (\S+)", run("export", "my.toml", "klipper").stdout, re.MULTILINE))
+    assert {name: float(written[name]) for name in settings} == settings
 
 
 def test_kinds_are_listed_for_programs_too(run: Callable[..., Result]) -> None:
@@ -1474,3 +1506,26 @@ def test_text_that_goes_on_is_below_its_column() -> None:
     assert fitted(table, None) == table == fitted(table, 100)
     assert fitted("one two three four", 10) == "one two\n    three\n    four"
     assert fitted("https://" + "x" * 30, 10) == "https://" + "x" * 30  # no word is cut
+
+
+def test_every_command_and_option_that_is_named_exists() -> None:
+    """In all texts of the library: messages, help, docstrings."""
+    context, templated = click.Context(main), {"--rod", "--arm"}
+    commands = {name: main.get_command(context, name) for name in main.list_commands(context)}
+    known = (
+        {option for each in commands.values() for param in each.params for option in param.opts}
+        | templated
+        | {"--help"}
+    )
+    for path in (Path(pf.__file__).parent).rglob("*.py"):
+        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+        named = {word for text in texts for word in re.findall(r"(?<![\w-])(?<!halcompile )--[a-z][a-z0-9-]*", text)}
+        called = {word for text in texts for word in re.findall(r"`pfabrik ([a-z]+)", text)}
+        assert (named - known, called - set(commands)) == (set(), set()), path
+
+
+def test_parts_of_an_export_are_chosen(run: Callable[..., Result]) -> None:
+    assert "stewart_fk" not in run("export", "stewart", "c", "--parts", "ik,limits", "--name", "stewart").stdout
+    assert "expected some of 'ik'" in run("export", "stewart", "c", "--parts", "dynamics").stderr
+    assert "--parts is of c, c-float" in run("export", "stewart", "mjcf", "--parts", "ik").stderr

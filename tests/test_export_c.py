@@ -21,9 +21,11 @@ from pfabrik.cli import main
 from pfabrik.description.joint_types import KINDS
 from pfabrik.description.task import task_of
 from pfabrik.errors import UnsupportedMechanism
+from pfabrik.export import self_test
 from pfabrik.export.export_c import c_source
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.wording import in_words
+from pfabrik.files import dumps, loads
 from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns
 from pfabrik.motion.limited_coordinates import coned
@@ -318,6 +320,26 @@ def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(tmp_path: Pa
     text = c_source(closure.stretched_wrist(tool=(0, 10, 270)))
     program = compiled(tmp_path, text, COMPILERS[0], driver=None)
     assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
+
+
+@needs_compiler
+def test_a_self_test_says_so_where_nothing_can_be_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(self_test, "N_POSES", 0)
+    program = compiled(tmp_path, c_source(machine("tricept_of_legs")), COMPILERS[0], driver=None)
+    run = subprocess.run([str(program)], capture_output=True, text=True)
+    assert (run.returncode, run.stdout) == (2, "nothing is checked: no pose near home has one answer alone\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "task"), [("canfield", ("x", "y")), ("canfield", ("tilt",)), ("g1_ankle", ("x", "y"))]
+)
+def test_actuators_that_the_task_leaves_to_a_choice_are_not_exported(name: str, task: tuple[str, ...]) -> None:
+    chosen = loads(
+        re.sub("(?m)^schema.*", f"schema = 1\ntask = {[*task]}", re.sub("(?m)^task.*", "", dumps(machine(name))))
+    )
+    with pytest.raises(UnsupportedMechanism, match=r"leaves motions open.*--parts"):
+        c_source(chosen)
+    assert "pfk_fk" in c_source(chosen, parts=("limits", "fk", "rates"))
 
 
 @needs_compiler

@@ -137,6 +137,11 @@ def joint_coordinates(mechanism: pf.Mechanism, words: str) -> tuple[str, float |
     return name, coordinates if len(coordinates) > 1 else coordinates[0]
 
 
+def comma_separated(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
+    """Names separated by commas."""
+    return None if value is None else [word.strip() for word in value.split(",") if word.strip()]
+
+
 def named_joints(option: tuple[str, ...], words: tuple[str, ...]) -> tuple[str, ...]:
     """The names of --joints in their order: with commas between, or apart, and then the later ones are `words`."""
     if len(option) > 1 and words:

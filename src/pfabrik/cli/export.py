@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -9,7 +10,7 @@ import click
 
 import pfabrik as pf
 
-from .arguments import MECH, load, named_joints
+from .arguments import MECH, comma_separated, load, named_joints
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import note
 
@@ -21,7 +22,12 @@ BACKENDS = ("torch", "jax", "numpy")
 
 
 def text_of(
-    mechanism: pf.Mechanism, form: str, name: str, joints: tuple[str, ...] | None = None, file: str = "FILE"
+    mechanism: pf.Mechanism,
+    form: str,
+    name: str,
+    joints: tuple[str, ...] | None = None,
+    file: str = "FILE",
+    parts: Sequence[str] | None = None,
 ) -> str:
     """The text of a mechanism in a format."""
     if form == "mjcf":
@@ -40,11 +46,10 @@ def text_of(
         from ..export.tensors import TASK, tensor_source
 
         return tensor_source(mechanism, backend=cast(Any, form), joints=joints or TASK)
-    from ..export.export_c import c_source
+    from ..export.export_c import PARTS, c_source
 
-    return c_source(
-        mechanism, precision="float" if form == "c-float" else "double", name=name, joints=joints, file=file
-    )
+    chosen, precision = cast(Any, parts or PARTS), cast(Any, "float" if form == "c-float" else "double")
+    return c_source(mechanism, precision=precision, parts=chosen, name=name, joints=joints, file=file)
 
 
 @click.command()
@@ -70,6 +75,12 @@ def text_of(
 @click.option(
     "--name", metavar="NAME", help="Of c, c-float, --ros2-control: what names begin with.  [default: pfk, or FOLDER's]"
 )
+@click.option(
+    "--parts",
+    metavar="A,B,...",
+    callback=comma_separated,
+    help="Of c, c-float: some of ik, limits, fk, rates.  [default: all]",
+)
 @force_option
 def export(
     mech: str,
@@ -78,6 +89,7 @@ def export(
     folder: Path | None,
     joints: tuple[str, ...],
     name: str | None,
+    parts: list[str] | None,
     force: bool,
     **files: Path | None,
 ) -> int:
@@ -108,13 +120,15 @@ def export(
         raise click.UsageError(f"expected a FORMAT ({', '.join(FORMATS)}), --torch, --jax, --numpy or --ros2-control")
     joints = named_joints(joints, words)
     _check_settings(outputs, folder, name, joints)
+    if parts and not outputs.keys() & {*NAMED}:
+        raise click.UsageError(f"--parts is of {', '.join(NAMED)}")
     for path in outputs.values():
         refuse_existing(path, force)
     check_outputs([(_option(form), path) for form, path in outputs.items()], [Path(mech)])
     mechanism = load(mech)
     for form, path in outputs.items():
         file = "FILE" if path == STANDARD else path.name
-        _write(path, form, text_of(mechanism, form, "pfk" if name is None else name, joints or None, file))
+        _write(path, form, text_of(mechanism, form, "pfk" if name is None else name, joints or None, file, parts))
     if folder is not None:
         _write_package(mechanism, folder, joints, name, force)
     return 0

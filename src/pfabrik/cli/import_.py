@@ -11,16 +11,12 @@ import click
 import pfabrik as pf
 
 from ..errors import PfabrikError
+from .arguments import comma_separated
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import complain, json_option, note, print_json
 
 if TYPE_CHECKING:
     from ..interop import Imported
-
-
-def words(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
-    """Names separated by commas."""
-    return None if value is None else [word.strip() for word in value.split(",") if word.strip()]
 
 
 @click.command("import")
@@ -29,13 +25,13 @@ def words(context: click.Context, parameter: click.Parameter, value: str | None)
 @click.option("--end-effector", metavar="NAME", help="A body, a site, or a joint. Default: where most joints meet.")
 @click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of a URDF, and its motors.")
 @click.option(
-    "--actuated", metavar="A,B,...", callback=words, help="Joints that are driven. Default: as the file says."
+    "--actuated", metavar="A,B,...", callback=comma_separated, help="Joints that are driven. Default: as the file says."
 )
-@click.option("--fixed", metavar="A,B,...", callback=words, help="Joints to hold where they are.")
+@click.option("--fixed", metavar="A,B,...", callback=comma_separated, help="Joints to hold where they are.")
 @click.option(
     "--task",
     metavar="A,B,...",
-    callback=words,
+    callback=comma_separated,
     help="What targets set, such as z,tilt. Default: what the end effector can do.",
 )
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")

@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias, get_args
 from ..checks import require_names, require_path
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
+from ..motion.fitting_task import leaves_a_choice
 from ..whole_files import whole_path
 from .machine_data import Machine
 from .named_joints import fitting_path
@@ -54,7 +55,8 @@ def export_c(
     Raises
     ------
     UnsupportedMechanism : some chain is no leg in closed form, or one that has no code here; the message says which,
-        and why. Also where "fk" is asked for and the actuators leave the end effector free; and with "limits" and a
+        and why. Also where "fk" is asked for and the actuators leave the end effector free, or "ik" and the task leaves
+        motions open that are a choice; and with "limits" and a
         clearance where the place of a link follows from no leg.
     InvalidArgument : an unknown precision or part, or a name that is not allowed.
     """
@@ -85,7 +87,13 @@ def c_source(
         raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")
     machine = Machine(mechanism)
     if "fk" in parts and machine.uncontrolled:
-        reason = f"its actuators leave the end effector {counted(machine.uncontrolled, 'freedom')}: leave 'fk' out"
+        left = counted(machine.uncontrolled, "freedom")
+        reason = f"its actuators leave the end effector {left}: leave 'fk' out of `parts` (--parts ik,limits,rates)"
+        raise UnsupportedMechanism(mechanism.name, [reason], "exported")
+    if "ik" in parts and machine.completes and machine.equations and leaves_a_choice(mechanism):
+        task = " ".join(mechanism.task)
+        reason = f"its task {task} leaves motions open that only the library chooses among: set them in `task`"
+        reason = f"{reason}, or leave 'ik' out of `parts` (--parts limits,fk,rates)"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     path = None if joints is None else fitting_path(mechanism, joints)
     return source(machine, name, precision, parts, path, quote(file))

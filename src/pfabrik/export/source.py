@@ -27,13 +27,15 @@ def source(
 ) -> str:
     """The text of the file: header, tables and routines."""
     routines = resources.files(__package__).joinpath("kinematics.c").read_text(encoding="utf-8")
-    text = selected(routines[routines.index("#ifndef") :], features(machine, parts, path))
+    checks = checks_of(machine, "limits" in parts) if "ik" in parts else None
+    is_checked = {"CHECKED"} if checks is not None and len(checks.targets) else set()
+    text = selected(routines[routines.index("#ifndef") :], features(machine, parts, path) | is_checked)
     included = {
         "machine.h": machine_h(machine, parts, path),
         "tables.h": tables_h(machine, precision, parts, text, path),
     }
-    if "ik" in parts:
-        included["checks.h"] = checks_h(checks_of(machine, "limits" in parts), AGREEMENT[precision])
+    if checks is not None:
+        included["checks.h"] = checks_h(checks, AGREEMENT[precision])
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
     words = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, parts, path)}\n{text}"), name, precision)
     return words.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)

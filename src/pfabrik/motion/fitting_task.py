@@ -107,6 +107,21 @@ def task_remark(mechanism: Mechanism) -> str:
     )
 
 
+def leaves_a_choice(mechanism: Mechanism) -> bool:
+    """True if a task leaves freedoms open that move several of the other coordinates together: answers are a choice.
+
+    Freedoms that each move one coordinate alone are no choice: it stays as the target has it.
+    """
+    bases, n_rows = _motions(mechanism)
+    counts = _counted(mechanism.task)[:n_rows]
+    for basis in bases:
+        values, right = right_singular(basis[counts][None])
+        left = basis @ right[0, np.count_nonzero(values > TOLERANCES.nearly_implied) :].T
+        if np.count_nonzero(np.abs(left).max(axis=1, initial=0.0) > TOLERANCES.nearly_implied) > left.shape[1] > 0:
+            return True
+    return False
+
+
 def motions_at(mechanism: Mechanism, q: Floats) -> Floats:
     """Twists (r, k) of the end effector, one for each motion that the loops allow at coordinates q (1, c)."""
     closure, twist = first_order(mechanism, q)
