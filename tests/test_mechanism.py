@@ -20,6 +20,7 @@ from pfabrik.description.home_mobility import universal_axes
 from pfabrik.description.joint_types import JOINT_TYPES, KINDS
 from pfabrik.description.mechanism import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
+from pfabrik.files import loads
 from pfabrik.tolerances import TOLERANCES
 
 Z = (0.0, 0.0, 1.0)
@@ -520,3 +521,23 @@ def _by_descent(points: np.ndarray) -> float:
         distances = np.linalg.norm(points - centre, axis=1)
         centre = centre + (points[distances.argmax()] - centre) / (step + 1)
     return float(np.linalg.norm(points - centre, axis=1).max())
+
+
+def test_a_freedom_that_the_task_does_not_set_is_no_warning() -> None:
+    """Five struts on rings about the spindle: it turns about z, which a task of position and tilt leaves out."""
+    rings = [((-418, 325), -415), ((-160, -500), -435), ((160, -500), -455), ((418, 325), -475), ((0, 530), -495)]
+    legs = []
+    for foot, z in rings:
+        out = np.array(foot) / np.hypot(*foot)
+        across = f"[{-out[1]}, {out[0]}, 0]"
+        legs.append(
+            f"[[leg]]\nchain = 'S-P*-R-R'\nbase = [{foot[0]}, {foot[1]}, 0]\n"
+            f"via = [[{80 * out[0]}, {80 * out[1]}, {z}]]\n"
+            f"platform = [0, 0, {z}]\nstroke = [200, 1200]\nC.axis = {across}\nD.axis = 'z'\n"
+        )
+    head = "schema = 1\nname = 'five'\nend_effector = 'platform'\nreference_point = [0, 0, -900]\n"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        loads(head + "task = ['x', 'y', 'z', 'tilt']\n" + "\n".join(legs))
+    with pytest.warns(MobilityWarning, match="1 freedom"):
+        loads(head + "\n".join(legs))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.spatial import transform
@@ -203,3 +205,12 @@ def test_what_is_square_to_an_axis_of_any_length_are_unit_vectors() -> None:
         across = square_to(axis)
         np.testing.assert_allclose(across @ across.T, np.eye(2), atol=1e-14)
         np.testing.assert_allclose(across @ axis, 0.0, atol=1e-14 * np.linalg.norm(axis))
+
+
+def test_angles_of_more_than_a_turn_warn_that_degrees_may_be_meant() -> None:
+    with pytest.warns(UserWarning, match=r"rpy: an angle of 90 rad is 14.3 turns; .*degrees=True"):
+        pf.pose([0, 0, 0], rpy=[0, 90, 0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pf.pose([0, 0, 0], rpy=[0, 90, 0], degrees=True)
+        pf.pose([0, 0, 0], rotvec=[0, 0, 2 * np.pi])

@@ -311,3 +311,9 @@ def test_what_is_shown_of_an_answer_has_no_digits_of_rounding(name: str) -> None
     answer = pf.solve_fk(mechanism, [1e-3 + drive.home for drive in mechanism.drives])
     shown = [answer._repr_html_(), pf.margins(answer)._repr_html_(), str(pf.search_log(mechanism, answer.pose))]
     assert [text for text in shown if re.search(r"(?<!&lt; )(?<!< )\b\d(\.\d+)?e-(1[2-9]|[23]\d)", text)] == []
+
+
+def test_a_status_compares_with_its_name_and_its_number(stewart: Mechanism) -> None:
+    status = pf.solve_ik(stewart, stewart.home_pose).status
+    assert status == "REACHED" and status == 0 and status == "REACHED"
+    assert status != "PROJECTED" and {status: 1}[Status.REACHED] == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -137,3 +139,31 @@ def test_starts_that_do_not_fit_are_refused() -> None:
         pf.track(STEWART, [POINT], start=unknown)
     with pytest.raises(InvalidArgument, match="start: found batch shape"):
         pf.Solver(machine("stewart"), start=pair)
+
+
+GOOD = {"mechanism": STEWART, "target": HOME, "targets": [HOME], "path": [HOME], "actuators": VALUES, "values": VALUES}
+GOOD |= {"solution": pf.solve_ik(STEWART, HOME), "q": pf.solve_ik(STEWART, HOME).q}
+WRONG_TYPES = [
+    *(None, "nonsense", object(), {"nonsense": 1.0}, np.array([object()] * 3), np.zeros((2, 5)), 1j, [None], len),
+    pf.solve_ik(FIVE_BAR, FIVE_BAR.home_pose),
+]
+VERBS = [name for name in pf.__all__ if inspect.isfunction(getattr(pf, name)) and name not in ("animate", "view")]
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_value_of_a_wrong_type_ends_in_one_sentence(verb: str, tmp_path: Path, monkeypatch: Any) -> None:
+    """Every verb, every argument: an error of the library, or a valid answer. Files of these names are not there."""
+    monkeypatch.chdir(tmp_path)
+    function, parameters = getattr(pf, verb), inspect.signature(getattr(pf, verb)).parameters.values()
+    named = [each for each in parameters if each.kind not in (each.VAR_KEYWORD, each.VAR_POSITIONAL)]
+    usual = {each.name: GOOD.get(each.name) for each in named if each.default is each.empty}
+    usual |= {"path": "file"} if "path" in usual and verb.startswith("export") else {}
+    for each in named:
+        for wrong in WRONG_TYPES:
+            if (each.name == "on_progress" and wrong is len) or (wrong is None and each.default is None):
+                continue
+            try:
+                with warnings.catch_warnings(action="ignore"):
+                    function(**(usual | {each.name: wrong}))
+            except (PfabrikError, OSError) as error:
+                assert "\n" not in str(error), (each.name, wrong)

@@ -66,6 +66,18 @@ def require_names(name: str, value: Any) -> tuple[str, ...]:
     return names
 
 
+def names_of(name: str, value: Any) -> tuple[str, ...]:
+    """Names, as a tuple: one text, or several in a list."""
+    return (value,) if isinstance(value, str) else require_names(name, value)
+
+
+def require_choice(name: str, value: Any, choices: Iterable[str | None]) -> None:
+    """InvalidArgument for what is none of some texts, or None where that is one of them; of any type."""
+    known = tuple(choices)
+    if not (value is None or isinstance(value, str)) or value not in known:
+        raise InvalidArgument(name, reprlib.repr(value), " or ".join(map(repr, known)))
+
+
 def _is_single(value: Any) -> bool:
     """True if what seems to be many things is a text, or an array without axes."""
     return isinstance(value, str | bytes) or getattr(value, "shape", None) == ()

@@ -145,11 +145,11 @@ class InvalidArgument(PfabrikError, ValueError):
 
     def __init__(self, argument: str, found: str, expected: str, rows: Sequence[int] = ()) -> None:
         self.argument = argument
-        self.found = found
+        self.found = " ".join(found.split())  # arrays are shown on several lines
         self.expected = expected
         self.rows = tuple(rows)
         where = f" (first bad row{'s' * (len(self.rows) > 1)}: {', '.join(map(str, self.rows))})" if self.rows else ""
-        super().__init__(f"{argument}: found {found}; expected {expected}{where}")
+        super().__init__(f"{argument}: found {self.found}; expected {expected}{where}")
 
 
 class UnknownName(PfabrikError, KeyError):
@@ -157,7 +157,7 @@ class UnknownName(PfabrikError, KeyError):
 
     def __init__(self, kind: str, name: Any, known: Iterable[str]) -> None:
         self.kind = kind
-        self.name = str(name)
+        self.name = name if isinstance(name, str) else " ".join(str(name).split())
         self.known = tuple(known)
         self._text = f"no {kind} named '{name}'{near_miss(self.name, self.known)} (known: {', '.join(self.known)})"
         super().__init__(self._text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+import warnings
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
@@ -64,6 +65,10 @@ def pose(
         value = value.as_matrix() if isinstance(value, SupportsMatrix) else value
         numbers = _numbers(name, value, {"rotation": (3, 3), "rpy": (3,), "rotvec": (3,)}.get(name, (4,)))
         in_degrees = degrees and name in ("rpy", "rotvec")
+        most = np.abs(numbers).max(initial=0.0) if name in ("rpy", "rotvec") and not degrees else 0.0
+        if most > 2.0 * np.pi:
+            turns = f"an angle of {most:.4g} rad is {most / (2.0 * np.pi):.3g} turns"
+            warnings.warn(f"{name}: {turns}; were degrees meant? pose(..., degrees=True)", stacklevel=2)
         turned = _ROTATIONS[name](name, np.radians(numbers) if in_degrees else numbers)
     try:
         shape = np.broadcast_shapes(positions.shape[:-1], turned.shape[:-2])

@@ -72,7 +72,7 @@ def actuation(mechanism: Mechanism, joints: str | Sequence[str]) -> Actuation:
     UnsupportedMechanism : the joints do not determine the actuators, or these not the joints; with the reason.
     """
     checked_mechanism(mechanism)
-    if joints == TASK and TASK not in {joint.name for joint in mechanism.joints}:
+    if isinstance(joints, str) and joints == TASK and TASK not in {joint.name for joint in mechanism.joints}:
         task = TaskPath(mechanism)
         require_determined(mechanism, task.names, task.rates_of, PURPOSE)
         return Actuation(task)

@@ -26,6 +26,15 @@ class Status(IntEnum):
     FAILED = rows.FAILED
     INVALID = rows.INVALID
 
+    def __eq__(self, other: object) -> bool:
+        """True for its number and for its name: ``solution.status == "REACHED"``."""
+        return self.name == other if isinstance(other, str) else int(self) == other
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = IntEnum.__hash__
+
     def __str__(self) -> str:
         return self.name
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
+from ..checks import names_of, require_choice
 from ..derived import derived
 from ..description.geometry import Geometry, geometry_of, with_geometry
 from ..description.mechanism import Joint, Mechanism, checked_mechanism
@@ -176,12 +177,11 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
     ------
     UnknownName, InvalidArgument : no such parameter, or one that is named twice.
     """
-    if ties not in (None, "copies"):
-        raise InvalidArgument("ties", repr(ties), "'copies' or None")
+    require_choice("ties", ties, ("copies", None))
     if free is None:
         free = ("dimensions",) if checked_mechanism(mechanism).dimensions else ("points", "offsets")
-    chosen = (free,) if isinstance(free, str) else tuple(free)
-    if not chosen or not all(isinstance(name, str) for name in chosen):
+    chosen = names_of("free", free)
+    if not chosen:
         raise InvalidArgument("free", repr(free), f"kinds (dimensions, {', '.join(KINDS)}) or names of parameters")
     return _parameters(checked_mechanism(mechanism), chosen, ties)
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..checks import require_method
 from ..drawing import SMALL, new_figure
 from .calibration import Calibration
 
@@ -28,6 +29,7 @@ def plot_calibration(calibration: Calibration) -> Figure:
     ------
     MissingLibrary : matplotlib is not installed.
     """
+    require_method("calibration", calibration, "suggest", "a Calibration, as `calibrate` returns")
     figure = new_figure(7.0, 2.4 + 0.13 * min(len(calibration.names), MOST_NAMED))
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
     _residuals(left, calibration)

@@ -7,6 +7,7 @@ the twists of its two bodies differ by its own screws only. The null space of th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -45,12 +46,15 @@ def loop_conditions(loops: Floats, screws: Floats) -> Floats:
     return conditions.reshape(*screws.shape[:-2], 6 * len(loops), screws.shape[-2])
 
 
-def end_effector_freedom(mechanism: Structure, locked: frozenset[int]) -> int:
+def end_effector_freedom(
+    mechanism: Structure, locked: frozenset[int], task: Sequence[str] = ("x", "y", "z", "rotation")
+) -> int:
     """Number of independent motions of the end effector at home, with some coordinates locked.
 
     Parameters
     ----------
     locked : columns of the coordinates that do not move.
+    task : what counts of a motion; what it does to other coordinates of the end effector does not.
 
     Returns
     -------
@@ -58,7 +62,10 @@ def end_effector_freedom(mechanism: Structure, locked: frozenset[int]) -> int:
     """
     twist, closure = _home_motion(mechanism, locked)
     motions = _null_space(closure)
-    return _rank((twist[3:] if mechanism.end_effector_is_joint else twist) @ motions)
+    turns = {"rotation", "tilt"} & {*task}, {"rotation", "tilt"} & {*task}, {"rotation", "yaw"} & {*task}
+    counts = np.array([*map(bool, turns), *(axis in task for axis in "xyz")])
+    counts[:3] &= not mechanism.end_effector_is_joint
+    return _rank(twist[counts] @ motions)
 
 
 def is_held(mechanism: Structure) -> bool:

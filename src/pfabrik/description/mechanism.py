@@ -65,7 +65,8 @@ class Mechanism(Structure):
     """A closed-loop machine: joints between named bodies, one body fixed, one body (or joint) to be placed.
 
     Construction checks everything and raises `InvalidMechanism` with every fault; afterwards nothing changes. A
-    `MobilityWarning` says when the actuators do not hold the end effector, or the loops keep it from moving.
+    `MobilityWarning` says when the actuators do not hold what the task sets of the end effector, or the loops keep it
+    from moving.
 
     Attributes
     ----------
@@ -205,7 +206,7 @@ class Mechanism(Structure):
             warnings.warn(f"'{self.name}': {doubt}", MobilityWarning, stacklevel=4)
 
     def _doubts_of_freedom(self) -> Iterator[str]:
-        left = end_effector_freedom(self, frozenset(drive.column for drive in self.drives))
+        left = end_effector_freedom(self, frozenset(drive.column for drive in self.drives), self.task)
         if left > 0:
             drives, leaves = len(self.actuator_names), "leave" if len(self.actuator_names) > 1 else "leaves"
             yield f"{counted(drives, 'actuator')} {leaves} the end effector {counted(left, 'freedom')} at home"

@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
+from ..checks import names_of
 from ..derived import derived
 from ..description.graph import Step
 from ..description.home_mobility import universal_axes
@@ -201,7 +202,7 @@ def joint_path(mechanism: Mechanism, names: str | Sequence[str]) -> JointPath:
     UnknownName : no joint or coordinate of that name.
     InvalidArgument : a name twice; joints that are not in series, or do not lead from the base to the end effector.
     """
-    return path_of(mechanism, (names,) if isinstance(names, str) else tuple(names))
+    return path_of(mechanism, names_of("joints", names))
 
 
 @derived

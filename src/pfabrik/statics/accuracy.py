@@ -11,7 +11,7 @@ import numpy as np
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, Mask, shaped
-from ..checks import require_positive
+from ..checks import require_choice, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..tolerances import TOLERANCES
@@ -94,8 +94,7 @@ def accuracy(
     UnsupportedMechanism : play in joints of a machine with redundant actuators.
     """
     mechanism = checked_solution(solution).mechanism
-    if kind not in ("worst", "rms"):
-        raise InvalidArgument("kind", repr(kind), "'worst' or 'rms'")
+    require_choice("kind", kind, ("worst", "rms"))
     tolerances, errors = _tolerances(solution, errors, sensitivity)
     of_actuators, of_joints = _errors(mechanism, errors)
     maps = maps_of(solution)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, shaped
+from ..checks import require_choice
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..motion.displacements import actuator_units
 from ..poses import as_floats
@@ -114,9 +115,7 @@ def wrench_capacity(
     UnsupportedMechanism : so many redundant actuators that their polytope has more than 20,000 pairs of facets.
     """
     mechanism = checked_solution(solution).mechanism
-    choices = ("force",) if mechanism.end_effector_is_joint else tuple(PARTS)
-    if of not in choices:
-        raise InvalidArgument("of", repr(of), f"one of {', '.join(choices)}")
+    require_choice("of", of, ("force",) if mechanism.end_effector_is_joint else PARTS)
     bounds = bounds_of("limits", limits, mechanism.actuator_names)
     maps, asked = maps_of(solution), asked_of(solution, wrench, at)
     normals, offsets = _half_spaces(solution, maps, bounds)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..batch import take, take_each
+from ..checks import require_method
 from ..kernels.platform.search_records import Starts
 from ..telling import OnProgress
 from .verdicts import MapQuestion
@@ -41,6 +42,8 @@ class Measure:
         self.question = question
         self.total = 0
         self._done = 0
+        if executor is not None:
+            require_method("executor", executor, "submit", "an executor of concurrent.futures, or None")
         self._executor, self._on_progress = executor, on_progress
         self._explorer = question.explorer()
         self._sent = b"" if executor is None or self._explorer is not None else pickle.dumps(question)
