@@ -17,6 +17,7 @@ from pfabrik.rotations import angles_between, from_rotvec, square_to
 ANGLES = [0.0, 1e-300, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 3.0, np.pi, 4.0, 100.0]
 
 
+@pytest.mark.filterwarnings("ignore:.*were degrees meant")
 @pytest.mark.parametrize("angle", ANGLES)
 def test_rotation_vectors_are_exact_at_every_angle(angle: float) -> None:
     """The antisymmetric part is compared relative to the angle, so that no branch may lose digits."""

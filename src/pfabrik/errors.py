@@ -159,7 +159,7 @@ class UnknownName(PfabrikError, KeyError):
         self.kind = kind
         self.name = name if isinstance(name, str) else " ".join(str(name).split())
         self.known = tuple(known)
-        self._text = f"no {kind} named '{name}'{near_miss(self.name, self.known)} (known: {', '.join(self.known)})"
+        self._text = f"no {kind} named '{self.name}'{near_miss(self.name, self.known)} (known: {', '.join(self.known)})"
         super().__init__(self._text)
 
     def __str__(self) -> str:
