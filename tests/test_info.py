@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -14,6 +16,7 @@ from pfabrik.cli import main
 from pfabrik.cli.info_report import chain_table, clean, vector
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.decompose import beyond_positions
+from pfabrik.description.home_mobility import universal_axes
 from pfabrik.engine import engine_of as answering_engine
 from pfabrik.platform.legs_engine import LegsEngine
 
@@ -88,3 +91,71 @@ def test_a_motor_in_no_sub_chain_is_why_the_closure_engine_answers() -> None:
 def test_parallelograms_are_shown_with_their_rods(name: str, line: str) -> None:
     assert printed(name).splitlines()[-1].strip() == line
     assert "parallelogram" not in printed("stewart")
+
+
+CARRIER = """
+schema = 1
+name = "a link that carries a strut"
+units = {{ length = "mm", angle = "deg" }}
+base = "base"
+end_effector = "hub"
+reference_point = [40, 300, 10]
+task = ["x", "z"]
+
+[[joint]]
+name = "in"
+type = "universal"
+connects = ["base", "link"]
+at = [0, 0, 0]
+
+[[joint]]
+name = "out"
+type = "spherical"
+connects = ["link", "hub"]
+at = [40, 300, 10]
+
+[[joint]]
+name = "gx"
+type = "prismatic"
+actuated = true
+connects = ["base", "sx"]
+axis = [1, 0, 0]
+
+[[joint]]
+name = "gz"
+type = "prismatic"
+actuated = true
+connects = ["sx", "sz"]
+axis = [0, 0, 1]
+
+[[joint]]
+name = "gy"
+type = "prismatic"
+connects = ["sz", "hub"]
+axis = [0, 1, 0]
+
+[[leg]]
+chain = "S-P-S"
+base = [[0, 150, 200]]
+platform = [{eye}]
+connects = ["base", "link"]
+stroke = [50, 400]
+"""
+
+
+def test_axes_of_a_link_on_whose_line_several_joints_are_keep_it_from_spinning(tmp_path: Path) -> None:
+    """The hub is on a sphere about the first joint: y = sqrt(r^2 - x^2 - z^2)."""
+    (tmp_path / "on.toml").write_text(CARRIER.format(eye="[20, 150, 5]"))
+    machine = pf.load(tmp_path / "on.toml")
+    axes = universal_axes(machine, machine.joint("in"))
+    assert axes @ [40, 300, 10] == pytest.approx([0.0, 0.0], abs=1e-10)
+    for x, z in ((100.0, 60.0), (-80.0, -70.0)):
+        solution = pf.solve_ik(machine, [x, 0.0, z])
+        assert solution
+        assert solution.pose[1, 3] == pytest.approx(math.sqrt(40**2 + 300**2 + 10**2 - x**2 - z**2))
+    shown = ", ".join(f"{value:.4g}" for value in axes[0])
+    assert f"angles about ({shown})" in printed(str(tmp_path / "on.toml"))
+    assert "has no `axes`" not in CliRunner().invoke(main, ["check", str(tmp_path / "on.toml")]).output
+    (tmp_path / "off.toml").write_text(CARRIER.format(eye="[60, 150, 5]"))
+    said = CliRunner().invoke(main, ["check", str(tmp_path / "off.toml")]).output
+    assert "universal joint 'in' has no `axes`" in said

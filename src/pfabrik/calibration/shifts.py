@@ -95,7 +95,6 @@ class ShiftedGeometry:
         for j, joint in enumerate(joints):
             if joint.type == "universal" and joint.axes is None:
                 ends, is_forward = ends_of_default_axes(mechanism, joint)
-                ends = [end for end in ends if end.at != joint.at]
                 if ends:
                     self._square.append((j, at[ends[0].name], is_forward))
         self.base = geometry_of(self.like)

@@ -9,7 +9,9 @@ import numpy as np
 
 import pfabrik as pf
 
+from ..description.graph import next_joints, steps_from_base
 from ..description.graph_faults import leaves
+from ..description.home_mobility import ends_of_default_axes, universal_axes
 from ..description.rod_lengths import odd_rods, uneven_rods, with_lengths
 from ..description.symmetry import crossed_rounds, near_copies
 from ..motion.fitting_task import has_dependent_coordinates, task_remark
@@ -29,6 +31,7 @@ def remarks_on(mechanism: pf.Mechanism) -> Iterator[str]:
         yield from (f"the loops hardly resist a motion of {nearly_free(motion)}" for motion in mobility.nearly_free)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
+    yield from axes_notes(mechanism)
     yield from rod_notes(mechanism)
     yield from symmetry_notes(mechanism)
     widest = max((width for joint in mechanism.joints for width in angular_widths(joint)), default=math.nan)
@@ -36,6 +39,24 @@ def remarks_on(mechanism: pf.Mechanism) -> Iterator[str]:
         yield f"a range of {widest:.4g} rad is {widest / FULL_TURN:.3g} turns; were degrees meant?"
     if mechanism.angle_unit == "deg" and widest < math.radians(FULL_TURN):
         yield f"no range of an angle is wider than {math.degrees(widest):.3g} degrees; were radians meant?"
+
+
+def axes_notes(mechanism: pf.Mechanism) -> Iterator[str]:
+    """Remarks on universal joints whose axes are left out, and do not follow from where the joints beyond them are."""
+    steps = steps_from_base(mechanism)
+    for joint in mechanism.joints:
+        if joint.type != "universal" or joint.axes is not None:
+            continue
+        lines, _ = ends_of_default_axes(mechanism, joint)
+        body = max(joint.connects, key=lambda each: steps.get(each, 0))
+        if not lines or (
+            body != mechanism.end_effector_body and lines[0] not in next_joints(mechanism.joints, joint, body)
+        ):
+            axes = " and ".join(map(vector, universal_axes(mechanism, joint)))
+            yield (
+                f"universal joint '{joint.name}' has no `axes`, and the joints beyond it are not on one line with it, "
+                f"which would tell them: {axes} are taken"
+            )
 
 
 def rod_notes(mechanism: pf.Mechanism) -> Iterator[str]:

@@ -80,7 +80,8 @@ def ik(
 def note_only_tilt(mechanism: pf.Mechanism, target: Target) -> None:
     """Note what does not count of a tilt where the end effector tilts about one axis alone."""
     from ..motion.tilt_axis import tilt_axis
-    from ..targets import as_poses, as_targets
+    from ..poses import as_poses
+    from ..targets import as_targets
     from .info_report import vector
 
     axis = tilt_axis(mechanism)

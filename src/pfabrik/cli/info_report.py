@@ -8,10 +8,13 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 import pfabrik as pf
 
 from ..answers.aligned_text import aligned, error_text
 from ..chains.serial_chain import is_chain
+from ..description.home_mobility import universal_axes
 from ..description.joint_types import KINDS
 from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
@@ -44,6 +47,7 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
                 "name": joint.name,
                 "type": joint.type,
                 "connects": joint.connects,
+                "axes": axes_of(joint, mechanism),
                 "actuated": joint.actuated,
                 "home": mechanism.home_coordinate(joint.name),
                 "range": joint.range,
@@ -63,6 +67,13 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
             for chain in pf.decompose(mechanism)
         ],
     }
+
+
+def axes_of(joint: pf.Joint, mechanism: pf.Mechanism) -> list[list[float]]:
+    """The axes that a joint turns about or slides along at home, unit vectors; none of a ball."""
+    if joint.type == "universal":
+        return np.asarray(universal_axes(mechanism, joint)).tolist()
+    return [] if KINDS[joint.type].direction is None else [np.asarray(mechanism.home_axis(joint.name)).tolist()]
 
 
 def describe(mechanism: pf.Mechanism) -> str:
@@ -139,12 +150,16 @@ def joint_table(mechanism: pf.Mechanism) -> str:
     rows = []
     for joint in mechanism.joints:
         name = joint.name + "*" * bool(joint.actuated)
-        rows.append((name, joint.type, " - ".join(joint.connects), coordinate(joint), limits(joint, mechanism)))
+        rows.append(
+            (name, joint.type, " - ".join(joint.connects), coordinate(joint, mechanism), limits(joint, mechanism))
+        )
     return aligned(("joint", "type", "connects", "coordinate", "limits"), rows)
 
 
-def coordinate(joint: pf.Joint) -> str:
+def coordinate(joint: pf.Joint, mechanism: pf.Mechanism) -> str:
     """The distance, angle or displacement that the joint's coordinate is."""
+    if joint.type == "universal":
+        return f"angles about {' and '.join(map(vector, universal_axes(mechanism, joint)))}"
     if joint.along:
         return f"distance {joint.along[0]} to {joint.along[1]}"
     if joint.axis is None:

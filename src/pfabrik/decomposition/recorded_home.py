@@ -52,10 +52,8 @@ class RecordedHome:
             return self._given_axis(joint, 0), self._given_axis(joint, 1)
         ends, is_forward = ends_of_default_axes(self.mechanism, joint)
         axes = self.vector(1.0, 0.0, 0.0), self.vector(0.0, 1.0, 0.0)
-        for end in ends:
-            if not self.centre(end).is_same(self.centre(joint)):
-                axes = square_to(self.centre(end) - self.centre(joint))
-                break
+        if ends:
+            axes = square_to(self.centre(ends[0]) - self.centre(joint))
         return axes if is_forward else axes[::-1]
 
     def coordinate(self, coordinate: JointCoordinate) -> Scalar:

@@ -155,14 +155,14 @@ def unclear_joints(mechanism: Structure) -> frozenset[int]:
 def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
     """The two axes of a universal joint at home, shape (2, 3): its own, or the default where none are given.
 
-    The default axes are normal to each other and to the line to the only next joint (on the body farther from the
+    The default axes are normal to each other and to the line on which all next joints are (on the body farther from the
     base, else on the nearer one), so that the joint keeps the link from spinning about itself; x and y where there is
     no such line. They do not depend on which body the joint names first.
     """
     if joint.axes is not None:
         return np.asarray(joint.axes)
     ends, is_forward = ends_of_default_axes(mechanism, joint)
-    lines = [result(V_SUBTRACT, end.at or (), joint.at or ()) for end in ends if end.at != joint.at]
+    lines = [result(V_SUBTRACT, end.at or (), joint.at or ()) for end in ends]
     normals = np.reshape(result(SQUARE, lines[0], result(LENGTH, lines[0])), (2, 3)) if lines else np.eye(3)[:2]
     return np.asarray(normals if is_forward else normals[::-1])
 
@@ -170,12 +170,22 @@ def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
 def ends_of_default_axes(mechanism: Structure, joint: Joint) -> tuple[list[Joint], bool]:
     """The joints to which the line of a universal joint may be that its default axes are square to, by precedence.
 
-    Also whether the first of these axes is that of the joint's first body.
+    Also whether the first of these axes is that of the joint's first body. Joints that are off one line by little, as
+    in a machine that was measured, count as on it.
     """
     steps = steps_from_base(mechanism)
     inward, outward = sorted(joint.connects, key=lambda body: steps.get(body, 0))
     sides = [next_joints(mechanism.joints, joint, body) for body in (outward, inward)]
-    return [ends[0] for ends in sides if len(ends) == 1], joint.connects[0] == inward
+    apart = [[end for end in ends if end.at != joint.at] for ends in sides]
+    lines = [ends[0] for ends in apart if ends and off_line(joint, ends) <= TOLERANCES.independent]
+    return lines, joint.connects[0] == inward
+
+
+def off_line(joint: Joint, ends: Sequence[Joint]) -> float:
+    """Largest sine between the lines from a joint to others, which are elsewhere; opposite ways are one line."""
+    lines = np.array([end.at for end in ends]) - joint.at
+    lines /= np.linalg.norm(lines, axis=1)[:, None]
+    return float(np.linalg.norm(np.cross(lines, lines[0]), axis=1).max())
 
 
 def joint_screws(mechanism: Structure, joint: Joint, point: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Floats:

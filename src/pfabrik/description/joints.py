@@ -49,7 +49,7 @@ class Joint:
     at : the joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
     axis : the axis of R, P and C.
     axes : the two axes of U; the first is fixed in the first body. By default they are square to each other and to the
-        line to the next joint, on the second body if it leads to a single one, else on the first: so the joint keeps
+        line on which the next joints are, on the body farther from the base, else on the nearer one: so the joint keeps
         its link from spinning about itself; x and y where there is no such line. Which two of the directions square
         to the line they are is left open: give them where that counts, as in a leg without a spherical joint.
     along : the two joints whose distance is the coordinate of a prismatic joint.

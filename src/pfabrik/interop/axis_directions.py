@@ -101,8 +101,10 @@ def bundles_of(axes: Sequence[Axis], slack: float) -> list[Bundle]:
 
 
 def _turn_to_base(bundle: Bundle, slack: float) -> None:
-    """Turn a bundle onto the axis of the base that it is along up to rounding, for targets count along these; by no more
-    than counts as parallel: then it is not turned against what else its body carries."""
+    """Turn a bundle onto the axis of the base that it is along up to rounding, for targets count along these.
+
+    By no more than counts as parallel: so it is not turned against what else its body carries.
+    """
     place = int(np.abs(bundle.along).argmax())
     axis = np.sign(bundle.along[place]) * np.eye(3)[place]
     if np.linalg.norm(bundle.along - axis) <= min(bundle.stiff, TOLERANCES.alignment) + slack:
