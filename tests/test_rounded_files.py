@@ -235,3 +235,31 @@ def test_the_original_file_is_the_referee_too(tmp_path: Path) -> None:
     original.write_text(model_text(linkage, 7).replace('"m1"', '"motor"'))
     with pytest.raises(UnknownName, match="m1"):
         verify(pf.load(machine), poses=1, original=original)
+
+
+@pytest.mark.parametrize(("digits", "by"), [(17, 1e-5), (17, 1e-2), (7, 1e-4), (5, 1e-2)])
+def test_a_joint_out_of_place_by_more_than_import_moves_it_is_no_agreement(
+    digits: int, by: float, tmp_path: Path
+) -> None:
+    """What the machine is off grows with what its joint is off; what import changes explains none of it."""
+    linkage, original = planar_four_bar(), tmp_path / "robot.xml"
+    original.write_text(model_text(linkage, digits))
+    right = imported(linkage, str(original), task=["x"]).mechanism
+    assert verify(right, poses=5, original=original)
+    place = [joint.name for joint in right.joints].index("h1")
+    at = right.joints[place].at + by * right.characteristic_length * linkage.hinges[0].axis[[1, 2, 0]]
+    moved = (*right.joints[:place], dataclasses.replace(right.joints[place], at=at), *right.joints[place + 1 :])
+    found = verify(dataclasses.replace(right, joints=moved), poses=5, original=original)
+    assert found.original is not None
+    assert not found.original
+    assert found.original.position_difference > found.original.position_tolerance
+
+
+def test_a_machine_typed_to_six_digits_says_by_how_much_it_differs(tmp_path: Path) -> None:
+    linkage, original = planar_four_bar(), tmp_path / "robot.xml"
+    original.write_text(model_text(linkage))
+    exact = imported(linkage, str(original), task=["x"]).mechanism
+    typed = [dataclasses.replace(each, at=np.round(each.at, 6)) for each in exact.joints]
+    against = verify(dataclasses.replace(exact, joints=typed), poses=5, original=original).original
+    assert against is not None
+    assert 1e-8 < against.position_difference < 1e-5 and against.position_tolerance < 1e-8

@@ -18,7 +18,6 @@ from ..files.units import metres_of
 from ..rotations import angles_between
 from ..tolerances import TOLERANCES
 from .compiled_model import CompiledModel
-from .digits import ModelDigits, worst
 from .loops_file import read_loops
 from .mjcf_plain import plain_model
 from .urdf_links import read_links
@@ -37,16 +36,13 @@ SAME_ROW = 1e-4
 STILL = 1e-13
 """Step [rad or m] that counts as none."""
 
-EXACT = 20.0
-"""How many times what rounding puts a joint off, at most, poses may differ: loops add that up, and magnify it."""
-
 
 class Original:
     """A model with the joints of a mechanism in it.
 
     Attributes
     ----------
-    position_tolerance, rotation_tolerance : how far its digits let poses be apart [m], [rad].
+    left_out : names of its joints that the mechanism has not.
     """
 
     def __init__(
@@ -59,23 +55,17 @@ class Original:
         require("the referee", "mujoco", "mujoco")
         self.mechanism = mechanism
         self.metres = metres_of(mechanism.length_unit)
-        plain = _plain(path, loops)
-        self.compiled = CompiledModel(ET.tostring(plain, encoding="unicode"))
+        self.compiled = CompiledModel(ET.tostring(_plain(path, loops), encoding="unicode"))
         self.compiled.put_configuration(configuration)
         self.model, self.data = self.compiled.model, self.compiled.data
         self._columns = dict(self._matched())
         self._require_drives()
         self._body = self._end_effector()
         self._passive, self._balls, self._unknown = self._degrees_of_freedom()
+        self.left_out = [self.compiled.joint_names[joint] for joint in set(self.model.dof_jntid[self._unknown])]
         self._is_closed = np.ones(self.model.neq, bool)
         self._put(np.array([each.home for each in mechanism.coordinates]), 1.0)
-        digits = worst(ModelDigits(plain, self.model).bodies)
-        length = mechanism.characteristic_length * self.metres
-        largest = TOLERANCES.file_gap * length
-        gap = self._close_home(largest)
-        off = digits.angle + (digits.length + (gap if gap <= largest else 0.0)) / length
-        self.rotation_tolerance = max(TOLERANCES.rotation, EXACT * off)
-        self.position_tolerance = max(TOLERANCES.position * length, self.rotation_tolerance * length)
+        self._close_home(TOLERANCES.file_gap * mechanism.characteristic_length * self.metres)
         self._home = self.data.qpos.copy()
         self._home_pose = self._pose()
 
@@ -162,7 +152,7 @@ class Original:
                 break
         return float(np.abs(self._rows(self._passive)[0]).max(initial=0.0))
 
-    def _close_home(self, largest: float) -> float:
+    def _close_home(self, largest: float) -> None:
         """Close the loops at home, and find out which: those with joints that the mechanism has not may not be its own.
 
         A joint that was held when the mechanism was imported is in loops of the mechanism, which close without it; one
@@ -172,7 +162,7 @@ class Original:
         begin = self.data.qpos.copy()
         gap = self._close(NEWTON_STEPS, self._passive)
         if gap <= largest:
-            return gap
+            return
         _, jacobian, equalities = self.compiled.rows()
         doubtful = np.unique(equalities[jacobian[:, self._unknown].any(axis=1)])
         self._is_closed[doubtful] = False
@@ -180,7 +170,7 @@ class Original:
         for equality in doubtful:
             self._is_closed[equality] = True
             self._is_closed[equality] = self._close_from(begin) <= largest
-        return self._close_from(begin)
+        self._close_from(begin)
 
     def _close_from(self, qpos: Floats) -> float:
         """Close the loops from a configuration of the model; the largest gap that is left [m or rad]."""

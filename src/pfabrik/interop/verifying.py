@@ -15,6 +15,7 @@ from ..answers.solution import Solution
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
+from .imported_again import changes_of_import
 from .original import Original
 from .referee import Referee
 from .referee_configurations import Travelled, reached_at_random, travelled
@@ -33,7 +34,8 @@ class AgainstOriginal:
     loop_gap : how far the file's own loops stay open, by rounding [length; angles as they are].
     position_difference, rotation_difference : between our pose and the file's, with the actuated joints where we have
         them [length], [rad].
-    position_tolerance, rotation_tolerance : how far apart the digits of the file let poses be [length], [rad].
+    position_tolerance, rotation_tolerance : how far what import changes within the digits of the file puts poses off
+        [length], [rad], as found by importing it again; and rounding.
     """
 
     loop_gap: float
@@ -43,7 +45,7 @@ class AgainstOriginal:
     rotation_tolerance: float
 
     def __bool__(self) -> bool:
-        """True if its loops close, and poses agree, as exactly as the digits of the file let them."""
+        """True if its loops close, and poses agree, as exactly as those of the file imported again."""
         apart = max(self.loop_gap, self.position_difference)
         return apart <= self.position_tolerance and self.rotation_difference <= self.rotation_tolerance
 
@@ -129,13 +131,18 @@ def verify(
     if not solutions:
         return Verification(0, np.nan, np.nan, np.nan, tolerance, Travelled({}, {}, 0.0, 0.0))
     gap, position, rotation = np.max([referee.compare(each, rng) for each in solutions], axis=0).tolist()
-    against = None if file is None else _against(file, solutions)
+    against = None
+    if file is not None:
+        assert original is not None
+        against = _against(file, solutions, changes_of_import(file, original, loops, configuration, solutions))
     return Verification(len(solutions), gap, position, rotation, tolerance, travelled(mechanism, solutions), against)
 
 
-def _against(original: Original, solutions: Sequence[Solution]) -> AgainstOriginal:
-    """The comparison of solutions with the original file, in the mechanism's unit."""
-    metres = original.metres
-    gap, position, rotation = np.max([original.compare(each) for each in solutions], axis=0).tolist()
-    tolerances = original.position_tolerance / metres, original.rotation_tolerance
-    return AgainstOriginal(gap / metres, position / metres, rotation, *tolerances)
+def _against(file: Original, solutions: Sequence[Solution], changed: tuple[float, float, float]) -> AgainstOriginal:
+    """The comparison of solutions with the original file, in the mechanism's unit; import alone has changed so much."""
+    gap, position, rotation = np.max([file.compare(each) for each in solutions], axis=0).tolist()
+    rounding = TOLERANCES.position * file.mechanism.characteristic_length
+    nearest = max(changed[:2]) / file.metres + rounding
+    return AgainstOriginal(
+        gap / file.metres, position / file.metres, rotation, nearest, changed[2] + TOLERANCES.rotation
+    )
