@@ -8,8 +8,6 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 import pfabrik as pf
 
 from ..answers.aligned_text import aligned, error_text
@@ -69,11 +67,11 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
     }
 
 
-def axes_of(joint: pf.Joint, mechanism: pf.Mechanism) -> list[list[float]]:
+def axes_of(joint: pf.Joint, mechanism: pf.Mechanism) -> list[object]:
     """The axes that a joint turns about or slides along at home, unit vectors; none of a ball."""
     if joint.type == "universal":
-        return np.asarray(universal_axes(mechanism, joint)).tolist()
-    return [] if KINDS[joint.type].direction is None else [np.asarray(mechanism.home_axis(joint.name)).tolist()]
+        return [*universal_axes(mechanism, joint)]
+    return [] if KINDS[joint.type].direction is None else [mechanism.home_axis(joint.name)]
 
 
 def describe(mechanism: pf.Mechanism) -> str:

@@ -2072,6 +2072,27 @@ static int pfk_lean_toward(pfk_pose *pose, const pfk_pose *target, pfk_real shar
     return !(cosine > PFK_RANK - 1.0);
 }
 
+#if ONE_TILT
+/* Turns a target so that its z axis is one that the only rotation leads to: the angle about its axis alone counts. */
+static void pfk_along_tilt(pfk_pose *target)
+{
+    pfk_pose goal = *target;
+    pfk_real z[3], lift, length, height = pfk_tilt_axis[2];
+    int i;
+    for (i = 0; i < 3; ++i)
+        z[i] = target->R[i][2];
+    lift = pfk_dot(z, pfk_tilt_axis);
+    for (i = 0; i < 3; ++i)
+        z[i] -= lift * pfk_tilt_axis[i];
+    length = pfk_norm(z);
+    if (!(length > PFK_RANK))
+        return;
+    for (i = 0; i < 3; ++i)
+        goal.R[i][2] = height * pfk_tilt_axis[i] + sqrt(1.0 - height * height) / length * z[i];
+    pfk_lean_toward(target, &goal, 1.0);
+}
+
+#endif
 /* Continues what a task sets of a pose, or all of it where redundant joints alone follow, to a target in so many
    steps, each completed from the one before: 0, PFK_NO_POSE, or the number of a leg that does not reach or close. */
 static int pfk_continue(const pfk_pose *target, int moves, int parts, pfk_real farthest, pfk_pose *own,
@@ -2231,6 +2252,9 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
         wanted.R[i / 3][i % 3] = own.R[i / 3][i % 3];
     if (pfk_make_exact(&wanted))
         return PFK_NO_POSE;
+#if ONE_TILT
+    pfk_along_tilt(&wanted);
+#endif
 #if COMPLETES
     begin = *pose;
     if (pfk_make_exact(&begin))

@@ -11,6 +11,7 @@ from ..arrays import Floats, Record
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.legs import records as K
 from ..motion.joint_path import JointPath, PathMotion
+from ..motion.tilt_axis import tilt_axis
 from .exported_links import ExportedLinks, angles_needed
 from .link_tables import link_tables
 from .machine_data import Coordinate, ExportedLeg, Machine
@@ -36,6 +37,7 @@ def features(machine: Machine, parts: Sequence[str], path: JointPath | None = No
     conditions: dict[str, object] = {
         "REDUNDANT": machine.n_redundant > 0,
         "IMPLICIT": machine.has_implicit_joints,
+        "ONE_TILT": completes and tilt_axis(machine.mechanism) is not None,
         "YAW": completes and machine.rotations == 1,
         "TURNS": "ik" in parts and any(driven.may_turn for driven in machine.driven),
         "PIVOTS": any(record["kind"] == K.PIVOT for record in records),
@@ -159,6 +161,9 @@ def _numbers(
     yield "};"
     if {"IK", "MOVES"} & features(machine, parts, path):
         yield f"static const int pfk_axes[3] = {{{', '.join(map(str, machine.axes))}}}; /* 1: the task sets x, y, z */"
+    axis = tilt_axis(machine.mechanism)
+    if axis is not None and "ONE_TILT" in features(machine, parts, path):
+        yield f"static const pfk_real pfk_tilt_axis[3] = {literal(axis)}; /* the only one of its turns */"
     yield f"static const pfk_real pfk_reference[3] = {literal(np.asarray(machine.mechanism.reference_point))};"
     yield ""
 
