@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
+import shutil
+import subprocess
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,6 +82,29 @@ def test_what_of_a_tilt_is_off_the_only_freedom_does_not_count(
         if reach.kind == "about"
     ]
     assert sorted(each.distance for each in leant) == pytest.approx(sorted(each.distance for each in level), rel=1e-3)
+
+
+class Pose(ctypes.Structure):
+    _fields_ = (("p", ctypes.c_double * 3), ("R", ctypes.c_double * 9))
+
+    @staticmethod
+    def of(pose: np.ndarray) -> Pose:
+        return Pose((ctypes.c_double * 3)(*pose[:3, 3]), (ctypes.c_double * 9)(*pose[:3, :3].ravel()))
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_exported_c_measures_a_tilt_along_the_only_freedom(tmp_path: Path) -> None:
+    machine, turn = platform(TURNS[1]), TURNS[1]
+    pf.export_c(machine, tmp_path / "machine.c")
+    subprocess.run(["gcc", "-shared", "-fPIC", "machine.c", "-o", "machine.so", "-lm"], cwd=tmp_path, check=True)
+    library, actuators = ctypes.CDLL(str(tmp_path / "machine.so")), (ctypes.c_double * 3)()
+    known = pf.solve_fk(machine, [0.05, -0.08, 0.1] + np.array([drive.home for drive in machine.drives]))
+    for target in off_the_plane(
+        np.repeat(known.pose[None], 5, axis=0), turn @ [0.0, 1.0, 0.0], np.random.default_rng(3)
+    ):
+        last = Pose.of(np.asarray(machine.home_pose))
+        assert library.pfk_ik(ctypes.byref(Pose.of(target)), ctypes.byref(last), actuators) == 0
+        assert np.array(actuators) == pytest.approx(known.actuators, abs=1e-9)
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), *TURNS], ids=["base", "upright", "leaning", "further"])

@@ -70,7 +70,7 @@ def as_object(mechanism: pf.Mechanism) -> dict[str, object]:
 def axes_of(joint: pf.Joint, mechanism: pf.Mechanism) -> list[object]:
     """The axes that a joint turns about or slides along at home, unit vectors; none of a ball."""
     if joint.type == "universal":
-        return [*universal_axes(mechanism, joint)]
+        return [axis.tolist() for axis in universal_axes(mechanism, joint)]
     return [] if KINDS[joint.type].direction is None else [mechanism.home_axis(joint.name)]
 
 
