@@ -49,7 +49,7 @@ class LimitMargin(NamedTuple):
     margin : as of `margins` a share of the range, (...,): 1 in the middle, 0 on a limit, negative beyond it or where
         loops do not close. Near a dead point, how near it is, as of `Singularity.serial`. inf where nothing limits.
     joint, bound : the limit, (...,): "min", "max", "cone"; "reach" or "closed" where a leg does not reach; "dead point"
-        of an actuator.
+        of an actuator; "singularity", of no joint, where actuators lose their hold.
     """
 
     margin: float | Floats
@@ -120,7 +120,7 @@ class Actuation:
         rows, shape = rows_of(self.names, q)
         placed = self._placer.place(rows)
         values = placed.actuators.reshape(*shape, placed.actuators.shape[1])
-        return Mapped(values, shaped(placed.status, shape), lambda: self._placer.solution_of(rows, shape))
+        return Mapped(values, shaped(placed.status, shape), lambda: self._placer.solution_of(placed.asked, shape))
 
     def to_joints(self, x: ArrayLike, *, start: Start | None = None) -> Mapped:
         """Coordinates (..., k) at actuator values x (..., n_a): as of `solve_fk`.

@@ -14,7 +14,7 @@ from .named_values import box_of
 from .placed import Placer
 
 POINTS = 20_000
-"""Points of a box at which feasibility is asked: the share that is lost is known to half a per cent."""
+"""Points of a box at which feasibility is asked: shares of it are known to half a per cent."""
 
 MOST_CUTS = 200
 """Most half-spaces: a hull that needs more has a border that no few planes follow."""
@@ -108,14 +108,15 @@ def feasible_hull(placer: Placer, box: Any, seed: int) -> Hull:
         is_inside &= infeasible @ normal <= offset
     needed = _needed(infeasible @ normals.T > offsets, 2 * k)
     normals, offsets, limits = normals[needed], offsets[needed], [limits[place] for place in needed]
-    kept = (points @ normals.T <= offsets).all(axis=1)
+    even = _even(k)
+    kept = (even @ normals.T <= offsets).all(axis=1)
     outward = normals / half
     sizes = np.linalg.norm(outward, axis=1)
     return Hull(
         outward / sizes[:, None],
         (offsets + outward @ middle) / sizes,
         middle + half * interior,
-        float((values < 0.0).mean()),
+        float((margin(even) < 0.0).mean()),
         float(1.0 - kept.mean()),
         tuple(limits),
     )
@@ -127,6 +128,15 @@ def _lattice(k: int, random: np.random.Generator) -> Floats:
         return random.uniform(-1.0, 1.0, (POINTS, k))
     axis = np.linspace(-1.0, 1.0, round(POINTS ** (1.0 / k)))
     return np.stack(np.meshgrid(*[axis] * k, indexing="ij"), axis=-1).reshape(-1, k)
+
+
+def _even(k: int) -> Floats:
+    """Points that fill the box [-1, 1]^k evenly, across any direction: multiples of a generalised golden ratio."""
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (k + 1))
+    steps = ratio ** -np.arange(1.0, k + 1.0)
+    return np.asarray(2.0 * ((0.5 + np.arange(POINTS)[:, None] * steps) % 1.0) - 1.0)
 
 
 def _needed(cut: Mask, n_box: int) -> list[int]:

@@ -22,12 +22,11 @@ from ..options import Options
 from ..platform.coordinates import read_coordinates
 from ..platform.jacobians import actuator_slopes
 from ..tolerances import TOLERANCES
-from .task_path import TaskPath
+from .assembly_mode import AssemblyMode
+from .task_path import Coordinates, TaskPath
 
 IN_MODE = Options(working_mode="keep")
 """A robot keeps its working mode: that of home."""
-
-Coordinates: TypeAlias = JointPath | TaskPath
 
 Limits: TypeAlias = NDArray[np.str_]
 """Joint and bound of a limit for every row, (n, 2)."""
@@ -36,7 +35,7 @@ NEAR_DEAD_POINT = 1e-2
 """Measure of a serial singularity [L and rad] below which it is named as what limits: actuators are a hundred times as
 fast there as the platform. Farther off it is no limit, and no share of a range to be compared with."""
 
-NO_LIMIT = ("", "")
+NO_LIMIT, SINGULARITY = ("", ""), ("", "singularity")
 WORD = "U128"
 """Type of names: room for those of any joint."""
 
@@ -47,6 +46,7 @@ class Placed(NamedTuple):
     actuators: Floats  # (n, n_a)
     status: Ints  # (n,)
     coordinates: Floats  # (n, k): those that the configurations have
+    asked: Floats  # (n, k): those asked for, or where a motion towards them ends at a parallel singularity
 
 
 class Placer:
@@ -60,22 +60,34 @@ class Placer:
         self.coordinates, self.mechanism = coordinates, coordinates.mechanism
 
     def place(self, q: Floats) -> Placed:
-        """Configurations at coordinates q (n, k), or as near as `solve_ik` finds them."""
-        placed = Placed(np.empty((len(q), len(self.mechanism.actuator_names))), np.empty(len(q), np.int64), q.copy())
-        is_found = np.zeros(len(q), bool)
+        """Configurations at coordinates q (n, k), or as near as `solve_ik` finds them in home's assembly mode."""
+        n, beyond = len(q), self.assembly.are_beyond(q)
+        placed = Placed(np.empty((n, len(self.mechanism.actuator_names))), np.empty(n, np.int64), q.copy(), q.copy())
+        is_found = np.zeros(n, bool)
         if self._by_legs is not None:
-            rows = np.flatnonzero(self.feasible_margins(q) >= -TOLERANCES.limit)
+            rows = np.flatnonzero((self._margins(q)[0] >= -TOLERANCES.limit) & ~beyond)
             solution = solve_ik(self._by_legs, self.coordinates.poses(q[rows]), options=IN_MODE)
             placed.actuators[rows], placed.status[rows] = solution.actuators, solution.status
             is_found[rows] = placed.status[rows] == Status.REACHED
+        placed.asked[beyond] = self.assembly.ends(q[beyond])
         rows = np.flatnonzero(~is_found)
+        self._put(placed, rows)
+        placed.status[beyond] = Status.PROJECTED
+        beyond = rows[self.assembly.are_beyond(placed.coordinates[rows])]  # what is nearest may be
+        placed.asked[beyond] = self.assembly.ends(placed.coordinates[beyond])
+        self._put(placed, beyond)
+        placed.status[beyond] = Status.PROJECTED
+        return placed
+
+    def _put(self, placed: Placed, rows: Ints) -> None:
+        """Put the answers of the machine to what is asked in some rows."""
         if len(rows):
-            solution = self.solution(q[rows])
+            asked = placed.asked[rows]
+            solution = self.solution(asked)
             status = np.array(solution.status)
-            status[(status == Status.REACHED) & ~self._has(solution, q[rows])] = Status.PROJECTED
+            status[(status == Status.REACHED) & ~self._has(solution, asked)] = Status.PROJECTED
             placed.actuators[rows], placed.status[rows] = solution.actuators, status
             placed.coordinates[rows] = self.values(solution)
-        return placed
 
     def solution(self, q: Floats) -> Solution:
         """The answers of the machine to the poses at coordinates q (n, k)."""
@@ -121,11 +133,7 @@ class Placer:
         With the legs' slopes dx/dT by the twist T of the platform, and the path's T = S dq/dt: dx/dq = dx/dT S. It does
         not ask for limits. Where loops do not close at q, and near dead points, it is that of `solution`.
         """
-        maps = None
-        if self._by_legs is not None and isinstance(self.coordinates, JointPath):
-            poses, twists = self.coordinates.poses_and_twists(q)
-            slopes = actuator_slopes(model_of(self._by_legs), poses)
-            maps = None if slopes is None else slopes @ twists
+        maps = self._slopes_by_legs(q)
         if maps is None:
             return self.jacobian_of(self.solution(q))
         rows = np.flatnonzero(np.isnan(maps[:, 0, 0]))
@@ -147,7 +155,7 @@ class Placer:
 
     def margins(self, q: Floats) -> tuple[Floats, Limits]:
         """The least margin of every row of q (n, k), (n,), and its limit (n, 2); negative beyond reach."""
-        margin, limits = self._margins_by_legs(q) if self._by_legs is not None else self._margins_by_solution(q)
+        margin, limits = self._margins(q)
         near = np.flatnonzero((margin > 0.0) & self._may_be_dead_point(q))
         if len(near):
             solution = self.solution(q[near])
@@ -156,11 +164,42 @@ class Placer:
             for row, distance, place in zip(near, distances, fastest, strict=True):
                 if distance < min(margin[row], NEAR_DEAD_POINT):
                     margin[row], limits[row] = distance, (self.mechanism.actuator_names[place], "dead point")
+        hold = self.assembly.margins(q)
+        nearer = np.flatnonzero(hold < np.minimum(margin, NEAR_DEAD_POINT))
+        margin[nearer], limits[nearer] = hold[nearer], SINGULARITY
         return margin, limits
 
     def feasible_margins(self, q: Floats) -> Floats:
         """The least margin of every row of q (n, k), (n,), dead points aside: its sign says whether q is feasible."""
-        return (self._margins_by_legs(q) if self._by_legs is not None else self._margins_by_solution(q))[0]
+        margin = self._margins(q)[0]
+        beyond = np.flatnonzero((margin >= 0.0) & self.assembly.are_beyond(q))
+        margin[beyond] = self.assembly.margins(q[beyond])
+        return margin
+
+    def _margins(self, q: Floats) -> tuple[Floats, Limits]:
+        return self._margins_by_legs(q) if self._by_legs is not None else self._margins_by_solution(q)
+
+    @cached_property
+    def assembly(self) -> AssemblyMode:
+        """The coordinates that home's assembly mode has."""
+        return AssemblyMode(self.coordinates, self._slopes)
+
+    def _slopes(self, q: Floats) -> Floats:
+        """Actuator rates (n, n_a, k) at q (n, k), NaN where loops do not close."""
+        maps = self._slopes_by_legs(q)
+        if maps is None:
+            solution = self.solution(q)
+            maps = self.jacobian_of(solution)
+            maps[~self._has(solution, q)] = np.nan
+        return maps
+
+    def _slopes_by_legs(self, q: Floats) -> Floats | None:
+        """Actuator rates (n, n_a, k) at q (n, k), NaN near dead points and where legs do not close; None without legs."""
+        if self._by_legs is None or not isinstance(self.coordinates, JointPath):
+            return None
+        poses, twists = self.coordinates.poses_and_twists(q)
+        slopes = actuator_slopes(model_of(self._by_legs), poses)
+        return None if slopes is None else slopes @ twists
 
     @cached_property
     def _by_legs(self) -> Mechanism | None:
@@ -213,9 +252,7 @@ class Placer:
 
     def _may_be_dead_point(self, q: Floats) -> Mask:
         """True where legs close at coordinates q (n, k), but have no slopes; wherever legs do not tell."""
-        slopes = None
-        if self._by_legs is not None and isinstance(self.coordinates, JointPath):
-            slopes = actuator_slopes(model_of(self._by_legs), self.coordinates.poses(q))
+        slopes = self._slopes_by_legs(q)
         return np.ones(len(q), bool) if slopes is None else np.isnan(slopes[:, 0, 0])
 
     def _has(self, solution: Solution, q: Floats) -> Mask:

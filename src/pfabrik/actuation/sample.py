@@ -48,9 +48,14 @@ def sample_feasible(placer: Placer, n: int, seed: int, box: Any) -> Sample:
     low, high = box_of(placer.coordinates, box)
     random = np.random.default_rng(seed)
     kept = np.empty((0, len(low)))
+    has_turns = np.array(placer.coordinates.is_angle) & (high - low > 2.0 * np.pi)
     for _ in range(MOST_DRAWS):
         drawn = random.uniform(low, high, (n, len(low)))
         kept = np.concatenate([kept, drawn[placer.feasible_margins(drawn) >= 0.0]])
+        made = np.abs(kept - placer.coordinates.home).max(axis=0, initial=0.0) > np.pi
+        if len(kept) and (has_turns & ~made).any():
+            names = ", ".join(np.array(placer.coordinates.names)[has_turns & ~made])
+            raise InvalidArgument("box", f"several turns of {names}, which the loops cannot make", "a box within a turn")
         if len(kept) >= n:
             solution = placer.solution(kept)
             reached = np.flatnonzero(np.asarray(solution.status) == Status.REACHED)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import compress
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..answers.solution import Solution
 from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
 from ..description.task import Task, task_of
+from ..motion.joint_path import JointPath
 from ..motion.mobility import generic_of
 from ..rotations import CROSSED, from_rotvec, to_rotvec, turning, yaws
 from ..tolerances import TOLERANCES
@@ -139,6 +141,9 @@ class TaskPath:
         places = {3: [0, 1, 2], 2: [0, 1], 1: [2], 0: []}[self._task.rotations]
         vectors[:, places] = turns
         return vectors
+
+
+Coordinates: TypeAlias = JointPath | TaskPath
 
 
 def _tilts(z: Floats) -> Floats:

@@ -159,7 +159,8 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
     ----------
     free : kinds, names, or a list of both:
 
-        - "dimensions": the named dimensions of the file that are numbers (`rod = 250`), in the units of the file;
+        - "dimensions": the named dimensions of the file that are numbers (`rod = 250`), in the units of the file; without
+          those that only set limits;
         - "points": centres of joints, "A1.x" [length]; of a hinge two components, as it may slide along its axis;
         - "axes": directions of axes, as turns about base axes, "A1.rx" [rad];
         - "offsets": of the actuators' zeros, "B1.offset", added to a reading [length or rad];
@@ -218,7 +219,7 @@ def _choose(
     if name == "dimensions":
         if not independent:
             raise InvalidArgument("free", "dimensions of a machine that has none", f"one of {', '.join(KINDS)}")
-        dimensions += independent
+        dimensions += _shaping(mechanism, independent, candidates)
     elif name in independent:
         dimensions.append(name)
     elif name in KINDS and name not in {joint.name for joint in mechanism.joints}:
@@ -230,6 +231,14 @@ def _choose(
         if not own:
             raise UnknownName("parameter", name, [*independent, *KINDS, *(s.name for s in known)])
         shifts += own
+
+
+def _shaping(mechanism: Mechanism, names: Sequence[str], candidates: Candidates) -> list[str]:
+    """The dimensions that change the geometry: others only set limits, say, which no measurement shows."""
+    own = Parameters(mechanism, names, candidates, [])
+    changes = own.slopes(own.values)
+    parts = [np.abs(np.nan_to_num(array)).reshape(len(names), -1).max(axis=1, initial=0.0) for array in changes]
+    return [name for name, part in zip(names, np.max(parts, axis=0), strict=True) if part > 0.0]
 
 
 def _with_cone(joint: Joint, before: Floats, after: Floats, turn: Floats) -> Joint:
