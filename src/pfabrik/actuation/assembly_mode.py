@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats, Ints, Mask
 from ..motion.displacements import actuator_units
 from .task_path import Coordinates
 
 ON_THE_WAY = 16
-"""Points on the way from home, up to half a turn of it, at which it is asked if a singularity was passed."""
+"""Points on a way from home, up to half a turn of it, at which it is asked if a singularity was passed."""
 
 TRIED = 512
 """Coordinates within the ranges by which it is told if there is a singularity at all."""
@@ -24,7 +24,7 @@ HALVINGS = 40
 
 
 class AssemblyMode:
-    """The coordinates q that a motion straight from home leads to without passing a parallel singularity.
+    """The coordinates q that a motion from home leads to without passing a parallel singularity: straight, or by axes.
 
     There actuators lose their hold: det dx/dq is 0, and has the other sign beyond. What is behind it is another
     assembly for the same actuators. Of redundant actuators a single determinant does not tell, and nothing is beyond.
@@ -40,29 +40,44 @@ class AssemblyMode:
         self._actuator_units, self._slopes = actuator_units(coordinates.mechanism), slopes
         self._is_square = len(coordinates.mechanism.actuator_names) == len(coordinates.names)
 
-    def margins(self, q: Floats) -> Floats:
-        """The least gain dx/dq of rows (n, k), (n,) [L, rad]; negative beyond, inf where loops do not close."""
-        if not self._is_square:
-            return np.full(len(q), np.inf)
-        scaled = self._scaled(q)
-        closes = np.isfinite(scaled[:, 0, 0])
+    def margins(self, q: Floats, least: float) -> Floats:
+        """The least gain dx/dq of rows (n, k), (n,) [L, rad]; negative beyond; inf if above `least` or loops are open.
+
+        It is no less than the determinant over the other gains, none of which is above the norm.
+        """
         margins = np.full(len(q), np.inf)
-        margins[closes] = np.linalg.svd(scaled[closes], compute_uv=False)[:, -1]
-        return np.where(self.are_beyond(q), -np.where(closes, margins, 0.0), margins)
+        if not self._is_square:
+            return margins
+        scaled, beyond = self._scaled(q), self.are_beyond(q)
+        with np.errstate(invalid="ignore"):
+            others = np.linalg.norm(scaled, axis=(1, 2)) ** (scaled.shape[2] - 1)
+            small = np.abs(np.linalg.det(scaled)) <= least * others
+        rows = np.flatnonzero(small | (beyond & np.isfinite(scaled[:, 0, 0])))
+        margins[rows] = np.linalg.svd(scaled[rows], compute_uv=False)[:, -1]
+        return np.where(beyond, -np.where(np.isfinite(margins), margins, 0.0), margins)
 
     def are_beyond(self, q: Floats) -> Mask:
-        """True for rows (n, k) that no straight motion from home leads to, by singularities or turns, (n,)."""
+        """True for rows (n, k) at which loops close, but to which no such motion leads, (n,)."""
+        beyond = np.zeros(len(q), bool)
         if not self._is_square or not self._are_any:
-            return np.zeros(len(q), bool)
-        way = q - self._coordinates.home
-        halves = np.maximum(1.0, np.abs(way[:, list(self._coordinates.is_angle)]).max(axis=1, initial=0.0) / np.pi)
-        beyond = self._signs(q) < 0.0
-        n = ON_THE_WAY * int(np.ceil(halves.max(initial=1.0)))
+            return beyond
+        signs = self._signs(q)
+        pending = np.flatnonzero(signs > 0.0)
+        for order in (None, np.arange(q.shape[1]), np.arange(q.shape[1])[::-1]):
+            pending = pending[~self._is_clear(q[pending], order)]
+        beyond[pending] = True
+        return np.asarray(beyond | (signs < 0.0))
+
+    def _is_clear(self, q: Floats, order: Ints | None) -> Mask:
+        """True for rows (n, k) to which all coordinates at once, or one by one in an order, can be moved from home."""
+        way, clear = q - self._coordinates.home, np.ones(len(q), bool)
+        halves = np.abs(way[:, list(self._coordinates.is_angle)]).max(initial=np.pi) / np.pi
+        n = ON_THE_WAY * int(np.ceil(halves)) * (1 if order is None else len(order))
         for share in np.arange(1, n) / n:
-            rows = np.flatnonzero(~beyond)
-            signs = self._signs(self._coordinates.home + share * way[rows])
-            beyond[rows] = (signs < 0.0) | (np.isnan(signs) & (halves[rows] > 1.0))  # a turn has to close all the way
-        return beyond
+            parts = share if order is None else np.clip(len(order) * share - order, 0.0, 1.0)
+            rows = np.flatnonzero(clear)
+            clear[rows] = self._signs(self._coordinates.home + parts * way[rows]) > 0.0
+        return clear
 
     def ends(self, q: Floats) -> Floats:
         """The last points (n, k) of straight motions from home to rows that are beyond."""

@@ -12,11 +12,11 @@ from ..errors import InvalidArgument
 
 
 class HalfSpaces(NamedTuple):
-    """The set of vectors v (k,) with |normal v| <= offset for every normal; it is symmetric about zero.
+    """The set of vectors v (k,) with normal v <= offset for every normal; it is symmetric about zero.
 
     Attributes
     ----------
-    normals : unit vectors, (..., m, k); zero where they say nothing.
+    normals : unit vectors, (..., m, k), the second half the opposites of the first; zero where they say nothing.
     offsets : (..., m).
     box : half the sides of the inscribed box, (..., k): every v with |v| <= box is in the set. Each side has the same
         share of what its coordinate has alone.
@@ -30,7 +30,7 @@ class HalfSpaces(NamedTuple):
 
     def contains(self, v: Floats) -> np.bool_ | Floats:
         """True where vectors v (..., k) are in the set."""
-        sizes = np.abs(np.einsum("...mk,...k->...m", self.normals, v))
+        sizes = np.einsum("...mk,...k->...m", self.normals, v)
         return np.asarray((sizes <= self.offsets).all(axis=-1))[()]
 
     def polygon(self) -> Floats:
@@ -45,7 +45,7 @@ class HalfSpaces(NamedTuple):
             raise InvalidArgument("polygon", found, "a single bounded set of two coordinates: (m, 2)")
         low, high = -self.alone.max() * ROOM, self.alone.max() * ROOM
         corners = np.array([[low, low], [high, low], [high, high], [low, high]])
-        for normal, offset in zip((*self.normals, *-self.normals), (*self.offsets, *self.offsets), strict=True):
+        for normal, offset in zip(self.normals, self.offsets, strict=True):
             corners = clipped(corners, normal, float(offset))
         return distinct(corners)
 
@@ -72,13 +72,14 @@ def preimage_of_box(rows: Floats, limits: Floats) -> HalfSpaces:
 
 
 def _with_box(normals: Floats, offsets: Floats) -> HalfSpaces:
-    """Half-spaces with the box whose sides are in proportion to what each coordinate has alone."""
+    """Half-spaces |normal v| <= offset with the box whose sides are in proportion to what each coordinate has alone."""
     sizes = np.abs(normals)
     alone = _least(offsets[..., None], sizes)
     finite = np.where(np.isfinite(alone), alone, 0.0)
     share = _least(offsets, np.einsum("...mk,...k->...m", sizes, finite), axis=-1)
     share = np.where(np.isfinite(share), share, 0.0)
-    return HalfSpaces(normals, offsets, np.where(np.isfinite(alone), share[..., None] * finite, np.inf), alone)
+    both, limits = np.concatenate([normals, -normals], axis=-2), np.concatenate([offsets, offsets], axis=-1)
+    return HalfSpaces(both, limits, np.where(np.isfinite(alone), share[..., None] * finite, np.inf), alone)
 
 
 def _least(offsets: Floats, sizes: Floats, axis: int = -2) -> Floats:

@@ -164,7 +164,7 @@ class Placer:
             for row, distance, place in zip(near, distances, fastest, strict=True):
                 if distance < min(margin[row], NEAR_DEAD_POINT):
                     margin[row], limits[row] = distance, (self.mechanism.actuator_names[place], "dead point")
-        hold = self.assembly.margins(q)
+        hold = self.assembly.margins(q, NEAR_DEAD_POINT)
         nearer = np.flatnonzero(hold < np.minimum(margin, NEAR_DEAD_POINT))
         margin[nearer], limits[nearer] = hold[nearer], SINGULARITY
         return margin, limits
@@ -173,7 +173,7 @@ class Placer:
         """The least margin of every row of q (n, k), (n,), dead points aside: its sign says whether q is feasible."""
         margin = self._margins(q)[0]
         beyond = np.flatnonzero((margin >= 0.0) & self.assembly.are_beyond(q))
-        margin[beyond] = self.assembly.margins(q[beyond])
+        margin[beyond] = self.assembly.margins(q[beyond], NEAR_DEAD_POINT)
         return margin
 
     def _margins(self, q: Floats) -> tuple[Floats, Limits]:

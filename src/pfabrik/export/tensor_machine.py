@@ -77,12 +77,13 @@ class TensorMachine:
         return self.mechanism.end_effector_is_joint
 
     def samples(self, n: int) -> Floats:
-        """Coordinates around home: of joints (n, k) within their ranges, or poses (n, 4, 4)."""
+        """Coordinates of joints (n, k) all over their ranges, around home where they have none; or poses (n, 4, 4)."""
         random = np.random.default_rng(0)
         if self.path is None:
             return targets_around_home(self.mechanism, n, random)
         reach = np.array(
             [0.5 if c.kind == "angle" else 0.3 * self.mechanism.characteristic_length for c in self.path.coordinates]
         )
-        low = np.maximum(self.path.low, self.path.home - reach)
-        return np.asarray(random.uniform(low, np.minimum(self.path.high, self.path.home + reach), (n, len(reach))))
+        low = np.where(np.isfinite(self.path.low), self.path.low, self.path.home - reach)
+        high = np.where(np.isfinite(self.path.high), self.path.high, self.path.home + reach)
+        return np.asarray(random.uniform(low, high, (n, len(reach))))

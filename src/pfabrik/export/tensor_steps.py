@@ -14,7 +14,10 @@ from .tensor_text import Steps, tensor_text
 N_TRIED = 400
 """Configurations by which steps are counted."""
 
-MOST_STEPS = 10
+MOST_STEPS = 12
+SAME = 1e-6
+"""Difference of coordinates up to which forward kinematics came back to them [rad or length]."""
+
 ENOUGH = 0.995
 """Share of them that must have come as far as rounding lets them, by forward kinematics."""
 
@@ -39,8 +42,11 @@ def steps_of(machine: TensorMachine) -> Steps:
     inside = inside if len(inside) else samples[:1]
     closes = samples[(margins[:, [name.startswith(CLOSING) for name in room["LIMITS"]]] > 0.0).all(axis=1)]
     closes = closes if len(closes) else samples[:1]
-    values = room["to_actuators"](inside)
     forward = room["to_pose" if machine.path is None else "to_joints"]
+    if machine.path is not None:  # others are another assembly for their actuators
+        own = np.abs(forward(room["to_actuators"](inside), steps=MOST_STEPS) - inside).max(axis=1) <= SAME
+        inside = inside[own] if own.any() else inside[:1]
+    values = room["to_actuators"](inside)
 
     def complete(steps: int) -> Floats:
         room["COMPLETING_STEPS"] = steps
