@@ -246,6 +246,11 @@ class Calibration:
         ]
 
 
+def _shown(rms: float) -> str:
+    """A root mean square in words, without digits of rounding."""
+    return "< 1e-12" if rms < 1e-12 else f"{rms:.3g}"
+
+
 def _parts(directions: Floats) -> Floats:
     """Part of every parameter in directions (k, p), (p,)."""
     return np.asarray(np.sqrt((directions**2).sum(axis=0)))
@@ -266,6 +271,8 @@ def _sentences(names: Sequence[str], directions: Floats, determined: Mask) -> li
             near = [k for k in remaining if abs(shared[p, k]) > TOGETHER * max(sizes[p] * sizes[k], 1e-300)]
             waiting += near
             remaining = [k for k in remaining if k not in near]
+        if determined[group].all():
+            continue
         group.sort()
         own = ", ".join(names[p] for p in group[:-1])
         if len(group) > 1:
