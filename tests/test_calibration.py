@@ -330,3 +330,47 @@ def test_a_calibration_shows_itself() -> None:
     assert found.to_dict()["parameters"][0]["name"] == "radius"
     figure = pf.plot_calibration(found)
     assert len(figure.axes) == 2
+
+
+@pytest.mark.parametrize(("name", "free", "has_poses"), [("stewart", "tool", True), ("delta", "frame", False)])
+def test_an_instrument_s_frame_and_target_and_scales_are_found(name: str, free: str, has_poses: bool) -> None:
+    rng, mechanism = np.random.default_rng(7), pf.load(name)
+    own = pf.parameters(mechanism, ["scale", "frame", free] if free == "tool" else ["scale", "frame"])
+    true = own.values + rng.uniform(-0.01, 0.01, len(own))
+    for place, each in enumerate(own.names):
+        if each.startswith(("frame", "tool")):
+            true[place] = rng.uniform(-1.4, 1.4) * (1.0 if own.units[place] == "rad" else 100.0)
+    positions = mechanism.home_pose[:3, 3] + rng.uniform(-20.0, 20.0, (40, 3))
+    solution = pf.solve_ik(mechanism, pf.pose(positions, rotvec=0.15 * has_poses * rng.uniform(-1.0, 1.0, (40, 3))))
+    by_name = dict(zip(own.names, true.tolist(), strict=True))
+    frame, tool = (
+        pf.pose(*([by_name.get(f"{of}.{c}", 0.0) for c in "xyz"],), rotvec=[by_name.get(f"{of}.r{c}", 0.0) for c in "xyz"])
+        for of in ("frame", "tool")
+    )
+    seen = frame @ solution.pose @ tool
+    readings = solution.actuators / [by_name[f"{each}.scale"] for each in mechanism.actuator_names]
+    measured = {"pose": seen} if has_poses else {"position": seen[:, :3, 3]}
+    found = pf.calibrate(mechanism, pf.Measurements(readings, **measured), free=own)
+    assert found.determined.all() and np.abs(found.values - true).max() < 1e-9
+
+
+def test_nothing_is_determined_of_which_nothing_says_how_good_it_is() -> None:
+    own, true, readings, poses = hexapod_data(tilt=0.15, n=7)
+    alone = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses))
+    assert not alone.determined.any() and np.isinf(alone.deviations).all() and "without sigma" in alone.undetermined[-1]
+    known = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses, sigma=1e-9))
+    assert known.determined.all() and np.isfinite(known.deviations).all()
+
+
+def test_a_poor_fit_warns_and_its_deviations_grow() -> None:
+    own, _, readings, poses = hexapod_data(tilt=0.15)
+    far = pf.pose([500.0, -500.0, 250.0], rotvec=[0.75, -0.45, 1.5]) @ poses
+    with pytest.warns(UserWarning, match="free 'frame' or 'tool' too"):
+        found = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=far, sigma=0.01), free="offsets")
+    assert found.deviations.min() > found.rms * 1e-3 and not found.determined.any()
+
+
+def test_a_distance_of_a_reading_from_itself_is_refused() -> None:
+    _, _, readings, _ = hexapod_data(tilt=0.1, n=4)
+    with pytest.raises(InvalidArgument, match="rows 2 and 2"):
+        pf.Measurements(readings, distances=[(0, 1, 10.0), (2, 2, 3.0)])

@@ -28,7 +28,7 @@ LEAST_NOISE = 1e-5
 """Error that measurements of unknown quality are taken to have at least [L], to say what they determine: 10 um of 1 m.
 Simulated ones have none, and would seem to determine what no instrument shows."""
 
-LIKELY = 0.95
+LIKELY = 0.75
 """Probability with which noise is no larger than it is taken to be, where few values are left over to tell it by."""
 
 MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
