@@ -385,3 +385,31 @@ def test_actuators_that_do_not_determine_the_joints_are_refused() -> None:
 def test_wrong_calls_name_what_is_wrong(call: Any, error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         call()
+
+
+def test_maps_end_at_parallel_singularities_and_come_back() -> None:
+    """An ankle whose joints may go farther than its motors hold it: rods level with the pivot are singular."""
+    joints = [
+        Joint("pitch", "revolute", ("base", "cross"), at=(0, 0, 0), axis=(0, 1, 0), range=(-2, 2)),
+        Joint("roll", "revolute", ("cross", "foot"), at=(0, 0, 0), axis=(1, 0, 0), range=(-2, 2)),
+    ]
+    for side, y, z in (("L", 43.0, 215.0), ("R", -43.0, 140.0)):
+        ends = ("foot", f"rod{side}"), (f"crank{side}", f"rod{side}")
+        joints += [
+            Joint(f"C{side}", "spherical", ends[0], at=(-56, y, 22)),
+            Joint(f"M{side}", "revolute", ("base", f"crank{side}"), at=(0, y, z), axis=(0, 1, 0), actuated=True),
+            Joint(f"B{side}", "spherical", ends[1], at=(-56, y, z + 22)),
+        ]
+    ankle = Mechanism(name="ankle", joints=joints, end_effector="foot", reference_point=(0, 0, 0), task=["tilt"])
+    a = pf.actuation(ankle, ("pitch", "roll"))
+    sample = a.sample(500)
+    back = a.to_joints(a.to_actuators(sample.q).values)
+    np.testing.assert_allclose(np.asarray(back), sample.q, atol=1e-6)
+    home = np.sign(np.linalg.det(a.jacobian(a.home)))
+    assert (np.sign(np.linalg.det(a.jacobian(sample.q))) == home).all()
+    drawn = np.random.default_rng(1).uniform(a.low, a.high, (2000, 2))
+    margin, mapped = a.margin(drawn), a.to_actuators(drawn)
+    beyond = margin.bound == "singularity"
+    assert beyond.any() and (np.asarray(mapped.status)[beyond & (margin.margin < 0.0)] == Status.PROJECTED).all()
+    lost = float((margin.margin < 0.0).mean())
+    assert a.hull().share_lost == pytest.approx(lost, abs=0.04)

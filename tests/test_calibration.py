@@ -344,7 +344,9 @@ def test_an_instrument_s_frame_and_target_and_scales_are_found(name: str, free: 
     solution = pf.solve_ik(mechanism, pf.pose(positions, rotvec=0.15 * has_poses * rng.uniform(-1.0, 1.0, (40, 3))))
     by_name = dict(zip(own.names, true.tolist(), strict=True))
     frame, tool = (
-        pf.pose(*([by_name.get(f"{of}.{c}", 0.0) for c in "xyz"],), rotvec=[by_name.get(f"{of}.r{c}", 0.0) for c in "xyz"])
+        pf.pose(
+            *([by_name.get(f"{of}.{c}", 0.0) for c in "xyz"],), rotvec=[by_name.get(f"{of}.r{c}", 0.0) for c in "xyz"]
+        )
         for of in ("frame", "tool")
     )
     seen = frame @ solution.pose @ tool
@@ -355,7 +357,7 @@ def test_an_instrument_s_frame_and_target_and_scales_are_found(name: str, free: 
 
 
 def test_nothing_is_determined_of_which_nothing_says_how_good_it_is() -> None:
-    own, true, readings, poses = hexapod_data(tilt=0.15, n=7)
+    own, _, readings, poses = hexapod_data(tilt=0.15, n=7)
     alone = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses))
     assert not alone.determined.any() and np.isinf(alone.deviations).all() and "without sigma" in alone.undetermined[-1]
     known = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=poses, sigma=1e-9))

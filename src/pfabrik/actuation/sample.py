@@ -55,7 +55,9 @@ def sample_feasible(placer: Placer, n: int, seed: int, box: Any) -> Sample:
         made = np.abs(kept - placer.coordinates.home).max(axis=0, initial=0.0) > np.pi
         if len(kept) and (has_turns & ~made).any():
             names = ", ".join(np.array(placer.coordinates.names)[has_turns & ~made])
-            raise InvalidArgument("box", f"several turns of {names}, which the loops cannot make", "a box within a turn")
+            raise InvalidArgument(
+                "box", f"several turns of {names}, which the loops cannot make", "a box within a turn"
+            )
         if len(kept) >= n:
             solution = placer.solution(kept)
             reached = np.flatnonzero(np.asarray(solution.status) == Status.REACHED)

@@ -64,7 +64,9 @@ def aligned(poses: Floats, given: Measurements, is_free: Mask, length: float) ->
         turns = frame[:3, :3] @ poses[:, :3, :3]
         if is_free[1, :3].all():
             places[1, :3] = to_rotvec(_nearest_turn(np.einsum("nji,njk->ik", turns[turned], orientation[turned])))
-        columns = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=2)[at][:, :, is_free[:, 3:].ravel()]
+        columns = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=2)[at][
+            :, :, is_free[:, 3:].ravel()
+        ]
         wanted = (position - poses[:, :3, 3] @ frame[:3, :3].T)[at]
         found = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), wanted.ravel())[0]
         places[:, 3:][is_free[:, 3:]] = found

@@ -97,7 +97,9 @@ class Fit:
         if not moves.any():
             return own.values
         poses = np.asarray(self._assembled(own.values)[1].pose)
-        return own.values + np.einsum("kx,pkx->p", aligned(poses, self.measurements, moves.any(axis=0), self.length), moves)
+        return own.values + np.einsum(
+            "kx,pkx->p", aligned(poses, self.measurements, moves.any(axis=0), self.length), moves
+        )
 
     def _near_measured_poses(self) -> Configurations | None:
         """Configurations at the measured poses, where these are whole."""
