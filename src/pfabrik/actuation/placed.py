@@ -194,7 +194,7 @@ class Placer:
         return maps
 
     def _slopes_by_legs(self, q: Floats) -> Floats | None:
-        """Actuator rates (n, n_a, k) at q (n, k), NaN near dead points and where legs do not close; None without legs."""
+        """Actuator rates (n, n_a, k) at q (n, k), NaN near dead points or where legs are open; None without legs."""
         if self._by_legs is None or not isinstance(self.coordinates, JointPath):
             return None
         poses, twists = self.coordinates.poses_and_twists(q)

@@ -44,8 +44,8 @@ class Calibration:
     Attributes
     ----------
     values : calibrated, (p,), in the order of `names`.
-    deviations : standard deviations, (p,); infinite where the data leave a parameter open, or nothing is left to say how
-        good they are. Residuals larger than `sigma` make them larger.
+    deviations : standard deviations, (p,); infinite where the data leave a parameter open, or nothing is left to
+        say how good they are. Residuals larger than `sigma` make them larger.
     determined : which parameters the measurements determine, (p,).
     rank : how many directions of parameters they determine.
     rms_before, rms : root mean square of the residuals with the machine as described, and calibrated: in standard
@@ -154,7 +154,7 @@ class Calibration:
         directions = self._open_directions()
         if not self._is_exhausted:
             return tuple(_sentences(self.names, directions, self.determined))
-        sentence = "no more values are measured than are free: how good they are is not known, and nothing is determined without sigma"
+        sentence = "no more values are measured than are free: without sigma nothing says how good they are"
         return (*_sentences(self.names, directions, _parts(directions) <= OPEN), sentence)
 
     def _open_directions(self) -> Floats:
@@ -246,11 +246,6 @@ class Calibration:
                 for each in suspects
             ),
         ]
-
-
-def _shown(rms: float) -> str:
-    """A root mean square in words, without digits of rounding."""
-    return "< 1e-12" if rms < 1e-12 else f"{rms:.3g}"
 
 
 def _parts(directions: Floats) -> Floats:

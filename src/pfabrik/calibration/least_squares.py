@@ -42,8 +42,8 @@ def calibrate(
 
     Measured values minus those of the machine with other parameters, over their standard deviations, are made small by
     SciPy's `least_squares` with exact derivatives. Directions of parameters that change no measurement stay as
-    described, and are reported: a small residual is no proof of a parameter. A frame and a target of the instrument that
-    may vary are aligned first, in closed form. A fit that misses the measurements by far warns: see `Calibration.doubt`.
+    described, and are reported: a small residual is no proof of a parameter. A frame and a target of the instrument
+    that may vary are aligned first, in closed form. A fit that misses by far warns: see `Calibration.doubt`.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class _Problem:
 
 
 FIRST_STEP = 1e-2
-"""A hundredth of the longest first step, in parameters' scales: farther, a machine is another or cannot be assembled."""
+"""A hundredth of the longest first step, in parameters' scales: farther, it is another machine, or none."""
 
 MOST_RANKS, MOST_STEPS = 3, 60
 """How often directions are chosen, and the most steps for each choice: a drawing needs one and five."""

@@ -22,7 +22,8 @@ from .parameter_kinds import KINDS, Candidates, tied
 from .shifts import Shift, ShiftedGeometry, with_own_axes
 
 Free: TypeAlias = str | Sequence[str] | None
-"""Kinds ("dimensions", "points", "axes", "lengths", "offsets", "frame", "tool", "scale") and names of parameters, dimensions or joints."""
+"""Kinds ("dimensions", "points", "axes", "lengths", "offsets", "frame", "tool", "scale"); names of dimensions, joints,
+or single parameters."""
 
 STEP = 1e-5
 """Step of central differences of a geometry, in a parameter's scale: truncation and rounding both leave 1e-10."""
@@ -159,13 +160,13 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
     ----------
     free : kinds, names, or a list of both:
 
-        - "dimensions": the named dimensions of the file that are numbers (`rod = 250`), in the units of the file; without
+        - "dimensions": the named dimensions of the file that are numbers (`rod = 250`), in the file's units; not
           those that only set limits;
         - "points": centres of joints, "A1.x" [length]; of a hinge two components, as it may slide along its axis;
         - "axes": directions of axes, as turns about base axes, "A1.rx" [rad];
         - "offsets": of the actuators' zeros, "B1.offset", added to a reading [length or rad];
         - "lengths": of rods on actuated joints of the base, "A1.rod" [length];
-        - "frame": of the base as an instrument sees it, "frame.x" [length] to "frame.rz" [rad], place and rotation vector;
+        - "frame": of the base as an instrument sees it, "frame.x" [length] to "frame.rz" [rad], a rotation vector;
         - "tool": of its target on the platform, "tool.x" to "tool.rz", from the reference point;
         - "scale": factors on the actuators' readings, "B1.scale";
         - the name of a dimension, of a joint (all its points), or of one parameter.

@@ -21,7 +21,7 @@ from .printing import json_option, note, print_answer
     "--free",
     multiple=True,
     metavar="NAME",
-    help="A parameter that may vary, or dimensions, points, axes, lengths, offsets, frame, tool, scale. May be repeated.",
+    help="What may vary: dimensions, points, axes, lengths, offsets, frame, tool, scale, or a name. May be repeated.",
 )
 @click.option("--tied", is_flag=True, help="Let copies of a joint vary as one.")
 @click.option("--sigma", type=float, help="Standard deviation of a measurement [length or rad]. Default: estimated.")
