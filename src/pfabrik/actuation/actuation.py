@@ -23,9 +23,9 @@ from .hull import Hull, feasible_hull
 from .inverses import inverses
 from .mapped import Mapped
 from .named_values import per_actuator, rows_of, speeds_of, vectors_of
-from .placed import Coordinates, Placer
+from .placed import Placer
 from .sample import Sample, sample_feasible
-from .task_path import TaskPath
+from .task_path import Coordinates, TaskPath
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

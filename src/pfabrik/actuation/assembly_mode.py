@@ -56,13 +56,18 @@ class AssemblyMode:
         margins[rows] = np.linalg.svd(scaled[rows], compute_uv=False)[:, -1]
         return np.where(beyond, -np.where(np.isfinite(margins), margins, 0.0), margins)
 
-    def are_beyond(self, q: Floats) -> Mask:
-        """True for rows (n, k) at which loops close, but to which no such motion leads, (n,)."""
+    def are_beyond(self, q: Floats, *, close: bool = False) -> Mask:
+        """True for rows (n, k) at which loops close, but to which no such motion leads, (n,).
+
+        Parameters
+        ----------
+        close : loops close at all rows, also where slopes do not tell, next to dead points.
+        """
         beyond = np.zeros(len(q), bool)
         if not self._is_square or not self._are_any:
             return beyond
         signs = self._signs(q)
-        pending = np.flatnonzero(signs > 0.0)
+        pending = np.flatnonzero((signs > 0.0) | (close & np.isnan(signs)))
         for order in (None, np.arange(q.shape[1]), np.arange(q.shape[1])[::-1]):
             pending = pending[~self._is_clear(q[pending], order)]
         beyond[pending] = True

@@ -11,7 +11,7 @@ from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..poses import as_floats
-from .placed import Coordinates
+from .task_path import Coordinates
 
 
 def rows_of(names: Sequence[str], q: Any) -> tuple[Floats, tuple[int, ...]]:

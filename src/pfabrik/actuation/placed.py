@@ -73,10 +73,10 @@ class Placer:
         rows = np.flatnonzero(~is_found)
         self._put(placed, rows)
         placed.status[beyond] = Status.PROJECTED
-        beyond = rows[self.assembly.are_beyond(placed.coordinates[rows])]  # what is nearest may be
-        placed.asked[beyond] = self.assembly.ends(placed.coordinates[beyond])
-        self._put(placed, beyond)
-        placed.status[beyond] = Status.PROJECTED
+        again = rows[self.assembly.are_beyond(placed.coordinates[rows])]  # what is nearest may be
+        placed.asked[again] = self.assembly.ends(placed.coordinates[again])
+        self._put(placed, again)
+        placed.status[again] = Status.PROJECTED
         return placed
 
     def _put(self, placed: Placed, rows: Ints) -> None:
@@ -172,8 +172,9 @@ class Placer:
     def feasible_margins(self, q: Floats) -> Floats:
         """The least margin of every row of q (n, k), (n,), dead points aside: its sign says whether q is feasible."""
         margin = self._margins(q)[0]
-        beyond = np.flatnonzero((margin >= 0.0) & self.assembly.are_beyond(q))
-        margin[beyond] = self.assembly.margins(q[beyond], NEAR_DEAD_POINT)
+        inside = np.flatnonzero(margin >= 0.0)
+        beyond = inside[self.assembly.are_beyond(q[inside], close=True)]
+        margin[beyond] = np.minimum(self.assembly.margins(q[beyond], NEAR_DEAD_POINT), -TOLERANCES.active)
         return margin
 
     def _margins(self, q: Floats) -> tuple[Floats, Limits]:

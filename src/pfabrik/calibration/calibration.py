@@ -119,7 +119,9 @@ class Calibration:
             return ""
         off = f"{self.rms:.3g} {'standard deviations' if known else self._parameters.mechanism.length_unit}".strip()
         held = [
-            name for name, moves in zip(INSTRUMENT, self._parameters.moves.any(axis=(0, 2)), strict=True) if not moves
+            name
+            for name, moves in zip(INSTRUMENT, np.asarray(self._parameters.moves.any(axis=(0, 2))), strict=True)
+            if not moves
         ]
         also = f": free {' or '.join(map(repr, held))} too?" if held else ""
         return f"no values were found that explain these measurements, which they miss by {off} rms{also}"

@@ -98,7 +98,7 @@ class Fit:
             return own.values
         poses = np.asarray(self._assembled(own.values)[1].pose)
         return own.values + np.einsum(
-            "kx,pkx->p", aligned(poses, self.measurements, moves.any(axis=0), self.length), moves
+            "kx,pkx->p", aligned(poses, self.measurements, np.asarray(moves.any(axis=0)), self.length), moves
         )
 
     def _near_measured_poses(self) -> Configurations | None:
