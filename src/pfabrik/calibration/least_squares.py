@@ -108,7 +108,8 @@ class _Problem:
                 return self._residual(base + basis @ y)
 
             def derivative(y: Floats, basis: Floats = basis, kept: Floats = kept) -> Floats:
-                return np.einsum("mp,kp->mk", self._jacobian(base + basis @ y), kept)  # not by threads of a BLAS
+                slopes = self._jacobian(base + basis @ y)
+                return np.asarray(np.einsum("mp,kp->mk", slopes, kept))  # not by threads of a BLAS
 
             begin = kept @ ((values - base) / self.own.scales)
             found = least_squares(

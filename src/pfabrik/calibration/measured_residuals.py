@@ -89,7 +89,7 @@ class Fit:
 
     def _places(self, values: Floats) -> Floats:
         """The frame and the target of the instrument at values (p,), (2, 6)."""
-        return np.einsum("p,pkx->kx", values, self.parameters.moves)
+        return np.asarray(np.einsum("p,pkx->kx", values, self.parameters.moves))
 
     def aligned_values(self) -> Floats:
         """The values of the machine as described, (p,), with the frame and the target that fit it best."""
@@ -97,9 +97,8 @@ class Fit:
         if not moves.any():
             return own.values
         poses = np.asarray(self._assembled(own.values)[1].pose)
-        return own.values + np.einsum(
-            "kx,pkx->p", aligned(poses, self.measurements, np.asarray(moves.any(axis=0)), self.length), moves
-        )
+        places = aligned(poses, self.measurements, np.asarray(moves.any(axis=0)), self.length)
+        return np.asarray(own.values + np.einsum("kx,pkx->p", places, moves))
 
     def _near_measured_poses(self) -> Configurations | None:
         """Configurations at the measured poses, where these are whole."""

@@ -146,8 +146,8 @@ class Candidates:
         """A shift that changes nothing yet."""
         shape, columns = (len(self.mechanism.joints), 3), len(self.geometry.home)
         scale = 1.0 if is_angle else self.length
-        nothing = (np.zeros(size) for size in (shape, shape, columns, (2, 6), columns))
-        return Shift(name, float(value), scale, is_angle, *nothing)
+        points, turns, home, factors = (np.zeros(size) for size in (shape, shape, columns, columns))
+        return Shift(name, float(value), scale, is_angle, points, turns, home, np.zeros((2, 6)), factors)
 
 
 def tied(mechanism: Mechanism, shifts: Sequence[Shift]) -> list[Shift]:
@@ -184,8 +184,8 @@ def tied(mechanism: Mechanism, shifts: Sequence[Shift]) -> list[Shift]:
                     rods += by_name[f"{stem}{k}.rod"].rods
             _check_equal(mechanism, shift, [by_name.get(f"{stem}{k}{rest}.{what}") for k in rotations[stem]])
             name = f"{stem}{rest}.{what}"
-            own = {"points": points, "turns": turns, "home": home, "factors": factors}
-            made.append(replace(shift, name=name, rods=tuple(rods), **own))
+            shift = replace(shift, name=name, rods=tuple(rods), points=points, turns=turns, home=home, factors=factors)
+            made.append(shift)
     return made
 
 
