@@ -16,6 +16,7 @@ from .closure.close import measure_configurations
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
+from .kernels.rows import REACHED
 from .model import model_of
 from .options import Options, checked_options
 from .poses import as_floats
@@ -59,7 +60,8 @@ def solve_fk(
     values, shape = as_values(mechanism, actuators)
     begin = start_of(mechanism, start, shape)
     if shape == () and np.vdot(values, values) <= HORIZON**2:  # one row of numbers, with nothing to set aside
-        return Solution(mechanism, engine_of(mechanism).forward(values, begin, options.actuator_tolerance), shape)
+        solutions = engine_of(mechanism).forward(values, begin, options.actuator_tolerance)
+        return Solution(mechanism, solutions, shape, values=values if solutions.rows.status[0] != REACHED else None)
     is_valid = np.asarray(np.isfinite(values).all(axis=1))
     if options.on_invalid == "raise" and not is_valid.all():
         bad = np.flatnonzero(~is_valid)[:5].tolist() if shape else ()
@@ -67,7 +69,7 @@ def solve_fk(
     starts = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(is_valid))
     clipped = np.clip(values[is_valid], -HORIZON, HORIZON)
     solutions = engine_of(mechanism).forward(clipped, starts, options.actuator_tolerance)
-    return Solution(mechanism, solutions.scatter(is_valid), shape)
+    return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
 
 
 def solution_at(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:

@@ -13,9 +13,9 @@ from .answers.active_limits import ActiveLimit, active_limits
 from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
-from .answers.words import NO_FREEDOM, STRETCHED, short_names
+from .answers.words import NO_FREEDOM, STRETCHED, has_freedom, short_names
 from .arrays import Floats, Mask
-from .closure.first_order import are_stretched
+from .closure.first_order import are_stretched, singularities
 from .description.mechanism import Mechanism
 from .description.mechanism_html import card
 from .description.task import task_of
@@ -23,7 +23,8 @@ from .engine import engine_of
 from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
 from .model import model_of
-from .motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
+from .motion.fitting_task import has_dependent_coordinates, task_remark
+from .motion.singularities import assembly_signs
 from .motion.tilt_axis import tilt_axis
 from .poses import as_floats
 from .rotations import from_rotvec
@@ -40,7 +41,10 @@ SHORTEST = 1e-12
 """Shortest step, which is not halved again [L or rad]: a joint is then on the limit that stops it, even if it turns a
 hundred thousand times as fast as the end effector moves. If it turns faster, links are practically stretched out."""
 
-IN_SHORT = {STRETCHED: "links stretched", NO_FREEDOM: "no freedom that way"}
+DEAD_POINT = "the drive is at a dead point, where the linkage may go on in either of two modes"
+"""Cause that stops a linkage with one freedom."""
+
+IN_SHORT = {STRETCHED: "links stretched", NO_FREEDOM: "no freedom that way", DEAD_POINT: "dead point"}
 """Short names of causes, for tables and pictures."""
 
 FULL_TURN = 2.0 * np.pi
@@ -58,8 +62,8 @@ class Reach:
     distance : that the end effector can move [length or rad]; inf where nothing stops it.
     stopped_by : the limits that stop it; empty if the links are stretched out or nothing stops it.
     end : the last configuration in this direction; None if nothing stops it.
-    cause : of the stop if no limit stops it, in words: the links are stretched out, the mechanism has no freedom that
-        way, or its task asks for more than it can do, whatever limits are active; else empty.
+    cause : of the stop if no limit stops it, in words: the links are stretched out, the drive of a linkage with one
+        freedom is at a dead point or the linkage at a change point, the mechanism has no freedom that way, or its task asks for more than it can do, whatever limits are active; else empty.
     """
 
     kind: Literal["along", "about"]
@@ -204,33 +208,31 @@ def travel(
         bounded = np.isfinite(distance)
         stop, end = (named[row], ends[row]) if bounded else ((), None)
         x, y, z = direction
-        cause = "" if end is None else _cause(end, bool(stop), *search.twist(row, end.pose))
+        cause = "" if end is None else _cause(end, bool(stop), search.sign != 0.0, *search.twist(row, end.pose))
         reaches.append(Reach(kind, (x, y, z), distance, stop, end, cause))
     return Travel(solution, tuple(reaches))
 
 
-def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> str:
+def _cause(end: Solution, is_at_limit: bool, is_linkage: bool, velocity: Floats, turn: Floats) -> str:
     """The cause that stops an end effector if no limit does, to first order; at a limit, only the task can be one.
 
     Parameters
     ----------
+    is_linkage : the search stops at dead points.
     velocity, turn : of the blocked motion, (3,) each: velocity of the reference point [L], and angular velocity.
     """
-    mechanism, task = end.mechanism, task_of(end.mechanism)
-    if is_at_limit and not has_dependent_coordinates(mechanism):
-        return ""
-    motions, axes = motions_at(mechanism, end._coordinates), list(task.axes)
-    turning = task.turning_axes(end.pose) if tilt_axis(mechanism) is None else np.eye(3)
-    about = turning if len(motions) > 3 else np.zeros((0, 3))
-    able = np.concatenate([motions[:3][axes], about @ motions[3:] if len(about) else motions[:0]])
-    blocked = np.concatenate([velocity[axes], about @ turn])
-    remainder = blocked - able @ np.linalg.lstsq(able, blocked, rcond=TOLERANCES.alignment)[0]
-    is_able = bool(np.linalg.norm(remainder) <= TOLERANCES.stretched * np.linalg.norm(blocked))
+    mechanism, q = end.mechanism, end._coordinates
     if has_dependent_coordinates(mechanism):
+        is_able = is_at_limit and has_freedom(mechanism, q, end.pose, velocity, turn)
         return "" if is_able else task_remark(mechanism)
-    if are_stretched(model_of(mechanism), end._coordinates).any():
-        return STRETCHED
-    return "" if is_able else NO_FREEDOM
+    if is_at_limit:
+        return ""
+    if is_linkage:
+        near = singularities(model_of(mechanism), q)
+        if np.minimum(near.parallel, near.constraint)[0] < TOLERANCES.stretched:
+            return DEAD_POINT
+    is_stretched = are_stretched(model_of(mechanism), q)[0] or has_freedom(mechanism, q, end.pose, velocity, turn)
+    return STRETCHED if is_stretched else NO_FREEDOM
 
 
 def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floats:
@@ -298,6 +300,7 @@ class _TravelSearch:
     ----------
     directions : unit vectors (n, 3): lines first, then axes.
     farthest : the farthest configuration reached yet in each direction, (n,).
+    sign : of the assembly that is kept, as of `assembly_signs`; 0 if there is none to keep.
     """
 
     def __init__(self, solution: Solution, lines: Floats, axes: Floats, pivot: Floats) -> None:
@@ -309,6 +312,10 @@ class _TravelSearch:
         rows = np.arange(len(self.directions))
         start = solution._configurations.at(0 * rows)
         self.farthest = self._engine.advance(self._targets(rows, np.zeros(len(rows))), start)
+        self._mechanism, self.sign = (
+            solution.mechanism,
+            float(assembly_signs(solution.mechanism, solution._coordinates)[0]),
+        )
 
     def run(self) -> Floats:
         """Distance in each direction, (n,) [length or rad].
@@ -346,6 +353,8 @@ class _TravelSearch:
         """True for directions whose pose at the given distance is reached; the next step starts there."""
         solutions = self._engine.advance(self._targets(rows, distances), self.farthest.at(rows))
         reached = np.asarray(solutions.rows.status == REACHED)
+        if self.sign:
+            reached &= assembly_signs(self._mechanism, solutions.coordinates) * self.sign >= 0.0
         self.farthest.put(rows[reached], solutions, reached)
         return reached
 

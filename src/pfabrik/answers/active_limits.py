@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 
 from ..apart.link_distances import pair_distances_at, pair_names
 from ..arrays import Floats
+from ..closure.first_order import are_stretched
 from ..description.mechanism import Mechanism
+from ..model import Model
 from ..motion.displacements import rate_units
+from ..motion.joint_rates import first_order, graph_of, right_singular
 from ..motion.limited_coordinates import coned, ranges_of
+from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 
-Bound: TypeAlias = Literal["min", "max", "cone", "clearance"]
-"""A limit of a joint, or the clearance of two links."""
+Bound: TypeAlias = Literal["min", "max", "cone", "clearance", "stretched"]
+"""A limit of a joint, the clearance of two links, or links that are stretched out or folded at a joint."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +31,8 @@ class ActiveLimit:
     Attributes
     ----------
     joint, bound : which limit of which joint; of a clearance the two bodies that are as near: ``BC1–BC3``.
-    value, limit : the coordinate (or the angle at the cone, or the distance of the links) and its bound [length or
-        rad].
+    value, limit : the coordinate (or the angle at the cone, or the distance of the links) and its bound, of links
+        that are stretched the coordinate itself [length or rad].
     coordinate : which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or
         cylindrical joint.
     multiplier : the most by which the answer comes nearer to its target per unit by which the limit is relaxed [length
@@ -115,6 +119,23 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
         multiplier = float(multipliers[row, place]) * unit
         limits[row].append(ActiveLimit(name, bound, value, limit, multiplier, coordinate_place))
     return [tuple(row_limits) for row_limits in limits]
+
+
+def stretched_joint(model: Model, q: Floats) -> tuple[ActiveLimit, ...]:
+    """The joint at which links are stretched out or folded at joint coordinates q (1, c); empty if none are.
+
+    It is the one that turns fastest in the motion that the end effector shows least of.
+    """
+    freedoms = generic_of(model.mechanism).mobility.platform
+    if not freedoms or not are_stretched(model, q)[0]:
+        return ()
+    closure, twist = first_order(model.mechanism, q)
+    values, right = right_singular(closure)
+    motions = right[0, np.count_nonzero(values > TOLERANCES.rank) :]
+    lost = np.linalg.svd(motions @ twist[0].T)[0][:, freedoms - 1] @ motions
+    coordinate = model.mechanism.coordinates[int(np.argmax(np.abs(graph_of(model.mechanism).rates.T @ lost)))]
+    value = float(q[0, coordinate.column]) + coordinate.home
+    return (ActiveLimit(coordinate.joint.name, "stretched", value, value, None, coordinate.place),)
 
 
 def has_passive_limits(mechanism: Mechanism, multipliers: Floats) -> bool:

@@ -28,7 +28,14 @@ from ..kernels.rows import (
 )
 from ..model import model_of
 from ..motion.displacements import columns, home_coordinates
-from .active_limits import ActiveLimit, active_limits, binding_limits, has_passive_limits, holding_limits
+from .active_limits import (
+    ActiveLimit,
+    active_limits,
+    binding_limits,
+    has_passive_limits,
+    holding_limits,
+    stretched_joint,
+)
 from .status import Status
 
 Held: TypeAlias = Literal["orientation", "position"] | None
@@ -43,23 +50,38 @@ class PoseRequest(NamedTuple):
     rotation_length: float | None
 
 
+_State: TypeAlias = tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None, Floats | None]
+
+
 class Answer:
     """The fields of a `Solution`, whose docstring describes them; text and pictures are made from these."""
 
     def __init__(
-        self, mechanism: Mechanism, found: Configurations, shape: tuple[int, ...], request: PoseRequest | None = None
+        self,
+        mechanism: Mechanism,
+        found: Configurations,
+        shape: tuple[int, ...],
+        request: PoseRequest | None = None,
+        values: Floats | None = None,
     ) -> None:
-        """Wrap configurations, as many as the batch shape has; `request` are the poses asked for, if any are missed."""
+        """Wrap configurations, as many as the batch shape has; if any are missed, with what was asked for.
+
+        Parameters
+        ----------
+        request : the poses asked for.
+        values : the actuator values asked for, (n, n_a) [length or rad].
+        """
         self.mechanism = mechanism
         self.shape = shape
         self._configurations = found
         self._request = request
+        self._values = values
 
-    def __getstate__(self) -> tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None]:
+    def __getstate__(self) -> _State:
         """The arguments of the constructor; cached properties are not pickled."""
-        return self.mechanism, self._configurations, self.shape, self._request
+        return self.mechanism, self._configurations, self.shape, self._request, self._values
 
-    def __setstate__(self, state: tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None]) -> None:
+    def __setstate__(self, state: _State) -> None:
         Answer.__init__(self, *state)
 
     @property
@@ -163,6 +185,9 @@ class Answer:
         if self._request is not None and len(projected):
             for row, row_limits in zip(projected, self._holding(self._request, projected), strict=True):
                 limits[row] = row_limits
+        model = model_of(self.mechanism)
+        for row in np.flatnonzero(status == Status.PROJECTED).tolist():
+            limits[row] = limits[row] or stretched_joint(model, self._coordinates[row : row + 1])
         return limits
 
     @cached_property

@@ -14,7 +14,7 @@ from ..kernels.rows import REACHED
 from .answer_fields import Answer
 from .solution_html import answer_html
 from .status import Status
-from .words import as_sentence, causes, given_up
+from .words import as_sentence, what_blocks
 
 _AlongAxis: TypeAlias = int | slice | EllipsisType | Sequence[int] | NDArray[np.integer] | NDArray[np.bool_]
 Index: TypeAlias = _AlongAxis | tuple[_AlongAxis, ...]
@@ -52,13 +52,15 @@ class Solution(Answer):
     iterations, rounds : passes over the chains, and revisions of the target, (...,).
     active_limits : limits that block a projected answer from its target, the largest multiplier first, or that another
         answer exceeds; for a batch, one tuple per row, in row order. Limits on which a projected answer lies, but whose
-        relaxation would not bring it nearer, are not listed. If a chain is at full stretch there may be none.
+        relaxation would not bring it nearer, are not listed. Where none blocks it, but links are stretched out or
+        folded, this is listed, as bound "stretched" of the joint between them.
     """
 
     @property
     def reason(self) -> str:
         """Why a single target is not reached, in words: the limits that block it, or another cause, such as a task that
-        asks for more than the mechanism can do; empty if it is reached.
+        asks for more than the mechanism can do; in forward kinematics after the distance from the values asked for.
+        Empty if it is reached.
 
         Raises
         ------
@@ -68,12 +70,7 @@ class Solution(Answer):
             raise TypeError("a batch has a reason a row: solution[row].reason")
         if self:
             return ""
-        sentence = as_sentence(self)
-        return (
-            "; ".join([*given_up(self), *causes(self)])
-            if self.status == Status.PROJECTED and self._request
-            else sentence
-        )
+        return "; ".join(what_blocks(self)) if self.status == Status.PROJECTED else as_sentence(self)
 
     def __bool__(self) -> bool:
         """True if the target, or every target of the batch, is REACHED."""
@@ -91,7 +88,8 @@ class Solution(Answer):
         chosen = np.arange(len(self._configurations)).reshape(self.shape)[cast(Any, index)]
         places = np.ravel(chosen)
         request = None if self._request is None else self._request._replace(targets=self._request.targets[places])
-        return Solution(self.mechanism, self._configurations.at(places), np.shape(chosen), request)
+        values = None if self._values is None else self._values[places]
+        return Solution(self.mechanism, self._configurations.at(places), np.shape(chosen), request, values)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))

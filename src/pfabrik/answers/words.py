@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
-from ..closure.first_order import are_stretched, forward_map
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
+from ..description.task import task_of
 from ..model import model_of
-from ..motion.fitting_task import has_dependent_coordinates, task_remark
+from ..motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
+from ..motion.tilt_axis import tilt_axis
+from ..rotations import to_rotvec
 from ..tolerances import TOLERANCES
 from .aligned_text import error_text
 
@@ -27,33 +29,38 @@ STRETCHED, NO_FREEDOM = "the links are stretched out or folded", "the mechanism 
 """Causes that stop an end effector if no limit does."""
 
 
-def as_sentence(answer: Answer, values: Floats | None = None) -> str:
+def as_sentence(answer: Answer) -> str:
     """The status of an answer to a single target, or to actuator values, in one sentence.
 
     For instance ``projected: 12.3 mm from the target; strut B3 at its maximum 250 mm; joint C1's cone at 45 deg``: the
     distance, the part of the target that is not held although it should be, and the limits that block it, the largest
     multiplier first.
-
-    Parameters
-    ----------
-    values : target values of the actuators (n_a,) [length or rad], in forward kinematics.
     """
     status = str(answer.status).lower()
     if status == "reached":
         return "reached"
-    if status == "projected" and values is not None:
-        why = reasons(answer) or ["no limit is active: no configuration with these values was found"]
-        return "; ".join([f"projected: {actuator_distance(answer, values)} from the values asked for", *why])
     if status == "projected":
-        return "; ".join([f"projected: {distance(answer)} from the target", *given_up(answer), *causes(answer)])
+        away = [f"{distance(answer)} from the target"] if answer._values is None else []
+        return "projected: " + "; ".join([*away, *what_blocks(answer)])
     if status == "exceeded":
         return f"exceeded: assembled, but beyond limits: {by_bound(exceeded(answer))}"
     return f"{status}: no feasible configuration found; {what_is_wrong(answer)}"
 
 
+def what_blocks(answer: Answer) -> list[str]:
+    """Phrases for why a projected answer is not where it should be; first the distance from the values asked for."""
+    if answer._values is None:
+        return [*given_up(answer), *causes(answer)]
+    return [f"{actuator_distance(answer, answer._values[0])} from the values asked for", *causes(answer)]
+
+
 def causes(answer: Answer) -> list[str]:
     """Phrases for the active limits of a projected answer, or for another cause if no limit is active."""
-    return reasons(answer) or [f"no limit is active: {why_without_limits(answer)}"]
+    limits = answer._limits[0]
+    if not limits:
+        return [f"no limit is active: {why_without_limits(answer)}"]
+    blocks_all = limits[0].bound != "stretched" or why_without_limits(answer) != NO_FREEDOM
+    return reasons(answer) if blocks_all else [*reasons(answer), NO_FREEDOM]
 
 
 def given_up(answer: Answer) -> list[str]:
@@ -73,33 +80,36 @@ def given_up(answer: Answer) -> list[str]:
 
 def why_without_limits(answer: Answer) -> str:
     """A phrase for the cause, to first order, that keeps an answer without active limits from its target."""
-    if has_dependent_coordinates(answer.mechanism):
-        return task_remark(answer.mechanism)
-    inside, outside = missed(answer)
-    phrases = []
-    if inside and are_stretched(model_of(answer.mechanism), answer._coordinates).any():
-        phrases.append(STRETCHED)
-    if outside:
-        phrases.append(NO_FREEDOM)
-    return ", and ".join(phrases) or "nothing nearer was found"
-
-
-def missed(answer: Answer) -> tuple[bool, bool]:
-    """True if the position error has a part along motions of the end effector, at home and here; and a part across.
-
-    With a rotation error, (True, False).
-    """
     mechanism, request = answer.mechanism, answer._request
-    if request is None or answer.rotation_error > TOLERANCES.rotation:
-        return True, False
-    axes = [axis in mechanism.task for axis in "xyz"]
-    offset = (request.targets[0] - answer.pose)[:3, 3][axes]
-    offset = offset / (np.abs(offset).max(initial=0.0) or 1.0)  # so that no square is too large
-    q = answer._coordinates
-    motions = np.hstack(list(forward_map(model_of(mechanism), np.concatenate([0.0 * q, q]))[:, :3][:, axes]))
-    along = motions @ np.linalg.lstsq(motions, offset, rcond=TOLERANCES.alignment)[0]
-    least = TOLERANCES.alignment * float(np.linalg.norm(offset))
-    return bool(np.linalg.norm(along) > least), bool(np.linalg.norm(offset - along) > least)
+    if request is None:
+        return "no configuration with these values was found"
+    if has_dependent_coordinates(mechanism):
+        return task_remark(mechanism)
+    pose, target = answer.pose, request.targets[0]
+    offset, turn = (target - pose)[:3, 3], to_rotvec(target[:3, :3] @ pose[:3, :3].T)
+    is_off = answer.rotation_error > TOLERANCES.rotation
+    has_way = has_freedom(mechanism, answer._coordinates, pose, offset / mechanism.characteristic_length, turn * is_off)
+    return "nothing nearer was found" if has_way else NO_FREEDOM
+
+
+def has_freedom(mechanism: Mechanism, q: Floats, pose: Floats, velocity: Floats, turn: Floats) -> bool:
+    """True if a motion of the end effector at a pose (4, 4), in what its task sets, is one it can make at home or here.
+
+    Parameters
+    ----------
+    q : joint coordinates here, (1, c).
+    velocity, turn : of the reference point [L] and angular, (3,) each.
+    """
+    task = task_of(mechanism)
+    axes, about = list(task.axes), np.zeros((0, 3))
+    if not mechanism.end_effector_is_joint:
+        about = task.turning_axes(pose) if tilt_axis(mechanism) is None else np.eye(3)
+    motions = np.hstack([motions_at(mechanism, place) for place in (0.0 * q, q)])
+    able = np.concatenate([motions[:3][axes], about @ motions[3:] if len(about) else motions[:0]])
+    wanted = np.concatenate([velocity[axes], about @ turn])
+    wanted = wanted / (np.abs(wanted).max(initial=0.0) or 1.0)  # so that no square is too large
+    across = wanted - able @ np.linalg.lstsq(able, wanted, rcond=TOLERANCES.alignment)[0]
+    return bool(np.linalg.norm(across) <= TOLERANCES.stretched * np.linalg.norm(wanted))
 
 
 def what_is_wrong(answer: Answer) -> str:
@@ -150,6 +160,8 @@ def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
     if limit.bound == "clearance":
         return "", f"clearance {limit.limit:.6g} {mechanism.length_unit}"
     joint = mechanism.joint(limit.joint)
+    if limit.bound == "stretched":
+        return "", limit.bound
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
     angle = math.degrees(limit.limit)
     if limit.bound == "cone":
@@ -174,6 +186,8 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
     Of bodies, ``BC1–BC3, BC2–BC4 at their clearance 2 mm``.
     """
+    if bound == "stretched":
+        return f"{STRETCHED} at joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
     if bound.startswith("clearance"):
         return f"{', '.join(joints)} at their {bound}"
     subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"

@@ -35,7 +35,7 @@ def describe(solution: pf.Solution, values: Floats | None = None) -> str:
     width = max(len(text) for _, text, _ in rows)
     lines = [f"{name:<16}{text:<{width}}   [{unit}]" for name, text, unit in rows]
     gap = f"{'loops closed to':<16}{loop_gap(solution)}"
-    return "\n".join([as_sentence(solution, values), "", *lines, gap, "", actuator_table(solution, values)])
+    return "\n".join([as_sentence(solution), "", *lines, gap, "", actuator_table(solution, values)])
 
 
 def pose_texts(solution: pf.Solution) -> tuple[list[str], list[str]]:

@@ -16,6 +16,8 @@ from itertools import compress
 import numpy as np
 
 from ..arrays import Floats, Mask
+from ..derived import derived
+from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
 from ..description.mechanism_html import card
 from ..description.task import task_of
@@ -23,6 +25,7 @@ from ..tolerances import TOLERANCES
 from .displacements import displacements
 from .joint_rates import actuated_columns, first_order, right_singular
 from .mobility import Generic, generic_of
+from .walks import around_home
 
 KINDS = ("serial", "parallel", "constraint", "passive")
 NUMBERS = (*KINDS, "lost", "gained")
@@ -227,3 +230,30 @@ def _pseudo_inverse(matrices: Floats) -> Floats:
     left, values, right = np.linalg.svd(matrices, full_matrices=False)
     inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > TOLERANCES.rank)
     return np.asarray(np.swapaxes(right, -1, -2) @ (inverse[..., None] * np.swapaxes(left, -1, -2)))
+
+
+def assembly_signs(mechanism: Mechanism, q: Floats) -> Floats:
+    """The sign of det C_P of a linkage with one freedom at coordinates q (n, c), (n,); 0 at a dead point or if unknown.
+
+    C_P are the loop conditions in the joints that are not driven: where it is singular, at dead points of the drive and
+    at change points, these may go on in either of two modes. It is known if the driven joint is the only freedom, and
+    the independent conditions are the same everywhere, as of loops in a plane.
+    """
+    basis, passive = _loop_basis(mechanism)
+    if not len(basis) or not len(q):
+        return np.zeros(len(q))
+    closure, _ = first_order(mechanism, q)
+    return np.asarray(np.sign(np.linalg.det(basis @ closure[:, :, passive])))
+
+
+@derived
+def _loop_basis(mechanism: Mechanism) -> tuple[Floats, list[int]]:
+    """Orthonormal combinations of loop conditions that are independent everywhere, and the columns of passive joints."""
+    generic, actuated = generic_of(mechanism), actuated_columns(mechanism)
+    passive = [k for k in np.flatnonzero(column_moves(mechanism) > 0.0).tolist() if k not in actuated]
+    if generic.mobility.platform != 1 or len(actuated) != 1 or len(passive) != generic.rank:
+        return np.zeros((0, 0)), passive
+    closure, _ = first_order(mechanism, around_home(mechanism))
+    left, sizes, _ = np.linalg.svd(np.concatenate(list(closure), axis=1), full_matrices=False)
+    basis = left[:, sizes > TOLERANCES.alignment].T
+    return (basis if len(basis) == generic.rank else np.zeros((0, 0))), passive

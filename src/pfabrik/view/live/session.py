@@ -79,7 +79,7 @@ class Session:
     @property
     def sentence(self) -> str:
         """The answer in one sentence."""
-        return as_sentence(self.solution, self.actuators if self.asked == "actuators" else None)
+        return as_sentence(self.solution)
 
     @property
     def pose_as_python(self) -> str:
