@@ -16,6 +16,7 @@ import pfabrik as pf
 from checks import INTERPRETED
 from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
+from pfabrik.files import loads
 from pfabrik.tolerances import TOLERANCES
 from test_clearance import distances_of_struts, struts
 
@@ -367,3 +368,55 @@ def test_a_turn_stops_where_struts_come_too_near() -> None:
     assert "BC1–BC4 too near" in found.why
     (free,) = pf.travel(pf.solve_ik(machine.with_clearance(None), home), about=[0, 0, 1])
     assert free.distance > found.distance + 0.1
+
+
+# --- linkages -----------------------------------------------------------------------------------------------------
+
+SLIDER_CRANK = """
+schema = 1
+name = "gripper"
+units = { length = "mm", angle = "deg" }
+base = "base"
+end_effector = "jaw"
+reference_point = [0, 40, 0]
+task = ["yaw"]
+joint = [
+  { name = "hinge", type = "revolute", connects = ["base", "jaw"], at = [0, 0, 0], axis = [0, 0, 1] },
+  { name = "knee", type = "revolute", connects = ["jaw", "rod"], at = [0, 40, 0], axis = [0, 0, 1] },
+  { name = "pin", type = "revolute", connects = ["rod", "slide"], at = [69.28203230275508, 0, 0], axis = [0, 0, 1] },
+  { name = "drive", type = "prismatic", connects = ["base", "slide"], axis = [1, 0, 0], actuated = true },
+]
+"""
+PARALLELOGRAM = """
+schema = 1
+name = "parallelogram"
+units = { length = "mm", angle = "deg" }
+base = "base"
+end_effector = "rocker"
+reference_point = [90, 40, 0]
+task = ["yaw"]
+joint = [
+  { name = "A", type = "revolute", connects = ["base", "crank"], at = [0, 0, 0], axis = [0, 0, 1], actuated = true },
+  { name = "B", type = "revolute", connects = ["crank", "coupler"], at = [0, 40, 0], axis = [0, 0, 1] },
+  { name = "C", type = "revolute", connects = ["coupler", "rocker"], at = [90, 40, 0], axis = [0, 0, 1] },
+  { name = "D", type = "revolute", connects = ["base", "rocker"], at = [90, 0, 0], axis = [0, 0, 1] },
+]
+"""
+
+
+@pytest.mark.skipif(INTERPRETED, reason="many steps")
+@pytest.mark.parametrize("text", [SLIDER_CRANK, PARALLELOGRAM])
+def test_a_linkage_stops_where_it_may_go_on_in_either_of_two_modes(text: str) -> None:
+    """Both are in line, and so at a dead point of the slide or a change point, a quarter turn from home each way."""
+    mechanism = loads(text)
+    home = home_of(mechanism)
+    found = pf.travel(home)
+    np.testing.assert_allclose(found.distances, np.pi / 2.0, atol=1e-5)  # loops are closed to 1e-12, its square
+    assert [reach.why for reach in found] == ["dead point"] * 2
+    turns = np.radians([40.0, 80.0, 100.0, 130.0, 85.0, 20.0])
+    poses = np.tile(mechanism.home_pose, (len(turns), 1, 1))
+    poses[:, :3, :3] = Rotation.from_rotvec(np.outer(turns, Z)).as_matrix()
+    path = pf.track(mechanism, poses)
+    assert [answer.status.name for answer in path] == ["REACHED"] * 2 + ["PROJECTED"] * 2 + ["REACHED"] * 2
+    np.testing.assert_allclose(path.rotation_error[2:4], turns[2:4] - np.pi / 2.0, atol=1e-5)
+    assert all("dead point" in answer.reason for answer in path[2:4])

@@ -13,14 +13,24 @@ from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
 from .arrays import Floats
+from .batch import put
 from .checks import require_callable
+from .closure.close import measure_configurations
+from .closure.configurations import Configurations
 from .description.mechanism import Mechanism
-from .engine import inverse_engine_of
+from .description.task import task_of
+from .engine import engine_of, inverse_engine_of
 from .errors import InvalidArgument
-from .kernels.rows import Rows
+from .kernels.rows import POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
+from .model import model_of
+from .motion.singularities import assembly_signs
 from .options import Options, checked_options
+from .poses import between
 from .targets import Target, as_targets, refuse_invalid
 from .tolerances import TOLERANCES
+
+LEAST_STEP = 1e-13
+"""Share of a step of a path to which the dead point that it passes is found: rounding is near."""
 
 
 def track(
@@ -36,7 +46,8 @@ def track(
 ) -> Track:
     """Solve a path of targets, each from the answer before it, in the working mode of the start.
 
-    Links that are stretched out at an unreachable target bend back to the side from which they came.
+    Links that are stretched out at an unreachable target bend back to the side from which they came. A linkage with one
+    freedom stops at dead points of its drive, and at change points.
 
     Parameters
     ----------
@@ -69,11 +80,45 @@ def track(
     pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
     begin = start_of(mechanism, start, ())
     solutions = inverse_engine_of(mechanism, options).follow(poses, begin, options, on_progress)
+    solutions = _kept_assembly(mechanism, poses, begin, solutions, options)
     if begin is not None:
         _continue_turns(mechanism, solutions.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, solutions.rows.status, options)
     request = PoseRequest(poses.copy(), options.hold, options.rotation_length)
     return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
+
+
+def _kept_assembly(
+    mechanism: Mechanism, targets: Floats, start: Configurations | None, solutions: Configurations, options: Options
+) -> Configurations:
+    """The solutions along targets (n, 4, 4); rows beyond a dead point of a linkage stop at it, on the start's side."""
+    engine, home = engine_of(mechanism), np.zeros((1, len(mechanism.coordinates)))
+    kept = start or engine.as_configurations(measure_configurations(model_of(mechanism), home))
+    sign = float(assembly_signs(mechanism, kept.coordinates)[0])
+    if not sign:
+        return solutions
+    crossed = np.flatnonzero(assembly_signs(mechanism, solutions.coordinates) * sign < 0.0)
+    if not len(crossed):
+        return solutions
+    solutions = solutions.with_rows(crossed[:0], solutions.at(crossed[:0]))
+    for row in crossed:
+        before = np.flatnonzero(solutions.rows.status[:row] <= PROJECTED)[-1:]
+        kept = solutions.at(before) if len(before) else kept
+        target, begin, share, step = targets[row : row + 1], kept.rows.poses.copy(), 0.0, 0.5
+        while step > LEAST_STEP:
+            there = engine.advance(between(begin, target, share + step), kept)
+            if there.rows.status[0] == REACHED and assembly_signs(mechanism, there.coordinates)[0] * sign >= 0.0:
+                kept, share = there, share + step
+            else:
+                step *= 0.5
+        position, rotation = task_of(mechanism).errors(kept.rows.poses, target)
+        kept.rows.measures[:, POSITION_ERROR], kept.rows.measures[:, ROTATION_ERROR] = position, rotation
+        near = options.tolerance or TOLERANCES.position * mechanism.characteristic_length
+        is_near = (position <= near) & (rotation <= options.rotation_tolerance)
+        kept.rows.status[:] = np.where(is_near, REACHED, PROJECTED)
+        put(solutions.rows, [row], kept.rows)
+        solutions.coordinates[row] = kept.coordinates[0]
+    return solutions
 
 
 def _continue_turns(mechanism: Mechanism, rows: Rows, start: Floats) -> None:

@@ -13,9 +13,9 @@ from .answers.active_limits import ActiveLimit, active_limits
 from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
-from .answers.words import NO_FREEDOM, STRETCHED, has_freedom, short_names
+from .answers.words import DEAD_POINT, NO_FREEDOM, STRETCHED, has_freedom, short_names
 from .arrays import Floats, Mask
-from .closure.first_order import are_stretched, singularities
+from .closure.first_order import are_stretched
 from .description.mechanism import Mechanism
 from .description.mechanism_html import card
 from .description.task import task_of
@@ -24,7 +24,7 @@ from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
 from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, task_remark
-from .motion.singularities import assembly_signs
+from .motion.singularities import assembly_signs, is_at_dead_point
 from .motion.tilt_axis import tilt_axis
 from .poses import as_floats
 from .rotations import from_rotvec
@@ -40,9 +40,6 @@ with limited steps can follow; the largest distance [L]."""
 SHORTEST = 1e-12
 """Shortest step, which is not halved again [L or rad]: a joint is then on the limit that stops it, even if it turns a
 hundred thousand times as fast as the end effector moves. If it turns faster, links are practically stretched out."""
-
-DEAD_POINT = "the drive is at a dead point, where the linkage may go on in either of two modes"
-"""Cause that stops a linkage with one freedom."""
 
 IN_SHORT = {STRETCHED: "links stretched", NO_FREEDOM: "no freedom that way", DEAD_POINT: "dead point"}
 """Short names of causes, for tables and pictures."""
@@ -63,7 +60,8 @@ class Reach:
     stopped_by : the limits that stop it; empty if the links are stretched out or nothing stops it.
     end : the last configuration in this direction; None if nothing stops it.
     cause : of the stop if no limit stops it, in words: the links are stretched out, the drive of a linkage with one
-        freedom is at a dead point or the linkage at a change point, the mechanism has no freedom that way, or its task asks for more than it can do, whatever limits are active; else empty.
+        freedom is at a dead point or the linkage at a change point, the mechanism has no freedom that way, or its task
+        asks for more than it can do, whatever limits are active; else empty.
     """
 
     kind: Literal["along", "about"]
@@ -208,17 +206,16 @@ def travel(
         bounded = np.isfinite(distance)
         stop, end = (named[row], ends[row]) if bounded else ((), None)
         x, y, z = direction
-        cause = "" if end is None else _cause(end, bool(stop), search.sign != 0.0, *search.twist(row, end.pose))
+        cause = "" if end is None else _cause(end, bool(stop), *search.twist(row, end.pose))
         reaches.append(Reach(kind, (x, y, z), distance, stop, end, cause))
     return Travel(solution, tuple(reaches))
 
 
-def _cause(end: Solution, is_at_limit: bool, is_linkage: bool, velocity: Floats, turn: Floats) -> str:
+def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> str:
     """The cause that stops an end effector if no limit does, to first order; at a limit, only the task can be one.
 
     Parameters
     ----------
-    is_linkage : the search stops at dead points.
     velocity, turn : of the blocked motion, (3,) each: velocity of the reference point [L], and angular velocity.
     """
     mechanism, q = end.mechanism, end._coordinates
@@ -227,10 +224,8 @@ def _cause(end: Solution, is_at_limit: bool, is_linkage: bool, velocity: Floats,
         return "" if is_able else task_remark(mechanism)
     if is_at_limit:
         return ""
-    if is_linkage:
-        near = singularities(model_of(mechanism), q)
-        if np.minimum(near.parallel, near.constraint)[0] < TOLERANCES.stretched:
-            return DEAD_POINT
+    if is_at_dead_point(mechanism, q):
+        return DEAD_POINT
     is_stretched = are_stretched(model_of(mechanism), q)[0] or has_freedom(mechanism, q, end.pose, velocity, turn)
     return STRETCHED if is_stretched else NO_FREEDOM
 

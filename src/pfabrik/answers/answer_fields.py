@@ -93,6 +93,10 @@ class Answer:
         """All joint coordinates as deviations from home, (n, columns) [length or rad]."""
         return self._configurations.coordinates
 
+    def _coordinates_at(self, place: int) -> Floats:
+        """Those of one row, (1, columns)."""
+        return self._configurations.coordinates_at(np.array([place]))
+
     def _shaped(self, array: NDArray[Any]) -> Any:
         return shaped(array, self.shape)
 
@@ -186,8 +190,8 @@ class Answer:
             for row, row_limits in zip(projected, self._holding(self._request, projected), strict=True):
                 limits[row] = row_limits
         model = model_of(self.mechanism)
-        for row in np.flatnonzero(status == Status.PROJECTED).tolist():
-            limits[row] = limits[row] or stretched_joint(model, self._coordinates[row : row + 1])
+        for place in np.flatnonzero(status == Status.PROJECTED).tolist():
+            limits[place] = limits[place] or stretched_joint(model, self._coordinates_at(place))
         return limits
 
     @cached_property

@@ -14,6 +14,7 @@ from ..description.readouts import readouts
 from ..description.task import task_of
 from ..model import model_of
 from ..motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
+from ..motion.singularities import is_at_dead_point
 from ..motion.tilt_axis import tilt_axis
 from ..rotations import to_rotvec
 from ..tolerances import TOLERANCES
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 
 STRETCHED, NO_FREEDOM = "the links are stretched out or folded", "the mechanism has no freedom that way"
+DEAD_POINT = "the drive is at a dead point, where the linkage may go on in either of two modes"
 """Causes that stop an end effector if no limit does."""
 
 
@@ -85,6 +87,8 @@ def why_without_limits(answer: Answer) -> str:
         return "no configuration with these values was found"
     if has_dependent_coordinates(mechanism):
         return task_remark(mechanism)
+    if is_at_dead_point(mechanism, answer._coordinates):
+        return DEAD_POINT
     pose, target = answer.pose, request.targets[0]
     offset, turn = (target - pose)[:3, 3], to_rotvec(target[:3, :3] @ pose[:3, :3].T)
     is_off = answer.rotation_error > TOLERANCES.rotation

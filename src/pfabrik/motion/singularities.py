@@ -242,13 +242,22 @@ def assembly_signs(mechanism: Mechanism, q: Floats) -> Floats:
     basis, passive = _loop_basis(mechanism)
     if not len(basis) or not len(q):
         return np.zeros(len(q))
+    invalid, q = _set_aside(q)
     closure, _ = first_order(mechanism, q)
-    return np.asarray(np.sign(np.linalg.det(basis @ closure[:, :, passive])))
+    return np.asarray(np.where(invalid, 0.0, np.sign(np.linalg.det(basis @ closure[:, :, passive]))))
+
+
+def is_at_dead_point(mechanism: Mechanism, q: Floats) -> bool:
+    """True if a linkage with one freedom is at a dead point of its drive or a change point at coordinates q (1, c)."""
+    if not len(_loop_basis(mechanism)[0]):
+        return False
+    near = measures(mechanism, q)
+    return bool(np.minimum(near.parallel, near.constraint)[0] < TOLERANCES.stretched)
 
 
 @derived
 def _loop_basis(mechanism: Mechanism) -> tuple[Floats, list[int]]:
-    """Orthonormal combinations of loop conditions that are independent everywhere, and the columns of passive joints."""
+    """Orthonormal combinations of loop conditions, independent everywhere, and the columns of passive joints."""
     generic, actuated = generic_of(mechanism), actuated_columns(mechanism)
     passive = [k for k in np.flatnonzero(column_moves(mechanism) > 0.0).tolist() if k not in actuated]
     if generic.mobility.platform != 1 or len(actuated) != 1 or len(passive) != generic.rank:
