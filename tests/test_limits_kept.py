@@ -1,4 +1,4 @@
-"""Limits are kept in all joints: an answer's coordinates are a configuration within every limit, and the same one."""
+"""Limits are kept in all joints of an answer, and what is not reached has a reason."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from machines import EVERY, machine
 from oracles import any_values, targets_about
 from pfabrik import Mechanism, Solution, Status
 from pfabrik.files import loads
+from pfabrik.motion.displacements import home_coordinates
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -100,3 +101,26 @@ def test_the_joints_of_an_answer_keep_every_limit(name: str) -> None:
         targets = targets[:, :3, 3] if mechanism.end_effector_is_joint else targets
         assert_is_its_own_configuration(mechanism, pf.solve_ik(mechanism, targets))
         assert_is_its_own_configuration(mechanism, pf.track(mechanism, targets[:4]))
+
+
+def test_forward_kinematics_gives_the_distance_from_the_values_asked_for() -> None:
+    asked = np.radians([30.0, -75.0])
+    answer = pf.solve_fk(pf.load("five_bar"), asked)
+    off = np.degrees(np.abs(answer.actuators - asked).max())
+    assert answer.reason.startswith(f"actuators up to {off:.3g} deg from the values asked for; ")
+    assert answer.active_limits and pf.solve_fk(pf.load("five_bar"), [asked])[0].reason == answer.reason
+
+
+@pytest.mark.skipif(INTERPRETED, reason="many searches")
+@pytest.mark.parametrize("name", EVERY)
+def test_what_stops_a_machine_has_a_name(name: str) -> None:
+    mechanism = machine(name)
+    for reach in pf.travel(pf.configuration(mechanism, home_coordinates(mechanism))):
+        assert bool(reach.why) is (reach.end is not None)
+    targets = targets_about(mechanism, np.random.default_rng(4), 3, 2.0, 1.0)
+    for hold in ("orientation", "position", None):
+        options = pf.Options(hold=hold)
+        for answer in pf.solve_ik(
+            mechanism, targets[:, :3, 3] if mechanism.end_effector_is_joint else targets, options=options
+        ):
+            assert bool(answer.reason) is (answer.status != Status.REACHED)
