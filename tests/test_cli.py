@@ -109,7 +109,7 @@ NO_EFFECT = "has no effect: the task is"
 SAID: dict[str, tuple[int, str, str]] = {
     # of six struts that hold alike, rounding decides which holds hardest, and not what is printed
     "ik stewart --position 0 0 300": (1, f"; {STRUTS_OUT}\n", ""),
-    "ik free.toml --position 0 0 400": (1, "mm from the target; the links are stretched out or folded at joint p4\n", ""),
+    "ik free.toml --position 0 0 400": (1, "; the links are stretched out or folded at joint p4\n", ""),
     "ik free.toml --position 30 10 180": (1, f"{NO_LIMIT}the mechanism has no freedom that way\n", ""),
     "ik free.toml --position 30 0 400": (
         1, "stretched out or folded at joint p4; the mechanism has no freedom that way\n", "",
