@@ -66,7 +66,7 @@ for each in pf.travel(here, along=[(1, 0, 0), (0, 0, 1)]):
 # stretched out.
 five_bar = pf.load("five_bar").without_limits()
 stretched = pf.solve_ik(five_bar, [0, 0, 300])
-print(stretched.active_limits, stretched.reason)
+print(stretched.active_limits[0].bound, "|", stretched.reason)
 
 # And here it is the machine's kind: a 5-bar moves in the plane x = 0 and cannot leave it.
 print(pf.solve_ik(five_bar, [20, 0, 180]).reason)
