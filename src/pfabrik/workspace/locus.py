@@ -11,8 +11,8 @@ from .result import Workspace
 from .sampled_lattice import codes, corners
 from .surface import crossed_edges
 
-HALVINGS = 7
-"""How often the way from a point within reach to one beyond is halved towards the border."""
+HALVINGS = 10
+"""How often the way from a point within reach to one beyond is halved towards the border: loci may run along it."""
 
 
 def drawn_to_border(over: Workspace, places: Ints, step: Floats) -> tuple[Ints, Floats]:
