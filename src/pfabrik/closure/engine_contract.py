@@ -66,6 +66,15 @@ class Engine(InverseEngine):
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
 
+    def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
+        """Answers whose projections have their redundant joints as near to those of the start as their poses let them.
+
+        Parameters
+        ----------
+        start : one start for all answers, or one for each; None for home.
+        """
+        return answers
+
     @abstractmethod
     def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """Solve for configurations with actuated values (n, n_a), from one start or one for each.

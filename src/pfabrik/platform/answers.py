@@ -73,6 +73,13 @@ class LegAnswers(Configurations):
         return LegAnswers(rows, coordinates, sides, q_proximal)
 
 
+def replaced(answers: Configurations, rows: NDArray[np.intp], others: Configurations) -> Configurations:
+    """Answers with others in some rows."""
+    if len(rows) == len(answers):
+        return others
+    return answers.with_others(rows, others) if isinstance(answers, LegAnswers) else answers.with_rows(rows, others)
+
+
 def sides_at(model: Model, start: Configurations) -> Floats:
     """The side of each leg in configurations, (n, legs): 0 if it has one solution; a redundant joint's coordinate.
 

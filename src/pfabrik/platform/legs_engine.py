@@ -27,7 +27,7 @@ from ..motion.outward import centres_at
 from ..options import Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
-from .answers import LegAnswers, answer_coordinates, sides_at, start_coordinates_of
+from .answers import LegAnswers, answer_coordinates, replaced, sides_at, start_coordinates_of
 from .coordinates import joint_coordinates
 from .forward import forward_kinematics, project_values
 from .leg_attempts import attempts
@@ -118,13 +118,29 @@ class LegsEngine(Engine):
             if is_kept.any():
                 fallback = fallback.at(np.flatnonzero(~is_kept))
             if len(unsolved) == len(targets):
-                return fallback
+                return self.rested(fallback, start)
             put(rows, unsolved, fallback.rows)
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
             sides[unsolved] = sides_at(self._model, fallback)
             if q_proximal is not None:
                 q_proximal[unsolved] = np.nan
-        return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
+        return self.rested(self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback), start)
+
+    def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
+        """As `Engine.rested`: projections leave redundant joints where they have pulled them."""
+        projected = (answers.rows.status == PROJECTED).nonzero()[0]
+        if not (self._table.has_free_redundant and len(projected)):
+            return answers
+        if start is not None and len(start) > 1:
+            start = start.at(projected)
+        start_sides, rows = self._sides_of(start), new_rows(self._model, len(projected))
+        _, sides = reach(self._model, answers.rows.poses[projected], start, start_sides, True, rows)
+        nearer = np.flatnonzero(rows.status == REACHED)
+        projected, old = projected[nearer], take(answers.rows, projected[nearer])
+        others = self._answers(rows, sides, None, start, start_sides, nearer[:0], None).at(nearer)
+        for array in ("status", "counters", "measures"):
+            getattr(others.rows, array)[:] = getattr(old, array)
+        return replaced(answers, projected, others)
 
     def in_other_modes(
         self, targets: Floats, start: Configurations | None

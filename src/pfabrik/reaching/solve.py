@@ -65,7 +65,9 @@ class ReachingEngine(InverseEngine):
             if not len(missed):
                 return solutions
             solutions = Configurations(solutions.rows, solutions.coordinates)
-            projected = self._by_passes(made_exact(targets[missed]), _at(start, missed), options, keep_mode)
+            starts = _at(start, missed)
+            projected = self._by_passes(made_exact(targets[missed]), starts, options, keep_mode)
+            projected = self._exact.rested(projected, starts)
             is_feasible = projected.rows.status != FAILED
             solutions.put(missed[is_feasible], projected, is_feasible)
             return solutions

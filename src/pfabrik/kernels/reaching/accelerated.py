@@ -27,6 +27,8 @@ PASSES, HASTY, PATIENT, TAKEN_OFF = 16, 2, 5, 0.7
 # Trunks aim this far inside limits [L], tour by tour, less by this factor from pass to pass, so that passes end; the
 # last tours find what is too small to have an inside.
 MARGINS, SHRINK = (0.04, 0.04, 0.0, 0.0), 0.6
+# A trunk has come back where the next step is a smaller share of its distance from its start.
+CAME_BACK = 1e-3
 # Longest steps for which half-spaces are trusted: of a trunk towards a target, of a target with all trunks [rad or L].
 LONGEST, LONGEST_OF_ALL = 0.8, 0.4
 # Other starts of a trunk, tour by tour: this share of each joint's range from either end; where a range is open, so far
@@ -69,33 +71,54 @@ def move_trunk(plan: Plan, trunk: int, config: Configuration, asks: Asks, share:
 
 @routine
 def reach_from_start(
-    plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks, margin: float, patience: int
+    plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks, margin: float, patience: int, near: bool
 ) -> tuple[float, int]:
     """Passes of a chain from where its trunk is; the largest excess that is left, and how many.
 
     Steps aim inside limits by a margin [length]; passes end after so many in a row that gain little.
+
+    Parameters
+    ----------
+    near : passes go on from where branches reach to the place nearest to the start that they reach. Least steps alone
+        lead far beyond a limit that hardly changes with the trunk.
     """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    best, stalled = math.inf, 0
+    best, stalled, nearest = math.inf, 0, math.inf
+    copy_row(config.trunks, asks.start)
     for n in range(PASSES + 1):
+        for j in range(first, last):
+            unit = plan.length if plan.trunk_joints[j]["kind"] == SLIDE else 1.0
+            asks.x[j - first] = (asks.start[j] - config.trunks[j]) / unit if near else 0.0
+        far = math.sqrt(dot_of(asks.x, asks.x, last - first))
         asks.goal[0] = margin
-        asks.goal[1] = margin
+        asks.goal[1] = max(margin, far * plan.length)
         asks.goal[2] = 1.0
         open_asks(asks, last - first, -first, 0)
         gap = ask_for_chain(plan, c, config, settings, asks)
         stalled = 0 if gap < TAKEN_OFF * best else stalled + 1
         best = min(best, gap)
-        if gap <= 0.5 * settings.enough or stalled == patience or n == PASSES:
-            return gap, n
-        for i in range(last - first):
-            asks.x[i] = 0.0
+        reaches = gap <= 0.5 * settings.enough
+        if (reaches and (far == 0.0 or far >= nearest)) or stalled == patience or n == PASSES:
+            break
+        if reaches:
+            copy_row(config.trunks, asks.trunks)
+            nearest = far
+        else:
+            for i in range(last - first):
+                asks.x[i] = 0.0
         least_step(asks)
         size = math.sqrt(dot_of(asks.x, asks.x, last - first))
+        if reaches and size <= CAME_BACK * far:
+            break
         move_trunk(plan, trunk, config, asks, min(1.0, LONGEST / max(size, 1e-300)))
         move_carriers(plan, config)
         margin *= SHRINK
-    return best, PASSES
+    if nearest < math.inf:
+        copy_row(asks.trunks, config.trunks)
+        move_carriers(plan, config)
+        gap = best
+    return gap, n
 
 
 @routine
@@ -117,7 +140,7 @@ def reach_with_trunk(plan: Plan, c: int, config: Configuration, settings: Settin
     """Passes of a chain with a trunk, from other starts too where one is caught; the excess left, and how many."""
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    gap, passes = reach_from_start(plan, c, config, settings, asks, MARGINS[0] * plan.length, HASTY)
+    gap, passes = reach_from_start(plan, c, config, settings, asks, MARGINS[0] * plan.length, HASTY, False)
     corners = 1 << min(last - first, VARIED)
     for start in range(len(INSIDE) * corners):
         if gap <= 0.5 * settings.enough:
@@ -125,7 +148,7 @@ def reach_with_trunk(plan: Plan, c: int, config: Configuration, settings: Settin
         start_trunk(plan, trunk, config, start, INSIDE[start // corners])
         tour = start // corners
         patience = HASTY if tour == 0 else PATIENT
-        gap, more = reach_from_start(plan, c, config, settings, asks, MARGINS[tour] * plan.length, patience)
+        gap, more = reach_from_start(plan, c, config, settings, asks, MARGINS[tour] * plan.length, patience, False)
         passes += more
     return gap, max(passes, 1)
 

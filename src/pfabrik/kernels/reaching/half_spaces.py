@@ -53,6 +53,7 @@ class Asks(NamedTuple):
     normals: Floats  # (n_branches, 3): which way each branch's end was missed last; zero if it was not
     pose: Floats  # (4, 4): the best pose so far
     trunks: Floats  # (n_trunk_joints,): its trunks
+    start: Floats  # (n_trunk_joints,): where they began
 
 
 @allocator
@@ -85,6 +86,7 @@ def new_asks(plan: Plan) -> Asks:
         np.zeros(4, np.int64),
         np.zeros((branches, 3)),
         np.zeros((4, 4)),
+        np.zeros(joints),
         np.zeros(joints),
     )
 

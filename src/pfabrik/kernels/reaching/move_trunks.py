@@ -37,6 +37,7 @@ def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings,
         copy_row(trunks[i], config.trunks)
         move_carriers(plan, config)
         stand_as_at_home(plan, config)
+        asks.normals[:] = 0.0
         for c in range(plan.chains.shape[0]):
-            reach_from_start(plan, c, config, settings, asks, margin, PATIENT)
+            reach_from_start(plan, c, config, settings, asks, margin, PATIENT, True)
         copy_row(config.trunks, trunks[i])
