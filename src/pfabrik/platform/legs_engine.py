@@ -33,7 +33,7 @@ from .forward import forward_kinematics, project_values
 from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
-from .reach import count_turns, reach, turns_repeatedly
+from .reach import count_turns, reach, rest_redundant, turns_repeatedly
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
 from .table import table_handle
 from .unreached import Request, Unreached, answer_unreached, project, reach_from_poses
@@ -131,16 +131,13 @@ class LegsEngine(Engine):
         projected = (answers.rows.status == PROJECTED).nonzero()[0]
         if not (self._table.has_free_redundant and len(projected)):
             return answers
-        if start is not None and len(start) > 1:
-            start = start.at(projected)
-        start_sides, rows = self._sides_of(start), new_rows(self._model, len(projected))
-        _, sides = reach(self._model, answers.rows.poses[projected], start, start_sides, True, rows)
-        nearer = np.flatnonzero(rows.status == REACHED)
-        projected, old = projected[nearer], take(answers.rows, projected[nearer])
-        others = self._answers(rows, sides, None, start, start_sides, nearer[:0], None).at(nearer)
-        for array in ("status", "counters", "measures"):
-            getattr(others.rows, array)[:] = getattr(old, array)
-        return replaced(answers, projected, others)
+        start = start if start is None or len(start) == 1 else start.at(projected)
+        rows, old = take(answers.rows, projected), answers.at(projected)
+        old_sides = self._sides_of(old)
+        sides = old_sides.copy()
+        nearer = rest_redundant(self._model, start, self._sides_of(start), sides, rows).nonzero()[0]
+        others = self._answers(rows, sides, None, old, old_sides, nearer[:0], None)
+        return replaced(answers, projected[nearer], others.at(nearer))
 
     def in_other_modes(
         self, targets: Floats, start: Configurations | None

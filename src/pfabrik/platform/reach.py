@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Records
+from ..arrays import Floats, Mask, Records
 from ..batch import put, take
 from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
@@ -12,7 +12,7 @@ from ..derived import derived
 from ..kernels.rows import OPEN, PENDING, REACHED, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from .redundant_joints import search_redundant_joints, step_redundant_joints
+from .redundant_joints import search_redundant_joints, split_by_redundant, step_redundant_joints
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -101,6 +101,29 @@ def _reach_from_home(model: Model, legs: TableHandle, targets: Floats, sides: Fl
     is_reached = is_unsolved & (rows.status == REACHED)
     sides[is_reached] = home_sides[is_reached]
     return n_reached
+
+
+def rest_redundant(model: Model, start: Configurations | None, start_sides: Floats, sides: Floats, rows: Rows) -> Mask:
+    """Move the redundant joints of answers, (n, legs), to where they are nearest to those of starts at the same poses.
+
+    Each independent set alone: limits that end a projection may hold one where it is. Return the mask of rows changed.
+    """
+    start_poses = model.mechanism.home_pose[None] if start is None else start.rows.poses
+    start_sides = np.broadcast_to(start_sides, sides.shape)
+    table, rested, is_changed = model.legs, start_sides.copy(), np.zeros(len(sides), bool)
+    step_redundant_joints(model, rows.poses, start_poses, rested, np.arange(len(sides)))
+    for _, legs in split_by_redundant(table):
+        columns = np.intersect1d(table.implicit_joints["leg"], np.arange(len(table.legs))[legs])
+        candidate, block = sides.copy(), take(rows, np.arange(len(sides)))
+        candidate[:, columns] = rested[:, columns]
+        far, before = (np.linalg.norm((each - start_sides)[:, columns], axis=1) for each in (candidate, sides))
+        _run(False, local_table(table), rows.poses, rows.poses, candidate, block)
+        is_nearer = (block.status == REACHED) & (far < before)
+        sides[is_nearer], rows.actuators[is_nearer] = candidate[is_nearer], block.actuators[is_nearer]
+        is_changed |= is_nearer
+    if start is not None:
+        count_turns(model, start.rows.actuators, rows)
+    return is_changed
 
 
 def _run(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:

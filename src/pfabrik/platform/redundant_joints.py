@@ -171,11 +171,12 @@ def _redundant_searches(model: Model) -> tuple[tuple[Records, slice, NearestPose
             legs,
             NearestPose(model, part_table, held, {"steps": MOST_STEPS}, no_starts(part_table), part_table.redundant),
         )
-        for part_table, legs in _split_by_redundant(model.legs)
+        for part_table, legs in split_by_redundant(model.legs)
     )
 
 
-def _split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
+@derived
+def split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
     """Tables of the legs on each independent set of redundant joints, with the slices of these legs.
 
     A pose separates the sets. Where the task leaves some of it open, or legs constrain it, all legs stay together.
