@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
-from checks import excess_of_joints, gap_of_joints
+from checks import actuator_units, excess_of_joints, gap_of_joints
 from machines.trunks import arms
 from oracles.arms import redundant_margin
 from pfabrik.closure.closure_engine import ClosureEngine
@@ -190,6 +190,45 @@ def test_forward_kinematics_returns_what_inverse_kinematics_was_given(name: str)
     assert same.mean() >= 0.9  # others are assemblies of their own
     onward = pf.solve_ik(mechanism, back.pose[same], start=back[int(np.flatnonzero(same)[0])])
     assert (np.asarray(onward.status) == pf.Status.REACHED).all()
+
+
+def loop(mechanism: pf.Mechanism, steps: int) -> np.ndarray:
+    """Poses (steps + 1, 4, 4) of a closed path that begins at home and turns all ways; half of it is out of reach."""
+    turn, poses = np.linspace(0.0, 2.0 * np.pi, steps + 1), np.tile(mechanism.home_pose, (steps + 1, 1, 1))
+    back, twice = 1.0 - np.cos(turn), np.sin(2.0 * turn)
+    shift = np.stack([0.6 * np.sin(turn), 0.36 * back, 0.18 * twice], axis=1)
+    poses[:, :3, 3] += mechanism.characteristic_length * shift
+    turned = Rotation.from_rotvec(0.2 * np.stack([np.sin(turn), twice, back], axis=1)).as_matrix()
+    poses[:, :3, :3] = turned @ mechanism.home_pose[:3, :3]
+    return poses
+
+
+@pytest.mark.parametrize("projection", ["nearest", "centroid"])
+@pytest.mark.parametrize("name", ["nrpm", "rails"])
+def test_half_the_steps_along_a_path_are_half_as_long_reached_or_not(name: str, projection: str) -> None:
+    """Or 0.71 times, where limits fold as a square root does; leaps that a track tells of are no steps of arms."""
+    mechanism, largest = machine(name), []
+    for steps in (60, 120):
+        track = pf.track(mechanism, loop(mechanism, steps), options=Options(projection=projection))
+        changes = np.abs(np.diff(track.actuators, axis=0)) / actuator_units(mechanism)
+        largest.append(changes[~np.asarray(track.jumps)[1:]].max())
+    assert 0.2 <= np.mean(track.status == pf.Status.PROJECTED) <= 0.8
+    assert largest[1] <= 0.8 * largest[0]
+
+
+@pytest.mark.parametrize("projection", ["nearest", "centroid"])
+@pytest.mark.parametrize("name", NAMES)
+def test_no_answer_has_its_arms_farther_than_the_same_pose_asked_for(name: str, projection: str) -> None:
+    mechanism = machine(name)
+    track = pf.track(mechanism, loop(mechanism, 60), options=Options(projection=projection))
+    rows = np.flatnonzero(~np.asarray(track.jumps)[1:]) + 1
+    start = pf.configuration(mechanism, track.q[rows - 1])
+    again = pf.solve_ik(mechanism, track.pose[rows], start=start, options=Options(working_mode="keep"))
+    far, farther = (
+        moved(mechanism, each, track.actuators[rows - 1]) for each in (again.actuators, track.actuators[rows])
+    )
+    assert np.count_nonzero(far > 1e-3) >= 5
+    assert ((farther <= far + 5e-3) | (again.status != pf.Status.REACHED)).all()
 
 
 def test_maps_and_code_that_know_no_arms_say_so() -> None:
