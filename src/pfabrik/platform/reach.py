@@ -9,7 +9,7 @@ from ..batch import put, take
 from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
-from ..kernels.rows import OPEN, PENDING, REACHED, Rows
+from ..kernels.rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
 from .redundant_joints import search_redundant_joints, split_by_redundant, step_redundant_joints
@@ -120,6 +120,8 @@ def rest_redundant(model: Model, start: Configurations | None, start_sides: Floa
         _run(False, local_table(table), rows.poses, rows.poses, candidate, block)
         is_nearer = (block.status == REACHED) & (far < before)
         sides[is_nearer], rows.actuators[is_nearer] = candidate[is_nearer], block.actuators[is_nearer]
+        for measure in (RESIDUAL, LIMIT_EXCESS):
+            rows.measures[is_nearer, measure] = block.measures[is_nearer, measure]
         is_changed |= is_nearer
     if start is not None:
         count_turns(model, start.rows.actuators, rows)
