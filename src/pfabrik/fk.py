@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -59,8 +60,9 @@ def solve_fk(
     options = checked_options(options)
     values, shape = as_values(mechanism, actuators)
     begin = start_of(mechanism, start, shape)
+    forward = partial(engine_of(mechanism).forward, keep_mode=options.working_mode != "any")
     if shape == () and np.vdot(values, values) <= HORIZON**2:  # one row of numbers, with nothing to set aside
-        solutions = engine_of(mechanism).forward(values, begin, options.actuator_tolerance)
+        solutions = forward(values, begin, options.actuator_tolerance)
         return Solution(mechanism, solutions, shape, values=values if solutions.rows.status[0] != REACHED else None)
     is_valid = np.asarray(np.isfinite(values).all(axis=1))
     if options.on_invalid == "raise" and not is_valid.all():
@@ -68,7 +70,7 @@ def solve_fk(
         raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
     starts = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(is_valid))
     clipped = np.clip(values[is_valid], -HORIZON, HORIZON)
-    solutions = engine_of(mechanism).forward(clipped, starts, options.actuator_tolerance)
+    solutions = forward(clipped, starts, options.actuator_tolerance)
     return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
 
 

@@ -158,9 +158,11 @@ class ApartEngine(Engine):
         """As `Engine.advance`; FAILED where links would be too near."""
         return self._checked(self.usual.advance(targets, start))
 
-    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
         """As `Engine.forward`."""
-        answers = self.usual.forward(values, start, tolerance)
+        answers = self.usual.forward(values, start, tolerance, keep_mode=keep_mode)
         rows = self._too_near(answers)
         if not len(rows):
             return answers

@@ -239,7 +239,9 @@ class ChainEngine(Engine):
         """Multipliers of all limits at configurations that are projections of targets (n, 4, 4)."""
         return self._joint_space.limit_multipliers(configurations, targets, projection)
 
-    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
         """Solve for configurations with actuated values (n, n_a), from one start or one for each.
 
         Values beyond their ranges are projected onto them, one by one, which is the nearest that is feasible.
@@ -260,7 +262,8 @@ class ChainEngine(Engine):
             unsolved = np.arange(len(values))
         if len(unsolved):
             block = start if start is None or len(start) == 1 else start.at(unsolved)
-            answers = answers.with_rows(unsolved, self._joint_space.forward(values[unsolved], block, tolerance))
+            others = self._joint_space.forward(values[unsolved], block, tolerance, keep_mode=keep_mode)
+            answers = answers.with_rows(unsolved, others)
         return answers
 
     def _are_idle_within(self, coordinates: Floats) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..batch import put
+from ..batch import put, take
 from ..derived import derived
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..motion.closure import Closure
@@ -21,8 +21,9 @@ from .descend import MOST_STEPS, nearest_actuators
 from .effort import descents_within
 from .random_starts import same_random_starts
 
-CONTINUATION_STEPS = 8
-"""Steps of a continuation from the actuator values of the start to the target values, if one step fails."""
+SHORTEST_SHARE = 1.0 / 1024.0
+"""Shortest step of a continuation, as a share of the way. Where even that does not contract, a parallel singularity
+ends the assembly mode."""
 
 STARTS = 48
 """Random starts, if nothing else assembles and there is no start whose mode is to be kept."""
@@ -44,39 +45,52 @@ LONGEST_SEARCH = 3.0
 """Largest change of an actuator value, if the target values are too far for a search to converge [L or rad]."""
 
 
-def assemble(closure: Closure, coordinates: Floats, values: Floats, *, has_start: bool) -> Closing:
+def assemble(
+    closure: Closure, coordinates: Floats, values: Floats, *, has_start: bool, keep_mode: bool = True
+) -> Closing:
     """Close the loops at actuated values (n, n_a), or at the nearest feasible values that a local search finds.
 
-    First Newton's method with the actuators locked; then continuation of the actuators to their values; then random
-    starts; then the nearest feasible values.
+    First Newton's method with the actuators locked, then continuation of the actuators to their values, in the assembly
+    mode of the start; without a start, in any mode, then random starts; then the nearest feasible values.
 
     Parameters
     ----------
     coordinates : joint coordinates of the start, (n, columns), deviations from home.
-    has_start : keep the assembly mode of the start if the values can be assembled in it, within limits or not. Other
-        starts, home first, then only replace a projection.
+    has_start : the start was given, and is not home. Other starts, home first, then only replace a projection.
+    keep_mode : stay in the assembly mode of the start; values to which it does not lead are answered on the way.
+        Readings of more actuators than freedoms, which fit nowhere else, are looked for everywhere.
 
     Returns
     -------
     Closing : judge by `feasible`, and by `actuator_errors`.
     """
     poses = platform_poses(closure.mechanism, coordinates)
-    best = _locked(closure, coordinates, poses, values)
-    if not best.feasible.all():
-        attempts = [] if is_over_determined(closure) else [_continue_to]
-        for attempt in attempts if has_start else [*attempts, _from_random_starts]:
-            unsolved = np.flatnonzero(~best.feasible)
-            if len(unsolved):
-                solutions = attempt(closure, coordinates[unsolved], poses[unsolved], values[unsolved])
-                best.put_better(unsolved, solutions)
+    best = _locked(closure, coordinates, poses, values, stays=True)
+    unsolved = np.flatnonzero(best.gap > CLOSED)
+    if len(unsolved):
+        lead = _locked if is_over_determined(closure) else _continue_to
+        put(best, unsolved, lead(closure, coordinates[unsolved], poses[unsolved], values[unsolved]))
     unsolved = np.flatnonzero(~best.feasible)
+    if len(unsolved) and not has_start and (not keep_mode or is_over_determined(closure)):
+        solutions = _from_random_starts(closure, coordinates[unsolved], poses[unsolved], values[unsolved])
+        best.put_better(unsolved, solutions)
+        unsolved = np.flatnonzero(~best.feasible)
     if not len(unsolved):
         return best
+    is_over, last = is_over_determined(closure), take(best, unsolved)
+    stays = keep_mode and not is_over
     was_open = best.gap[unsolved] > CLOSED
-    _project(closure, best, unsolved, (coordinates[unsolved], poses[unsolved]), values[unsolved], has_start)
-    if has_start:
-        errors = np.abs(actuator_errors(closure, best.coordinates[unsolved], values[unsolved])).max(axis=1, initial=0.0)
-        near = NOISE if is_over_determined(closure) else NEAR
+    begin = coordinates[unsolved], poses[unsolved]
+    _project(closure, best, unsolved, begin, values[unsolved], has_start or stays)
+    errors = np.abs(actuator_errors(closure, best.coordinates[unsolved], values[unsolved])).max(axis=1, initial=0.0)
+    if stays:  # values that assemble after all do so in another mode
+        elsewhere = np.flatnonzero(errors <= NEAR)
+        for on_the_way in (close(closure, *begin, max_iterations=0), last):
+            on_the_way.gaps[:] = close(closure, on_the_way.coordinates, on_the_way.poses, max_iterations=0).gaps
+            kept = elsewhere[on_the_way.feasible[elsewhere]]
+            put(best, unsolved[kept], on_the_way, kept)
+    elif has_start:
+        near = NOISE if is_over else NEAR
         missed = unsolved[was_open & ((errors > near) | ~best.feasible[unsolved])]
         if len(missed):
             _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
@@ -112,20 +126,31 @@ def is_over_determined(closure: Closure) -> bool:
     return counted.actuators > counted.mobility - counted.idle
 
 
-def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Close the loops by Newton's method with the actuators locked at values (n, n_a)."""
+def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats, *, stays: bool = False) -> Closing:
+    """Close the loops by Newton's method with the actuators locked at values (n, n_a); `stays` as of `close`."""
     start = coordinates.copy()
     closure.put_actuators(start, values)
-    return close(closure, start, poses, locked=closure.driven)
+    if stays:  # joints that carry all of the loops take the platform along
+        poses = platform_poses(closure.mechanism, start)
+    return close(closure, start, poses, locked=closure.driven, stays=stays)
 
 
 def _continue_to(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
-    """Continuation of the actuators from their present values to the target values (n, n_a)."""
-    begin = closure.actuators(coordinates)
-    for step in range(1, CONTINUATION_STEPS + 1):
-        closing = _locked(closure, coordinates, poses, begin + (values - begin) * step / CONTINUATION_STEPS)
-        coordinates, poses = closing.coordinates, closing.poses
-    return closing
+    """Lead the actuators from their present values to (n, n_a), in steps that halve where Newton's does not contract.
+
+    Rows whose assembly mode a parallel singularity ends have the last configuration on the way, and infinite gaps.
+    """
+    begin, present = closure.actuators(coordinates), close(closure, coordinates, poses, max_iterations=0)
+    way, share = np.zeros(len(values)), np.full(len(values), 0.5)
+    while len(rows := np.flatnonzero((way < 1.0) & (share >= SHORTEST_SHARE))):
+        wanted = begin[rows] + (values - begin)[rows] * (way + share)[rows, None]
+        trial = _locked(closure, present.coordinates[rows], present.poses[rows], wanted, stays=True)
+        is_closed = trial.gap <= CLOSED
+        put(present, rows[is_closed], trial, is_closed)
+        way[rows] += np.where(is_closed, share[rows], 0.0)
+        share[rows] = np.where(is_closed, np.minimum(2.0 * share[rows], 1.0 - way[rows]), 0.5 * share[rows])
+    present.gaps[way < 1.0] = np.inf
+    return present
 
 
 def _from_random_starts(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:

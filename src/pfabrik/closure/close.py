@@ -119,6 +119,7 @@ def close(
     limits: bool = False,
     margin: float = 0.0,
     undamped: bool = False,
+    stays: bool = False,
     closeness: float = 1e-13,
     max_iterations: int = 100,
 ) -> Closing:
@@ -134,6 +135,7 @@ def close(
     centres : target positions of joint centres, (n, joints, 3); NaN for none.
     limits : keep all limits too, with `margin` to spare.
     undamped : take undamped steps, also uphill: finds more of many solutions, but not the nearest.
+    stays : end, open, where Newton's steps do not contract: what closes otherwise may be in any assembly mode.
     max_iterations : most steps; with 0 configurations are measured, not changed.
     closeness : largest gap, excess and miss that ends the search [L or rad].
     """
@@ -149,7 +151,8 @@ def close(
         limits=int(limits),
         margin=margin,
         balls_follow=int(follow),
-        undamped=int(undamped),
+        undamped=int(undamped or stays),
+        stays=int(stays),
         closeness=closeness,
         max_iterations=max_iterations,
     )

@@ -165,10 +165,12 @@ class ClosureEngine(Engine):
         """Multipliers of all limits at configurations that are projections of targets (n, 4, 4)."""
         return projection_multipliers(self.model.closure, configurations.coordinates, targets, projection)
 
-    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
         """Solve for configurations with actuated values (n, n_a), from one start or one for each."""
         closure, coordinates = self.model.closure, coordinates_for(self.model, start, len(values))
-        closing = assemble(closure, coordinates, values, has_start=start is not None)
+        closing = assemble(closure, coordinates, values, has_start=start is not None, keep_mode=keep_mode)
         return forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
 
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:

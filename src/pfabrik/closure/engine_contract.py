@@ -76,8 +76,12 @@ class Engine(InverseEngine):
         return answers
 
     @abstractmethod
-    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
         """Solve for configurations with actuated values (n, n_a), from one start or one for each.
+
+        With `keep_mode` in the assembly mode of the start, or home's.
 
         REACHED where the values differ by at most `tolerance` [L or rad]; PROJECTED at the nearest values found.
         """

@@ -76,7 +76,7 @@ _ANSWERS = tuple(_values("i F3 F3 f2 i1 f3 f2 f2"))
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, tuple(_values("i F3 F3 F2 i1 f3 f2 f2"))),
     (answer, _ANSWERS),
-    (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i f i")), _CLOSED)),
+    (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (solve_by_half_spaces, _PASSES),
     (move_trunks, (_PASSES[0], *_values("F3 f2"), _PASSES[3], 0.0)),

@@ -9,16 +9,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
-from ..batch import take, take_each
+from ..arrays import Floats, Mask
+from ..batch import put, take, take_each
 from ..closure.assemble import NOISE, is_over_determined
 from ..closure.configurations import Configurations, new_rows
+from ..closure.parasitic import differences
 from ..derived import derived
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.rows import ACTUATOR_ERROR, ITERATIONS, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
+from ..kernels.rows import (
+    ACTUATOR_ERROR,
+    EXCEEDED,
+    ITERATIONS,
+    PENDING,
+    POSITION_ERROR,
+    PROJECTED,
+    REACHED,
+    ROTATION_ERROR,
+    Rows,
+)
 from ..kernels.threads import in_blocks
 from ..model import Model
+from ..tolerances import TOLERANCES
 from .nearest import nearest_actuators
 from .nearest_pose import home_start, no_starts, starts_at
 from .seeds import seeds_of
@@ -26,6 +38,9 @@ from .single import AssemblyOutputs, scratch_of
 from .table import search_table
 
 ROWS_A_BLOCK = 256
+
+WAY_HALVINGS = 12
+"""Halvings that find the last configuration of an assembly mode on the way to values beyond."""
 
 
 def forward_kinematics(
@@ -35,16 +50,21 @@ def forward_kinematics(
     sides: Floats,
     tolerance: float,
     given: tuple[Rows, AssemblyOutputs] | None,
+    *,
+    keep_mode: bool,
 ) -> tuple[Rows, Floats, Floats]:
     """Configurations within all limits at actuated values (n, n_a); rows without one are PENDING.
 
-    Rows that do not assemble from home are assembled from seeds, then projected. Rows that do not assemble from a given
-    start are projected first. Where that misses their values, they are assembled from home and from seeds, unless they
-    assemble in the mode of the start, but beyond a limit.
+    Rows that do not assemble in the assembly mode of the start are projected. In any mode, rows that do not assemble
+    from home are assembled from seeds before. Rows that do not assemble from a given start are projected first; where
+    that misses their values, they are assembled from home and from seeds, unless they assemble in the mode of the
+    start, but beyond a limit.
 
     Parameters
     ----------
     sides : of each leg at the start, (n or 1, legs).
+    keep_mode : stay in the assembly mode of the start. Readings of more actuators than freedoms, which fit nowhere
+        else, are looked for everywhere.
     given : the outputs of a single row whose assembly from the start failed already.
 
     Returns
@@ -56,17 +76,24 @@ def forward_kinematics(
     rows, (wanted_values, *outputs) = given or _assembled_from(model, values, starts)
     solution, is_missed = Starts(rows.poses, *outputs), rows.status == PENDING
     assemble_missed = partial(_assemble_missed, model, values, rows, wanted_values, solution)
-    if is_cold:
+    if not np.count_nonzero(rows.status):
+        return rows, solution.q, solution.sides
+    keep_mode = keep_mode and not is_over_determined(model.closure)
+    if is_cold and not keep_mode:
         assemble_missed(starts, seeds_of, np.flatnonzero(rows.status != REACHED))
     unsolved = np.flatnonzero(rows.status != REACHED)
     if not len(unsolved):
         return rows, solution.q, solution.sides
     rows.status[unsolved] = PENDING
     _project(model, wanted_values, starts, unsolved, rows, solution, anywhere=is_cold)
+    if keep_mode:
+        home = np.array([[drive.home for drive in model.mechanism.drives]])
+        begin = home if start is None else start.rows.actuators
+        _return_to_mode(model, values, wanted_values, begin, starts, unsolved, rows, solution, tolerance)
     nearby = unsolved[rows.measures[unsolved, ACTUATOR_ERROR] <= tolerance]
     rows.status[nearby[rows.status[nearby] == PROJECTED]] = REACHED
     is_missed &= rows.status != REACHED
-    if is_cold or not np.count_nonzero(is_missed):
+    if is_cold or keep_mode or not np.count_nonzero(is_missed):
         return rows, solution.q, solution.sides
     if is_over_determined(model.closure):
         is_missed &= (rows.status == PENDING) | (rows.measures[:, ACTUATOR_ERROR] > NOISE)
@@ -123,6 +150,52 @@ def _assemble_missed(
         array[places[is_reached]] = block_array[is_reached]
     rows.actuators[places[is_reached]] = values_here[is_reached]
     rows.measures[places[is_reached], ACTUATOR_ERROR] = 0.0
+
+
+def _return_to_mode(
+    model: Model,
+    values: Floats,
+    wanted_values: Floats,
+    begin: Floats,
+    starts: Starts,
+    places: NDArray[np.intp],
+    rows: Rows,
+    solution: Starts,
+    tolerance: float,
+) -> None:
+    """Replace projections that are in another assembly mode than their starts: by those of searches from the starts
+    alone, or by the last configurations within limits on the way from there, with actuators `begin`, to the values."""
+    places = places[_is_elsewhere(model, starts, places, rows, tolerance)]
+    if not len(places):
+        return
+    rows.status[places] = PENDING
+    _project(model, wanted_values, starts, places, rows, solution, anywhere=False)
+    places = places[_is_elsewhere(model, starts, places, rows, tolerance)]
+    asked, own_starts, share = values[places], take_each(starts, places), np.zeros(len(places))
+    begin = begin if len(begin) == 1 else begin[places]
+    rows.status[places] = PENDING
+    for halving in (0.0, *0.5 ** np.arange(1.0, WAY_HALVINGS)):
+        block, outputs = _assembled_from(model, begin + (share + halving)[:, None] * (asked - begin), own_starts)
+        reached = np.flatnonzero(block.status == REACHED)
+        share[reached] += halving
+        block.status[:] = PROJECTED
+        errors = np.abs(block.actuators - asked)[:, model.legs.driven["column"]] / model.legs.driven["unit"]
+        block.measures[:, ACTUATOR_ERROR] = errors.max(axis=1, initial=0.0)
+        here = places[reached]
+        put(rows, here, take(block, reached))
+        solution.q[here], solution.sides[here] = outputs.q[reached], outputs.sides[reached]
+
+
+def _is_elsewhere(model: Model, starts: Starts, places: NDArray[np.intp], rows: Rows, tolerance: float) -> Mask:
+    """True for rows that are not what their start assembles to at their values, (n,).
+
+    Values to which the mode of the start does not lead count as elsewhere if they are those asked for; else they are on
+    the border of what assembles.
+    """
+    own, _ = _assembled_from(model, rows.actuators[places], take_each(starts, places))
+    away = differences(model.closure, own.poses, rows.poses[places]) > TOLERANCES.stretched
+    is_asked_for = (rows.status[places] == PROJECTED) & (rows.measures[places, ACTUATOR_ERROR] <= tolerance)
+    return np.asarray(np.where(own.status == PENDING, is_asked_for, (own.status == EXCEEDED) | away))
 
 
 def _project_elsewhere(

@@ -341,7 +341,9 @@ class LegsEngine(Engine):
             all_weights[by_joints] = self._joint_space.limit_multipliers(answers.at(by_joints), targets[by_joints], way)
         return all_weights
 
-    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
         """The configurations at actuated values (n, n_a), from one start or one for each."""
         start_sides, outputs = self._sides_of(start), None
         if len(values) == 1:
@@ -349,13 +351,15 @@ class LegsEngine(Engine):
             rows.actuators[:] = values
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
                 return self._single_answer(rows, solution, start, start_sides)
-        rows, q_proximal, sides = forward_kinematics(self._model, values, start, start_sides, tolerance, outputs)
+        rows, q_proximal, sides = forward_kinematics(
+            self._model, values, start, start_sides, tolerance, outputs, keep_mode=keep_mode
+        )
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved) == len(values):
-            return self._joint_space.forward(values, start, tolerance)
+            return self._joint_space.forward(values, start, tolerance, keep_mode=keep_mode)
         if len(unsolved):
             block_start = start if start is None or len(start) == 1 else start.at(unsolved)
-            fallback = self._joint_space.forward(values[unsolved], block_start, tolerance)
+            fallback = self._joint_space.forward(values[unsolved], block_start, tolerance, keep_mode=keep_mode)
             put(rows, unsolved, fallback.rows)
         return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
 

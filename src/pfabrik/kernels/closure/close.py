@@ -52,6 +52,10 @@ LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
 """Damping of the normal equations, whose entries are of order one: the least stops idle motions (a rod's own spin)
 without slowing convergence; the most ends a search in which no step reduces the cost."""
 
+CONTRACTION = 0.5
+"""Newton's method is in the assembly mode of its start if each step is at most this share of the one before, and none
+is shortened: the start is then in the ball around the solution in which there is no other (Newton and Kantorovich)."""
+
 FEW = 100
 """Coordinates of one group up to which the least damping exceeds the rounding errors of the factor. These grow with the
 cube of the number of coordinates, as six equations leave all but six pivots to damping."""
@@ -258,6 +262,7 @@ def close_row(
     undamped, keeps_yaw = problem.undamped == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
     cost, factor, step = math.inf, 1.0, math.inf
+    longest_step = 0.99 * LONGEST_STEP if problem.stays == 1 else math.inf
     iterations, phase = 0, TRY
     while True:
         clear(layout, eq)
@@ -301,7 +306,10 @@ def close_row(
             if keeps_yaw:
                 turn_about_z(trial.X, yaw - yaw_of(trial.X))  # undo the yaw of second order
             iterations += 1
-        elif phase == MEASURE:
+            if problem.stays == 1 and not step <= longest_step:
+                phase = MEASURE
+            longest_step = CONTRACTION * step
+        if phase == MEASURE:
             if problem.balls_follow == 1:
                 follow_platform(loops, best, eq)
             copy_state(best, trial)

@@ -65,6 +65,7 @@ class ClosureProblem(NamedTuple):
     margin: float  # distance inside the limits
     balls_follow: int  # 1: the ball joints of `last_balls` follow the platform; they are locked in the layout
     undamped: int  # 1: undamped steps, also uphill: finds more of many solutions, but not the nearest
+    stays: int  # 1: undamped steps while these contract, so that the solution is the start's own
     closeness: float  # largest gap that ends the search
     max_iterations: int
 

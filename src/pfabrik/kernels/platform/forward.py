@@ -15,13 +15,15 @@ import numpy as np
 from ...arrays import Floats, Ints, Record
 from .._jit import kernel, opener, routine
 from ..legs.answer import KEPT, deviation, excess_of, largest_entry
-from ..legs.complete_poses import middle_of, orthonormalise
+from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
+from ..legs.endings import turned
 from ..legs.open_table import SAMPLE, open_table
-from ..legs.records import PIVOT, Q_PROXIMAL, Table
+from ..legs.records import CRANK, FROM_BASE, PIVOT, Q_PROXIMAL, REDUNDANT, Table
 from ..linear import solve_spd, solve_square
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
-from ..vectors import add, copy_row, copy_table, cross, put, sub, vec, wrap
+from ..vectors import add, copy_row, copy_table, cross, put, scale, sub, turn, vec, wrap
+from ..vectors import move as moved
 from .equations import (
     LegEvaluation,
     PlatformState,
@@ -41,11 +43,19 @@ ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
 """Largest residual of an assembled configuration, and of one that no step improves [L or rad]: with more actuators than
 freedoms, or redundant constraints, equations agree only as exactly as the description."""
 
-STEPS, INTERMEDIATE_STEPS = 24, 8
-"""Most Newton steps, and those at each intermediate continuation step."""
+STEPS = 24
+"""Most Newton steps."""
 
-CONTINUATION_STEPS = 8
-"""Steps of the continuation from the start's actuator values to the given ones, if Newton's method diverges."""
+ON_THE_WAY = 1e-5
+"""Largest residual of a configuration that a continuation goes on from [L or rad]."""
+
+CONTRACTION = 0.5
+"""Newton's method stays in the assembly mode of its start if each step is at most this share of the one before: its
+start is then in the ball around the solution in which there is no other (Newton and Kantorovich)."""
+
+SHORTEST_SHARE = 1.0 / 1024.0
+"""Shortest step of a continuation, as a share of the way. Where even that does not contract, a parallel singularity
+ends the assembly mode."""
 
 SIGHT = 1e3
 """Largest deviation from home that is solved for [L or rad]: beyond, nearby values differ by less than rounding."""
@@ -66,6 +76,7 @@ class NewtonScratch(NamedTuple):
     start_values: Floats  # (n_a,): deviations from home where a continuation starts
     state: PlatformState
     best: PlatformState
+    behind: PlatformState  # the last configuration of a continuation
     spheres: Spheres  # none if there are other equations
 
 
@@ -98,6 +109,7 @@ def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
         np.zeros(n_driven),
         new_platform_state(n_legs),
         new_platform_state(n_legs),
+        new_platform_state(n_legs),
         new_spheres(table),
     )
 
@@ -111,11 +123,63 @@ def drives_proximal(table: Table, i: int) -> bool:
 
 @routine
 def place_drivers(table: Table, scratch: NewtonScratch) -> None:
-    """Put actuated proximal and redundant joints at their values."""
+    """Put actuated proximal and redundant joints at their values.
+
+    A joint that carries all legs takes the platform along, or turns it on its carrier: the loops stay as they are.
+    """
     q = scratch.state.q
     for i in range(table.driven.shape[0]):
         if drives_proximal(table, i):
-            q[table.driven[i]["leg"]] = table.driven[i]["sense"] * scratch.values[table.driven[i]["column"]]
+            k = table.driven[i]["leg"]
+            value = table.driven[i]["sense"] * scratch.values[table.driven[i]["column"]]
+            if carries_all(table, k):
+                take_platform_along(table, k, value - q[k], scratch.state)
+            q[k] = value
+
+
+@routine
+def carries_all(table: Table, k: int) -> bool:
+    """True if a leg is a redundant joint between base and platform that all legs are on but those that it is on."""
+    legs, root, n_carriers = table.legs, k, 0
+    while legs[root]["redundant"] >= 0:
+        root = legs[root]["redundant"]
+        n_carriers += 1
+    if legs[k]["kind"] != REDUNDANT or legs[root]["frame"] != FROM_BASE or n_carriers != k:
+        return False
+    for j in range(k, legs.shape[0]):  # joints come before the legs that are on them
+        joint = j
+        while joint > k:
+            joint = legs[joint]["redundant"]
+        if joint != k:
+            return False
+    return True
+
+
+@routine
+def take_platform_along(table: Table, k: int, change: float, state: PlatformState) -> None:
+    """Move the platform as a joint that carries all legs moves it when its coordinate changes."""
+    pose, joint = state.pose, table.legs[k]
+    axis, point, other = vec(joint["proximal_axis"]), vec(joint["proximal_point"]), joint["redundant"]
+    while other >= 0:  # it is where the joints between it and the base, or the platform, have it
+        leg, q = table.legs[other], state.q[other]
+        if leg["at_platform_end"] == joint["at_platform_end"]:
+            if leg["proximal"] == CRANK:
+                centre, cosine, sine = vec(leg["proximal_point"]), math.cos(q), math.sin(q)
+                axis = turned(axis, vec(leg["proximal_axis"]), cosine, sine)
+                point = add(centre, turned(sub(point, centre), vec(leg["proximal_axis"]), cosine, sine))
+            else:
+                point = add(point, scale(q, vec(leg["proximal_axis"])))
+        other = leg["redundant"]
+    if joint["at_platform_end"] == 1:
+        axis, point, change = turn(pose, axis), moved(pose, point), -change
+    if joint["proximal"] == CRANK:
+        arm = sub((pose[0, 3], pose[1, 3], pose[2, 3]), point)
+        shift = sub(turned(arm, axis, math.cos(change), math.sin(change)), arm)
+        turn_pose(pose, scale(change, axis))
+    else:
+        shift = scale(change, axis)
+    for i in range(3):
+        pose[i, 3] += shift[i]
 
 
 @routine
@@ -199,46 +263,63 @@ def solve_linear(scratch: NewtonScratch) -> bool:
 
 
 @routine
-def newton(table: Table, steps: int, scratch: NewtonScratch) -> float:
-    """Solve for the actuators' values from the current configuration; the largest residual left."""
+def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) -> float:
+    """Solve for the actuators' values from the current configuration; the largest residual left.
+
+    Parameters
+    ----------
+    assembled : residual that ends the iteration [L or rad].
+    stays : end with an infinite residual if steps do not contract, as of `CONTRACTION`.
+    """
     free, normal, step = scratch.free, scratch.normal, scratch.step
-    m, previous = free.shape[0], math.inf
+    m, previous, longest_step = free.shape[0], math.inf, math.inf
     place_drivers(table, scratch)
     if has_spheres(scratch):
         set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
-    for iteration in range(steps):
+    for iteration in range(STEPS):
         worst = put_residuals(table, scratch)
-        if not worst < math.inf or worst <= ASSEMBLED or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * previous):
+        if not worst < math.inf or worst <= assembled or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * previous):
             return worst
         is_near = iteration > 0 and worst * worst <= ASSEMBLED * previous  # another step with the same slopes suffices
         if not is_near and not has_spheres(scratch):
             put_equations(table, scratch)
         if not solve_linear(scratch):
             return math.inf
-        previous = worst
+        previous, size = worst, 0.0
         for a in range(m):
             step[free[a]] = normal[a, m]
-        take_step(table, scratch)
+            size += normal[a, m] * normal[a, m]
+        if not take_step(table, scratch) and stays:
+            return math.inf
+        if stays and worst > NEARLY_ASSEMBLED and not math.sqrt(size) <= longest_step:
+            return math.inf
+        longest_step = CONTRACTION * math.sqrt(size)
     return put_residuals(table, scratch)
 
 
 @routine
-def take_step(table: Table, scratch: NewtonScratch) -> None:
-    """Take a step, shortened if the platform's joints move or turn too far for the linearisation.
+def take_step(table: Table, scratch: NewtonScratch) -> bool:
+    """Take a step; False if it was shortened, as the platform's joints move or turn too far for the linearisation.
 
     The reference point may be far away, so the platform turns about the centre of its joints.
     """
     pose, step, middle = scratch.state.pose, scratch.step, middle_of(scratch.state.pose, table.task[0])
     put(step, add(vec(step), cross(vec(step[3:]), middle)))
-    move(table, step, min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP)), scratch.state)
+    share = min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP))
+    move(table, step, share, scratch.state)
     shift = sub(middle, middle_of(pose, table.task[0]))
     for i in range(3):
         pose[i, 3] += shift[i]
+    return share == 1.0
 
 
 @routine
 def continue_to(table: Table, values: Floats, scratch: NewtonScratch) -> float:
-    """Solve for the actuators' values by continuation from those of the current configuration; the largest residual."""
+    """Solve for the actuators' values in the assembly mode of the current configuration; the largest residual.
+
+    The actuators go to their values in steps from each of which Newton's method contracts; they halve where it does
+    not. Infinite where a singularity ends the mode.
+    """
     start_values, current_values = scratch.start_values, scratch.values
     evaluate_legs(table, scratch.state, scratch.leg_eval)
     for i in range(table.driven.shape[0]):
@@ -246,13 +327,20 @@ def continue_to(table: Table, values: Floats, scratch: NewtonScratch) -> float:
         start_values[column] = deviation(table.driven[i], scratch.leg_eval.values)
         if table.driven[i]["turns"] == 1:
             start_values[column] = wrap(start_values[column], values[column])
-    worst = math.inf
-    for step in range(1, CONTINUATION_STEPS + 1):
+    way, share, worst = 0.0, 0.5, math.inf
+    copy_platform_state(scratch.state, scratch.behind)
+    while way < 1.0 and share >= SHORTEST_SHARE:
         for column in range(current_values.shape[0]):
-            current_values[column] = (
-                start_values[column] + (values[column] - start_values[column]) * step / CONTINUATION_STEPS
-            )
-        worst = newton(table, STEPS if step == CONTINUATION_STEPS else INTERMEDIATE_STEPS, scratch)
+            current_values[column] = start_values[column] + (values[column] - start_values[column]) * (way + share)
+        assembled = ASSEMBLED if way + share == 1.0 else ON_THE_WAY
+        worst = newton(table, assembled, True, scratch)
+        if worst <= max(assembled, NEARLY_ASSEMBLED):
+            copy_platform_state(scratch.state, scratch.behind)
+            way += share
+            share = min(2.0 * share, 1.0 - way)
+        else:
+            copy_platform_state(scratch.behind, scratch.state)
+            share, worst = 0.5 * share, math.inf
     return worst
 
 
@@ -310,15 +398,15 @@ def assemble_row(
 ) -> int:
     """Assemble one row within all limits, into `scratch.state`, with the legs evaluated there; its status.
 
-    From the row's own start, then by continuation; then from the seeds, of which the solution nearest to the row's
-    start is taken.
+    From the row's own start in its assembly mode, at once or by continuation; then from the seeds in any, of which the
+    solution nearest to the row's start is taken.
     """
     own_start, target_values, status = row if starts.poses.shape[0] > 1 else 0, deviations[row], PENDING
     put_deviations(table, actuators[row], target_values)
     for attempt in range(2):
         load_start(table, starts, own_start, scratch)
         copy_row(target_values, scratch.values)
-        worst = newton(table, STEPS, scratch) if attempt == 0 else continue_to(table, target_values, scratch)
+        worst = newton(table, ASSEMBLED, True, scratch) if attempt == 0 else continue_to(table, target_values, scratch)
         if worst <= NEARLY_ASSEMBLED:
             if is_feasible(table, target_values, scratch):
                 return REACHED
@@ -328,7 +416,7 @@ def assemble_row(
     for start in range(seeds.poses.shape[0]):
         load_start(table, seeds, start, scratch)
         copy_row(target_values, scratch.values)
-        if newton(table, STEPS, scratch) <= NEARLY_ASSEMBLED and is_feasible(table, target_values, scratch):
+        if newton(table, ASSEMBLED, False, scratch) <= NEARLY_ASSEMBLED and is_feasible(table, target_values, scratch):
             distance = squared_distance(scratch.state.pose, starts.poses[own_start])
             if distance < nearest:
                 nearest = distance
@@ -376,8 +464,8 @@ def assemble(
 ) -> int:
     """Assemble legs at given actuators, within all limits; the other rows are PENDING.
 
-    Or EXCEEDED, if they assemble from the row's start but beyond a limit. Newton's method runs from each row's start;
-    if it does not converge, a continuation leads the actuators to their values.
+    Or EXCEEDED, if they assemble in the mode of the row's start but beyond a limit. Newton's method runs from each
+    row's start; if it does not contract, a continuation leads the actuators to their values.
 
     Parameters
     ----------
