@@ -112,6 +112,8 @@ int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real 
 
 #define PFK_TURN 6.283185307179586
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
+#define PFK_CONTRACTION 0.25 /* of each step to the one before, at most, in the assembly mode of the start */
+#define PFK_SHORTEST_SHARE (1.0 / 1024.0) /* of the way: a shorter step means that the mode ends there */
 #define PFK_FAR 1e30
 #define PFK_MODE_APART 1e-3  /* two working modes meet where their actuators are nearer [L or rad] */
 enum {
@@ -1322,8 +1324,9 @@ static int pfk_arm_motions(const pfk_state *state, int count, pfk_real motion[PF
 #endif
 
 /* Moves what is open until all legs close, in no more than `most` steps that together go no farther than `farthest`, by
-   Newton's method: 0, or the number of a leg that does not. All of the pose is open where actuators are given. Where it
-   is strict all legs must reach at every step. */
+   Newton's method: 0, or the number of a leg that does not. All of the pose is open where actuators are given: then,
+   where it is strict, steps must contract, for what closes otherwise may be in any assembly mode. Where it is strict
+   without them, all legs must reach at every step. */
 static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most, pfk_real farthest, int strict,
                       pfk_state *state, int *steps)
 {
@@ -1332,13 +1335,14 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
     pfk_row row[PFK_ROWS];
     pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], motion[PFK_UNKNOWNS][PFK_COLUMNS], x[PFK_UNKNOWNS];
     pfk_real twist[PFK_COLUMNS], worst, last = 0.0, gone = 0.0, size, share;
+    pfk_real most_size = PFK_CONTRACTION * PFK_LONGEST_STEP;
     int i, j, k, open, missing, count, turned = 0;
 #if REDUNDANT
     int redundant_from;
 #endif
     for (*steps = 0;; ++*steps) {
         missing = pfk_place(pose, given, !given, state);
-        if (missing && strict)
+        if (missing && strict && !given)
             return missing;
         open = pfk_equations(state, given, 1, row, &worst);
         if (worst <= PFK_CLOSED || (*steps && worst <= PFK_CLOSE && worst > 0.25 * last))
@@ -1378,6 +1382,9 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
             pfk_turn_back(&start, pose);
             continue;
         }
+        if (given && strict && worst > PFK_CLOSE && !(size <= most_size))
+            return open;
+        most_size = PFK_CONTRACTION * size;
         share = size > PFK_LONGEST_STEP ? PFK_LONGEST_STEP / size : 1.0;
         gone += share * size;
         for (k = 0; k < PFK_COLUMNS; ++k)
@@ -2743,24 +2750,64 @@ void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTU
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 {
     pfk_state state;
-    pfk_pose own = *pose;
-    pfk_real given[PFK_ACTUATORS], off;
-    int i, code, count = 0;
-    for (i = 0; i < PFK_ACTUATORS; ++i) {
-        given[i] = pfk_driven[i].sense * (actuators[i] - pfk_driven[i].home);
-        if (!(fabs(0.0 * given[i]) <= 0.0))
+    pfk_pose own = *pose, trial, home;
+    pfk_real given[PFK_ACTUATORS], begin[PFK_ACTUATORS], off, way = 0.0, share = 1.0;
+    int i, code, more, count = 0, known = 0;
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        if (!(fabs(0.0 * actuators[i]) <= 0.0))
             return PFK_NO_ACTUATORS;
-    }
     if (pfk_make_exact(&own))
         return PFK_NO_POSE;
+    while (way < 1.0) { /* at once, or in steps from the actuators at the pose that stay in its assembly mode */
+        for (i = 0; i < PFK_ACTUATORS; ++i) {
+            off = way + share < 1.0 ? (1.0 - way - share) * (begin[i] - actuators[i]) : 0.0;
+            given[i] = pfk_driven[i].sense * (actuators[i] + off - pfk_driven[i].home);
+        }
+        trial = own;
 #if REDUNDANT
-    pfk_rest(&own, &state); /* redundant joints begin where the pose has them */
+        pfk_rest(&trial, &state); /* redundant joints begin where the pose has them */
 #endif
-    code = pfk_settle(&own, given, PFK_ALL, PFK_FK_STEPS, PFK_FAR, 0, &state, &count);
-    if (steps)
-        *steps = count;
-    if (code)
-        return PFK_LEG + code;
+        code = pfk_settle(&trial, given, PFK_ALL, PFK_FK_STEPS, PFK_FAR, known < 2, &state, &more);
+        count += more;
+        if (steps)
+            *steps = count;
+        if (known > 1) { /* the mode ends on the way */
+            if (code)
+                return PFK_LEG + code;
+            *pose = trial;
+            return PFK_OTHER_MODE;
+        }
+        if (!code) {
+            own = trial;
+            way += share;
+            share = 2.0 * share < 1.0 - way ? 2.0 * share : 1.0 - way;
+            continue;
+        }
+        if (!known) {
+            trial = own;
+            pfk_home(&home);
+            for (i = 0, off = 0.0; i < 3; ++i)
+                off += fabs(own.p[i] - home.p[i]) / PFK_SIZE + fabs(own.R[i][i] - 1.0);
+#if IMPLICIT
+            known = 1 + pfk_settle(&trial, 0, PFK_REDUNDANT_ALONE, PFK_IK_STEPS, PFK_NEAR, 0, &state, &more);
+#else
+            known = 1 + pfk_place(&trial, 0, 1, &state);
+#endif
+            pfk_read(&state, begin);
+            for (i = 0; i < PFK_ACTUATORS; ++i)
+                begin[i] = pfk_driven[i].is_length ? begin[i] : pfk_wrap(begin[i], actuators[i]);
+            if (off <= PFK_CLOSE) { /* home, which may be at a dead point */
+                known = 1;
+                for (i = 0; i < PFK_ACTUATORS; ++i)
+                    begin[i] = pfk_driven[i].home;
+            }
+        }
+        share *= 0.5;
+        if (known > 1 || share < PFK_SHORTEST_SHARE) {
+            known = 2;
+            share = 1.0 - way;
+        }
+    }
     pfk_make_exact(&own);
     *pose = own;
 #if IMPLICIT
