@@ -133,7 +133,7 @@ SAID: dict[str, tuple[int, str, str]] = {
         1, f"projected: actuators up to 20 mm from the values asked for; {STRUTS_OUT}\n", "",
     ),
     # the elbows are 320 apart, the forearms reach 290
-    "fk free.toml 53 -53": (1, "no limit is active: no configuration with these values was found\n", ""),
+    "fk free.toml 53 -53": (1, "a parallel singularity\n", ""),
     "fk stewart 20 20 20 20 20 20 --all": (1, "no assembly mode found\n", ""),
     "fk stewart 300 300 300 300 300 300 --all": (1, ", none within all limits\n", ""),
     "fk stewart 280 280 280 280 280 280 --all": (0, "  nothing\n", ""),  # on its limit, not beyond it

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Floats
+from ..closure.assemble import is_over_determined
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
 from ..description.task import task_of
@@ -29,6 +30,12 @@ if TYPE_CHECKING:
 STRETCHED, NO_FREEDOM = "the links are stretched out or folded", "the mechanism has no freedom that way"
 DEAD_POINT = "the drive is at a dead point, where the linkage may go on in either of two modes"
 """Causes that stop an end effector if no limit does."""
+
+CONTRADICTORY, MODE_ENDS = (
+    "the values contradict each other",
+    "the assembly mode ends at a dead point, a parallel singularity",
+)
+"""Causes that keep actuators from their values if no limit does: elsewhere they could go on towards these."""
 
 
 def as_sentence(answer: Answer) -> str:
@@ -84,7 +91,7 @@ def why_without_limits(answer: Answer) -> str:
     """A phrase for the cause, to first order, that keeps an answer without active limits from its target."""
     mechanism, request = answer.mechanism, answer._request
     if request is None:
-        return "no configuration with these values was found"
+        return CONTRADICTORY if is_over_determined(model_of(mechanism).closure) else MODE_ENDS
     if has_dependent_coordinates(mechanism):
         return task_remark(mechanism)
     if is_at_dead_point(mechanism, answer._coordinates):

@@ -112,7 +112,13 @@ int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real 
 
 #define PFK_TURN 6.283185307179586
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
+#if REDUNDANT
 #define PFK_CONTRACTION 0.25 /* of each step to the one before, at most, in the assembly mode of the start */
+#define PFK_FIRST_STEP 0.125 /* the longest there [L or rad]: joints that carry others turn them about other points */
+#else
+#define PFK_CONTRACTION 0.5
+#define PFK_FIRST_STEP PFK_LONGEST_STEP
+#endif
 #define PFK_SHORTEST_SHARE (1.0 / 1024.0) /* of the way: a shorter step means that the mode ends there */
 #define PFK_FAR 1e30
 #define PFK_MODE_APART 1e-3  /* two working modes meet where their actuators are nearer [L or rad] */
@@ -1335,7 +1341,7 @@ static int pfk_settle(pfk_pose *pose, const pfk_real *given, int moves, int most
     pfk_row row[PFK_ROWS];
     pfk_real system[PFK_ROWS][PFK_UNKNOWNS + 1], motion[PFK_UNKNOWNS][PFK_COLUMNS], x[PFK_UNKNOWNS];
     pfk_real twist[PFK_COLUMNS], worst, last = 0.0, gone = 0.0, size, share;
-    pfk_real most_size = PFK_CONTRACTION * PFK_LONGEST_STEP;
+    pfk_real most_size = PFK_FIRST_STEP;
     int i, j, k, open, missing, count, turned = 0;
 #if REDUNDANT
     int redundant_from;
@@ -2750,14 +2756,20 @@ void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTU
 int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 {
     pfk_state state;
-    pfk_pose own = *pose, trial, home;
-    pfk_real given[PFK_ACTUATORS], begin[PFK_ACTUATORS], off, way = 0.0, share = 1.0;
-    int i, code, more, count = 0, known = 0;
+    pfk_pose own = *pose;
+    pfk_real given[PFK_ACTUATORS], off;
+    int i, code, count = 0;
+#if STAYS
+    pfk_pose trial, home;
+    pfk_real begin[PFK_ACTUATORS], way = 0.0, share = 1.0;
+    int more, known = 0;
+#endif
     for (i = 0; i < PFK_ACTUATORS; ++i)
         if (!(fabs(0.0 * actuators[i]) <= 0.0))
             return PFK_NO_ACTUATORS;
     if (pfk_make_exact(&own))
         return PFK_NO_POSE;
+#if STAYS
     while (way < 1.0) { /* at once, or in steps from the actuators at the pose that stay in its assembly mode */
         for (i = 0; i < PFK_ACTUATORS; ++i) {
             off = way + share < 1.0 ? (1.0 - way - share) * (begin[i] - actuators[i]) : 0.0;
@@ -2808,6 +2820,19 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
             share = 1.0 - way;
         }
     }
+#else
+    /* more actuators than freedoms: what they agree on is in one place */
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        given[i] = pfk_driven[i].sense * (actuators[i] - pfk_driven[i].home);
+#if REDUNDANT
+    pfk_rest(&own, &state); /* redundant joints begin where the pose has them */
+#endif
+    code = pfk_settle(&own, given, PFK_ALL, PFK_FK_STEPS, PFK_FAR, 0, &state, &count);
+    if (steps)
+        *steps = count;
+    if (code)
+        return PFK_LEG + code;
+#endif
     pfk_make_exact(&own);
     *pose = own;
 #if IMPLICIT

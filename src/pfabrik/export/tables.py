@@ -8,8 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ..arrays import Floats, Record
+from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.legs import records as K
+from ..model import model_of
 from ..motion.joint_path import JointPath, PathMotion
 from ..motion.tilt_axis import tilt_axis
 from .exported_links import ExportedLinks, angles_needed
@@ -53,6 +55,7 @@ def features(machine: Machine, parts: Sequence[str], path: JointPath | None = No
         or path is not None
         or (machine.n_redundant and "fk" in parts)
         or ("ik" in parts and not completes),
+        "STAYS": "fk" in parts and not is_over_determined(model_of(machine.mechanism).closure),
         "SOLVES": machine.equations > 0 or "fk" in parts or "rates" in parts,
         "JOINTS": path is not None,
         "TO_ACTUATORS": path is not None and "ik" in parts,

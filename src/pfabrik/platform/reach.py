@@ -6,12 +6,14 @@ import numpy as np
 
 from ..arrays import Floats, Mask, Records
 from ..batch import put, take
+from ..closure.assemble import SHORTEST_SHARE
 from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..kernels.rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
+from ..poses import between
 from .redundant_joints import search_redundant_joints, split_by_redundant, step_redundant_joints
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
@@ -44,6 +46,8 @@ def reach(
     if model.legs.has_implicit_joints:
         sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
     n_unsolved = 1 if is_tried else _reach_at_start(model, start is None, legs, targets, start_poses, sides, rows)
+    if n_unsolved and keep_mode and model.legs.has_implicit_joints:
+        n_unsolved -= _lead(model, legs, targets, start_poses, sides, rows)
     if n_unsolved and model.legs.is_for_blocks and model.legs.task["unset"][0]:
         n_unsolved -= _complete(model, legs, targets, start_poses, sides, rows)
     if n_unsolved and model.legs.has_free_redundant:
@@ -65,6 +69,31 @@ def _reach_at_start(
         return _run(model.legs.is_for_blocks, legs, targets, start_poses, sides, rows)
     rows.actuators[:] = resting.actuators
     return _run(True, table_handle(resting.table), targets, start_poses, resting.table.home_sides, rows)
+
+
+def _lead(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
+    """Lead the platform from its start to the targets that are not reached; return the number of rows solved.
+
+    Each step completes near the configuration before, and halves where that fails: implicit joints keep their branch.
+    """
+    unsolved = np.flatnonzero(rows.status != REACHED)
+    begin = np.broadcast_to(start_poses, targets.shape)[unsolved]
+    present, led_sides, led, way = begin.copy(), sides[unsolved], take(rows, unsolved), np.zeros(len(unsolved))
+    share = np.full(len(unsolved), 0.5)
+    while len(active := np.flatnonzero((way < 1.0) & (share >= SHORTEST_SHARE))):
+        wanted = between(begin[active], targets[unsolved[active]], (way + share)[active, None, None])
+        block, block_sides = take(led, active), led_sides[active]
+        _run(False, legs, wanted, present[active], block_sides, block)
+        is_reached = block.status == REACHED
+        reached = active[is_reached]
+        put(led, reached, block, is_reached)
+        present[reached], led_sides[reached] = block.poses[is_reached], block_sides[is_reached]
+        way[reached] += share[reached]
+        share[active] = np.where(is_reached, np.minimum(2.0 * share[active], 1.0 - way[active]), 0.5 * share[active])
+    solved = np.flatnonzero(way == 1.0)
+    put(rows, unsolved[solved], led, solved)
+    sides[unsolved[solved]] = led_sides[solved]
+    return len(solved)
 
 
 def _reach_by_redundant(
