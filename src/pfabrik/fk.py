@@ -35,16 +35,16 @@ def solve_fk(
 ) -> Solution:
     """The pose of the end effector, and all joints, at given actuator values.
 
-    Newton's method closes the loops from the start with the actuators locked. If it fails, continuation moves the
-    actuators to their values in steps; if that fails too, other starts follow. The assembly mode is that of the start
-    if Newton's method or continuation succeeds. `assembly_modes` finds all assembly modes.
+    Newton's method closes the loops from the start with the actuators locked. If its steps do not contract, continuation
+    moves the actuators to their values in steps of which each does. So the answer is in the assembly mode of the start;
+    in any mode, with `working_mode="any"`, other starts follow. `assembly_modes` finds all assembly modes.
 
     Parameters
     ----------
     actuators : actuated coordinates (..., n_a) in the order of `mechanism.actuator_names` [length or rad]; or joint
         name -> its values (...,), for every actuator.
     start : a Solution or joint vector q to start from, single or one for each row. Default: home.
-    options : of these, `actuator_tolerance` and `on_invalid`.
+    options : of these, `working_mode`, `actuator_tolerance` and `on_invalid`.
 
     Returns
     -------

@@ -21,7 +21,7 @@ _CHOICES: dict[str, tuple[object, ...]] = {
 
 @dataclass(frozen=True)
 class Options:
-    """How `solve_ik` and `track` work, and `solve_fk`, for which only the last two count.
+    """How `solve_ik` and `track` work, and `solve_fk`, for which only `working_mode` and the last two count.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Options:
     max_iterations : K, forward and backward passes a chain may take for one target; of the paper's method alone.
     max_rounds : how often its projection may revise a target.
     working_mode : "keep" stays in the start's working mode (home's without a start), "any" may change it to reach;
-        None keeps it if there is a start.
+        None keeps it if there is a start. `solve_fk` keeps the assembly mode, of home too, but with "any".
     hold : what a projection keeps: "orientation" (the paper's choice) or "position" if a feasible pose has it that is
         not much farther from the target than the start, None nothing. `Solution.held` tells what was kept.
     projection : which feasible pose answers a target that is not reached: the "nearest" that local searches from
