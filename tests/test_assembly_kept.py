@@ -52,7 +52,7 @@ joint = [
   { name = "low", type = "revolute", connects = ["lever", "rod"], at = [-400, 0, 0], axis = [0, 1, 0] },
   { name = "elbow", type = "revolute", connects = ["lower", "upper"], at = [0, 0, 1000], axis = [0, 1, 0] },
   { name = "top", type = "spherical", connects = ["rod", "upper"], at = [-400, 0, 1000] },
-  { type = "revolute", name = "wrist", actuated = true, connects = ["upper", "W"], at = [1200, 0, 1e3], axis = [0, 1, 0] },
+  { type = "revolute", name = "H", actuated = true, connects = ["upper", "W"], at = [1200, 0, 1e3], axis = [0, 1, 0] },
 MORE]
 """
 
