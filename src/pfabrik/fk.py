@@ -35,9 +35,9 @@ def solve_fk(
 ) -> Solution:
     """The pose of the end effector, and all joints, at given actuator values.
 
-    Newton's method closes the loops from the start with the actuators locked. If its steps do not contract, continuation
-    moves the actuators to their values in steps of which each does. So the answer is in the assembly mode of the start;
-    in any mode, with `working_mode="any"`, other starts follow. `assembly_modes` finds all assembly modes.
+    Newton's method closes the loops from the start with the actuators locked. If its steps do not contract, the
+    actuators move to their values in steps of which each does. So the answer is in the assembly mode of the start. With
+    `working_mode="any"` other starts follow. `assembly_modes` finds all assembly modes.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real 
 
 #define PFK_TURN 6.283185307179586
 #define PFK_LONGEST_STEP 0.5 /* [L or rad] */
-#if REDUNDANT
+#if IMPLICIT
 #define PFK_CONTRACTION 0.25 /* of each step to the one before, at most, in the assembly mode of the start */
 #define PFK_FIRST_STEP 0.125 /* the longest there [L or rad]: joints that carry others turn them about other points */
 #else
