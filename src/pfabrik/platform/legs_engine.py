@@ -354,6 +354,11 @@ class LegsEngine(Engine):
         rows, q_proximal, sides = forward_kinematics(
             self._model, values, start, start_sides, tolerance, outputs, keep_mode=keep_mode
         )
+        projected = np.flatnonzero(rows.status == PROJECTED)
+        if len(projected) and not keep_mode:  # seeds are few where one freedom goes all round
+            begin = start if start is None or len(start) == 1 else start.at(projected)
+            others = self._joint_space.forward(values[projected], begin, tolerance, keep_mode=False)
+            rows.status[projected[others.rows.status == REACHED]] = PENDING
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved) == len(values):
             return self._joint_space.forward(values, start, tolerance, keep_mode=keep_mode)
