@@ -117,3 +117,14 @@ def test_an_answer_is_where_small_steps_lead(name: str) -> None:
     assert (np.asarray(answer.actuator_error)[~reached] > 1e-9).all()
     assert all("parallel singularity" in row.reason for row in answer[~reached])
     assert pf.solve_fk(mechanism, values[reached], options=pf.Options(working_mode="any"))
+
+
+def test_a_crank_reaches_in_any_mode_whatever_its_circles_reach() -> None:
+    """Coupler and rocker meet if the distance of their ends is at most the sum of both, and at least the difference."""
+    mechanism, coupler, rocker = loads(CRANK), 100.0, np.hypot(20.0, 80.0)
+    angles = np.linspace(-3.1, 3.1, 8 if INTERPRETED else 40)
+    ends = 80.0 * np.column_stack([-np.sin(angles), np.cos(angles)])
+    distances = np.linalg.norm(ends - [120.0, 0.0], axis=1)
+    answer = pf.solve_fk(mechanism, angles[:, None], options=pf.Options(working_mode="any"))
+    meets = (distances <= coupler + rocker) & (distances >= coupler - rocker)
+    np.testing.assert_array_equal(answer.status == pf.Status.REACHED, meets)
