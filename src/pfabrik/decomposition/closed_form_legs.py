@@ -224,12 +224,26 @@ def _readings(elements: list[ElementaryJoint]) -> Iterator[Callable[[], tuple[Le
     readings = (elements, False), ([element.back for element in elements[::-1]], True)
     for n_proximal, (elements_read, is_reversed), make in product((0, 1), readings, (_pivot, _rod_alone)):
         yield partial(make, elements_read, n_proximal, is_reversed)
-    for make_on_redundant, (elements_read, is_reversed), n_proximal in product(
-        (_on_orienting_joint, _on_implicit_joint), readings, (0, 1)
+    hinge_first = [(_with_hinge_first(elements_read), is_reversed) for elements_read, is_reversed in readings]
+    for make_on_redundant, readings_of_kind in (
+        (_on_orienting_joint, [*readings, *hinge_first]),
+        (_on_implicit_joint, readings),
     ):
-        yield partial(make_on_redundant, elements_read, n_proximal, is_reversed)
+        for (elements_read, is_reversed), n_proximal in product(readings_of_kind, (0, 1)):
+            yield partial(make_on_redundant, elements_read, n_proximal, is_reversed)
     for n_redundant, (elements_read, is_reversed) in product(range(1, MOST_REDUNDANT + 1), readings):
         yield partial(_on_redundant, elements_read[:n_redundant], [elements_read[n_redundant:]], is_reversed)
+
+
+def _with_hinge_first(elements: list[ElementaryJoint]) -> list[ElementaryJoint]:
+    """Elements of which the first two, a slide along a hinge's axis and this hinge, are swapped: their order is free.
+
+    The hinge may then orient a rod on the slide. A rod on the hinge, the slide following, would be at a dead point
+    wherever the rod's own hinge faces its end: everywhere, if that hinge is square to the axis.
+    """
+    if len(elements) < 2 or (elements[0].kind, elements[1].kind) != ("P", "R") or not are_parallel(*elements[:2]):
+        return elements
+    return [elements[1], elements[0], *elements[2:]]
 
 
 def _on_orienting_joint(elements: list[ElementaryJoint], n_proximal: int, is_reversed: bool) -> tuple[LegForm, ...]:
