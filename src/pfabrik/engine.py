@@ -13,6 +13,7 @@ from .description.mechanism import Mechanism
 from .model import Model, model_of
 from .options import USUAL, Options
 from .platform.legs_engine import LegsEngine
+from .platform.tip_engine import TipEngine, read_at_tip
 from .reaching.solve import ReachingEngine
 
 
@@ -45,6 +46,12 @@ def _engine(model: Model) -> Engine:
 @derived
 def _usual(model: Model) -> Engine:
     """The engine that knows nothing of links."""
+    at_tip = read_at_tip(model)
+    return _completing(model) if at_tip is None else TipEngine(model, _completing(model), LegsEngine(at_tip))
+
+
+def _completing(model: Model) -> Engine:
+    """The engine that completes what a task leaves open of a pose."""
     if model.has_legs:
         return LegsEngine(model)
     return ChainEngine(model) if is_chain(model) else ClosureEngine(model)

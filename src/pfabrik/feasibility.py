@@ -23,6 +23,7 @@ from .kernels.threads import in_blocks
 from .model import Model, model_of
 from .platform.answers import sides_at
 from .platform.table import table_handle
+from .platform.tip_engine import read_at_tip
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -95,6 +96,7 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     InvalidArgument : targets of the wrong shape.
     """
     model = model_of(checked_mechanism(mechanism))
+    model = read_at_tip(model) or model
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"])
     table = model.legs

@@ -1,0 +1,128 @@
+"""The engine of machines whose end effector is placed as a point: one leg, whose rotation the task leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..closure.attempts import Attempt
+from ..closure.close import Closing, platform_poses
+from ..closure.configurations import Configurations
+from ..closure.engine_contract import Engine
+from ..closure.projection import ProjectionMode
+from ..derived import derived
+from ..description.geometry import home_numbers, with_numbers
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
+from ..kernels.rows import INVALID
+from ..model import Model
+from ..options import Options
+from .legs_engine import LegsEngine
+
+
+@derived
+def read_at_tip(model: Model) -> Model | None:
+    """The machine with a joint at its reference point as end effector; None where no leg has two solutions so.
+
+    A task that leaves the whole rotation open sets a point. Where one leg carries the end effector, its elbow, which
+    completing a pose leaves to Newton's method, is then a branch of the leg in closed form.
+    """
+    mechanism = model.mechanism
+    is_point = not mechanism.end_effector_is_joint and model.task.rotations == 0
+    if not is_point or any(joint.cone is not None for joint in mechanism.joints):
+        return None
+    read = Model(_with_tip(mechanism, model.length))
+    read.mechanism.__dict__["_model"] = read  # not one shared with a description that is equal, whose L differs
+    is_better = not read.why_poses_do_not_suffice and read.legs.has_sides and not read.legs.has_implicit_joints
+    return read if is_better else None
+
+
+def _with_tip(mechanism: Mechanism, length: float) -> Mechanism:
+    """A mechanism with one joint more, the last, at the reference point, as its end effector; of the same length L."""
+    name = "tip"
+    while name in (*mechanism.bodies, *(joint.name for joint in mechanism.joints)):
+        name += "'"
+    connects, at = (mechanism.end_effector, f"beyond {name}"), mechanism.reference_point
+    tip = Joint(name, "revolute", connects, at=at, axis=(0.0, 0.0, 1.0))
+    read = mechanism._with(joints=(*mechanism.joints, tip), end_effector=name, shapes=(), ignore=())
+    numbers = home_numbers(read).copy()
+    numbers[0] = length
+    return with_numbers(read, numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class TipEngine(Engine):
+    """Targets by the closed forms of the leg up to the reference point, all else by the usual engine.
+
+    Attributes
+    ----------
+    model, usual : the machine, and its engine that completes poses.
+    at_tip : the engine of `read_at_tip`.
+    """
+
+    model: Model
+    usual: Engine
+    at_tip: LegsEngine
+
+    def answer(
+        self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Configurations:
+        """As `InverseEngine.answer`."""
+        return self._with_rotations(self.at_tip.answer(targets, _at_tip(start), options, keep_mode=keep_mode))
+
+    def follow(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        on_progress: Callable[[int, int], None] | None,
+    ) -> Configurations:
+        """As `InverseEngine.follow`."""
+        return self._with_rotations(self.at_tip.follow(targets, _at_tip(start), options, on_progress))
+
+    def attempts(
+        self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Iterator[Attempt]:
+        """As `InverseEngine.attempts`."""
+        return self.at_tip.attempts(target, _at_tip(start), options, keep_mode=keep_mode)
+
+    def advance(self, targets: Floats, start: Configurations) -> Configurations:
+        """As `Engine.advance`."""
+        at_start = _at_tip(start)
+        assert at_start is not None
+        return self._with_rotations(self.at_tip.advance(targets, at_start))
+
+    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+        """As `Engine.forward`."""
+        return self.usual.forward(values, start, tolerance)
+
+    def as_configurations(self, closing: Closing) -> Configurations:
+        """As `Engine.as_configurations`."""
+        return self.usual.as_configurations(closing)
+
+    def points(self, configurations: Configurations) -> Mapping[str, Floats]:
+        """As `Engine.points`."""
+        return self.usual.points(configurations)
+
+    def limit_multipliers(self, configurations: Configurations, targets: Floats, projection: ProjectionMode) -> Floats:
+        """As `Engine.limit_multipliers`."""
+        return self.usual.limit_multipliers(configurations, targets, projection)
+
+    def _with_rotations(self, answers: Configurations) -> Configurations:
+        """Answers of the point as those of the body: with the rotation that their joints give, without the tip's."""
+        coordinates, rows = answers.coordinates[:, :-1], answers.rows
+        valid = np.flatnonzero(rows.status != INVALID)
+        rows.poses[valid, :3, :3] = platform_poses(self.model.mechanism, coordinates[valid])[:, :3, :3]
+        return Configurations(rows, coordinates)
+
+
+def _at_tip(start: Configurations | None) -> Configurations | None:
+    """Configurations of the body as those of the point, which has no rotation."""
+    if start is None:
+        return None
+    poses = start.rows.poses.copy()
+    poses[:, :3, :3] = np.eye(3)
+    return Configurations(start.rows._replace(poses=poses), np.pad(start.coordinates, ((0, 0), (0, 1))))
