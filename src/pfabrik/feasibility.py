@@ -22,8 +22,9 @@ from .errors import UnsupportedMechanism, counted
 from .kernels.threads import in_blocks
 from .model import Model, model_of
 from .platform.answers import sides_at
+from .platform.folds import starts_beside
 from .platform.table import table_handle
-from .platform.tip_engine import read_at_tip
+from .platform.tip_engine import measured, start_at_tip
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -96,23 +97,32 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     InvalidArgument : targets of the wrong shape.
     """
     model = model_of(checked_mechanism(mechanism))
-    model = read_at_tip(model) or model
+    configuration = None if start is None else start_of(mechanism, start, ())
+    if measured(model) is not model:
+        model, configuration = measured(model), start_at_tip(configuration)
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"])
-    table = model.legs
-    start_pose, sides, configuration = mechanism.home_pose[None].copy(), table.home_sides, None
-    if start is not None:
-        configuration = start_of(mechanism, start, ())
-        assert configuration is not None
-        start_pose = np.require(configuration.rows.poses, requirements=["C", "W"])
-        sides = sides_at(model, configuration)
     poses, shape = as_targets(mechanism, targets)
-    margin, binding = _margins(model, poses, start_pose, sides)
-    limits = _limits(table)
+    margin, binding = _of_mode(model, poses, configuration)
+    for _, beside in starts_beside(model, configuration):  # a start on a fold is of both modes
+        other_margin, other_binding = _of_mode(model, poses, beside)
+        better = other_margin > margin
+        margin[better], binding[better] = other_margin[better], other_binding[better]
+    limits = _limits(model.legs)
     if mechanism.clearance is not None:
-        _lower_to_clearance(model, mechanism.clearance, poses, configuration, sides, margin, binding)
         limits += tuple((name, "clearance") for name in pair_names(mechanism))
     return Feasibility(shaped(margin, shape), shaped(binding, shape), limits)
+
+
+def _of_mode(model: Model, poses: Floats, start: Configurations | None) -> tuple[Floats, Ints]:
+    """Margins (n,) of poses (n, 4, 4), and the indices of their limits, in the working mode of a start, or of home."""
+    mechanism, start_pose, sides = model.mechanism, model.mechanism.home_pose[None].copy(), model.legs.home_sides
+    if start is not None:
+        start_pose, sides = np.require(start.rows.poses, requirements=["C", "W"]), sides_at(model, start)
+    margin, binding = _margins(model, poses, start_pose, sides)
+    if mechanism.clearance is not None:
+        _lower_to_clearance(model, mechanism.clearance, poses, start, sides, margin, binding)
+    return margin, binding
 
 
 def _lower_to_clearance(

@@ -16,6 +16,7 @@ from .feasibility import feasibility
 from .ik import keeps_mode, solve_ik
 from .model import model_of
 from .options import Options, checked_options
+from .platform.tip_engine import measured
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -112,7 +113,7 @@ def search_log(
 
 def _blocked_by(mechanism: Mechanism, target: Target, start: Start | None) -> tuple[str, str, float] | None:
     """The limit that a target exceeds most, in the working mode of the start."""
-    if model_of(mechanism).why_poses_do_not_suffice:
+    if measured(model_of(mechanism)).why_poses_do_not_suffice:
         return None
     found = feasibility(mechanism, target, start=start)
     margin, binding = float(found.margin), int(found.binding)

@@ -118,8 +118,9 @@ def workspace(
 def note_slow(mechanism: pf.Mechanism) -> None:
     """Note before the work begins that it takes longer where no closed forms answer, and why."""
     from ..model import model_of
+    from ..platform.tip_engine import measured
 
-    reason = model_of(mechanism).why_poses_do_not_suffice
+    reason = measured(model_of(mechanism)).why_poses_do_not_suffice
     if reason:
         note(f"no closed forms, {reason}: points are tried one by one, for about a minute")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..batch import put, take
 from ..closure.configurations import Configurations, Places
+from ..derived import derived
 from ..kernels.legs import records as K
 from ..kernels.rows import Rows
 from ..model import Model
@@ -93,14 +94,10 @@ def sides_at(model: Model, start: Configurations) -> Floats:
         redundant = table.implicit_joints
         redundant_columns = [table.known["column"][table.known["leg"] == k][0] for k in redundant["leg"]]
         sides[:, redundant["leg"]] = redundant["sense"] * start.coordinates[:, redundant_columns] / redundant["unit"]
-    two_sided = np.flatnonzero(table.home_sides[0])
+    two_sided, columns = columns_of_sides(model)
     if not len(two_sided):
         return sides
     closure = model.path_closure
-    places = np.where(table.legs["kind"] == K.PIVOT, K.BASE_END, K.Q_PROXIMAL)
-    columns = [
-        table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in two_sided
-    ]
     if set(columns) <= set(closure.actuated.tolist()):
         q = np.zeros((len(start), len(closure.scale)))
         closure.put_actuators(q, start.rows.actuators)
@@ -120,6 +117,18 @@ def sides_at(model: Model, start: Configurations) -> Floats:
             )
         sides[:, two_sided[group]] *= np.where(errors[0] <= errors[1], 1.0, -1.0)
     return sides
+
+
+@derived
+def columns_of_sides(model: Model) -> tuple[NDArray[np.intp], list[int]]:
+    """The legs with two solutions, and the column of the coordinate in which these differ."""
+    table = model.legs
+    two_sided = np.flatnonzero(table.home_sides[0])
+    places = np.where(table.legs["kind"] == K.PIVOT, K.BASE_END, K.Q_PROXIMAL)
+    columns = [
+        table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in two_sided
+    ]
+    return two_sided, columns
 
 
 def start_coordinates_of(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from itertools import chain, combinations, islice
 from typing import cast
 
 import numpy as np
@@ -29,6 +28,7 @@ from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, answer_coordinates, replaced, sides_at, start_coordinates_of
 from .coordinates import joint_coordinates
+from .folds import starts_beside, subsets
 from .forward import forward_kinematics, project_values
 from .leg_attempts import attempts
 from .nearest import limit_multipliers
@@ -75,6 +75,27 @@ class LegsEngine(Engine):
         Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
         `nearby` by a search around the start alone.
         """
+        answers = self._answer(targets, start, options, keep_mode=keep_mode, nearby=nearby)
+        if not keep_mode or not self._table.has_sides or (answers.rows.status == REACHED).all():
+            return answers
+        for is_folded, begin in starts_beside(self._model, start):
+            others = self._answer(targets, begin, options, keep_mode=True, nearby=nearby)
+            better = np.flatnonzero(is_folded & self._is_nearer(others.rows, answers.rows, options))
+            if len(better):
+                replaced = answers.with_others if isinstance(answers, LegAnswers) else answers.with_rows
+                answers = replaced(better, others.at(better))
+        return answers
+
+    def _answer(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool,
+    ) -> Configurations:
+        """As `answer`, from a start on a fold in one of the modes that meet there."""
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         start_sides = self._sides_of(start)
         rows = self._single.new_rows() if is_one else new_rows(self._model, len(targets))
@@ -149,7 +170,7 @@ class LegsEngine(Engine):
         table, start_sides = self._table, self._sides_of(start)
         two_sided = np.flatnonzero(table.home_sides[0])
         start_poses = np.broadcast_to(self._single.home if start is None else start.rows.poses, targets.shape).copy()
-        for changed in _subsets(two_sided.tolist()):
+        for changed in subsets(two_sided.tolist()):
             sides, rows = (
                 np.repeat(start_sides, len(targets) // len(start_sides), axis=0),
                 new_rows(self._model, len(targets)),
@@ -205,14 +226,18 @@ class LegsEngine(Engine):
 
     def _kept_projections(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
         """The UNSURE projections to keep: the fallback neither reaches their targets nor comes nearer."""
+        return np.asarray((rows.status == UNSURE) & ~self._is_nearer(fallback, rows, options))
+
+    def _is_nearer(self, others: Rows, rows: Rows, options: Options) -> Mask:
+        """True where others reach targets that rows do not, or come nearer and hold no less, (n,)."""
         length = options.rotation_length or self._model.mechanism.rotation_length
-        projected, other = (
+        distances, other_distances = (
             np.hypot(batch.measures[:, POSITION_ERROR], length * batch.measures[:, ROTATION_ERROR])
-            for batch in (rows, fallback)
+            for batch in (rows, others)
         )
-        nearer = (fallback.status == PROJECTED) & (other < projected - TOLERANCES.position * self._model.length)
-        better = (fallback.status == REACHED) | (nearer & (fallback.holds >= rows.holds))
-        return np.asarray((rows.status == UNSURE) & ~better)
+        is_nearer = other_distances < distances - TOLERANCES.position * self._model.length
+        is_nearer = (others.status == PROJECTED) & is_nearer & (others.holds >= rows.holds)
+        return np.asarray((rows.status != REACHED) & ((others.status == REACHED) | is_nearer))
 
     def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
         """As `Engine.prepared`; None if actuators may turn more than once, and are counted from a start."""
@@ -434,13 +459,3 @@ class LegsEngine(Engine):
         if start is not None:
             count_turns(self._model, start.rows.actuators, rows)
         return True
-
-
-MOST_CHANGED = 64
-"""Most working modes that are looked through."""
-
-
-def _subsets(legs: list[int]) -> Iterator[list[int]]:
-    """The subsets of some legs but the empty one, the smallest first, up to `MOST_CHANGED`."""
-    every = chain.from_iterable(combinations(legs, n) for n in range(1, len(legs) + 1))
-    return (list(subset) for subset in islice(every, MOST_CHANGED))

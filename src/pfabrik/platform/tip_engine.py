@@ -40,6 +40,12 @@ def read_at_tip(model: Model) -> Model | None:
     return read if is_better else None
 
 
+def measured(model: Model) -> Model:
+    """The machine whose legs measure targets: `read_at_tip` where there is one, but with a clearance between links."""
+    read = read_at_tip(model) if model.mechanism.clearance is None else None
+    return model if read is None else read
+
+
 def _with_tip(mechanism: Mechanism, length: float) -> Mechanism:
     """A mechanism with one joint more, the last, at the reference point, as its end effector; of the same length L."""
     name = "tip"
@@ -47,7 +53,7 @@ def _with_tip(mechanism: Mechanism, length: float) -> Mechanism:
         name += "'"
     connects, at = (mechanism.end_effector, f"beyond {name}"), mechanism.reference_point
     tip = Joint(name, "revolute", connects, at=at, axis=(0.0, 0.0, 1.0))
-    read = mechanism._with(joints=(*mechanism.joints, tip), end_effector=name, shapes=(), ignore=())
+    read = mechanism._with(joints=(*mechanism.joints, tip), end_effector=name, shapes=(), ignore=(), clearance=None)
     numbers = home_numbers(read).copy()
     numbers[0] = length
     return with_numbers(read, numbers)
@@ -71,7 +77,7 @@ class TipEngine(Engine):
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """As `InverseEngine.answer`."""
-        return self._with_rotations(self.at_tip.answer(targets, _at_tip(start), options, keep_mode=keep_mode))
+        return self._with_rotations(self.at_tip.answer(targets, start_at_tip(start), options, keep_mode=keep_mode))
 
     def follow(
         self,
@@ -81,17 +87,17 @@ class TipEngine(Engine):
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """As `InverseEngine.follow`."""
-        return self._with_rotations(self.at_tip.follow(targets, _at_tip(start), options, on_progress))
+        return self._with_rotations(self.at_tip.follow(targets, start_at_tip(start), options, on_progress))
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Iterator[Attempt]:
         """As `InverseEngine.attempts`."""
-        return self.at_tip.attempts(target, _at_tip(start), options, keep_mode=keep_mode)
+        return self.at_tip.attempts(target, start_at_tip(start), options, keep_mode=keep_mode)
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """As `Engine.advance`."""
-        at_start = _at_tip(start)
+        at_start = start_at_tip(start)
         assert at_start is not None
         return self._with_rotations(self.at_tip.advance(targets, at_start))
 
@@ -119,7 +125,7 @@ class TipEngine(Engine):
         return Configurations(rows, coordinates)
 
 
-def _at_tip(start: Configurations | None) -> Configurations | None:
+def start_at_tip(start: Configurations | None) -> Configurations | None:
     """Configurations of the body as those of the point, which has no rotation."""
     if start is None:
         return None

@@ -25,6 +25,7 @@ from ..kernels.platform.search_records import Starts
 from ..model import model_of
 from ..motion.displacements import home_coordinates
 from ..options import Options
+from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
 from .exploring import Explorer, Tell
 from .orientations import least_of_all
@@ -67,7 +68,7 @@ class MapQuestion:
     @property
     def has_margins(self) -> bool:
         """True if closed forms give margins; else points are solved one by one, and only known as reached or not."""
-        return self.hold == "orientation" and not model_of(self.mechanism).why_poses_do_not_suffice
+        return self.hold == "orientation" and not measured(model_of(self.mechanism)).why_poses_do_not_suffice
 
     @property
     def limits(self) -> Limits:

@@ -1,0 +1,65 @@
+"""Folds: configurations in which both solutions of a leg coincide, and which so belong to both of its working modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, combinations, islice
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..closure.configurations import Configurations, new_rows
+from ..derived import derived
+from ..kernels.legs import records as K
+from ..model import Model
+from ..tolerances import TOLERANCES
+from .answers import LegAnswers, columns_of_sides, sides_at
+from .coordinates import read_coordinates
+
+MOST_CHANGED = 64
+"""Most working modes that are looked through."""
+
+
+def subsets(legs: list[int]) -> Iterator[list[int]]:
+    """The subsets of some legs but the empty one, the smallest first, up to `MOST_CHANGED`."""
+    every = chain.from_iterable(combinations(legs, n) for n in range(1, len(legs) + 1))
+    return (list(subset) for subset in islice(every, MOST_CHANGED))
+
+
+def starts_beside(model: Model, start: Configurations | None) -> Iterator[tuple[Mask, LegAnswers]]:
+    """A start, or home, on the other sides that legs may take there, and which of its rows are on such a fold."""
+    if start is None:
+        if not _home_folds(model):
+            return
+        rows, coordinates = new_rows(model, 1), np.zeros((1, len(model.mechanism.coordinates)))
+        rows.poses[:], rows.actuators[:] = model.mechanism.home_pose, model.path_closure.actuators(coordinates)
+        start = LegAnswers(rows, coordinates, model.legs.home_sides)
+    sides = sides_at(model, start)
+    folded = _folded(model, start.rows.poses, sides)
+    for changed in subsets(np.flatnonzero(folded.any(axis=0)).tolist()):
+        others = sides.copy()
+        others[:, changed] *= -1.0
+        yield np.asarray(folded[:, changed].all(axis=1)), LegAnswers(start.rows, start.coordinates, others)
+
+
+@derived
+def _home_folds(model: Model) -> bool:
+    """True if home is on a fold."""
+    return bool(_folded(model, model.mechanism.home_pose[None], model.legs.home_sides).any())
+
+
+def _folded(model: Model, poses: Floats, sides: Floats) -> Mask:
+    """True for legs whose two solutions coincide at poses (n, 4, 4) [length], (n, legs)."""
+    table, folded = model.legs, np.zeros(sides.shape, bool)
+    two_sided, columns = columns_of_sides(model)
+    is_on_redundant = table.legs["kind"][two_sided] != K.REDUNDANT
+    for group in (~is_on_redundant, is_on_redundant):
+        q = np.zeros((2, len(sides), len(model.path_closure.scale)))
+        for factor, values in zip((1.0, -1.0), q, strict=True):
+            candidate = sides.copy()
+            candidate[:, two_sided[group]] *= factor
+            read_coordinates(table, poses, candidate, values)
+        turns = np.where(model.path_closure.turning[columns] > 0.0, 2.0 * np.pi, np.inf)
+        apart = np.abs(np.subtract(*q)[:, columns])
+        folded[:, two_sided[group]] = (np.minimum(apart, np.abs(turns - apart)) <= TOLERANCES.same_mode)[:, group]
+    return folded
