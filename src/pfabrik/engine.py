@@ -13,7 +13,8 @@ from .description.mechanism import Mechanism
 from .model import Model, model_of
 from .options import USUAL, Options
 from .platform.legs_engine import LegsEngine
-from .platform.tip_engine import TipEngine, read_at_tip
+from .platform.seeds import seeds_of_other_assemblies
+from .platform.tip_engine import TipEngine, measured, read_at_tip
 from .reaching.solve import ReachingEngine
 
 
@@ -33,6 +34,16 @@ def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Inverse
     """
     nearest = options.exact and options.projection == "nearest"
     return engine_of(mechanism) if nearest or not positions_express(mechanism) else _reaching(model_of(mechanism))
+
+
+def knows_all_modes(mechanism: Mechanism) -> bool:
+    """True if closed forms list every configuration on a target, or if a chain without loops is searched as a whole."""
+    model = model_of(mechanism)
+    if measured(model) is not model:
+        return True
+    if not model.has_legs:
+        return is_chain(model)
+    return not model.legs.is_completed or not len(seeds_of_other_assemblies(model).poses)
 
 
 @derived

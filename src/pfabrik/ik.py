@@ -7,11 +7,14 @@ import numpy as np
 from .answers.answer_fields import PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
+from .closure.closure_engine import close_on_targets, to_answers
 from .closure.configurations import Configurations
+from .closure.parasitic import has_parasitic_motion
 from .description.mechanism import Mechanism
-from .engine import inverse_engine_of
+from .engine import engine_of, inverse_engine_of, knows_all_modes
 from .errors import InvalidArgument
 from .kernels.rows import HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
+from .model import model_of
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
 from .tolerances import TOLERANCES
@@ -48,9 +51,10 @@ def solve_ik(
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
     begin = start_of(mechanism, start, shape)
-    solutions = inverse_engine_of(mechanism, options).answer(
-        targets, begin, options, keep_mode=keeps_mode(options, begin)
-    )
+    keep_mode = keeps_mode(options, begin)
+    solutions = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keep_mode)
+    if not keep_mode:
+        solutions = _reach_missed(mechanism, solutions, targets, begin, options)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
@@ -60,6 +64,28 @@ def solve_ik(
     if begin is not None and isinstance(start, Solution) and start._request is not None:
         solutions = _prefer_start(mechanism, solutions, request, begin, start._request)
     return Solution(mechanism, solutions, shape, request)
+
+
+def _reach_missed(
+    mechanism: Mechanism, solutions: Configurations, targets: Floats, start: Configurations | None, options: Options
+) -> Configurations:
+    """The solutions, with the targets reached that closing the loops in joint coordinates reaches.
+
+    From the start, then from the answers, these leg by leg. For machines with modes that no engine enumerates.
+    """
+    model, engine = model_of(mechanism), engine_of(mechanism)
+    for from_answers in (False, True):
+        rows = np.flatnonzero((solutions.rows.status == PROJECTED) & ~solutions.rows.certain)
+        if not len(rows) or knows_all_modes(mechanism):
+            break
+        begin = solutions.at(rows) if from_answers else start if start is None or len(start) == 1 else start.at(rows)
+        leg_by_leg = from_answers and not model.has_legs and has_parasitic_motion(model.path_closure)
+        closing = close_on_targets(model, targets[rows], begin, leg_by_leg=leg_by_leg)
+        found = to_answers(model, closing, targets[rows], np.full(len(rows), HOLD_NOTHING), options)
+        reached = np.flatnonzero((found.rows.status == REACHED) & engine.as_configurations(closing).is_within_limits)
+        if len(reached):
+            solutions = solutions.with_rows(rows[reached], found.at(reached))
+    return solutions
 
 
 def _prefer_start(

@@ -34,7 +34,7 @@ from .engine_contract import Engine
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .projection import ProjectionMode, held_parts, project, projection_modes, projection_multipliers
 from .stretched import BentConfiguration
-from .target_closing import STEPS, STRANGE, close_below, reach
+from .target_closing import STEPS, STRANGE, close_below, reach, reach_once
 
 
 class ClosureEngine(Engine):
@@ -178,6 +178,13 @@ class ClosureEngine(Engine):
         closure, coordinates = self.model.closure, coordinates_for(self.model, start, len(values))
         closing = nearest_values(closure, coordinates, values, has_start=start is not None)
         return forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
+
+
+def close_on_targets(model: Model, targets: Floats, start: Configurations | None, *, leg_by_leg: bool) -> Closing:
+    """Close the loops with the platform on targets (n, 4, 4), in any mode; from one start or each from its own."""
+    begin = start_coordinates(model, start)
+    begin = begin if len(begin) > 1 else np.repeat(begin, len(targets), axis=0)
+    return reach_once(model.path_closure, targets, begin, platform_poses(model.mechanism, begin), leg_by_leg)
 
 
 def start_coordinates(model: Model, start: Configurations | None) -> Floats:

@@ -15,7 +15,7 @@ from ..tolerances import TOLERANCES
 from .close import HELD, Closing, close
 from .effort import starts_within, steps_per_continuation_step, steps_within
 from .multistart import random_feasible
-from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion
+from .parasitic import asks_too_much, differences, follows_task, has_parasitic_motion, is_flipped
 from .random_starts import random_coordinates
 
 CONTINUATION_STEPS = 8
@@ -76,6 +76,23 @@ def reach(closure: Closure, targets: Floats, start: Floats, begin: Floats, keep_
         if asks_too_much(closure) or len(random_feasible(closure)[0]) < NEARBY:
             completed = task.completed(targets, begin)
             _search_from_random(closure, best, np.arange(len(targets)), completed, held, is_pose_fixed=False)
+    return best
+
+
+def reach_once(closure: Closure, targets: Floats, start: Floats, begin: Floats, leg_by_leg: bool) -> Closing:
+    """Close all loops on their targets from configurations (n, columns) with platforms (n, 4, 4).
+
+    What the task leaves open of a pose is expected as it is there. With `leg_by_leg`, where that fails, each leg is
+    searched for alone at the pose expected, whatever the branches of the others; once all are near, the pose follows.
+    """
+    poses, held = closure.task.completed(targets, begin), closure.task.held
+    best = close_below(closure, start, poses, held)
+    rows = np.flatnonzero(~best.feasible)
+    if leg_by_leg and len(rows):
+        near = close_below(closure, start[rows], poses[rows], HELD)
+        _search_from_random(closure, near, np.arange(len(rows)), poses[rows], HELD, is_pose_fixed=True)
+        best.put_better(rows, close_below(closure, near.coordinates, poses[rows], held))
+    best.gaps[is_flipped(closure, best.poses)] = np.inf
     return best
 
 

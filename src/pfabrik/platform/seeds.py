@@ -48,6 +48,9 @@ SEEDS_PER_MODE, RARE_BONUS = 4, 0.2
 mode may have a small component of its own."""
 
 
+JOINT_PLACES = 12
+"""Places of an implicit joint, evenly over its range, from which it is solved for: a hinge has few solutions."""
+
 DECIMALS = 6
 """Decimals of the places of legs [L]: aligned ones differ by rounding."""
 
@@ -88,7 +91,27 @@ def seeds_of_other_assemblies(model: Model) -> Starts:
         rows.measures,
     )
     error = np.abs(in_lengths(rows.poses, 1.0 / length) - seeds.poses).max(axis=(1, 2))
-    return take(seeds, np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
+    others = take(seeds, np.flatnonzero((rows.status != REACHED) | (error > TOLERANCES.same_mode)))
+    return Starts(*(np.concatenate(both) for both in zip(others, _spread_joints(model), strict=True)))
+
+
+def _spread_joints(model: Model) -> Starts:
+    """Home with one implicit joint after the other all over its range, where the task sets the whole pose.
+
+    Such a joint has few solutions, to which seeds near home may all be on one side.
+    """
+    table, home = model.legs, home_start(model)
+    if table.is_partial:
+        return no_starts(table)
+    joints = table.implicit_joints
+    legs = np.repeat(joints["leg"], JOINT_PLACES)
+    ends = (np.clip(joints[end], -np.pi, np.pi) for end in ("lo", "hi"))
+    values = (joints["sense"] * np.linspace(*ends, JOINT_PLACES, endpoint=False)).T.ravel()
+    poses, q, sides = (
+        np.repeat(array, len(legs), axis=0) for array in (home.poses, np.zeros_like(home.sides), home.sides)
+    )
+    sides[np.arange(len(legs)), legs] = values
+    return Starts(poses, q, sides)
 
 
 def _random_feasible(model: Model, rng: np.random.Generator, n: int, radius: float) -> Starts:
