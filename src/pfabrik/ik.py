@@ -7,6 +7,7 @@ import numpy as np
 from .answers.answer_fields import PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
+from .arrays import Floats
 from .closure.closure_engine import close_on_targets, to_answers
 from .closure.configurations import Configurations
 from .closure.parasitic import has_parasitic_motion
