@@ -14,8 +14,8 @@ class Status(IntEnum):
     """The status of an answer; the largest of a batch is the worst.
 
     REACHED : on the target, closed and within every limit.
-    PROJECTED : near the target, closed and within every limit; no configuration that reaches it was found, and where the
-        answer is `certified` none exists.
+    PROJECTED : near the target, closed and within every limit; no configuration that reaches it was found, and where
+        the answer is `certified` none exists.
     EXCEEDED : on the target and closed, but beyond a limit; `assembly_modes` and `working_modes` search for such.
     FAILED : no feasible configuration was found.
     INVALID : the target is no pose, or not finite; only if such rows are to be marked.
