@@ -54,13 +54,15 @@ def solve_ik(
     begin = start_of(mechanism, start, shape)
     keep_mode = keeps_mode(options, begin)
     solutions = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keep_mode)
-    if not keep_mode:
-        solutions = _reach_missed(mechanism, solutions, targets, begin, options)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
     if not is_missed:
         return Solution(mechanism, solutions, shape)
+    if not keep_mode:
+        solutions = _reach_missed(mechanism, solutions, targets, begin, options)
+        if (solutions.rows.status == REACHED).all():
+            return Solution(mechanism, solutions, shape)
     request = PoseRequest(targets.copy(), options.hold, options.rotation_length)
     if begin is not None and isinstance(start, Solution) and start._request is not None:
         solutions = _prefer_start(mechanism, solutions, request, begin, start._request)

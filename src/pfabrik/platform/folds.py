@@ -26,26 +26,30 @@ def subsets(legs: list[int]) -> Iterator[list[int]]:
     return (list(subset) for subset in islice(every, MOST_CHANGED))
 
 
-def starts_beside(model: Model, start: Configurations | None) -> Iterator[tuple[Mask, LegAnswers]]:
+def starts_beside(model: Model, start: Configurations | None) -> list[tuple[Mask, LegAnswers]]:
     """A start, or home, on the other sides that legs may take there, and which of its rows are on such a fold."""
-    if start is None:
-        if not _home_folds(model):
-            return
-        rows, coordinates = new_rows(model, 1), np.zeros((1, len(model.mechanism.coordinates)))
-        rows.poses[:], rows.actuators[:] = model.mechanism.home_pose, model.path_closure.actuators(coordinates)
-        start = LegAnswers(rows, coordinates, model.legs.home_sides)
-    sides = sides_at(model, start)
+    return _beside(home_answer(model) if start is None else start, model)
+
+
+@derived
+def _beside(start: Configurations, model: Model) -> list[tuple[Mask, LegAnswers]]:
+    """As `starts_beside`; kept with the start, from which many targets may be asked for."""
+    sides, found = sides_at(model, start), []
     folded = _folded(model, start.rows.poses, sides)
     for changed in subsets(np.flatnonzero(folded.any(axis=0)).tolist()):
         others = sides.copy()
         others[:, changed] *= -1.0
-        yield np.asarray(folded[:, changed].all(axis=1)), LegAnswers(start.rows, start.coordinates, others)
+        is_folded = np.asarray(folded[:, changed].all(axis=1))
+        found.append((is_folded, LegAnswers(start.rows, start.coordinates, others)))
+    return found
 
 
 @derived
-def _home_folds(model: Model) -> bool:
-    """True if home is on a fold."""
-    return bool(_folded(model, model.mechanism.home_pose[None], model.legs.home_sides).any())
+def home_answer(model: Model) -> LegAnswers:
+    """Home as an answer."""
+    rows, coordinates = new_rows(model, 1), np.zeros((1, len(model.mechanism.coordinates)))
+    rows.poses[:], rows.actuators[:] = model.mechanism.home_pose, model.path_closure.actuators(coordinates)
+    return LegAnswers(rows, coordinates, model.legs.home_sides)
 
 
 def _folded(model: Model, poses: Floats, sides: Floats) -> Mask:

@@ -28,8 +28,9 @@ from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, answer_coordinates, replaced, sides_at, start_coordinates_of
 from .coordinates import joint_coordinates
-from .folds import starts_beside, subsets
+from .folds import home_answer, starts_beside, subsets
 from .forward import forward_kinematics, project_values
+from .keep import kept
 from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
@@ -76,15 +77,28 @@ class LegsEngine(Engine):
         `nearby` by a search around the start alone.
         """
         answers = self._answer(targets, start, options, keep_mode=keep_mode, nearby=nearby)
-        if not keep_mode or not self._table.has_sides or (answers.rows.status == REACHED).all():
+        is_closed = isinstance(answers, LegAnswers) and answers.q_proximal is None
+        if not keep_mode or not self._table.has_sides or (is_closed and (answers.rows.status == REACHED).all()):
             return answers
+        answers = self._kept(answers, targets, start, options)
         for is_folded, begin in starts_beside(self._model, start):
             others = self._answer(targets, begin, options, keep_mode=True, nearby=nearby)
+            others = self._kept(others, targets, begin, options)
             better = np.flatnonzero(is_folded & self._is_nearer(others.rows, answers.rows, options))
             if len(better):
                 replaced = answers.with_others if isinstance(answers, LegAnswers) else answers.with_rows
                 answers = replaced(better, others.at(better))
         return answers
+
+    def _kept(
+        self, answers: Configurations, targets: Floats, start: Configurations | None, options: Options
+    ) -> Configurations:
+        """As `keep.kept`."""
+
+        def answer(target: Floats, begin: Configurations) -> Configurations:
+            return self._answer(target, begin, options, keep_mode=True, nearby=True)
+
+        return kept(self._model, answers, targets, home_answer(self._model) if start is None else start, answer)
 
     def _answer(
         self,

@@ -105,8 +105,8 @@ def _spread_joints(model: Model) -> Starts:
         return no_starts(table)
     joints = table.implicit_joints
     legs = np.repeat(joints["leg"], JOINT_PLACES)
-    ends = (np.clip(joints[end], -np.pi, np.pi) for end in ("lo", "hi"))
-    values = (joints["sense"] * np.linspace(*ends, JOINT_PLACES, endpoint=False)).T.ravel()
+    lo, hi = (np.clip(joints[end], -np.pi, np.pi) for end in ("lo", "hi"))
+    values = (joints["sense"] * np.linspace(lo, hi, JOINT_PLACES, endpoint=False)).T.ravel()
     poses, q, sides = (
         np.repeat(array, len(legs), axis=0) for array in (home.poses, np.zeros_like(home.sides), home.sides)
     )

@@ -1,0 +1,56 @@
+"""Answers that have left the sides of their start, where the mode is to be kept: led there in small steps instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..closure.configurations import Configurations
+from ..kernels.rows import HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
+from ..model import Model
+from ..poses import between
+from .answers import LegAnswers, sides_at
+from .branch import same_branch
+
+Answer = Callable[[Floats, Configurations], Configurations]
+"""Answers one target (1, 4, 4) around a start, in its working mode."""
+
+FIRST_STEP, LAST_STEP = 1 / 8, 1 / 1024
+"""Shares of the way to a target: the first step, and the step below which a mode is taken to end."""
+
+
+def kept(
+    model: Model, answers: Configurations, targets: Floats, start: Configurations, answer: Answer
+) -> Configurations:
+    """The answers, with those on other sides than their start replaced by what small steps reach."""
+    sides = sides_at(model, start)
+    has_left = (answers.rows.status <= PROJECTED) & ~_same_sides(model, answers, sides)
+    for row in np.flatnonzero(has_left):
+        place = np.array([row])
+        begin, begin_sides = (start, sides) if len(start) == 1 else (start.at(place), sides[place])
+        led = _led(model, targets[place], begin, begin_sides, answer)
+        answers = answers.with_others(place, led) if isinstance(answers, LegAnswers) else answers.with_rows(place, led)
+    return answers
+
+
+def _same_sides(model: Model, answers: Configurations, sides: Floats) -> Mask:
+    """True where no leg with two solutions is on another side than in `sides`, (n,)."""
+    return same_branch(sides_at(model, answers), sides * (model.legs.home_sides != 0.0))
+
+
+def _led(model: Model, target: Floats, start: Configurations, sides: Floats, answer: Answer) -> Configurations:
+    """The answer to one target as far as steps from the start lead to it, PROJECTED where they end before it."""
+    begin, last, done, step = start.rows.poses, answer(start.rows.poses, start), 0.0, FIRST_STEP
+    while done < 1.0 and step >= LAST_STEP:
+        trial = answer(between(begin, target, done + step), last)
+        if trial.rows.status[0] == REACHED and _same_sides(model, trial, sides)[0]:
+            last, done = trial, done + step
+        else:
+            step *= 0.5
+    if done < 1.0:
+        measures = last.rows.measures
+        measures[:, POSITION_ERROR], measures[:, ROTATION_ERROR] = model.task.errors(last.rows.poses, target)
+        last.rows.status[:], last.rows.counters[:, HOLD] = PROJECTED, HOLD_NOTHING
+    return last
