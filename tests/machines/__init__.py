@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache, partial
+from pathlib import Path
 
 from pfabrik import Mechanism, catalog, load
 
@@ -31,15 +32,21 @@ EVERY: dict[str, Callable[[], Mechanism]] = {
 }
 """Every machine of the catalogue and of the tests but trees."""
 
+FILES: dict[str, Callable[[], Mechanism]] = {
+    f"files.{path.stem}": partial(load, path) for path in sorted(Path(__file__).with_name("files").glob("*.toml"))
+}
+"""Machines of kinds that answers once were wrong for, as files."""
+
 
 @cache
 def machine(name: str) -> Mechanism:
     """A machine by its name in `EVERY`, or in one of the tables; made once."""
-    return (TRUNKS | CLOSED | ON_ARMS | MACHINES | EVERY)[name]()
+    return (TRUNKS | CLOSED | ON_ARMS | MACHINES | FILES | EVERY)[name]()
 
 
 __all__ = [
     "EVERY",
+    "FILES",
     "MACHINES",
     "TRUNKS",
     "five_bar",

@@ -101,9 +101,11 @@ class TipEngine(Engine):
         assert at_start is not None
         return self._with_rotations(self.at_tip.advance(targets, at_start))
 
-    def forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
         """As `Engine.forward`."""
-        return self.usual.forward(values, start, tolerance)
+        return self.usual.forward(values, start, tolerance, keep_mode=keep_mode)
 
     def as_configurations(self, closing: Closing) -> Configurations:
         """As `Engine.as_configurations`."""
