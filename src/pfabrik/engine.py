@@ -38,7 +38,11 @@ def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> Inverse
 
 def knows_all_modes(mechanism: Mechanism) -> bool:
     """True if closed forms list every configuration on a target, or if a chain without loops is searched as a whole."""
-    model = model_of(mechanism)
+    return _knows_all_modes(model_of(mechanism))
+
+
+@derived
+def _knows_all_modes(model: Model) -> bool:
     if measured(model) is not model:
         return True
     if not model.has_legs:

@@ -59,7 +59,7 @@ def solve_ik(
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
     if not is_missed:
         return Solution(mechanism, solutions, shape)
-    if not keep_mode:
+    if not keep_mode and not knows_all_modes(mechanism):
         solutions = _reach_missed(mechanism, solutions, targets, begin, options)
         if (solutions.rows.status == REACHED).all():
             return Solution(mechanism, solutions, shape)
@@ -79,7 +79,7 @@ def _reach_missed(
     model, engine = model_of(mechanism), engine_of(mechanism)
     for from_answers in (False, True):
         rows = np.flatnonzero((solutions.rows.status == PROJECTED) & ~solutions.rows.certain)
-        if not len(rows) or knows_all_modes(mechanism):
+        if not len(rows):
             break
         begin = solutions.at(rows) if from_answers else start if start is None or len(start) == 1 else start.at(rows)
         leg_by_leg = from_answers and not model.has_legs and has_parasitic_motion(model.path_closure)

@@ -77,8 +77,11 @@ class LegsEngine(Engine):
         `nearby` by a search around the start alone.
         """
         answers = self._answer(targets, start, options, keep_mode=keep_mode, nearby=nearby)
-        is_closed = isinstance(answers, LegAnswers) and answers.q_proximal is None
-        if not keep_mode or not self._table.has_sides or (is_closed and (answers.rows.status == REACHED).all()):
+        if not keep_mode or not self._table.has_sides:
+            return answers
+        status = answers.rows.status
+        is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
+        if isinstance(answers, LegAnswers) and answers.q_proximal is None and not is_missed:
             return answers
         answers = self._kept(answers, targets, start, options)
         for is_folded, begin in starts_beside(self._model, start):
@@ -94,6 +97,9 @@ class LegsEngine(Engine):
         self, answers: Configurations, targets: Floats, start: Configurations | None, options: Options
     ) -> Configurations:
         """As `keep.kept`."""
+
+        if isinstance(answers, LegAnswers) and (answers.sides * self._sides_of(start) >= 0.0).all():
+            return answers
 
         def answer(target: Floats, begin: Configurations) -> Configurations:
             return self._answer(target, begin, options, keep_mode=True, nearby=True)
