@@ -132,7 +132,9 @@ def stretched_joint(model: Model, q: Floats) -> tuple[ActiveLimit, ...]:
     closure, twist = first_order(model.mechanism, q)
     values, right = right_singular(closure)
     motions = right[0, np.count_nonzero(values > TOLERANCES.rank) :]
-    lost = np.linalg.svd(motions @ twist[0].T)[0][:, freedoms - 1] @ motions
+    if not len(motions):  # so folded that nothing moves, to first order
+        return ()
+    lost = np.linalg.svd(motions @ twist[0].T)[0][:, min(freedoms, len(motions)) - 1] @ motions
     coordinate = model.mechanism.coordinates[int(np.argmax(np.abs(graph_of(model.mechanism).rates.T @ lost)))]
     value = float(q[0, coordinate.column]) + coordinate.home
     return (ActiveLimit(coordinate.joint.name, "stretched", value, value, None, coordinate.place),)

@@ -75,6 +75,9 @@ class Fit:
             deviations = np.reshape(start.q, (-1, start.q.shape[-1])) - home_coordinates(start.mechanism)
             self._start = start_of(self.machine, deviations + home_coordinates(self.machine), start.shape)
         solution = self._assembled(self.parameters.values)[1]
+        if not solution and start is None and self._start is not None:  # measured in another frame, or too far off
+            self._start = self._last = None
+            solution = self._assembled(self.parameters.values)[1]
         self._start = copy(solution._configurations)
         bad = np.flatnonzero(np.ravel(solution.status) != Status.REACHED)
         if len(bad):
