@@ -52,7 +52,7 @@ def other_process(folder: Path, *line: str) -> None:
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where one quick run has written everything; in this process, where other tests have compiled the closed forms."""
+    """What one quick run writes. A campaign: CI runs the full reproduction, which checks the same."""
     made = tmp_path_factory.mktemp("reproduce")
     (made / "page.md").write_text(PAGE, encoding="utf-8")
     with contextlib.chdir(made):
@@ -72,7 +72,7 @@ def rows(folder: Path) -> Callable[[str], list[dict[str, str]]]:
 Rows = Callable[[str], list[dict[str, str]]]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_every_table_and_picture_is_written(folder: Path) -> None:
     names = {path.name for path in (folder / "out").iterdir()}
     assert names >= {"report.md", "efficacy.png", "efficiency.png", "robustness.png", *SUMMARIES}
@@ -80,7 +80,7 @@ def test_every_table_and_picture_is_written(folder: Path) -> None:
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_round_trip_is_exact_by_default(rows: Rows) -> None:
     default = [row for row in rows("efficacy.csv") if row["options"] == "default"]
     assert [row["mechanism"] for row in default] == list(MACHINES)
@@ -90,7 +90,7 @@ def test_the_round_trip_is_exact_by_default(rows: Rows) -> None:
         assert float(row["orientation_rmse_deg"] or 0.0) <= 1e-8
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_round_trip_with_the_papers_tolerance_is_as_good_as_the_papers(rows: Rows) -> None:
     printed = {case.key: case.printed for case in cases()}
     for row in rows("efficacy.csv"):
@@ -99,7 +99,7 @@ def test_the_round_trip_with_the_papers_tolerance_is_as_good_as_the_papers(rows:
             assert float(row["orientation_rmse_deg"] or 0.0) <= 10 * (printed[row["mechanism"]].orientation_rmse or 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", SUMMARIES)
 def test_every_answer_of_every_experiment_is_feasible(rows: Rows, name: str) -> None:
     for row in rows(name):
@@ -108,7 +108,7 @@ def test_every_answer_of_every_experiment_is_feasible(rows: Rows, name: str) -> 
             assert float(row[measure]) <= 1e-9, row
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("key", MACHINES)
 def test_every_step_out_of_reach_is_feasible_and_continuous(rows: Rows, key: str) -> None:
     length = pf.load(key).characteristic_length
@@ -123,7 +123,7 @@ def test_every_step_out_of_reach_is_feasible_and_continuous(rows: Rows, key: str
         assert size <= 3.0 * jumps[kind, "inside"]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("key", MACHINES)
 def test_projections_are_near_the_nearest_feasible_pose_and_never_nearer(rows: Rows, key: str) -> None:
     """The 5-bar's are farther: what its chains agree on beside a stop of a hinge is aside of the way to the target."""
@@ -134,7 +134,7 @@ def test_projections_are_near_the_nearest_feasible_pose_and_never_nearer(rows: R
         assert 1.0 - 1e-5 <= float(row["position_error"]) / min(found) <= (1.5 if key == "five_bar" else 1.1)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("key", MACHINES)
 def test_exact_projections_come_as_near_as_a_general_optimiser(rows: Rows, key: str) -> None:
     """Poses of the target's orientation, where every one of these targets has one that is feasible."""
@@ -144,7 +144,7 @@ def test_exact_projections_come_as_near_as_a_general_optimiser(rows: Rows, key: 
     assert max(ratios) <= 1.01
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_every_random_target_is_reached_as_the_closed_form_has_it(rows: Rows) -> None:
     for row in rows("efficiency.csv"):
         if row["options"] == "default":
@@ -153,7 +153,7 @@ def test_every_random_target_is_reached_as_the_closed_form_has_it(rows: Rows) ->
             assert float(row["agreement"]) <= 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_page_changes_between_its_marks_only(folder: Path) -> None:
     text = (folder / "page.md").read_text(encoding="utf-8")
     assert text.startswith(f"# Title\n\nbefore\n\n{BEGIN}\n|")
@@ -162,7 +162,7 @@ def test_the_page_changes_between_its_marks_only(folder: Path) -> None:
     assert "position RMSE" in text
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_same_numbers_come_out_of_another_process(folder: Path, tmp_path: Path) -> None:
     other_process(tmp_path, "-c", STEPS, ".")
     names = {f"{part}_{cases()[0].key}.csv" for part in ("efficacy", "robustness")}
