@@ -8,7 +8,7 @@ from ..arrays import Floats, Mask
 from ..derived import derived
 from ..motion.closure import Closure
 from ..motion.mobility import generic_of
-from ..motion.walks import around_home
+from ..motion.walks import STEP, around_home
 from ..tolerances import TOLERANCES
 from .close import platform_poses
 
@@ -57,8 +57,9 @@ def has_parasitic_motion(closure: Closure) -> bool:
     mechanism = closure.mechanism
     poses = platform_poses(mechanism, around_home(mechanism))
     home = np.repeat(mechanism.home_pose[None], len(poses), axis=0)
-    kept = closure.task.completed(poses, home)
-    return bool((differences(closure, poses, kept) > TOLERANCES.same_mode).any())
+    kept, shares = closure.task.completed(poses, home), differences(closure, poses, home) / STEP
+    least = TOLERANCES.same_mode * np.minimum(shares**2, 1.0)  # such motion grows as the square of the way
+    return bool((differences(closure, poses, kept) > np.maximum(least, TOLERANCES.position)).any())
 
 
 def is_flipped(closure: Closure, poses: Floats) -> Mask:
