@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 Row = Mapping[str, Any]
+ROUNDING = "< 1e-09"
+"""What is below the tolerance of answers."""
 
 
 def write_csv(path: Path, rows: Sequence[Row]) -> None:
@@ -29,10 +31,12 @@ def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with a few digits; a dash where there is none."""
-    return "–" if value is None or value != value else f"{value:.{digits}g}"
+    """A number with a few digits, none of them of rounding; a dash where there is none."""
+    if value is None or value != value:
+        return "–"
+    return ROUNDING if 0.0 < abs(value) < 1e-9 else f"{value:.{digits}g}"
 
 
 def tiny(value: float) -> str:
     """A number of which only the size matters."""
-    return f"{value:.0e}" if value else "0"
+    return "0" if not value else ROUNDING if value < 1e-9 else f"{value:.0e}"
