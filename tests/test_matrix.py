@@ -185,3 +185,19 @@ def test_an_eighth_of_the_step_is_a_small_part_of_the_largest_change(name: str) 
         changes = np.abs(np.diff(track.actuators, axis=0) / actuator_units(m)).max(axis=1)
         largest.append(changes[~track.jumps[1:]].max() if largest else changes.max())
     assert largest[1] <= max(0.7 * largest[0], 2e-3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_path_that_comes_home_ends_there(name: str) -> None:
+    """Out of reach and back: home is reached, and but for a jump that is said the actuators are home's."""
+    m = machine(name)
+    end = targets_about(m, np.random.default_rng(5), 1, 0.6, 0.0)[0]
+    share = np.concatenate([np.linspace(0, 1, 13), np.linspace(1, 0, 13)])[:, None]
+    targets = np.repeat(m.home_pose[None], len(share), axis=0)
+    targets[:, :3, 3] += share * (end - m.home_pose)[:3, 3]
+    track = pf.track(m, targets)
+    assert track.status[-1] == Status.REACHED
+    mobility = pf.mobility(m)
+    if track.jumps.any() or mobility.uncontrolled or mobility.actuators > mobility.platform:
+        return
+    assert (np.abs(track.actuators[-1] - track.actuators[0]) / actuator_units(m)).max() <= 1e-5

@@ -97,28 +97,48 @@ def _kept_assembly(
     sign = float(assembly_signs(mechanism, kept.coordinates)[0])
     if not sign:
         return solutions
-    crossed = np.flatnonzero(assembly_signs(mechanism, solutions.coordinates) * sign < 0.0)
+    is_beyond = assembly_signs(mechanism, solutions.coordinates) * sign < 0.0
+    crossed = np.flatnonzero(is_beyond | (solutions.rows.status == PROJECTED))
     if not len(crossed):
         return solutions
     solutions = solutions.with_rows(crossed[:0], solutions.at(crossed[:0]))
-    for row in crossed:
-        before = np.flatnonzero(solutions.rows.status[:row] <= PROJECTED)[-1:]
-        kept = solutions.at(before) if len(before) else kept
-        target, begin, share, step = targets[row : row + 1], kept.rows.poses.copy(), 0.0, 0.5
-        while step > LEAST_STEP:
-            there = engine.advance(between(begin, target, share + step), kept)
-            if there.rows.status[0] == REACHED and assembly_signs(mechanism, there.coordinates)[0] * sign >= 0.0:
-                kept, share = there, share + step
-            else:
-                step *= 0.5
-        position, rotation = task_of(mechanism).errors(kept.rows.poses, target)
-        kept.rows.measures[:, POSITION_ERROR], kept.rows.measures[:, ROTATION_ERROR] = position, rotation
-        near = options.tolerance or TOLERANCES.position * mechanism.characteristic_length
-        is_near = (position <= near) & (rotation <= options.rotation_tolerance)
-        kept.rows.status[:] = np.where(is_near, REACHED, PROJECTED)
-        put(solutions.rows, [row], kept.rows)
-        solutions.coordinates[row] = kept.coordinates[0]
+    before = np.flatnonzero(solutions.rows.status[: crossed[0]] == REACHED)[-1:]
+    kept = solutions.at(before) if len(before) else kept
+    for row in range(crossed[0], len(targets)):  # the others were answered from a dead point, or beyond it
+        target = targets[row : row + 1]
+        answer = engine.answer(target, kept, options, keep_mode=True)
+        is_kept = assembly_signs(mechanism, answer.coordinates)[0] * sign > 0.0
+        if answer.rows.status[0] == REACHED and is_kept:
+            kept = answer
+        elif answer.rows.status[0] <= PROJECTED and not is_kept:
+            answer = _up_to_dead_point(mechanism, target, kept, sign, options)
+        put(solutions.rows, [row], answer.rows)
+        solutions.coordinates[row] = answer.coordinates[0]
     return solutions
+
+
+def _up_to_dead_point(
+    mechanism: Mechanism, target: Floats, start: Configurations, sign: float, options: Options
+) -> Configurations:
+    """The last configuration with the start's sign of assembly on the straight way to a target (1, 4, 4)."""
+    engine, begin, kept, share, step = (
+        engine_of(mechanism),
+        start.rows.poses.copy(),
+        start.at(np.zeros(1, int)),
+        0.0,
+        0.5,
+    )
+    while step > LEAST_STEP:
+        there = engine.advance(between(begin, target, share + step), kept)
+        if there.rows.status[0] == REACHED and assembly_signs(mechanism, there.coordinates)[0] * sign >= 0.0:
+            kept, share = there, share + step
+        else:
+            step *= 0.5
+    position, rotation = task_of(mechanism).errors(kept.rows.poses, target)
+    kept.rows.measures[:, POSITION_ERROR], kept.rows.measures[:, ROTATION_ERROR] = position, rotation
+    near = options.tolerance or TOLERANCES.position * mechanism.characteristic_length
+    kept.rows.status[:] = np.where((position <= near) & (rotation <= options.rotation_tolerance), REACHED, PROJECTED)
+    return kept
 
 
 def _continue_turns(mechanism: Mechanism, rows: Rows, start: Floats) -> None:

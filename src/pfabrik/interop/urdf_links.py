@@ -124,6 +124,9 @@ def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
             frames[joint.child] = frames[link] @ joint.frame
             outward.append(joint)
             links.append(joint.child)
+    apart = [name for name in names if name not in frames]
+    if apart:
+        raise fault("robot", f"links that do not hang on '{roots[0]}' ({', '.join(apart[:5])})", "a tree of all links")
     transmitted = dict.fromkeys(joint.get("name", "") for joint in root.iterfind("transmission/joint"))
     driven = [name for name in transmitted if name in link_of]
     return UrdfLinks(root.get("name", "mechanism"), roots[0], outward, frames, link_of, driven)
