@@ -353,7 +353,7 @@ def test_a_self_test_fails_where_the_machine_is_another(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler here")
-@pytest.mark.parametrize("standard", ["c++11", "c++20"])
+@pytest.mark.parametrize("standard", ["c++11", pytest.param("c++20", marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(
     ("name", "precision"), [("linear_delta", "float"), ("canfield", "double"), (AMBIGUOUS, "double")]
 )

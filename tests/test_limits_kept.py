@@ -42,6 +42,7 @@ PARALLEL_RODS = "".join(
     for side, y in (("L", 15), ("R", -15))
 )
 CONE = 'cone = { axis = [80, 0, -140], half_angle = 35, fixed_to = "platform" },'
+SLOW = ("snake60", "closure.Par4", "closure.H4")
 SPARES = {
     "hinges": ('type = "revolute", axis = [0, 1, 0]', "[-60, 60]", '["z", "tilt"]', BALL_AND_HINGE),
     "cranks": (
@@ -90,7 +91,7 @@ def assert_is_its_own_configuration(mechanism: Mechanism, answer: Solution) -> N
 
 
 @pytest.mark.skipif(INTERPRETED, reason="many searches")
-@pytest.mark.parametrize("name", [*EVERY, *SPARES])
+@pytest.mark.parametrize("name", [*(pytest.param(name, marks=pytest.mark.campaign) for name in EVERY), *SPARES])
 def test_the_joints_of_an_answer_keep_every_limit(name: str) -> None:
     is_spare = name in SPARES
     mechanism, rng, count = spare(name) if is_spare else machine(name), np.random.default_rng(2), 200 if is_spare else 8
@@ -112,7 +113,7 @@ def test_forward_kinematics_gives_the_distance_from_the_values_asked_for() -> No
 
 
 @pytest.mark.skipif(INTERPRETED, reason="many searches")
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.campaign] * (n in SLOW)) for n in EVERY])
 def test_what_stops_a_machine_has_a_name(name: str) -> None:
     mechanism = machine(name)
     for reach in pf.travel(pf.configuration(mechanism, home_coordinates(mechanism))):
