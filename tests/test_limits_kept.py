@@ -42,6 +42,7 @@ PARALLEL_RODS = "".join(
     for side, y in (("L", 15), ("R", -15))
 )
 CONE = 'cone = { axis = [80, 0, -140], half_angle = 35, fixed_to = "platform" },'
+SLOW = ("snake60", "closure.Par4", "closure.H4")
 SPARES = {
     "hinges": ('type = "revolute", axis = [0, 1, 0]', "[-60, 60]", '["z", "tilt"]', BALL_AND_HINGE),
     "cranks": (
@@ -112,9 +113,7 @@ def test_forward_kinematics_gives_the_distance_from_the_values_asked_for() -> No
 
 
 @pytest.mark.skipif(INTERPRETED, reason="many searches")
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.campaign] * ("4" in n or "60" in n)) for n in EVERY]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.campaign] * (n in SLOW)) for n in EVERY])
 def test_what_stops_a_machine_has_a_name(name: str) -> None:
     mechanism = machine(name)
     for reach in pf.travel(pf.configuration(mechanism, home_coordinates(mechanism))):
