@@ -9,7 +9,7 @@ from ..rotations import from_rotvec, to_rotvec, turning
 from .measurements import Measurements
 
 INSTRUMENT = ("frame", "tool")
-"""What a pose T_base_platform is seen through: T_instrument_base T_base_platform T_platform_target."""
+"""The frame and target of an instrument, which sees T_instrument_base T_base_platform T_platform_target."""
 
 ROUNDS = 20
 """Rounds in which frame and target are aligned to each other."""

@@ -12,7 +12,7 @@ from .sampled_lattice import codes, corners
 from .surface import crossed_edges
 
 HALVINGS = 10
-"""How often the way from a point within reach to one beyond is halved towards the border: loci may run along it."""
+"""Halvings of the way from a point within reach to one beyond, towards the border: loci may run along it."""
 
 
 def drawn_to_border(over: Workspace, places: Ints, step: Floats) -> tuple[Ints, Floats]:

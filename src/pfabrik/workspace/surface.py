@@ -180,7 +180,7 @@ def _segments(case: int, side: Sequence[int]) -> Iterator[tuple[Edge, Edge]]:
 
 
 def closeness(question: MapQuestion) -> float:
-    """How far inside the border vertices are at most [cells]."""
+    """Largest distance of vertices inside the border [cells]."""
     return CLOSE if question.has_margins else CLOSE_ONE_BY_ONE
 
 
