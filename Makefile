@@ -5,9 +5,9 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # What a run of the machines needs, and with it what tests and checks need.
 READY := .venv/.ready
 STAMP := .venv/.installed
-# The kernels, compiled in place where there is a C compiler; without one Numba compiles what is needed.
-MODULE := src/pfabrik/kernels/_compiled.json
-KERNELS := $(shell find src/pfabrik/kernels building -name '*.py' -o -name '*.c')
+# The kernels, compiled in place where there is a C compiler; without one they are plain Python.
+MODULE := build/kernels/.made
+KERNELS := $(shell find src/pfabrik/kernels src/pfabrik/to_c building -name '*.py' -o -name '*.[ch]')
 # Matrices are small here: threads of the linear algebra would only wait for each other, the more so where tests run in
 # parallel.
 export OPENBLAS_NUM_THREADS := 1
@@ -88,6 +88,7 @@ $(READY): pyproject.toml
 
 $(MODULE): $(READY) $(KERNELS)
 	@$(BIN)/python building/compile_kernels.py || [ $$? = 3 ]
+	@mkdir -p $(@D) && touch $@
 
 $(STAMP): $(READY)
 	@printf 'installing what tests and checks need ' >&2

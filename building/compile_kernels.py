@@ -1,61 +1,52 @@
 """Compile all kernels to one extension module, in place: `python building/compile_kernels.py`.
 
-Needs Numba and a C compiler with Python's headers; the module needs neither. Objects are kept in `build/kernels`, by
-what they are made of: after an edit only the kernels that depend on it are compiled again.
+Needs NumPy and a C compiler with Python's headers. Kernels are translated to C, in `build/kernels`; objects are kept
+there by what they are made of: after an edit only the files that depend on it are compiled again.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
-import json
 import os
+import re
 import shlex
 import subprocess
 import sys
 import sysconfig
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-os.environ["PFABRIK_KERNELS"] = "numba"
-os.environ.pop("NUMBA_DISABLE_JIT", None)
+BUILD = ROOT / "build" / "kernels"
+os.environ["PFABRIK_KERNELS"] = "python"
 sys.path.insert(0, str(ROOT / "src"))
-
-SPLIT = ("legs.", "platform.")
-"""Kernels of two processes: these share little with the others, and take about as long."""
 
 LEVELLED = ("legs.answer_blocks", "legs.margins_in_blocks", "clearance.capsule_clearance")
 """Kernels whose loops are vectors: compiled for each level of processors. On all others a level has no effect."""
 
+LEVELS = {
+    "v2": ["-march=x86-64-v2"],
+    "v3": ["-march=x86-64-v3"],
+    "v4": ["-march=x86-64-v4", "-mprefer-vector-width=512"],
+}
+FLAGS = ["-std=c99", "-O3", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+"""Without contraction the same arithmetic everywhere; what sets `errno` or traps could not be a vector."""
+
 UNABLE = 3
 """Exit code where no compiler is."""
 
-LEVELS = {"v2": ("x86-64-v2", ""), "v3": ("x86-64-v3", ""), "v4": ("x86-64-v4", "-prefer-256-bit")}
 
-
-class Part(NamedTuple):
-    """A kernel for one level: what it is made of, by hash, and what the table of the module says of it."""
+class Kernel(NamedTuple):
+    """What the table of the module says of a kernel."""
 
     name: str
-    level: str
-    triple: str
-    key: str
     takes: str
-
-    @property
-    def symbol(self) -> str:
-        return "_".join([self.name.replace(".", "_"), *([self.level] if self.level else [])])
-
-    @property
-    def place(self) -> Path:
-        return folder_for(self.triple) / f"{self.symbol}-{self.key[:16]}.o"
-
-
-def folder_for(triple: str) -> Path:
-    """Where objects are kept."""
-    return ROOT / "build" / "kernels" / triple
+    gives: str
+    words: int
+    group: str
 
 
 def compiler() -> list[str]:
@@ -63,67 +54,84 @@ def compiler() -> list[str]:
     return shlex.split(os.environ.get("CC", "clang" if os.name == "nt" else "cc"))
 
 
-def lacks() -> str:
-    """What is missing to build: a sentence, or nothing."""
+def macros() -> dict[str, str] | None:
+    """What the compiler defines for its platform, with Python's headers; None if there is no compiler."""
     include = sysconfig.get_path("include")
-    command = [*compiler(), "-E", f"-I{include}", "-x", "c", "-"]
+    command = [*compiler(), "-E", "-dM", f"-I{include}", "-x", "c", "-"]
     try:
         ran = subprocess.run(command, input="#include <Python.h>\n", capture_output=True, text=True, check=False)
     except OSError:
-        return f"there is no C compiler ({compiler()[0]})"
-    return f"the C compiler finds no Python.h in {include}: its package is python3-dev" if ran.returncode else ""
+        sys.stderr.write(f"kernels are not compiled: there is no C compiler ({compiler()[0]})\n")
+        return None
+    if ran.returncode:
+        sys.stderr.write(f"kernels are not compiled: the C compiler finds no Python.h in {include} (python3-dev)\n")
+        return None
+    return dict(re.findall(r"#define (\w+) ?(.*)", ran.stdout))
 
 
-def levels_of(triple: str, name: str) -> dict[str, tuple[str, str]]:
-    """Levels that a kernel is compiled for, with processor and features of each."""
-    if not triple.startswith("x86_64"):
-        return {"": ("apple-m1" if "apple" in triple else "generic", "")}
-    return LEVELS if name in LEVELLED else {"": LEVELS["v2"]}
+def code_of(value: Any) -> str:
+    """How `entry.c` reads an argument: numbers i, f, b; arrays with dimensions and bytes, in capitals if only read."""
+    if isinstance(value, tuple):
+        return "(" + "".join(map(code_of, value)) + ")"
+    if hasattr(value, "dtype"):
+        kind = "r" if value.dtype.names else value.dtype.kind
+        return f"{kind if value.flags.writeable else kind.upper()}{value.ndim}{value.dtype.itemsize};"
+    return "b" if isinstance(value, bool) else "i" if isinstance(value, int) else "f"
 
 
-def parts_for(triple: str) -> list[Part]:
-    """All that the module consists of."""
-    import llvmlite
-    import numba
-    from emit import code_of
+def words_of(t: Any) -> int:
+    """How many eight-byte words an argument takes."""
+    if isinstance(t, str):
+        return 1
+    return 1 + t.ndim if hasattr(t, "ndim") else sum(map(words_of, t.items))
 
-    from pfabrik.kernels._numba.cache import digest_for
+
+def entry(made: Any, symbol: str, spell: Any) -> tuple[str, int]:
+    """The function that `entry.c` calls, which takes arguments as words in memory; and how many."""
+    given, at = ["memory"] if made.allocates else [], 0
+    for t in made.arguments:
+        reads = {"i": f"words[{at}]", "b": f"words[{at}] != 0", "f": f"((const union number *)words)[{at}].number"}
+        if isinstance(t, str):
+            given.append(reads[t])
+        else:
+            star = "*" if hasattr(t, "ndim") else ""
+            given.append(f"{star}(const {spell.value(t)} *)(const void *)(words + {at})")
+        at += words_of(t)
+    call = f"{made.name}({', '.join(given)});"
+    call = call if made.gives == "n" else f"results[0] = {call}"
+    takes = "const integer *words, integer *results"
+    text = f"int {symbol}({takes});\n"
+    if made.allocates:
+        text += f"static void run_{symbol}(arena *memory, {takes}) {{\n    (void)results;\n    {call}\n}}\n"
+        call = f"return with_memory(run_{symbol}, words, results);"
+    else:
+        call += "\n    (void)results;\n    return 0;"
+    return f"{text}int {symbol}({takes}) {{\n    {call}\n}}\n", at
+
+
+def translate() -> tuple[dict[str, str], list[Kernel]]:
+    """C text by its group, and all kernels; one group is compiled for each level."""
     from pfabrik.kernels._shipped import name_of
     from pfabrik.kernels.ahead import KERNELS
+    from pfabrik.to_c import Program
 
-    own = hashlib.sha256((HERE / "emit.py").read_bytes()).hexdigest()
-    parts = []
-    for kernel, arguments in KERNELS:
-        name, takes = name_of(kernel.py_func), "".join(map(code_of, arguments))
-        for level, processor in levels_of(triple, name).items():
-            made_of = [own, digest_for(kernel.py_func), takes, triple, *processor]
-            made_of += [numba.__version__, llvmlite.__version__]
-            key = hashlib.sha256("\n".join(made_of).encode()).hexdigest()
-            parts.append(Part(name, level, triple, key, takes))
-    return parts
-
-
-def compile_parts(triple: str, is_first: bool) -> None:
-    """Compile what has no object yet of one half of the kernels, with a dot for each."""
-    from emit import Target, emit, lower
-
-    from pfabrik.kernels._shipped import name_of
-    from pfabrik.kernels.ahead import KERNELS
-
-    missing = [part for part in parts_for(triple) if not part.place.exists()]
-    for kernel, arguments in KERNELS:
-        name = name_of(kernel.py_func)
-        wanted = [part for part in missing if part.name == name]
-        if not wanted or name.startswith(SPLIT) != is_first:
-            continue
-        lowered = lower(kernel, arguments)
-        for part in wanted:
-            target = Target(triple, *levels_of(triple, name)[part.level])
-            data, n_words = emit(lowered, f"pf_{part.symbol}", target)
-            write(part.place.with_suffix(".json"), json.dumps([lowered.gives, n_words]).encode())
-            write(part.place, data)
-        sys.stderr.write(".")
-        sys.stderr.flush()
+    texts, table, host = {}, [], (HERE / "host.h").read_text(encoding="utf-8")
+    names = {kernel: name_of(kernel) for kernel, _ in KERNELS}
+    groups = {name: "blocks" if name in LEVELLED else name.partition(".")[0] for name in names.values()}
+    for group in dict.fromkeys(groups.values()):
+        program, entries = Program(), []
+        for kernel, arguments in KERNELS:
+            name = names[kernel]
+            if groups[name] != group:
+                continue
+            made = program.add(kernel, *arguments)
+            symbol = f"pf_{name.replace('.', '_')}"
+            text, words = entry(made, f"LEVELLED({symbol})" if group == "blocks" else symbol, program.spell)
+            entries.append(text.replace(f"run_LEVELLED({symbol})", f"run_{symbol}"))
+            table.append(Kernel(name, "".join(map(code_of, arguments)), made.gives, words, group))
+        head = "#define JOINED(a, b) a##_##b\n#define NAMED(a, b) JOINED(a, b)\n#define LEVELLED(a) NAMED(a, LEVEL)\n"
+        texts[group] = program.text("\n".join([host, head if group == "blocks" else "", *entries]))
+    return texts, table
 
 
 def write(path: Path, data: bytes) -> None:
@@ -134,86 +142,89 @@ def write(path: Path, data: bytes) -> None:
     os.replace(beside, path)
 
 
-def table(parts: list[Part], levels: list[str]) -> str:
+def table_of(kernels: list[Kernel], levels: list[str]) -> str:
     """The C text of the table of kernels."""
-    told = [json.loads(part.place.with_suffix(".json").read_text()) for part in parts]
-    lines = [f"int pf_{part.symbol}(const word *, word *);" for part in parts]
-    lines.append("static const struct kernel KERNELS[] = {")
-    for part, (gives, n_words) in zip(parts, told, strict=True):
-        level = levels.index(part.level) + 1 if part.level else 0
-        lines.append(f'    {{"{part.symbol}", pf_{part.symbol}, "{part.takes}", \'{gives}\', {n_words}, {level}}},')
-    n_arrays, names = max(part.takes.count(";") for part in parts), ", ".join(f'"{level}"' for level in levels) or "0"
+    rows = []
+    for kernel in kernels:
+        for k, level in enumerate(levels if kernel.group == "blocks" else [""]):
+            symbol = "_".join([kernel.name.replace(".", "_"), *([level] if level else [])])
+            place = k + 1 if level else 0
+            rows.append(
+                (symbol, f'"{symbol}", pf_{symbol}, "{kernel.takes}", \'{kernel.gives}\', {kernel.words}, {place}')
+            )
+    names = ", ".join(f'"{level}"' for level in levels if level) or "0"
+    most_arrays = max(kernel.takes.count(";") for kernel in kernels)
     return "\n".join(
         [
-            *lines,
+            *(f"int pf_{symbol}(const word *, word *);" for symbol, _ in rows),
+            "static const struct kernel KERNELS[] = {",
+            *(f"    {{{row}}}," for _, row in rows),
             "};",
             f"static const char *const LEVELS[] = {{{names}}};",
-            f"enum {{ N_KERNELS = {len(parts)}, N_LEVELS = {len(levels)},",
-            f"       MOST_WORDS = {max(n_words for _, n_words in told)}, MOST_ARRAYS = {n_arrays} }};",
+            f"enum {{ N_KERNELS = {len(rows)}, N_LEVELS = {sum(map(bool, levels))},",
+            f"       MOST_WORDS = {max(kernel.words for kernel in kernels)}, MOST_ARRAYS = {most_arrays} }};",
             "",
         ]
     )
 
 
-def link(parts: list[Part], triple: str, levels: list[str], into: Path) -> Path:
-    """Link the module; where it is."""
-    build = folder_for(triple)
-    write(build / "table.h", table(parts, levels).encode())
-    module = into / ("_compiled.pyd" if "windows" in triple else "_compiled.abi3.so")
-    flags = ["-O2", "-fvisibility=hidden", f"-I{sysconfig.get_path('include')}", f"-I{build}"]
-    if "windows" in triple:
-        flags += ["-shared", f"-L{Path(sys.base_prefix) / 'libs'}"]
-    elif "apple" in triple:
-        flags += ["-bundle", "-undefined", "dynamic_lookup"]
+def compiled(group: str, text: str, flags: list[str], name: str) -> Path:
+    """The object of a C file; compiled, if there is none yet of the same text and command."""
+    command = [*compiler(), *flags]
+    key = hashlib.sha256("\n".join([text, *command]).encode()).hexdigest()[:16]
+    source, made = BUILD / f"{group}.c", BUILD / f"{name}-{key}.o"
+    if not made.exists():
+        sys.stderr.write(".")
+        sys.stderr.flush()
+        beside = made.with_name(f"{made.name}.{os.getpid()}")
+        subprocess.run([*command, "-c", str(source), "-o", str(beside)], check=True)
+        os.replace(beside, made)
+    return made
+
+
+def build(platform: dict[str, str], into: Path) -> Path:
+    """Translate, compile what has changed, and link; where the module is."""
+    texts, kernels = translate()
+    levels = list(LEVELS) if "__x86_64__" in platform else [""]
+    flags = [*FLAGS, *([] if "_WIN32" in platform else ["-fPIC"])]
+    jobs = []
+    for group, text in texts.items():
+        write(BUILD / f"{group}.c", text.encode())
+        for level in levels if group == "blocks" else levels[:1]:
+            own = [
+                *flags,
+                *LEVELS.get(level, []),
+                *([f"-DLEVEL={level}" if level else "-DLEVEL="] if group == "blocks" else []),
+            ]
+            jobs.append((group, text, own, f"{group}-{level}" if group == "blocks" else group))
+    write(BUILD / "table.h", table_of(kernels, levels).encode())
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        objects = list(pool.map(lambda job: compiled(*job), jobs))
+    sys.stderr.write("\n" if sys.stderr.isatty() else "")
+    for path in set(BUILD.glob("*.o")) - set(objects):  # of sources that are no more
+        path.unlink()
+    module = into / ("_compiled.pyd" if "_WIN32" in platform else "_compiled.abi3.so")
+    link = ["-O2", "-fvisibility=hidden", f"-I{sysconfig.get_path('include')}", f"-I{BUILD}"]
+    if "_WIN32" in platform:
+        link += ["-shared", f"-L{Path(sys.base_prefix) / 'libs'}"]
+    elif "__APPLE__" in platform:
+        link += ["-bundle", "-undefined", "dynamic_lookup"]
     else:
-        flags += ["-shared", "-fPIC", "-s", "-Wl,-z,noexecstack", "-lm"]
-    made = build / f"{module.name}.{os.getpid()}"
-    sources = [str(HERE / "entry.c"), *(str(part.place) for part in parts)]
-    subprocess.run([*compiler(), *sources, *flags, "-o", str(made)], check=True)
-    write(module, made.read_bytes())
-    made.unlink()
-    return module
-
-
-def build(triple: str, into: Path) -> Path:
-    """Compile what has changed, link, and write the card that the library compares the module with."""
-    from pfabrik.kernels._shipped import CARD, sources_digest
-
-    parts = parts_for(triple)
-    if not all(part.place.exists() for part in parts):
-        sys.stderr.write("compiling kernels ")
-        halves = [[sys.executable, __file__, "--triple", triple, "--half", half] for half in ("first", "other")]
-        running = [subprocess.Popen(half) for half in halves]
-        failed = sum(process.wait() != 0 for process in running)
-        sys.stderr.write("\n")
-        if failed:
-            raise SystemExit("kernels do not compile")
-    levels = [level for level in LEVELS if any(part.level == level for part in parts)]
-    module = link(parts, triple, levels, into)
-    card = {"file": module.name, "module": hashlib.sha256(module.read_bytes()).hexdigest(), "sources": sources_digest()}
-    write(into / CARD, json.dumps(card).encode())
-    for path in folder_for(triple).glob("*.[oj]*"):  # of sources that are no more
-        if path.with_suffix(".o") not in {part.place for part in parts}:
-            path.unlink()
+        link += ["-shared", "-fPIC", "-s", "-Wl,-z,noexecstack", "-lm"]
+    made = BUILD / f"{module.name}.{os.getpid()}"
+    subprocess.run([*compiler(), str(HERE / "entry.c"), *map(str, objects), *link, "-o", str(made)], check=True)
+    os.replace(made, module) if made.stat().st_dev == into.stat().st_dev else write(module, made.read_bytes())
     return module
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--triple", help="another platform than this one, as LLVM names it; CC must compile for it")
     parser.add_argument("--into", type=Path, default=ROOT / "src" / "pfabrik" / "kernels", help="folder of the module")
-    parser.add_argument("--half", choices=["first", "other"], help=argparse.SUPPRESS)
     given = parser.parse_args()
-    if (missing := lacks()) and not given.half:
-        sys.stderr.write(f"kernels are not compiled: {missing}; Numba compiles them when they are needed\n")
+    platform = macros()
+    if platform is None:
         return UNABLE
-    import llvmlite.binding as llvm
-
-    triple = given.triple or llvm.get_process_triple()
-    if given.half:
-        compile_parts(triple, given.half == "first")
-        return 0
-    build(triple, given.into)
+    build(platform, given.into)
     return 0
 
 

@@ -1,9 +1,9 @@
 /* From Python into kernels that were compiled ahead.
 
-   A kernel takes its arguments as eight-byte words: numbers as they are, an array as Numba lays it out (no owner, twice;
-   size, bytes of an element, address, shape, strides), records field by field. `take` checks each argument against the
-   kernel's code (numbers i, f, b; arrays with dimensions and bytes of an element, in capitals if only read; records in
-   parentheses), and `call` releases the GIL meanwhile. Limited API: one build for every Python from 3.11 on. */
+   A kernel takes its arguments as eight-byte words: numbers as they are, an array as its address and its shape, records
+   field by field. `take` checks each argument against the kernel's code (numbers i, f, b; arrays with dimensions and
+   bytes of an element, in capitals if only read; records in parentheses), and `call` releases the GIL meanwhile. Limited
+   API: one build for every Python from 3.11 on. */
 #define Py_LIMITED_API 0x030B0000
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -15,53 +15,13 @@ typedef int64_t word;
 
 struct kernel {
     const char *name;
-    int (*run)(const word *words, word *results); /* results: what it returns, and where what it raises is described */
+    int (*run)(const word *words, word *result); /* 0, or 1 where there is not enough memory */
     const char *takes;
     char gives; /* n, i or b */
     int n_words, level; /* level: 0, or from 1 on the processor's that it needs */
 };
 
 #include "table.h" /* KERNELS, N_KERNELS, LEVELS, N_LEVELS, MOST_WORDS, MOST_ARRAYS */
-
-/* ---- What kernels need of Numba's runtime: memory with a count of references, which is one thread's. ---- */
-
-struct memory {
-    size_t count;
-    void *destructor, *info, *data;
-    size_t size;
-    void *allocator;
-};
-
-void *NRT_MemInfo_alloc_aligned(size_t size, unsigned align) {
-    struct memory *memory = size > SIZE_MAX - align - sizeof *memory ? NULL : malloc(size + align + sizeof *memory);
-    if (memory) {
-        uintptr_t first = (uintptr_t)(memory + 1);
-        *memory = (struct memory){.count = 1, .size = size, .data = (void *)((first + align - 1) / align * align)};
-    }
-    return memory;
-}
-
-void NRT_MemInfo_call_dtor(struct memory *memory) { free(memory); }
-
-void NRT_incref(struct memory *memory) {
-    if (memory) memory->count++;
-}
-
-void NRT_decref(struct memory *memory) {
-    if (memory && --memory->count == 0) free(memory);
-}
-
-/* Strides of an array in another shape; 0 if it is not contiguous. The caller has compared the sizes. */
-int numba_attempt_nocopy_reshape(word n, const word *shape, const word *strides, word n_new, const word *new_shape,
-                                 word *new_strides, word itemsize, int is_fortran) {
-    word step = itemsize;
-    if (is_fortran) return 0;
-    for (word i = n; i-- > 0; step *= shape[i])
-        if (shape[i] != 1 && strides[i] != step) return 0;
-    step = itemsize;
-    for (word i = n_new; i-- > 0; step *= new_shape[i]) new_strides[i] = step;
-    return 1;
-}
 
 /* ---- Arguments ---- */
 
@@ -106,9 +66,9 @@ static int take_array(struct arguments *a, PyObject *given) {
         return 0;
     }
     word *to = a->word;
-    to[0] = to[1] = 0, to[2] = view->len / itemsize, to[3] = itemsize, to[4] = (word)(intptr_t)view->buf;
-    for (int i = 0; i < n; i++) to[5 + i] = view->shape[i], to[5 + n + i] = view->strides[i];
-    a->word += 5 + 2 * n;
+    to[0] = (word)(intptr_t)view->buf;
+    for (int i = 0; i < n; i++) to[1 + i] = view->shape[i];
+    a->word += 1 + n;
     return 1;
 }
 
@@ -147,22 +107,10 @@ static int take(struct arguments *a, PyObject *given) {
 
 /* ---- Calls ---- */
 
-/* Raise what a kernel raised: Numba keeps its class and its arguments pickled. */
-static PyObject *raise_from(const struct kernel *kernel, word where) {
-    struct { const char *data; int32_t size; } *raised = (void *)(intptr_t)where;
-    PyObject *pickle = raised ? PyImport_ImportModule("pickle") : NULL;
-    PyObject *told = pickle ? PyObject_CallMethod(pickle, "loads", "y#", raised->data, (Py_ssize_t)raised->size) : NULL;
-    if (told) PyErr_SetObject(PyTuple_GetItem(told, 0), PyTuple_GetItem(told, 1));
-    else if (!PyErr_Occurred()) PyErr_SetString(PyExc_SystemError, kernel->name);
-    Py_XDECREF(told);
-    Py_XDECREF(pickle);
-    return NULL;
-}
-
 static PyObject *call(PyObject *self, PyObject *const *given, Py_ssize_t n_given) {
     const struct kernel *kernel = PyCapsule_GetPointer(self, NULL);
     struct arguments a;
-    word results[2] = {0, 0};
+    word result = 0;
     int is_taken = 1, status = 0;
     a.kernel = kernel, a.code = kernel->takes, a.word = a.words, a.n_views = 0;
     for (a.place = 1; is_taken && a.place <= n_given; a.place++)
@@ -170,14 +118,14 @@ static PyObject *call(PyObject *self, PyObject *const *given, Py_ssize_t n_given
     if (is_taken && *a.code) is_taken = refuse(&a, "more arguments");
     if (is_taken) {
         Py_BEGIN_ALLOW_THREADS
-        status = kernel->run(a.words, results);
+        status = kernel->run(a.words, &result);
         Py_END_ALLOW_THREADS
     }
     while (a.n_views) PyBuffer_Release(a.views + --a.n_views);
     if (!is_taken) return NULL;
-    if (status != 0 && status != -2) return raise_from(kernel, results[1]); /* -2: None is returned */
-    if (kernel->gives == 'i') return PyLong_FromLongLong(results[0]);
-    if (kernel->gives == 'b') return PyBool_FromLong(results[0] & 1);
+    if (status != 0) return PyErr_NoMemory();
+    if (kernel->gives == 'i') return PyLong_FromLongLong(result);
+    if (kernel->gives == 'b') return PyBool_FromLong(result & 1 ? 1 : 0);
     Py_INCREF(Py_None);
     return Py_None;
 }

@@ -1,10 +1,7 @@
-"""The compiled code, by engine: numbers in, numbers out. Imports NumPy only, and Numba where that compiles."""
+"""The compiled code, by engine: numbers in, numbers out. Imports NumPy only."""
 
-import os
+from ._shipped import LIBRARY
+from ._shipped import NoKernels as NoKernels
 
-IS_INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-"""Kernels run as plain Python, which needs neither a compiler nor Numba."""
-
-
-class NoKernels(ImportError):
-    """Nothing can run the kernels; the message says what to install."""
+IS_INTERPRETED = LIBRARY is None
+"""Kernels run as plain Python, which needs no compiler: the same answers, far slower."""

@@ -1,49 +1,84 @@
 """The decorators of compiled code.
 
 Python calls kernels; their parts (`routine`, `inlined`, `allocator`) are called by compiled code alone: where Python
-calls one, it is interpreted. Kernels are looked up in the compiled module; without one Numba compiles, in `_numba`.
+calls one, it is interpreted. Kernels are looked up in the compiled module; without one all are plain Python.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
-from ._shipped import COMPILES, LIBRARY, name_of
+from ._shipped import LIBRARY, name_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
 
-if COMPILES and not TYPE_CHECKING:
-    from ._numba.decorators import allocator, inlined, kernel, opener, routine, search
-else:
 
-    def kernel(function: F) -> F:
-        """Compiled code that Python calls from any thread: no GIL, IEEE division.
+class Source(NamedTuple):
+    """A function of Python that a decorator was given, and the decorator's name."""
 
-        A kernel with a `scratch_address` cannot allocate, as a `routine` cannot.
-        """
-        return function if LIBRARY is None else cast(F, LIBRARY.kernel(name_of(function)))
+    function: Any
+    kind: str
 
-    def search(function: F) -> F:
-        """A kernel that searches, or works row by row: no loop is short enough to vectorise."""
-        return kernel(function)
 
-    def routine(function: F) -> F:
-        """A part of kernels that cannot allocate."""
-        return function
+SOURCES: dict[Any, Source] = {}
+"""What each decorated function was made of, for the translation to C."""
 
-    def inlined(function: F) -> F:
-        """A `routine` inlined at every call: it is called so often that the calls would cost time."""
-        return function
+OPENERS: dict[Any, tuple[Any, ...]] = {}
+"""The sample of each `opener`."""
 
-    def allocator(function: F) -> F:
-        """A part of kernels that may allocate."""
-        return function
 
-    def opener(sample: R) -> Callable[[Any], R]:
-        """Compiled function from the address of a `Handle` to its NamedTuple, with the types of a sample.
+def _marked(function: F, kind: str, made: Any) -> F:
+    SOURCES[made] = Source(function, kind)
+    return cast(F, made)
 
-        Interpreted code is given the NamedTuple itself.
-        """
-        return lambda record: record
+
+def kernel(function: F) -> F:
+    """Compiled code that Python calls from any thread: no GIL, IEEE division.
+
+    A kernel with a `scratch_address` cannot allocate, as a `routine` cannot.
+    """
+    return _kernel(function, "kernel")
+
+
+def flattened(function: F) -> F:
+    """A kernel in which every call is inlined: it is called for one pose at a time."""
+    return _kernel(function, "flattened")
+
+
+def search(function: F) -> F:
+    """A kernel that searches, or works row by row: no loop is short enough to vectorise."""
+    return _kernel(function, "search")
+
+
+def _kernel(function: F, kind: str) -> F:
+    return _marked(function, kind, function if LIBRARY is None else LIBRARY.kernel(name_of(function)))
+
+
+def routine(function: F) -> F:
+    """A part of kernels that cannot allocate."""
+    return _marked(function, "routine", function)
+
+
+def inlined(function: F) -> F:
+    """A `routine` inlined at every call: it is called so often that the calls would cost time."""
+    return _marked(function, "inlined", function)
+
+
+def allocator(function: F) -> F:
+    """A part of kernels that may allocate."""
+    return _marked(function, "allocator", function)
+
+
+def opener(sample: R) -> Callable[[Any], R]:
+    """Function from the address of a `Handle` to its NamedTuple, with the types of a sample.
+
+    Interpreted code is given the NamedTuple itself.
+    """
+
+    def given(record: R) -> R:
+        return record
+
+    OPENERS[given] = sample
+    return given

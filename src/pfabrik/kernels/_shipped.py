@@ -1,26 +1,23 @@
-"""Which code runs: kernels compiled when the package was built, what Numba compiles here, or plain Python."""
+"""Which code runs: kernels compiled when the package was built, or plain Python."""
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-import json
+import importlib
 import os
-import sys
+import warnings
 from collections.abc import Callable
-from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from . import IS_INTERPRETED, NoKernels
-
 HERE = Path(__file__).parent
-CARD = "_compiled.json"
-"""File beside the module of compiled kernels: its name, its hash, and the hash of the sources that it was made of."""
 
 CHOICE = "PFABRIK_KERNELS"
-"""Environment variable: `numba`, `compiled`, or a level of the compiled kernels, `v2`; else what is there."""
+"""Environment variable: `python`, `compiled`, or a level of the compiled kernels, `v2`; else what is there."""
+
+
+class NoKernels(ImportError):
+    """The compiled kernels that were asked for are not there; the message says what to do."""
 
 
 def name_of(function: Callable[..., Any]) -> str:
@@ -28,43 +25,25 @@ def name_of(function: Callable[..., Any]) -> str:
     return f"{function.__module__.rpartition('.')[0].rpartition('.')[2]}.{function.__name__}".lstrip(".")
 
 
-def sources_digest(folder: Path = HERE) -> str:
-    """Hash of the sources of kernels; none where only bytecode was installed, which nobody edits."""
-    paths = sorted((path.relative_to(folder).as_posix(), path) for path in folder.rglob("*.py"))
-    digest = hashlib.sha256()
-    for name, path in paths:
-        text = path.read_bytes()
-        digest.update(f"{name} {len(text)}\n".encode() + text)
-    return digest.hexdigest() if paths else ""
+def is_stale(file: str | None) -> bool:
+    """Whether kernels of a checkout were edited after the module was compiled; what is installed nobody edits."""
+    if file is None or not (HERE.parents[2] / "building" / "compile_kernels.py").exists():
+        return False
+    made = os.stat(file).st_mtime
+    return any(path.stat().st_mtime > made for path in HERE.rglob("*.py"))
 
 
-def load_module(folder: Path = HERE) -> tuple[ModuleType | None, str]:
-    """The module of compiled kernels, or why there is none; it is read and compared before it is loaded.
-
-    A damaged extension module does not fail to load: it ends the process.
-    """
+def load_module() -> tuple[ModuleType | None, str]:
+    """The module of compiled kernels, or why there is none."""
     try:
-        card = json.loads((folder / CARD).read_text(encoding="utf-8"))
-        file, module, sources = folder / card["file"], card["module"], card["sources"]
-        data = file.read_bytes()
-    except (OSError, ValueError, TypeError, KeyError):
-        return None, "no kernels were compiled for this installation"
-    if hashlib.sha256(data).hexdigest() != module:
-        return None, f"the compiled kernels, {file}, are damaged"
-    if sources_digest(folder) not in (sources, ""):
-        return None, "the kernels were edited since they were compiled"
-    foreign = f"the compiled kernels, {file}, are not for this Python or this processor"
-    if not file.name.endswith(tuple(EXTENSION_SUFFIXES)) or "t" in getattr(sys, "abiflags", ""):
-        return None, foreign
-    name = f"{__package__}._compiled"
-    spec = importlib.util.spec_from_file_location(name, file, loader=ExtensionFileLoader(name, str(file)))
-    assert spec is not None and spec.loader is not None
-    try:
-        loaded = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(loaded)
+        module = importlib.import_module("._compiled", __package__)
     except ImportError as error:
-        return None, f"{foreign} ({error})"
-    return loaded, ""
+        if not any(HERE.glob("_compiled.*")):
+            return None, "no kernels were compiled for this installation"
+        return None, f"the compiled kernels are not for this Python or this processor ({error})"
+    if is_stale(module.__file__):
+        return None, "the kernels were edited since they were compiled"
+    return module, ""
 
 
 class Library:
@@ -74,7 +53,7 @@ class Library:
         """Take the best level that this processor has, or the one that is given."""
         levels = module.LEVELS
         if level is not None and level not in levels:
-            raise NoKernels(f"{CHOICE}={level}: expected numba, compiled{''.join(f', {each}' for each in levels)}")
+            raise NoKernels(f"{CHOICE}={level}: expected python, compiled{''.join(f', {each}' for each in levels)}")
         self.module, self.level = module, level or (levels[-1] if levels else "")
 
     def kernel(self, name: str) -> Any:
@@ -83,26 +62,28 @@ class Library:
         return getattr(self.module, f"{plain}_{self.level}", None) or getattr(self.module, plain)
 
 
-def choose() -> tuple[Library | None, bool, str]:
-    """Compiled kernels if they are to run; whether Numba is to compile; and why there are no compiled ones.
+def choose() -> Library | None:
+    """Compiled kernels if they are to run.
 
     Raises
     ------
     NoKernels
     """
     choice = os.environ.get(CHOICE, "")
-    if choice == "numba":
-        return None, True, ""
+    if choice == "python":
+        return None
     module, reason = load_module()
     if module is not None:
-        return Library(module, choice if choice not in ("", "compiled") else None), False, ""
+        return Library(module, choice if choice not in ("", "compiled") else None)
     if choice:
         raise NoKernels(f"{CHOICE}={choice}: {reason}")
-    if importlib.util.find_spec("numba") is None:
-        raise NoKernels(
-            f"{reason}, and Numba, which would compile them, is not installed: pip install numba, or a wheel of pfabrik"
-        )
-    return None, True, reason if (HERE / CARD).exists() else ""
+    warnings.warn(
+        f"{reason}: answers are the same, and take 15 to 100 times as long; install a wheel, or compile them with a C "
+        "compiler (python building/compile_kernels.py)",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+    return None
 
 
-LIBRARY, COMPILES, REASON = (None, False, "") if IS_INTERPRETED else choose()
+LIBRARY = choose()

@@ -1,14 +1,11 @@
-"""Ahead-of-time compilation of every kernel, without a mechanism."""
+"""Every kernel, with the types of its arguments."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ._shipped import COMPILES, name_of
 from .certify.prove import prove
 from .chains.answer_chains import nearest_in_chains, reach_in_chains, walk_chains
 from .chains.chain_records import ChainAim, ChainAnswers
@@ -105,21 +102,3 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (fastest, tuple(_values("F1 F2 F2 F1 F1 b f1"))),
 )
 """Every kernel with arguments of its types, the most used first; arrays that it only reads are read-only."""
-
-
-def compile_all(report: Callable[[str, float], None] | None = None) -> None:
-    """Compile every kernel that is not in Numba's cache yet, or load it; nothing where compiled kernels are there.
-
-    Parameters
-    ----------
-    report : called after each kernel with its name and the seconds taken.
-    """
-    if not COMPILES:
-        return
-    from ._numba.decorators import compile_for
-
-    for kernel, arguments in KERNELS:
-        began = time.perf_counter()
-        compile_for(kernel, arguments)
-        if report is not None:
-            report(name_of(kernel.py_func), time.perf_counter() - began)

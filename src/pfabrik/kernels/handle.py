@@ -40,10 +40,10 @@ class Scratch(local, Generic[R]):
 
 
 def _descriptors(record: tuple[Any, ...]) -> Iterator[int]:
-    """Arrays in Numba's memory layout: no owner, size, bytes of an element, address, shape, strides."""
+    """Arrays as compiled code has them: address and shape."""
     for item in record:
         if isinstance(item, tuple):
             yield from _descriptors(item)
         else:
             assert item.flags.c_contiguous and item.flags.writeable
-            yield from (0, 0, item.size, item.itemsize, item.ctypes.data, *item.shape, *item.strides)
+            yield from (item.ctypes.data, *item.shape)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
-from .._jit import allocator, kernel, routine
+from .._jit import allocator, flattened, routine
 from ..linear import solve_spd
 from ..quaternions import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
@@ -248,7 +248,7 @@ def cone_cosine(cone: Record, values: Floats) -> float:
     return dot(vec(cone["axis"]), (leg_values[place], leg_values[place + 1], leg_values[place + 2]))
 
 
-@kernel
+@flattened
 def answer(
     machine: int,
     targets: Floats,

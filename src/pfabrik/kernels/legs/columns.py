@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...arrays import Floats, Record
-from .._jit import routine
+from .._jit import inlined, routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
 from .complete_poses import NOT_A_ROTATION, ROUNDED, orthonormalise
 from .records import CRANK
@@ -40,7 +40,7 @@ ATAN = (
 TAN_EIGHTH = 0.41421356237309503
 
 
-@routine
+@inlined
 def arctangent(y: float, x: float) -> float:
     """atan2 without branches, so that loops over it vectorise."""
     a, b = abs(x), abs(y)

@@ -37,7 +37,9 @@ def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings,
         copy_row(trunks[i], config.trunks)
         move_carriers(plan, config)
         stand_as_at_home(plan, config)
-        asks.normals[:] = 0.0
+        for k in range(asks.normals.shape[0]):
+            for j in range(asks.normals.shape[1]):
+                asks.normals[k, j] = 0.0
         for c in range(plan.chains.shape[0]):
             reach_from_start(plan, c, config, settings, asks, margin, PATIENT, True)
         copy_row(config.trunks, trunks[i])

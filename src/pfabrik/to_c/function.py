@@ -1,0 +1,486 @@
+"""One function of kernels in C, for one set of argument types."""
+
+from __future__ import annotations
+
+import ast
+import re
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+from .expressions import ANNOTATED, OPERATORS, Expressions
+from .flow import Flow, is_range, names_in
+from .naming import c_name, comment, is_simple
+from .sources import comments_of, short_path, tree_of
+from .types import BOOL, INTEGER, NOTHING, NUMBERS, REAL, Struct, Tuple, Unsupported, join
+from .values import ORDER, UNARY, Value
+
+if TYPE_CHECKING:
+    from .program import Program
+
+INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}
+
+MOST_PASSES = 8
+"""A function is translated until its types, its result and its effects are settled; two or three times are usual."""
+
+
+class Function(Expressions):
+    """A function: its text, its name, what it takes, gives, reads and writes, and whether it takes memory."""
+
+    def __init__(self, program: Program, source: Any, arguments: tuple[Any, ...]) -> None:
+        super().__init__()
+        self.program, self.source, self.arguments = program, source, arguments
+        function = source.function
+        self.globals, self.file = function.__globals__, function.__code__.co_filename
+        self.node, self.path, self.comments = tree_of(function), short_path(self.file), comments_of(self.file)
+        self.flow = Flow(self.node, self.globals)
+        self.name, self.gives = "", None
+        self.types: dict[str, Any] = {}
+        self.by_value: set[str] = set()
+
+    # ---- the whole ----
+
+    def translate(self) -> None:
+        """Fill the lines of the body."""
+        node, takes = self.node, self.node.args
+        if len(takes.args) != len(self.arguments) or takes.defaults or takes.kwonlyargs or takes.vararg or takes.kwarg:
+            self.refuse(node.lineno, f"{node.name}: another number of arguments, or arguments with defaults")
+        for name in self.flow.unset:
+            self.fail(name, "read before it is assigned")
+        if self.flow.perhaps_unset:
+            self.refuse(
+                node.lineno, f"{node.name}: perhaps read before assigned: {', '.join(sorted(self.flow.perhaps_unset))}"
+            )
+        self.parameters = [a.arg for a in takes.args]
+        self.types = dict(zip(self.parameters, self.arguments, strict=True))
+        declared = ast.unparse(node.returns) if node.returns else ""
+        self.gives = {"None": NOTHING, **ANNOTATED}.get(declared)
+        for _ in range(MOST_PASSES):
+            before = self._settled()
+            self.lines, self.indent, self.n_temporaries, self._last = [], 1, 0, node.body[0].lineno - 1
+            self._declared = set(self.parameters)
+            self.block(node.body[1:] if isinstance(node.body[0], ast.Expr) and ast.get_docstring(node) else node.body)
+            self.gives = self.gives or NOTHING
+            if before == self._settled():
+                return
+        self.refuse(node.lineno, f"{node.name}: its types do not settle")
+
+    def _settled(self) -> Any:
+        return dict(self.types), self.gives, self.reads, self.writes, self.allocates, set(self.by_value)
+
+    def refuse(self, line: int, what: str) -> None:
+        raise Unsupported(f"{self.path}:{line}: {what}")
+
+    def text(self) -> str:
+        """The function as C text."""
+        spell = self.program.spell
+        takes = [f"{spell.variable(self.types[name])}{c_name(name)}" for name in self.parameters]
+        if self.allocates:
+            takes.insert(0, "arena *memory")
+        gives = spell.stored(self.gives)
+        kind = {"inlined": "INLINED ", "flattened": "FLATTENED static "}.get(self.source.kind, "static ")
+        head = f"{kind}{gives}{self.name}({', '.join(takes) or 'void'})"
+        if len(head) > 118:
+            head = f"{kind}{gives}{self.name}(\n" + textwrap.fill(f"{', '.join(takes)})", 116, **INDENTED)
+        told = comment(f"{ast.get_docstring(self.node) or ''}\n[{self.path}:{self.node.lineno}]")
+        unused = [f"    (void){c_name(name)};" for name in self.parameters if not self._mentions(c_name(name))]
+        return f"{told}{head} {{\n" + "\n".join([*unused, *self.lines]) + "\n}\n"
+
+    def _mentions(self, name: str) -> bool:
+        pattern = re.compile(rf"\b{name}\b")
+        return any(pattern.search(re.sub(r"/\*.*?\*/", "", line)) for line in self.lines)
+
+    def counts_up(self, name: str) -> bool:
+        loops = [n for n in ast.walk(self.node) if isinstance(n, ast.For) and name in names_in(n.target)]
+        starts = [s.iter.args for s in loops if isinstance(s.iter, ast.Call)]
+        return all(len(a) == 1 or (len(a) == 2 and isinstance(a[0], ast.Constant) and a[0].value >= 0) for a in starts)  # type: ignore[operator]
+
+    # ---- statements ----
+
+    def block(self, statements: list[ast.stmt]) -> None:
+        for s in statements:
+            self._tell(s)
+            is_whole = isinstance(s, (ast.For, ast.While, ast.If))
+            if is_whole or isinstance(s, ast.AugAssign):
+                for name in sorted(self.flow.homes):
+                    if self.flow.homes[name] is s and name not in self.flow.counters:
+                        self._declare(name)
+            n = len(self.lines)
+            getattr(self, f"do_{type(s).__name__}", self._unknown)(s)
+            told = self.comments.get(s.lineno if is_whole else s.end_lineno or s.lineno)
+            if told and not told[1] and not is_whole and len(self.lines) > n:
+                self.lines[-1] += f" {comment(told[0]).strip()}"
+
+    def _tell(self, s: ast.stmt) -> None:
+        """The comments before a statement, and after the head of one with blocks."""
+        for line in range(self._last + 1, s.lineno + 1):
+            told = self.comments.get(line)
+            if told and (told[1] or (line == s.lineno and isinstance(s, (ast.For, ast.While, ast.If)))):
+                self.emit(comment(told[0]).strip())
+        self._last = s.lineno if isinstance(s, (ast.For, ast.While, ast.If)) else s.end_lineno or s.lineno
+
+    def _unknown(self, s: ast.stmt) -> None:
+        self.fail(s, f"{type(s).__name__} is not in the subset")
+
+    def do_Expr(self, s: ast.Expr) -> None:
+        if not isinstance(s.value, ast.Constant):
+            v = self.expression(s.value)
+            if v.type is not None:
+                self.emit(f"{'' if v.type == NOTHING else '(void)'}{v.text};")
+
+    def do_Pass(self, s: ast.Pass) -> None:
+        pass
+
+    def do_Break(self, s: ast.Break) -> None:
+        self.emit("break;")
+
+    def do_Continue(self, s: ast.Continue) -> None:
+        self.emit("continue;")
+
+    def do_Return(self, s: ast.Return) -> None:
+        if s.value is None or (isinstance(s.value, ast.Constant) and s.value.value is None):
+            self.emit("return;")
+            return
+        v = self.expression(s.value, self.gives)
+        if v.type is None:
+            return
+        if self.gives is None or not isinstance(self.gives, str):
+            joined = join(self.gives, v.type)
+            if joined is None:
+                self.fail(s, "results of different types")
+            self.gives = joined
+        v = self.cast(v, self.gives, s)
+        self.emit(f"return {self.stored(v)};")
+
+    def do_AnnAssign(self, s: ast.AnnAssign) -> None:
+        if s.value is None:
+            self.fail(s, "a variable without a value")
+        wanted = ANNOTATED.get(ast.unparse(s.annotation))
+        v = self.expression(s.value, wanted)
+        self.assign(s.target, self.cast(v, wanted, s) if v.type in NUMBERS else v, s)
+
+    def do_Assign(self, s: ast.Assign) -> None:
+        if len(s.targets) > 1:
+            v = self.expression(s.value)
+            if v.type is not None and not v.is_constant and not is_simple(v.text):
+                v = self.keep(v)
+            for target in s.targets:
+                self.assign(target, v, s)
+            return
+        target, value = s.targets[0], s.value
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            self.assign_all(target.elts, value.elts, s)
+        elif isinstance(target, ast.Tuple) and is_choice(value, len(target.elts)):
+            assert isinstance(value, ast.IfExp)
+            self.assign_chosen(target, value, s)
+        else:
+            self.assign(target, self.expression(value, self.type_of(target)), s)
+
+    def assign_chosen(self, target: ast.Tuple, value: ast.IfExp, s: ast.stmt) -> None:
+        """One of two tuples, item by item: loops over it are vectors then."""
+        test = self.truth(value.test)
+        assert isinstance(value.body, ast.Tuple) and isinstance(value.orelse, ast.Tuple)
+        if test.is_constant and not test.writes:
+            self.assign_all(target.elts, (value.body if test.constant else value.orelse).elts, s)
+            return
+        test = test if is_simple(test.text) else self.keep(test)
+        made = []
+        for a, b, place in zip(value.body.elts, value.orelse.elts, target.elts, strict=True):
+            x, y = self.perhaps(a, self.type_of(place)), self.perhaps(b, self.type_of(place))
+            t = join(x.type, y.type)
+            if t is None and x.type is not None and y.type is not None:
+                self.fail(s, "a choice of values of different types")
+            x, y = (self.addressed(self.as_view(self.cast(v, t, s))) for v in (x, y))
+            text = f"{test.text} ? {x.at(UNARY)} : {y.at(UNARY)}"
+            made.append(Value(text, t, 1, is_lasting=x.is_lasting and y.is_lasting, reads=x.reads | y.reads))
+        read = names_in(value)
+        if any(names_in(place, ast.Store) & read for place in target.elts) or any(v.reads for v in made[1:]):
+            made = [self.keep(v) if v.type is not None else v for v in made]
+        for place, v in zip(target.elts, made, strict=True):
+            self.assign(place, v, s)
+
+    def type_of(self, target: ast.expr) -> Any:
+        """Type of a variable, if it is known."""
+        return self.types.get(target.id) if isinstance(target, ast.Name) else None
+
+    def assign_all(self, targets: list[ast.expr], values: list[ast.expr], s: ast.stmt) -> None:
+        """As many values as targets: all are computed before any is stored, where that matters."""
+        if len(targets) != len(values):
+            self.fail(s, "tuples of different lengths")
+        if not self._matters(targets, values):
+            for target, node in zip(targets, values, strict=True):
+                if isinstance(target, ast.Tuple) and isinstance(node, ast.Tuple):
+                    self.assign_all(target.elts, node.elts, s)
+                else:
+                    self.assign(target, self.expression(node, self.type_of(target)), s)
+            return
+        wants = [self.type_of(target) for target in targets]
+        found = self.evaluate(values, wants)
+        for k, (v, want) in enumerate(zip(found, wants, strict=True)):
+            if v.type is not None and not v.is_constant:
+                v = self.cast(v, want, s) if want in NUMBERS and v.type in NUMBERS else v
+                found[k] = self.keep(v)
+        for target, v in zip(targets, found, strict=True):
+            self.assign(target, v, s)
+
+    def _matters(self, targets: list[ast.expr], values: list[ast.expr]) -> bool:
+        """Whether what is stored first could be read by a value after it."""
+        for k, target in enumerate(targets):
+            later = [
+                *values[k + 1 :],
+                *(i for t in targets[k + 1 :] for i in ast.walk(t) if isinstance(i, ast.Subscript)),
+            ]
+            if any(names_in(target, ast.Store) & names_in(node) for node in later):
+                return True
+            stores = any(isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store) for n in ast.walk(target))
+            if stores and any(
+                isinstance(n, (ast.Subscript, ast.Call)) for node in values[k + 1 :] for n in ast.walk(node)
+            ):
+                return True
+        return False
+
+    def assign(self, target: ast.expr, v: Value, s: ast.stmt) -> None:
+        if isinstance(target, ast.Name):
+            self.assign_name(target.id, v, s)
+        elif v.type is None:
+            for name in names_in(target, ast.Store):
+                self.assign_name(name, v, s)
+        elif isinstance(target, ast.Tuple):
+            if not isinstance(v.type, Tuple) or len(v.type.items) != len(target.elts):
+                self.fail(s, "another number of values than of variables")
+            v = v if is_simple(v.text) else self.keep(v)
+            for k, each in enumerate(target.elts):
+                if not isinstance(each, ast.Name) or each.id in self.flow.read:
+                    self.assign(each, self.item(v, k), s)
+        elif isinstance(target, ast.Subscript):
+            n = len(self.lines)
+            place = self.expression(target)
+            if (len(self.lines) > n and v.has_effect) or v.writes & place.reads:
+                kept = self.keep(v, n)  # Python computes the value first
+                v = kept
+            self.store(place, v, s)
+        else:
+            self.fail(s, "a target that is not in the subset")
+
+    def store(self, place: Value, v: Value, s: ast.stmt) -> None:
+        """Store into memory."""
+        if place.type is None:
+            return
+        if place.type not in (INTEGER, REAL) or v.type not in NUMBERS:
+            self.fail(s, "an element that is no number")
+        self.writes |= place.reads
+        self.emit(f"{place.text} = {self.cast(v, place.type, s).text};")
+
+    def assign_name(self, name: str, v: Value, s: ast.stmt) -> None:
+        if v.type == NOTHING:
+            self.fail(s, "nothing is assigned")
+        known = self.types.get(name)
+        if v.type is not None:
+            v = self.as_view(v)
+            joined = v.type if known is None else known if known == v.type else None
+            if joined is None:
+                self.fail(s, f"{name} changes its type")
+            self.types[name] = joined
+        if v.type is None:
+            return
+        if name not in self.flow.read:
+            self.emit(f"(void){v.at(UNARY)};")
+            return
+        if isinstance(v.type, Struct) and not v.is_lasting and name not in self.parameters:
+            self.by_value.add(name)
+        own, text = c_name(name), self.stored(v) if name in self.by_value else v.text
+        if isinstance(v.type, Struct) and name in self.parameters and not v.is_lasting:
+            self.fail(s, "a parameter that becomes a new NamedTuple")
+        if self.flow.homes.get(name) is s and name not in self._declared:
+            self._declared.add(name)
+            self.emit(f"{self._kind_of(name)}{own} = {text};")
+        else:
+            self.emit(f"{own} = {text};")
+
+    def _kind_of(self, name: str) -> str:
+        t, spell = self.types[name], self.program.spell
+        return f"{spell.value(t)} " if name in self.by_value else spell.variable(t)
+
+    def _declare(self, name: str) -> None:
+        if name not in self._declared and self.types.get(name) is not None:
+            self.emit(f"{self._kind_of(name)}{c_name(name)};")
+        self._declared.add(name)
+
+    def do_AugAssign(self, s: ast.AugAssign) -> None:
+        load = as_load(s.target)
+        place, right = self.evaluate([load, s.value])
+        made = self.operated(place, s.op, right, s)
+        if made.type is None:
+            return
+        if made.type != place.type:
+            self.fail(s, "a variable that changes its type")
+        if isinstance(s.target, ast.Subscript):
+            lvalue = place if place.reads else self.expression(load)  # it was kept, if the value changes it
+            if not lvalue.reads:
+                self.fail(s, "an element that is no number")
+            self.writes |= lvalue.reads
+        else:
+            lvalue = place
+        sign, level, _ = OPERATORS[type(s.op)]
+        if place.text == lvalue.text and level != 13 and not isinstance(s.op, (ast.LShift, ast.RShift)):
+            right = self.cast(right, made.type, s)
+            if right.is_constant and right.text == "1" and sign in "+-":
+                self.emit(f"{lvalue.text}{sign}{sign};")
+            else:
+                self.emit(f"{lvalue.text} {sign}= {right.text};")
+        else:
+            self.emit(f"{lvalue.text} = {made.text};")
+
+    def do_If(self, s: ast.If) -> None:
+        test = self.truth(s.test)
+        if test.is_constant and not test.writes:
+            self._last = s.lineno
+            self._same_level(s.body if test.constant else s.orelse)
+            return
+        self.emit(f"if ({test.text}) {{")
+        self.inside(s.body)
+        rest = s.orelse
+        while len(rest) == 1 and isinstance(rest[0], ast.If):
+            inner, n = rest[0], len(self.lines)
+            homes = any(home is inner for home in self.flow.homes.values())
+            test = self.truth(inner.test)
+            if len(self.lines) > n or test.is_constant or homes or self.comments.get(inner.lineno, ("", False))[0]:
+                del self.lines[n:]
+                break
+            self.emit(f"}} else if ({test.text}) {{")
+            self.inside(inner.body)
+            rest = inner.orelse
+        if rest:
+            self.emit("} else {")
+            self.inside(rest)
+        self.emit("}")
+
+    def _same_level(self, statements: list[ast.stmt]) -> None:
+        """A block that always runs: its variables stay within it."""
+        if any(home in statements for home in self.flow.homes.values()):
+            self.emit("{")
+            self.inside(statements)
+            self.emit("}")
+        else:
+            self.block(statements)
+
+    def inside(self, statements: list[ast.stmt]) -> None:
+        self.indent += 1
+        self.block(statements)
+        self.indent -= 1
+
+    def do_While(self, s: ast.While) -> None:
+        if s.orelse:
+            self.fail(s, "a loop with else")
+        n = len(self.lines)
+        self.indent += 1
+        test = self.truth(s.test)
+        self.indent -= 1
+        before, self.lines[n:] = self.lines[n:], []
+        if before:
+            self.emit("while (true) {")
+            self.lines += before
+            self.lines.append("    " * (self.indent + 1) + f"if (!({test.text})) break;")
+        else:
+            self.emit(f"while ({test.text}) {{")
+        self.inside(s.body)
+        self.emit("}")
+
+    def do_For(self, s: ast.For) -> None:
+        if s.orelse:
+            self.fail(s, "a loop with else")
+        if is_range(s.iter):
+            self.count(s)
+        else:
+            self.for_each(s)
+
+    def count(self, s: ast.For) -> None:
+        """A loop over a range."""
+        assert isinstance(s.iter, ast.Call)
+        if not isinstance(s.target, ast.Name):
+            self.fail(s, "a loop over a range with several variables")
+        given = [self.cast(v, INTEGER, s) if v.type in (BOOL, INTEGER) else v for v in self.evaluate(s.iter.args)]
+        if any(v.type not in (INTEGER, None) for v in given):
+            self.fail(s, "a range that is no integer")
+        zero, one = Value("0", INTEGER, constant=0), Value("1", INTEGER, constant=1)
+        start = given[0] if len(given) > 1 else zero
+        stop, step = given[min(len(given) - 1, 1)], given[2] if len(given) > 2 else one
+        if not step.is_constant or step.constant == 0:
+            self.fail(s, "a range whose step is not constant")
+        if start.is_constant and stop.is_constant and not range(start.constant, stop.constant, step.constant):
+            return
+        name = c_name(s.target.id) if s.target.id in self.flow.read else f"turn{self.indent}"
+        assigned = names_in(ast.Module(s.body, []), ast.Store)
+        is_own = s.target.id in self.flow.counters or s.target.id not in self.flow.read
+        counter = name if is_own else f"next_{name}"
+        end, more = stop.at(ORDER + 1), ""
+        if not self._stays(s.iter.args[min(len(given) - 1, 1)], stop, assigned):
+            end, more = f"{counter}_end", f", {counter}_end = {stop.text}"
+        compare, by = (
+            ("<", f"{counter} += {step.text}") if step.constant > 0 else (">", f"{counter} -= {-step.constant}")
+        )
+        by = {1: f"{counter}++", -1: f"{counter}--"}.get(step.constant, by)
+        known = self.types.setdefault(s.target.id, INTEGER) if s.target.id in self.flow.read else INTEGER
+        if known != INTEGER:
+            self.fail(s, f"{name} changes its type")
+        self.emit(f"for (integer {counter} = {start.text}{more}; {counter} {compare} {end}; {by}) {{")
+        if not is_own:
+            self.lines.append("    " * (self.indent + 1) + f"{name} = {counter};")
+        self.inside(s.body)
+        self.emit("}")
+
+    def _stays(self, node: ast.expr, stop: Value, assigned: set[str]) -> bool:
+        """Whether the end of a range is the same at each turn, and costs nothing."""
+        if stop.is_constant:
+            return True
+        if names_in(node) & assigned or stop.has_effect or (stop.text.startswith("t") and stop.text[1:].isdigit()):
+            return not stop.has_effect and stop.text[1:].isdigit()
+        parts = [
+            n
+            for n in ast.walk(node)
+            if isinstance(n, ast.Call) and not (isinstance(n.func, ast.Name) and n.func.id == "len")
+        ]
+        return not parts and "?" not in stop.text
+
+    def for_each(self, s: ast.For) -> None:
+        """A loop over a tuple."""
+        v = self.expression(s.iter)
+        if v.type is None:
+            return
+        if not isinstance(v.type, Tuple) or not v.type.items:
+            self.fail(s, "a loop over what is neither a range nor a tuple")
+        t: Any = None
+        for item in v.type.items:
+            joined = join(t, item)
+            if joined is None:
+                self.fail(s, "a loop over values of different types")
+            t = joined
+        if not v.type.is_uniform:
+            v = self.cast(v, Tuple((t,) * len(v.type.items)), s)
+        self.n_temporaries += 1
+        values, k = f"each{self.n_temporaries}", f"k{self.n_temporaries}"
+        self.emit("{")
+        self.indent += 1
+        self.emit(f"const {self.program.spell.value(v.type)} {values} = {v.text};")
+        self.emit(f"for (int {k} = 0; {k} < {len(v.type.items)}; {k}++) {{")
+        self.indent += 1
+        self.assign(s.target, Value(f"{values}.at[{k}]", t), s)
+        self.indent -= 1
+        self.inside(s.body)
+        self.emit("}")
+        self.indent -= 1
+        self.emit("}")
+
+
+def is_choice(node: ast.expr, n: int) -> bool:
+    """Whether a value is one of two tuples of a length."""
+    return isinstance(node, ast.IfExp) and all(
+        isinstance(each, ast.Tuple) and len(each.elts) == n for each in (node.body, node.orelse)
+    )
+
+
+def as_load(target: ast.expr) -> ast.expr:
+    """A target as an expression that reads it."""
+    read = ast.parse(ast.unparse(target), mode="eval").body
+    for node in ast.walk(read):
+        ast.copy_location(node, target)
+    return read
