@@ -8,7 +8,7 @@ import math
 import operator
 from collections.abc import Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -103,8 +103,9 @@ class Expressions:
 
     # ---- lines ----
 
-    def fail(self, node: ast.AST, what: str) -> NoReturn:
-        raise Unsupported(f"{self.path}:{getattr(node, 'lineno', 0)}: {what}: {ast.unparse(node)[:80]}")
+    def fault(self, node: ast.AST, what: str) -> Unsupported:
+        """An error with the place in the source."""
+        return Unsupported(f"{self.path}:{getattr(node, 'lineno', 0)}: {what}: {ast.unparse(node)[:80]}")
 
     def emit(self, text: str) -> None:
         self.lines.append("    " * self.indent + text)
@@ -150,7 +151,7 @@ class Expressions:
         """An expression; `want` is the type that its place has, if that is known."""
         method = getattr(self, f"on_{type(node).__name__}", None)
         if method is None:
-            self.fail(node, f"{type(node).__name__} is not in the subset")
+            raise self.fault(node, f"{type(node).__name__} is not in the subset")
         value: Value = method(node, want)
         return value
 
@@ -159,7 +160,7 @@ class Expressions:
         n = len(self.lines)
         value = self.truth(node) if is_truth else self.expression(node, want)
         if len(self.lines) > n:
-            self.fail(node, "must be computed before an expression in which it may not be evaluated")
+            raise self.fault(node, "must be computed before an expression in which it may not be evaluated")
         return value
 
     def truth(self, node: ast.expr) -> Value:
@@ -176,7 +177,7 @@ class Expressions:
         """A value as one of another type, where Python takes it for one."""
         if t is None or v.type is None or v.type == t:
             return v
-        more = {"reads": v.reads, "writes": v.writes}
+        more = effects([v])
         if v.type in NUMBERS and t in NUMBERS:
             if t == REAL and v.is_constant and v.type == INTEGER and v.text.lstrip("-").isdigit():
                 return Value(self.program.number(v.constant), REAL, v.level, float(v.constant))
@@ -193,14 +194,13 @@ class Expressions:
             v = v if is_simple(v.text) else self.keep(v)
             items = [self.cast(self.item(v, k), each, node) for k, each in enumerate(t.items)]
             return self.tuple_of(items, t)
-        self.fail(node, "a value of another type than its place has")
+        raise self.fault(node, "a value of another type than its place has")
 
     def tuple_of(self, items: list[Value], t: Tuple) -> Value:
         """A tuple of values."""
         name, inner = self.program.spell.value(t), ", ".join(self.stored(v) for v in items)
-        made = Value(
-            f"({name}){{{{{inner}}}}}" if t.is_uniform else f"({name}){{{inner}}}", t, parts=items, **effects(items)
-        )
+        text = f"({name}){{{{{inner}}}}}" if t.is_uniform else f"({name}){{{inner}}}"
+        made = Value(text, t, parts=items, **effects(items))
         if items and all(v.is_constant for v in items):
             made.constant = tuple(v.constant for v in items)
         return made
@@ -211,7 +211,7 @@ class Expressions:
             return v.parts[k]
         t = v.type.items[k]
         text = f"{v.at(POSTFIX)}." + (f"at[{k}]" if v.type.is_uniform else f"f{k}")
-        more = {"reads": v.reads, "writes": v.writes}
+        more = effects([v])
         if isinstance(t, Struct):
             return Value(f"&{text}", t, UNARY, **more)
         return Value(text, t, constant=v.constant[k] if v.is_constant else UNKNOWN, **more)
@@ -233,7 +233,7 @@ class Expressions:
         if isinstance(value, (bool, int, float)):
             t = self.program.type_of(value)
             return Value(self.program.literal(value, t), t, constant=value)
-        self.fail(node, "a constant that is no number")
+        raise self.fault(node, "a constant that is no number")
 
     def on_Name(self, node: ast.Name, want: Any) -> Value:
         name = node.id
@@ -251,7 +251,7 @@ class Expressions:
                 return self.globals[node.id]
             if hasattr(builtins, node.id):
                 return getattr(builtins, node.id)
-            self.fail(node, "a name that is not known")
+            raise self.fault(node, "a name that is not known")
         assert isinstance(node, ast.Attribute)
         return getattr(self.global_of(node.value), node.attr)
 
@@ -267,20 +267,20 @@ class Expressions:
                 return Value(self.program.number(value), REAL, constant=value)
             if isinstance(owner, ModuleType):
                 return self.program.constant(node.attr.upper() if owner is math else node.attr, value, owner.__name__)
-            self.fail(node, "an attribute of what is no module")
+            raise self.fault(node, "an attribute of what is no module")
         owner = self.addressed(self.expression(node.value))
         if owner.type is None:
             return Value("0", None)
         if isinstance(owner.type, Struct) and node.attr in owner.type.cls._fields:
             t = owner.type.items[owner.type.cls._fields.index(node.attr)]
-            text, more = f"{self.path_of(owner)}{c_name(node.attr)}", {"reads": owner.reads, "writes": owner.writes}
+            text, more = f"{self.path_of(owner)}{c_name(node.attr)}", effects([owner])
             if isinstance(t, Struct):
                 return Value(f"&{text}", t, UNARY, is_lasting=owner.is_lasting, **more)
             return Value(text, t, possible=self.fact(owner.type.cls.__name__, node.attr), **more)
         if isinstance(owner.type, Array) and node.attr == "shape":
             lengths = [self.length(owner, k) for k in range(owner.type.ndim)]
             return self.tuple_of(lengths, Tuple((INTEGER,) * len(lengths)))
-        self.fail(node, "an attribute that is not in the subset")
+        raise self.fault(node, "an attribute that is not in the subset")
 
     def fact(self, owner: str, field: str) -> frozenset[int] | None:
         """All values of a field, or lengths of an array, of the tables that the program is for."""
@@ -313,10 +313,7 @@ class Expressions:
         n = len(node.elts)
         wants = want.items if isinstance(want, Tuple) and len(want.items) == n else [None] * n
         items = self.evaluate(node.elts, wants)
-        items = [
-            self.cast(v, w, node) if w in NUMBERS and v.type in NUMBERS else v
-            for v, w in zip(items, wants, strict=True)
-        ]
+        items = [self.cast(v, w, node) if is_number(v, w) else v for v, w in zip(items, wants, strict=True)]
         if any(v.type is None for v in items):
             return Value("0", None, **effects(items))
         return self.tuple_of(items, Tuple(tuple(v.type for v in items)))
@@ -336,7 +333,7 @@ class Expressions:
         if v.type is None:
             return v
         if v.type not in (INTEGER, REAL) or (isinstance(node.op, ast.Invert) and v.type != INTEGER):
-            self.fail(node, "an operator of what is no number")
+            raise self.fault(node, "an operator of what is no number")
         sign = {ast.USub: "-", ast.UAdd: "", ast.Invert: "~"}[type(node.op)]
         text = v.at(UNARY)
         constant = UNKNOWN if not v.is_constant or sign == "~" else -v.constant if sign else v.constant
@@ -351,7 +348,7 @@ class Expressions:
                 break
             values.append(self.perhaps(each, is_truth=is_truth))
         if any(v.type not in (BOOL, None) for v in values):
-            self.fail(node, "`and` or `or` of what is not a truth value")
+            raise self.fault(node, "`and` or `or` of what is not a truth value")
         if values[-1].is_constant and bool(values[-1].constant) is absorbing and not any(v.writes for v in values):
             return self.boolean(absorbing)
         values = [v for v in values if not v.is_constant] or values[:1]
@@ -377,7 +374,7 @@ class Expressions:
         """Whether a value is one of a tuple's."""
         is_in, among = isinstance(node.ops[0], ast.In), node.comparators[0]
         if len(node.ops) > 1 or not isinstance(among, ast.Tuple):
-            self.fail(node, "`in` of what is not a tuple")
+            raise self.fault(node, "`in` of what is not a tuple")
         left, *others = self.evaluate([node.left, *among.elts])
         left = left if is_simple(left.text) else self.keep(left)
         op = ast.Eq() if is_in else ast.NotEq()
@@ -390,14 +387,14 @@ class Expressions:
         if a.type is None or b.type is None:
             return Value("false", BOOL, **more)
         if type(op) not in COMPARISONS:
-            self.fail(node, "a comparison that is not in the subset")
+            raise self.fault(node, "a comparison that is not in the subset")
         sign, compare = COMPARISONS[type(op)]
         if isinstance(a.type, Tuple) and a.type == b.type and sign in ("==", "!="):
             a, b = (v if is_simple(v.text) else self.keep(v) for v in (a, b))
             pairs = [f"{self.item(a, k).text} {sign} {self.item(b, k).text}" for k in range(len(a.type.items))]
             return Value((" && " if sign == "==" else " || ").join(pairs), BOOL, AND if sign == "==" else OR, **more)
         if a.type not in NUMBERS or b.type not in NUMBERS:
-            self.fail(node, "a comparison of what is no number")
+            raise self.fault(node, "a comparison of what is no number")
         sides = [v.possible or (frozenset({v.constant}) if v.is_constant else None) for v in (a, b)]
         if sides[0] and sides[1] and not more["writes"]:
             outcomes = {bool(compare(x, y)) for x in sides[0] for y in sides[1]}
@@ -416,7 +413,7 @@ class Expressions:
         a, b = self.perhaps(node.body, want), self.perhaps(node.orelse, want)
         t = join(a.type, b.type)
         if t is None and a.type is not None and b.type is not None:
-            self.fail(node, "a choice of values of different types")
+            raise self.fault(node, "a choice of values of different types")
         a, b = self.as_view(self.cast(a, t, node)), self.as_view(self.cast(b, t, node))
         if isinstance(t, Struct) and (a.is_held or b.is_held):
             text = f"{test.at(EQUAL)} ? {self.stored(a)} : {self.stored(b)}"
@@ -434,24 +431,24 @@ class Expressions:
         if a.type is None or b.type is None:
             return Value("0", None, **more)
         if a.type not in NUMBERS or b.type not in NUMBERS:
-            self.fail(node, "arithmetic with what is no number")
+            raise self.fault(node, "arithmetic with what is no number")
         if type(op) not in OPERATORS:
-            self.fail(node, "an operator that is not in the subset")
+            raise self.fault(node, "an operator that is not in the subset")
         sign, level, operate = OPERATORS[type(op)]
         t = join(a.type, b.type)
         if isinstance(op, BITS):
             if t == REAL:
-                self.fail(node, "bits of a number that is no integer")
+                raise self.fault(node, "bits of a number that is no integer")
             if t == BOOL and isinstance(op, (ast.LShift, ast.RShift)):
                 t = INTEGER
         elif t == BOOL:
-            t = INTEGER
+            raise self.fault(node, "arithmetic with two truth values")
         if isinstance(op, ast.Div):
             t = REAL
         if isinstance(op, ast.Pow) and t == REAL:
             return self.power(a, b, node)
         if isinstance(op, (ast.FloorDiv, ast.Mod)) and t == REAL:
-            self.fail(node, "// or % of a number that is no integer")
+            raise self.fault(node, "// or % of a number that is no integer")
         a, b = self.cast(a, t, node), self.cast(b, t, node)
         constant = UNKNOWN
         if a.is_constant and b.is_constant and t == INTEGER and not isinstance(op, ast.Pow):
@@ -496,14 +493,15 @@ class Expressions:
         while isinstance(base, ast.Subscript):
             groups.insert(0, base.slice)
             base = base.value
-        v, pending = self.expression(base), []
+        v = self.expression(base)
+        pending: list[Value] = []
         for group in groups:
             indices = list(group.elts) if isinstance(group, ast.Tuple) else [group]
             if v.type is None:
                 return Value("0", None)
             if isinstance(v.type, Array):
                 if len(pending) + len(indices) > v.type.ndim:
-                    self.fail(node, "too many indices")
+                    raise self.fault(node, "too many indices")
                 if any(isinstance(i, ast.Slice) for i in indices):
                     v, pending = self.sliced(self.rows(v, pending), indices, node), []
                 else:
@@ -515,7 +513,7 @@ class Expressions:
             elif isinstance(v.type, Tuple):
                 v = self.chosen(v, group, node)
             else:
-                self.fail(node, "an index of what has none")
+                raise self.fault(node, "an index of what has none")
         return self.rows(v, pending)
 
     def places(self, v: Value, indices: list[ast.expr], first: int, node: ast.AST) -> list[Value]:
@@ -525,12 +523,12 @@ class Expressions:
             if place.type == BOOL:
                 place = self.cast(place, INTEGER, node)
             if place.type not in (INTEGER, None):
-                self.fail(node, "an index that is no integer")
+                raise self.fault(node, "an index that is no integer")
             if place.is_constant and place.constant < 0:
                 place = Value(f"{self.length(v, first + k).text} - {-place.constant}", INTEGER, SUM)
             found.append(place)
         if conflict([v, *found]):
-            self.fail(node, "an index that changes what it is an index of")
+            raise self.fault(node, "an index that changes what it is an index of")
         return found
 
     def element(self, v: Value, indices: list[Value]) -> Value:
@@ -538,9 +536,9 @@ class Expressions:
         t, more = v.type, effects([v, *indices])
         if v.inner:
             path, shape = v.inner
-            text = (
-                indices[0].text if len(shape) == 1 else f"{indices[0].at(PRODUCT)} * {shape[1]} + {indices[1].at(SUM)}"
-            )
+            text = indices[0].text
+            if len(shape) > 1:
+                text = f"{indices[0].at(PRODUCT)} * {shape[1]} + {indices[1].at(SUM)}"
             return self.read(f"{path}[{text}]", t.element, more)
         text = v.text if is_simple(v.text) else self.keep(v).text
         places = ", ".join(i.at(SUM) for i in indices)
@@ -583,14 +581,11 @@ class Expressions:
         """A part of an array: contiguous if only its rows are fewer, else with steps."""
         v = self.as_view(v)
         if any(isinstance(i, ast.Slice) and i.step is not None for i in indices):
-            self.fail(node, "a slice with a step")
-        if (
-            v.type.is_contiguous
-            and not any(isinstance(i, ast.Slice) for i in indices[:-1])
-            and isinstance(indices[-1], ast.Slice)
-        ):
-            v = self.rows(v, self.places(v, indices[:-1], 0, node))
-            part = indices[-1]
+            raise self.fault(node, "a slice with a step")
+        *before, part = indices
+        slices = [isinstance(i, ast.Slice) for i in before]
+        if v.type.is_contiguous and not any(slices) and isinstance(part, ast.Slice):
+            v = self.rows(v, self.places(v, before, 0, node))
             if part.lower is None and part.upper is None:
                 return v
             first = self.end(part.lower, node) if part.lower is not None else Value("0", INTEGER)
@@ -600,15 +595,16 @@ class Expressions:
             if part.upper is not None:
                 end = f", {self.end(part.upper, node).text}"
             return Value(f"{'part' if end else 'rest'}_{name}({v.text}, {first.text}{end})", made, **effects([v]))
-        return self.strided(
-            v, [i if isinstance(i, ast.Slice) else self.places(v, [i], k, node)[0] for k, i in enumerate(indices)]
-        )
+        places: list[Value | ast.Slice] = []
+        for k, i in enumerate(indices):
+            places.append(i if isinstance(i, ast.Slice) else self.places(v, [i], k, node)[0])
+        return self.strided(v, places)
 
     def end(self, node: ast.expr, whole: ast.AST) -> Value:
         """Where a slice begins or ends."""
         v = self.expression(node)
         if v.type not in (INTEGER, None) or v.writes:
-            self.fail(whole, "a slice whose ends are no integers")
+            raise self.fault(whole, "a slice whose ends are no integers")
         return v
 
     def strided(self, v: Value, indices: Sequence[Value | ast.Slice]) -> Value:
@@ -645,7 +641,7 @@ class Expressions:
     def field(self, owner: Value, key: ast.expr, node: ast.AST) -> Value:
         """A field of a record."""
         if not (isinstance(key, ast.Constant) and isinstance(key.value, str)):
-            self.fail(node, "a field that has no name")
+            raise self.fault(node, "a field that has no name")
         kind = owner.type.dtype[key.value]
         t, path = element_of(kind.base, {}), f"{self.path_of(owner)}{c_name(key.value)}"
         more = effects([owner])
@@ -661,12 +657,12 @@ class Expressions:
         if index.is_constant:
             n = len(v.type.items)
             if not -n <= index.constant < n:
-                self.fail(node, "a place that the tuple has not")
+                raise self.fault(node, "a place that the tuple has not")
             is_one = v.level == POSTFIX and not v.text.startswith("(")  # a call, evaluated once
             v = v if (v.parts and not v.has_effect) or is_one else self.keep(v)
             return self.item(v, index.constant % n)
         if not v.type.is_uniform or index.type != INTEGER:
-            self.fail(node, "a place in a tuple that is not known")
+            raise self.fault(node, "a place in a tuple that is not known")
         v = v if is_simple(v.text) else self.keep(v)
         return Value(f"{v.text}.at[IN({index.text}, {len(v.type.items)})]", v.type.items[0], **effects([v, index]))
 
@@ -678,14 +674,14 @@ class Expressions:
         if isinstance(node.func, ast.Attribute) and not self.is_global(node.func):
             return self.reshaped(node)
         if not self.is_global(node.func):
-            self.fail(node, "a call of a variable")
+            raise self.fault(node, "a call of a variable")
         called = self.global_of(node.func)
         if isinstance(called, type) and hasattr(called, "_fields"):
             return self.constructed(node, called)
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
-            self.fail(node, "arguments by name, or in a tuple")
+            raise self.fault(node, "arguments by name, or in a tuple")
         if called is np.zeros or called is np.empty:
-            return self.allocated(node, called.__name__)
+            return self.allocated(node, "zeros" if called is np.zeros else "empty")
         values = self.evaluate(node.args)
         if any(v.type is None for v in values):
             return Value("0", None, **effects(values))
@@ -695,8 +691,9 @@ class Expressions:
             return Value(f"({kind})(intptr_t){values[0].at(UNARY)}", t, UNARY, is_lasting=True)
         if source_of(called) is not None:
             return self.called(called, values, node)
-        if getattr(math, getattr(called, "__name__", ""), None) is called:
-            return self.of_math(called.__name__, values, node)
+        name = getattr(called, "__name__", "")
+        if getattr(math, name, None) is called:
+            return self.of_math(name, values, node)
         return self.of_python(called, values, node)
 
     def called(self, called: Any, values: list[Value], node: ast.Call) -> Value:
@@ -706,7 +703,7 @@ class Expressions:
 
         takes = tree_of(source_of(called).function).args.args
         if len(takes) != len(values):
-            self.fail(node, "another number of arguments than the function takes")
+            raise self.fault(node, "another number of arguments than the function takes")
         given = []
         for v, a in zip(values, takes, strict=True):
             declared = ANNOTATED.get(ast.unparse(a.annotation) if a.annotation else "")
@@ -730,14 +727,13 @@ class Expressions:
         """A new NamedTuple."""
         nodes = dict(zip(cls._fields, node.args, strict=False)) | {str(k.arg): k.value for k in node.keywords}
         if list(nodes) != list(cls._fields):
-            self.fail(node, "a NamedTuple without all of its fields in order")
+            raise self.fault(node, "a NamedTuple without all of its fields in order")
         wants = [ANNOTATED.get(str(hint)) for hint in cls.__annotations__.values()]
         values = self.evaluate([nodes[f] for f in cls._fields])
         if any(v.type is None for v in values):
             return Value("0", None, **effects(values))
-        values = [
-            self.cast(v, w, node) if v.type in NUMBERS else self.as_view(v) for v, w in zip(values, wants, strict=True)
-        ]
+        pairs = zip(values, wants, strict=True)
+        values = [self.cast(v, w, node) if v.type in NUMBERS else self.as_view(v) for v, w in pairs]
         t = Struct(cls, tuple(v.type for v in values))
         text = f"({self.program.spell.value(t)}){{{', '.join(map(self.stored, values))}}}"
         return Value(text, t, is_held=True, **effects(values))
@@ -756,14 +752,13 @@ class Expressions:
             else:
                 sizes = [v]
         if any(v.type not in (INTEGER, None) for v in sizes):
-            self.fail(node, "a shape that is no integer")
+            raise self.fault(node, "a shape that is no integer")
         element = element_of(self.global_of(node.args[1]), self.program.records) if len(node.args) > 1 else REAL
         last = sizes[-1]
         width = last.constant if len(sizes) == 2 and last.is_constant and last.constant >= WIDE else 0
         t = Array(element, len(sizes), width=width)
-        return Value(
-            f"{how}_{self.program.spell.value(t)}(memory, {', '.join(v.text for v in sizes)})", t, **effects(sizes)
-        )
+        taken = ", ".join(["memory", *(v.text for v in sizes)])
+        return Value(f"{how}_{self.program.spell.value(t)}({taken})", t, **effects(sizes))
 
     def reshaped(self, node: ast.Call) -> Value:
         """An array in another shape."""
@@ -772,7 +767,7 @@ class Expressions:
         if v.type is None:
             return v
         if node.func.attr != "reshape" or not isinstance(v.type, Array) or not v.type.is_contiguous or node.keywords:
-            self.fail(node, "a method that is not in the subset")
+            raise self.fault(node, "a method that is not in the subset")
         v = self.as_view(v)
         v = v if is_simple(v.text) else self.keep(v)
         sizes = self.evaluate(node.args)
@@ -792,7 +787,7 @@ class Expressions:
             return Value(f"(integer)floor{suffix}({inner})", INTEGER, UNARY, **more)
         if name in ("isnan", "isfinite"):
             return Value(f"({name}({inner}) != 0)", BOOL, **more)
-        self.fail(node, "a function of math that is not in the subset")
+        raise self.fault(node, "a function of math that is not in the subset")
 
     def of_python(self, called: Any, values: list[Value], node: ast.AST) -> Value:
         """A call of a function that Python has itself."""
@@ -805,7 +800,7 @@ class Expressions:
             for each in values:
                 t = join(t, each.type)
             if t not in (INTEGER, REAL):
-                self.fail(node, "the least or most of what are no numbers")
+                raise self.fault(node, "the least or most of what are no numbers")
             first, *others = [self.cast(each, t, node) for each in values]
             text = first.text
             for each in others:
@@ -816,14 +811,19 @@ class Expressions:
         if called is len and isinstance(v.type, Tuple):
             return Value(str(len(v.type.items)), INTEGER, constant=len(v.type.items))
         if v.type not in NUMBERS or len(values) != 1:
-            self.fail(node, "a call of what is no part of kernels")
+            raise self.fault(node, "a call of what is no part of kernels")
         if called is abs and v.type != BOOL:
             return Value(f"{f'fabs{suffix}' if v.type == REAL else 'abs_i'}({v.text})", v.type, **more)
         if called in (int, float, bool):
             return self.cast(v, ANNOTATED[called.__name__], node)
         if called is round:
             return Value(f"(integer)rint{suffix}({v.text})", INTEGER, UNARY, **more)
-        self.fail(node, "a call of what is no part of kernels")
+        raise self.fault(node, "a call of what is no part of kernels")
+
+
+def is_number(v: Value, t: Any) -> bool:
+    """Whether a value can become one of a type of numbers."""
+    return v.type in NUMBERS and t in NUMBERS
 
 
 def opened_by(called: Any) -> Any:

@@ -52,11 +52,10 @@ class Flow:
     def __init__(self, function: ast.FunctionDef, constants: dict[str, Any]) -> None:
         self.arguments = {a.arg for a in function.args.args}
         self.constants = {name: value for name, value in constants.items() if name not in self.arguments}
-        self.local = self.arguments | names_in(ast.Module(function.body, []), ast.Store)
-        self.read = names_in(ast.Module(function.body, []), ast.Load)
-        self.read |= {
-            s.target.id for s in ast.walk(function) if isinstance(s, ast.AugAssign) and isinstance(s.target, ast.Name)
-        }
+        body = ast.Module(function.body, [])
+        changed = [s.target for s in ast.walk(body) if isinstance(s, ast.AugAssign)]
+        self.local = self.arguments | names_in(body, ast.Store)
+        self.read = names_in(body, ast.Load).union(*map(names_in, changed))
         self.unset: list[ast.Name] = []  # read where no way has set them
         self.perhaps_unset: set[str] = set()  # read where some way has not
         self._jumps: list[tuple[list[State], list[State]]] = []  # of each loop: at its breaks and continues
@@ -71,15 +70,13 @@ class Flow:
         mentions = [s for s in block if name in names_in(s)]
         if len(mentions) == 1:
             inner = [b for b in blocks_of(mentions[0]) if any(name in names_in(s) for s in b)]
-            apart = sum(
-                name in names_in(part) for part in ast.iter_child_nodes(mentions[0]) if isinstance(part, ast.expr)
-            )
-            if len(inner) == 1 and not apart:
+            head = [part for part in ast.iter_child_nodes(mentions[0]) if isinstance(part, ast.expr)]
+            if len(inner) == 1 and not any(name in names_in(part) for part in head):
                 return self._home(name, inner[0])
         return mentions[0]
 
     def _counters(self, function: ast.FunctionDef) -> set[str]:
-        """Names that only count loops: every mention is in a loop over a range that sets them, and no body sets them."""
+        """Names that only count loops: every mention is in a loop over a range that sets it, and no body sets it."""
         loops: dict[str, list[ast.For]] = {}
         for node in ast.walk(function):
             if isinstance(node, ast.For) and isinstance(node.target, ast.Name) and is_range(node.iter):

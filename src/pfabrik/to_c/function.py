@@ -17,6 +17,18 @@ from .values import ORDER, UNARY, Value
 if TYPE_CHECKING:
     from .program import Program
 
+STRANGE = (
+    ast.ListComp,
+    ast.SetComp,
+    ast.DictComp,
+    ast.GeneratorExp,
+    ast.Lambda,
+    ast.FunctionDef,
+    ast.NamedExpr,
+    ast.Starred,
+)
+"""What brings variables of its own, or sets them within an expression."""
+
 INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}
 
 MOST_PASSES = 8
@@ -33,7 +45,8 @@ class Function(Expressions):
         self.globals, self.file = function.__globals__, function.__code__.co_filename
         self.node, self.path, self.comments = tree_of(function), short_path(self.file), comments_of(self.file)
         self.flow = Flow(self.node, self.globals)
-        self.name, self.gives = "", None
+        self.name = ""
+        self.gives: Any = None
         self.types: dict[str, Any] = {}
         self.by_value: set[str] = set()
 
@@ -43,13 +56,15 @@ class Function(Expressions):
         """Fill the lines of the body."""
         node, takes = self.node, self.node.args
         if len(takes.args) != len(self.arguments) or takes.defaults or takes.kwonlyargs or takes.vararg or takes.kwarg:
-            self.refuse(node.lineno, f"{node.name}: another number of arguments, or arguments with defaults")
+            raise self.refused(node.lineno, f"{node.name}: another number of arguments, or arguments with defaults")
+        for part in ast.walk(ast.Module(node.body, [])):
+            if isinstance(part, STRANGE):
+                raise self.fault(part, f"{type(part).__name__} is not in the subset")
         for name in self.flow.unset:
-            self.fail(name, "read before it is assigned")
+            raise self.fault(name, "read before it is assigned")
         if self.flow.perhaps_unset:
-            self.refuse(
-                node.lineno, f"{node.name}: perhaps read before assigned: {', '.join(sorted(self.flow.perhaps_unset))}"
-            )
+            names = ", ".join(sorted(self.flow.perhaps_unset))
+            raise self.refused(node.lineno, f"{node.name}: perhaps read before it is assigned: {names}")
         self.parameters = [a.arg for a in takes.args]
         self.types = dict(zip(self.parameters, self.arguments, strict=True))
         declared = ast.unparse(node.returns) if node.returns else ""
@@ -62,13 +77,13 @@ class Function(Expressions):
             self.gives = self.gives or NOTHING
             if before == self._settled():
                 return
-        self.refuse(node.lineno, f"{node.name}: its types do not settle")
+        raise self.refused(node.lineno, f"{node.name}: its types do not settle")
 
     def _settled(self) -> Any:
         return dict(self.types), self.gives, self.reads, self.writes, self.allocates, set(self.by_value)
 
-    def refuse(self, line: int, what: str) -> None:
-        raise Unsupported(f"{self.path}:{line}: {what}")
+    def refused(self, line: int, what: str) -> Unsupported:
+        return Unsupported(f"{self.path}:{line}: {what}")
 
     def text(self) -> str:
         """The function as C text."""
@@ -119,7 +134,7 @@ class Function(Expressions):
         self._last = s.lineno if isinstance(s, (ast.For, ast.While, ast.If)) else s.end_lineno or s.lineno
 
     def _unknown(self, s: ast.stmt) -> None:
-        self.fail(s, f"{type(s).__name__} is not in the subset")
+        raise self.fault(s, f"{type(s).__name__} is not in the subset")
 
     def do_Expr(self, s: ast.Expr) -> None:
         if not isinstance(s.value, ast.Constant):
@@ -146,14 +161,14 @@ class Function(Expressions):
         if self.gives is None or not isinstance(self.gives, str):
             joined = join(self.gives, v.type)
             if joined is None:
-                self.fail(s, "results of different types")
+                raise self.fault(s, "results of different types")
             self.gives = joined
         v = self.cast(v, self.gives, s)
         self.emit(f"return {self.stored(v)};")
 
     def do_AnnAssign(self, s: ast.AnnAssign) -> None:
         if s.value is None:
-            self.fail(s, "a variable without a value")
+            raise self.fault(s, "a variable without a value")
         wanted = ANNOTATED.get(ast.unparse(s.annotation))
         v = self.expression(s.value, wanted)
         self.assign(s.target, self.cast(v, wanted, s) if v.type in NUMBERS else v, s)
@@ -188,7 +203,7 @@ class Function(Expressions):
             x, y = self.perhaps(a, self.type_of(place)), self.perhaps(b, self.type_of(place))
             t = join(x.type, y.type)
             if t is None and x.type is not None and y.type is not None:
-                self.fail(s, "a choice of values of different types")
+                raise self.fault(s, "a choice of values of different types")
             x, y = (self.addressed(self.as_view(self.cast(v, t, s))) for v in (x, y))
             text = f"{test.text} ? {x.at(UNARY)} : {y.at(UNARY)}"
             made.append(Value(text, t, 1, is_lasting=x.is_lasting and y.is_lasting, reads=x.reads | y.reads))
@@ -205,7 +220,7 @@ class Function(Expressions):
     def assign_all(self, targets: list[ast.expr], values: list[ast.expr], s: ast.stmt) -> None:
         """As many values as targets: all are computed before any is stored, where that matters."""
         if len(targets) != len(values):
-            self.fail(s, "tuples of different lengths")
+            raise self.fault(s, "tuples of different lengths")
         if not self._matters(targets, values):
             for target, node in zip(targets, values, strict=True):
                 if isinstance(target, ast.Tuple) and isinstance(node, ast.Tuple):
@@ -225,16 +240,13 @@ class Function(Expressions):
     def _matters(self, targets: list[ast.expr], values: list[ast.expr]) -> bool:
         """Whether what is stored first could be read by a value after it."""
         for k, target in enumerate(targets):
-            later = [
-                *values[k + 1 :],
-                *(i for t in targets[k + 1 :] for i in ast.walk(t) if isinstance(i, ast.Subscript)),
-            ]
+            places = [n for t in targets[k + 1 :] for n in ast.walk(t) if isinstance(n, ast.Subscript)]
+            later: list[ast.expr] = [*values[k + 1 :], *places]
             if any(names_in(target, ast.Store) & names_in(node) for node in later):
                 return True
             stores = any(isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store) for n in ast.walk(target))
-            if stores and any(
-                isinstance(n, (ast.Subscript, ast.Call)) for node in values[k + 1 :] for n in ast.walk(node)
-            ):
+            reads = [n for node in values[k + 1 :] for n in ast.walk(node) if isinstance(n, (ast.Subscript, ast.Call))]
+            if stores and reads:
                 return True
         return False
 
@@ -246,7 +258,7 @@ class Function(Expressions):
                 self.assign_name(name, v, s)
         elif isinstance(target, ast.Tuple):
             if not isinstance(v.type, Tuple) or len(v.type.items) != len(target.elts):
-                self.fail(s, "another number of values than of variables")
+                raise self.fault(s, "another number of values than of variables")
             v = v if is_simple(v.text) else self.keep(v)
             for k, each in enumerate(target.elts):
                 if not isinstance(each, ast.Name) or each.id in self.flow.read:
@@ -259,26 +271,26 @@ class Function(Expressions):
                 v = kept
             self.store(place, v, s)
         else:
-            self.fail(s, "a target that is not in the subset")
+            raise self.fault(s, "a target that is not in the subset")
 
     def store(self, place: Value, v: Value, s: ast.stmt) -> None:
         """Store into memory."""
         if place.type is None:
             return
         if place.type not in (INTEGER, REAL) or v.type not in NUMBERS:
-            self.fail(s, "an element that is no number")
+            raise self.fault(s, "an element that is no number")
         self.writes |= place.reads
         self.emit(f"{place.text} = {self.cast(v, place.type, s).text};")
 
     def assign_name(self, name: str, v: Value, s: ast.stmt) -> None:
         if v.type == NOTHING:
-            self.fail(s, "nothing is assigned")
+            raise self.fault(s, "nothing is assigned")
         known = self.types.get(name)
         if v.type is not None:
             v = self.as_view(v)
             joined = v.type if known is None else known if known == v.type else None
             if joined is None:
-                self.fail(s, f"{name} changes its type")
+                raise self.fault(s, f"{name} changes its type")
             self.types[name] = joined
         if v.type is None:
             return
@@ -289,7 +301,7 @@ class Function(Expressions):
             self.by_value.add(name)
         own, text = c_name(name), self.stored(v) if name in self.by_value else v.text
         if isinstance(v.type, Struct) and name in self.parameters and not v.is_lasting:
-            self.fail(s, "a parameter that becomes a new NamedTuple")
+            raise self.fault(s, "a parameter that becomes a new NamedTuple")
         if self.flow.homes.get(name) is s and name not in self._declared:
             self._declared.add(name)
             self.emit(f"{self._kind_of(name)}{own} = {text};")
@@ -312,11 +324,11 @@ class Function(Expressions):
         if made.type is None:
             return
         if made.type != place.type:
-            self.fail(s, "a variable that changes its type")
+            raise self.fault(s, "a variable that changes its type")
         if isinstance(s.target, ast.Subscript):
             lvalue = place if place.reads else self.expression(load)  # it was kept, if the value changes it
             if not lvalue.reads:
-                self.fail(s, "an element that is no number")
+                raise self.fault(s, "an element that is no number")
             self.writes |= lvalue.reads
         else:
             lvalue = place
@@ -370,7 +382,7 @@ class Function(Expressions):
 
     def do_While(self, s: ast.While) -> None:
         if s.orelse:
-            self.fail(s, "a loop with else")
+            raise self.fault(s, "a loop with else")
         n = len(self.lines)
         self.indent += 1
         test = self.truth(s.test)
@@ -387,7 +399,7 @@ class Function(Expressions):
 
     def do_For(self, s: ast.For) -> None:
         if s.orelse:
-            self.fail(s, "a loop with else")
+            raise self.fault(s, "a loop with else")
         if is_range(s.iter):
             self.count(s)
         else:
@@ -397,15 +409,15 @@ class Function(Expressions):
         """A loop over a range."""
         assert isinstance(s.iter, ast.Call)
         if not isinstance(s.target, ast.Name):
-            self.fail(s, "a loop over a range with several variables")
+            raise self.fault(s, "a loop over a range with several variables")
         given = [self.cast(v, INTEGER, s) if v.type in (BOOL, INTEGER) else v for v in self.evaluate(s.iter.args)]
         if any(v.type not in (INTEGER, None) for v in given):
-            self.fail(s, "a range that is no integer")
+            raise self.fault(s, "a range that is no integer")
         zero, one = Value("0", INTEGER, constant=0), Value("1", INTEGER, constant=1)
         start = given[0] if len(given) > 1 else zero
         stop, step = given[min(len(given) - 1, 1)], given[2] if len(given) > 2 else one
         if not step.is_constant or step.constant == 0:
-            self.fail(s, "a range whose step is not constant")
+            raise self.fault(s, "a range whose step is not constant")
         if start.is_constant and stop.is_constant and not range(start.constant, stop.constant, step.constant):
             return
         name = c_name(s.target.id) if s.target.id in self.flow.read else f"turn{self.indent}"
@@ -415,14 +427,12 @@ class Function(Expressions):
         end, more = stop.at(ORDER + 1), ""
         if not self._stays(s.iter.args[min(len(given) - 1, 1)], stop, assigned):
             end, more = f"{counter}_end", f", {counter}_end = {stop.text}"
-        compare, by = (
-            ("<", f"{counter} += {step.text}") if step.constant > 0 else (">", f"{counter} -= {-step.constant}")
-        )
-        by = {1: f"{counter}++", -1: f"{counter}--"}.get(step.constant, by)
+        compare, by = ("<", f" += {step.constant}") if step.constant > 0 else (">", f" -= {-step.constant}")
+        by = {1: "++", -1: "--"}.get(step.constant, by)
         known = self.types.setdefault(s.target.id, INTEGER) if s.target.id in self.flow.read else INTEGER
         if known != INTEGER:
-            self.fail(s, f"{name} changes its type")
-        self.emit(f"for (integer {counter} = {start.text}{more}; {counter} {compare} {end}; {by}) {{")
+            raise self.fault(s, f"{name} changes its type")
+        self.emit(f"for (integer {counter} = {start.text}{more}; {counter} {compare} {end}; {counter}{by}) {{")
         if not is_own:
             self.lines.append("    " * (self.indent + 1) + f"{name} = {counter};")
         self.inside(s.body)
@@ -432,14 +442,12 @@ class Function(Expressions):
         """Whether the end of a range is the same at each turn, and costs nothing."""
         if stop.is_constant:
             return True
-        if names_in(node) & assigned or stop.has_effect or (stop.text.startswith("t") and stop.text[1:].isdigit()):
-            return not stop.has_effect and stop.text[1:].isdigit()
-        parts = [
-            n
-            for n in ast.walk(node)
-            if isinstance(n, ast.Call) and not (isinstance(n.func, ast.Name) and n.func.id == "len")
-        ]
-        return not parts and "?" not in stop.text
+        if re.fullmatch(r"t\d+", stop.text):
+            return True
+        if names_in(node) & assigned or stop.has_effect or "?" in stop.text:
+            return False
+        calls = [n for n in ast.walk(node) if isinstance(n, ast.Call)]
+        return all(isinstance(n.func, ast.Name) and n.func.id == "len" for n in calls)
 
     def for_each(self, s: ast.For) -> None:
         """A loop over a tuple."""
@@ -447,12 +455,12 @@ class Function(Expressions):
         if v.type is None:
             return
         if not isinstance(v.type, Tuple) or not v.type.items:
-            self.fail(s, "a loop over what is neither a range nor a tuple")
+            raise self.fault(s, "a loop over what is neither a range nor a tuple")
         t: Any = None
         for item in v.type.items:
             joined = join(t, item)
             if joined is None:
-                self.fail(s, "a loop over values of different types")
+                raise self.fault(s, "a loop over values of different types")
             t = joined
         if not v.type.is_uniform:
             v = self.cast(v, Tuple((t,) * len(v.type.items)), s)

@@ -7,9 +7,9 @@ import re
 
 _KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false "
-    "integer real arena memory take place near far huge small y0 y1 yn j0 j1 jn gamma round floor sqrt sin cos tan atan2 "
-    "acos asin atan hypot fabs log exp pow fmin fmax fma remainder signbit isnan isfinite index div abs"
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
+    "false integer real arena memory take place near far huge small y0 y1 yn j0 j1 jn gamma round floor sqrt sin cos "
+    "tan atan2 acos asin atan hypot fabs log exp pow fmin fmax fma remainder signbit isnan isfinite index div abs"
 )
 RESERVED = frozenset(_KEYWORDS.split())
 

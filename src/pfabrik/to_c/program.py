@@ -120,10 +120,9 @@ class Program:
             self._constants[wanted] = value
             text = self.literal(value, t)
             is_small = t == INTEGER and abs(value) < _SMALL
-            kind = "" if is_small else self.spell.stored(t)
-            self.items[wanted] = (
-                f"enum {{ {wanted} = {text} }};\n" if is_small else f"static const {kind}{wanted} = {text};\n"
-            )
+            text = f"{wanted} = {text}"
+            text = f"enum {{ {text} }};\n" if is_small else f"static const {self.spell.stored(t)}{text};\n"
+            self.items[wanted] = text
         return Value(wanted, t, constant=value)
 
     def text(self, more: str = "") -> str:
@@ -160,15 +159,18 @@ def source_of(called: Any) -> Any:
 
 def named_records() -> dict[Any, str]:
     """Structured types by the names of the globals that hold them; a name that is taken has its module's before it."""
+    from ..kernels._jit import SOURCES
+
     found: dict[Any, str] = {}
-    for module in list(sys.modules.values()):
-        if getattr(module, "__name__", "").startswith(f"{__package__.partition('.')[0]}.kernels"):
-            for name, value in vars(module).items():
-                if isinstance(value, np.dtype) and value.names and value not in found:
-                    parts = name.strip("_").split("_")
-                    if camel(parts) in found.values():
-                        parts = [*module.__name__.rpartition(".")[2].split("_"), *parts]
-                    found[value] = camel(parts)
+    own = f"{__package__.partition('.')[0]}.kernels."
+    names = {name for name in sys.modules if name.startswith(own)} | {s.function.__module__ for s in SOURCES.values()}
+    for module in sorted(names):
+        for name, value in vars(sys.modules[module]).items():
+            if isinstance(value, np.dtype) and value.names and value not in found:
+                parts = name.strip("_").split("_")
+                if camel(parts) in found.values():
+                    parts = [*module.rpartition(".")[2].split("_"), *parts]
+                found[value] = camel(parts)
     return found
 
 

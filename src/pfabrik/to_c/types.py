@@ -170,13 +170,13 @@ class Spelling:
         steps = "" if t.is_contiguous else f" integer step[{n}];"
         self.declare(name, f"typedef struct {{ {item} *data; integer n[{n}];{steps} }} {name};\n")
         lengths, given = [f"a.n[{k}]" for k in range(n)], [f"n{k}" for k in range(n)]
-        size = " * ".join(f"(size_t){k}" for k in given)
+        size = " * ".join([*(f"(size_t){k}" for k in given), f"sizeof({item})"])
         takes = ", ".join(f"integer {k}" for k in given)
         for how in ("zeros", "empty"):
             self.declare(
                 f"{how}_{name}",
                 f"static inline {name} {how}_{name}(arena *memory, {takes}) {{\n"
-                f"    {name} made = {{take(memory, {size} * sizeof({item}), {int(how == 'zeros')}), {{{', '.join(given)}}}}};\n"
+                f"    {name} made = {{take(memory, {size}, {int(how == 'zeros')}), {{{', '.join(given)}}}}};\n"
                 "    return made;\n}\n",
             )
         if not t.is_contiguous:

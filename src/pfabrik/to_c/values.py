@@ -41,7 +41,7 @@ class Value:
         return self.text if self.level >= level else f"({self.text})"
 
 
-def effects(values: list[Value]) -> dict[str, frozenset[str]]:
+def effects(values: list[Value]) -> dict[str, Any]:
     """What several expressions read and write together."""
     return {
         "reads": NONE.union(*(v.reads for v in values)),

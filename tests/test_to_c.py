@@ -1,0 +1,184 @@
+"""The subset of Python that kernels are written in, translated to C: each construct answers as in plain Python."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pfabrik.kernels._jit import SOURCES
+from pfabrik.to_c import Program, Unsupported
+from subset import constructs, refused
+
+WARNINGS = [
+    "-std=c99",
+    "-O1",
+    "-ffp-contract=off",
+    "-Werror",
+    "-Wall",
+    "-Wextra",
+    "-pedantic",
+    "-Wconversion",
+    "-Wshadow",
+]
+SANITIZERS = ["-DCHECKED", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or [os.environ.get("CC", "cc")]
+CASES = 40
+CONSTRUCTS = ("arithmetic", "functions", "conditions", "loops", "order", "tuples", "views", "records", "structures")
+CONSTRUCTS += ("memory", "polymorphic")
+
+
+def drawn(rng: np.random.Generator) -> dict[str, Any]:
+    """An argument for each name that constructs have."""
+    links = np.zeros(3, constructs.LINK)
+    links["kind"], links["length"] = rng.integers(0, 3, 3), rng.normal(size=3)
+    for field in ("axis", "frame", "places"):
+        links[field] = rng.integers(-9, 9, links[field].shape)
+    table = constructs.Table(rng.normal(size=4), links.copy(), rng.normal(size=(2, 2)))
+    other = constructs.Table(rng.normal(size=5), links.copy(), rng.normal(size=(3, 1)))
+    return {
+        "x": rng.normal(size=6) * 3.0,
+        "n": rng.integers(-50, 50, 2),
+        "grid": rng.normal(size=(4, 4)),
+        "cube": rng.normal(size=(2, 3, 4)),
+        "links": links,
+        "table": table,
+        "other": other,
+        "out": np.zeros(24),
+    }
+
+
+def arguments(function: Any, rng: np.random.Generator) -> list[Any]:
+    """Arguments of a construct."""
+    values = drawn(rng) | ({"n": 7} if function.__name__ == "memory" else {})
+    return [values[name] for name in inspect.signature(function).parameters]
+
+
+def arrays_of(values: list[Any]) -> list[Any]:
+    """All arrays of arguments, in order."""
+    found = []
+    for value in values:
+        found += (
+            arrays_of(list(value)) if isinstance(value, tuple) else [value] if isinstance(value, np.ndarray) else []
+        )
+    return found
+
+
+def c_of(program: Program, value: Any, name: str) -> tuple[str, str]:
+    """Static data for an argument, with how it is given."""
+    if isinstance(value, int):
+        return "", str(value)
+    t = program.type_of(value)
+    if isinstance(value, tuple):
+        parts = [c_of(program, item, f"{name}_{k}") for k, item in enumerate(value)]
+        inner = ", ".join(
+            given.replace(f"({program.spell.value(f)})", "") for f, (_, given) in zip(t.items, parts, strict=True)
+        )
+        return "".join(text for text, _ in parts), f"&({program.spell.value(t)}){{{inner}}}"
+    shape = ", ".join(map(str, value.shape))
+    data = f"static {program.spell.value(t.element)} {name}[{max(value.size, 1)}];\n"
+    return data, f"({program.spell.value(t)}){{{name}, {{{shape}}}}}"
+
+
+def executable(folder: Path, compiler: str, flags: list[str]) -> Path:
+    """A program that reads the arrays of all cases and writes what constructs made of them."""
+    program, rng = Program(), np.random.default_rng(0)
+    data, calls = "", ""
+    for name in CONSTRUCTS:
+        function = SOURCES[getattr(constructs, name)].function
+        values = arguments(function, rng)
+        made = program.add(getattr(constructs, name), *values)
+        told = [c_of(program, value, f"{name}_{k}") for k, value in enumerate(values)]
+        data += "".join(text for text, _ in told)
+        places = [line.split()[-1].split("[")[0] for text, _ in told for line in text.splitlines()]
+        given = [*(["&memory"] if made.allocates else []), *(given for _, given in told)]
+        calls += f"    for (int i = 0; i < {CASES}; i++) {{\n"
+        calls += "".join(f"        if (!fread({place}, sizeof {place}, 1, stdin)) return 1;\n" for place in places)
+        calls += f"        memory.next = memory.end - sizeof BUFFER;\n        {made.name}({', '.join(given)});\n"
+        calls += "".join(f"        fwrite({place}, sizeof {place}, 1, stdout);\n" for place in places) + "    }\n"
+    main = "#include <stdio.h>\nstatic char BUFFER[1 << 20];\n" + data
+    main += "int main(void) {\n    arena memory = {BUFFER, BUFFER + sizeof BUFFER, NULL, NULL};\n"
+    main += f"{calls}    return 0;\n}}\n"
+    source, made_file = folder / f"{compiler}.c", folder / f"{compiler}{len(flags)}"
+    source.write_text(program.text(main))
+    subprocess.run([compiler, *WARNINGS, *flags, str(source), "-o", str(made_file), "-lm"], check=True)
+    return made_file
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("flags", [[], SANITIZERS], ids=["plain", "sanitized"])
+def test_constructs_answer_as_in_python(tmp_path: Path, compiler: str, flags: list[str]) -> None:
+    if flags and not sanitizes(tmp_path, compiler):
+        pytest.skip(f"{compiler} has no sanitizers")
+    made, rng = executable(tmp_path, compiler, flags), np.random.default_rng(1)
+    sent, expected, names = [], [], []
+    for name in CONSTRUCTS:
+        function = SOURCES[getattr(constructs, name)].function
+        for _ in range(CASES):
+            values = arguments(function, rng)
+            sent += [array.tobytes() for array in arrays_of(values)]
+            function(*values)
+            expected += copy.deepcopy(arrays_of(values))
+            names += [name] * len(arrays_of(values))
+    ran = subprocess.run([str(made)], input=b"".join(sent), capture_output=True, check=False)
+    assert ran.returncode == 0, ran.stderr.decode()[:2000]
+    at = 0
+    for name, array in zip(names, expected, strict=True):
+        got = np.frombuffer(ran.stdout, array.dtype, array.size, at).reshape(array.shape)
+        at += array.nbytes
+        if name == "functions":  # the mathematics of the C library may round otherwise
+            np.testing.assert_allclose(got, array, rtol=4e-16, err_msg=name)
+        else:
+            np.testing.assert_array_equal(got, array, err_msg=name)
+
+
+def sanitizes(folder: Path, compiler: str) -> bool:
+    """Whether a compiler's sanitizers are installed."""
+    (folder / "empty.c").write_text("int main(void) { return 0; }\n")
+    command = [compiler, *SANITIZERS, str(folder / "empty.c"), "-o", str(folder / "empty")]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+REFUSED = [f for f in vars(refused).values() if inspect.isfunction(f) and f in SOURCES and f.__doc__]
+
+
+@pytest.mark.parametrize("function", REFUSED, ids=lambda f: f.__name__)
+def test_what_the_subset_lacks_is_refused_with_its_place(function: Any) -> None:
+    x = np.zeros(3)
+    samples = [refused.Pair(x, x), x] if function.__name__ == "set_anew" else [x]
+    first = inspect.getsourcelines(function)[1]
+    with pytest.raises(Unsupported) as told:
+        Program().add(function, *samples)
+    place, _, what = str(told.value).partition(": ")
+    if function.__name__ not in ("recursive", "global_array"):
+        file, line = place.split(":")
+        assert file == "refused.py" and first <= int(line) < first + 12
+    assert function.__doc__ in f"{place}: {what}"
+
+
+def test_elements_outside_an_array_are_found(tmp_path: Path) -> None:
+    program = Program()
+    made = program.add(constructs.last, np.zeros(3))
+    main = f"int main(void) {{ return (int){made.name}(({program.spell.value(made.arguments[0])}){{NULL, {{0}}}}); }}\n"
+    (tmp_path / "outside.c").write_text(program.text(main))
+    command = [COMPILERS[0], "-DCHECKED", str(tmp_path / "outside.c"), "-o", str(tmp_path / "outside"), "-lm"]
+    subprocess.run(command, check=True)
+    ran = subprocess.run([str(tmp_path / "outside")], capture_output=True, text=True, check=False)
+    assert ran.returncode != 0 and "index -1 of 0" in ran.stderr
+
+
+@pytest.mark.parametrize("flag", ["-ffast-math", "-m32 -mfpmath=387"])
+def test_arithmetic_that_is_not_ieee_is_refused(tmp_path: Path, flag: str) -> None:
+    (tmp_path / "head.c").write_text(Program().text("int main(void) { return 0; }\n"))
+    command = [COMPILERS[0], *flag.split(), "-E", str(tmp_path / "head.c")]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "-m32" in flag and "IEEE" not in ran.stderr and "x87" not in ran.stderr:
+        pytest.skip("no compiler for x87 here")
+    assert ran.returncode != 0 and "kernels need" in ran.stderr
