@@ -35,6 +35,8 @@ LEVELS = {
 FLAGS = ["-std=c99", "-O3", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
 """Without contraction the same arithmetic everywhere; what sets `errno` or traps could not be a vector."""
 
+CHECKS = ["-DCHECKED", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+
 UNABLE = 3
 """Exit code where no compiler is."""
 
@@ -182,11 +184,11 @@ def compiled(group: str, text: str, flags: list[str], name: str) -> Path:
     return made
 
 
-def build(platform: dict[str, str], into: Path) -> Path:
+def build(platform: dict[str, str], into: Path, more: list[str]) -> Path:
     """Translate, compile what has changed, and link; where the module is."""
     texts, kernels = translate()
     levels = list(LEVELS) if "__x86_64__" in platform else [""]
-    flags = [*FLAGS, *([] if "_WIN32" in platform else ["-fPIC"])]
+    flags = [*FLAGS, *([] if "_WIN32" in platform else ["-fPIC"]), *more]
     jobs = []
     for group, text in texts.items():
         write(BUILD / f"{group}.c", text.encode())
@@ -201,10 +203,10 @@ def build(platform: dict[str, str], into: Path) -> Path:
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         objects = list(pool.map(lambda job: compiled(*job), jobs))
     sys.stderr.write("\n" if sys.stderr.isatty() else "")
-    for path in set(BUILD.glob("*.o")) - set(objects):  # of sources that are no more
+    for path in set() if more else set(BUILD.glob("*.o")) - set(objects):  # of sources that are no more
         path.unlink()
     module = into / ("_compiled.pyd" if "_WIN32" in platform else "_compiled.abi3.so")
-    link = ["-O2", "-fvisibility=hidden", f"-I{sysconfig.get_path('include')}", f"-I{BUILD}"]
+    link = [*more, "-O2", "-fvisibility=hidden", f"-I{sysconfig.get_path('include')}", f"-I{BUILD}"]
     if "_WIN32" in platform:
         link += ["-shared", f"-L{Path(sys.base_prefix) / 'libs'}"]
     elif "__APPLE__" in platform:
@@ -220,11 +222,12 @@ def build(platform: dict[str, str], into: Path) -> Path:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--into", type=Path, default=ROOT / "src" / "pfabrik" / "kernels", help="folder of the module")
+    parser.add_argument("--checked", action="store_true", help="stop at an index outside its array, and for sanitizers")
     given = parser.parse_args()
     platform = macros()
     if platform is None:
         return UNABLE
-    build(platform, given.into)
+    build(platform, given.into, CHECKS if given.checked else [])
     return 0
 
 
