@@ -15,7 +15,6 @@ from .checks import require_callable
 from .description.mechanism import Mechanism, checked_mechanism
 from .fk import solve_fk
 from .ik import solve_ik
-from .kernels.ahead import compile_all
 from .poses import pose
 from .track import track
 
@@ -43,7 +42,6 @@ def warm_up(mechanism: Mechanism | None = None, *, on_step: Callable[[str, float
     """
     require_callable("on_step", on_step)
     if mechanism is None:
-        compile_all(on_step)
         return
     for name, step in _questions(checked_mechanism(mechanism)):
         start = time.perf_counter()

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ..kernels._jit import SOURCES
 from .function import Function
 from .naming import RESERVED, c_name, number
+from .sources import source_of
 from .types import INTEGER, REAL, Array, Spelling, Struct, Unsupported, type_of
 from .values import Value
 
@@ -147,20 +149,8 @@ def same(a: Any, b: Any) -> bool:
     return type(a) is type(b) and bool(a == b)
 
 
-def source_of(called: Any) -> Any:
-    """The function of Python that a decorator of kernels was given, with its kind; None for anything else."""
-    from ..kernels._jit import SOURCES
-
-    try:
-        return SOURCES.get(called)
-    except TypeError:  # it has no hash
-        return None
-
-
 def named_records() -> dict[Any, str]:
     """Structured types by the names of the globals that hold them; a name that is taken has its module's before it."""
-    from ..kernels._jit import SOURCES
-
     found: dict[Any, str] = {}
     own = f"{__package__.partition('.')[0]}.kernels."
     names = {name for name in sys.modules if name.startswith(own)} | {s.function.__module__ for s in SOURCES.values()}

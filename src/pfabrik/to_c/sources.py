@@ -7,6 +7,9 @@ import tokenize
 from functools import cache
 from pathlib import Path
 from types import FunctionType
+from typing import Any
+
+from ..kernels._jit import OPENERS, SOURCES, Source
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -36,3 +39,21 @@ def short_path(path: str) -> str:
     """A path as it is told: from the package's folder on."""
     where = Path(path)
     return where.relative_to(PACKAGE).as_posix() if PACKAGE in where.parents else where.name
+
+
+def source_of(called: Any) -> Source | None:
+    """The function of Python that a decorator of kernels was given, with its kind; None for anything else."""
+    source: Source | None = found_in(SOURCES, called)
+    return source
+
+
+def opened_by(called: Any) -> Any:
+    """The sample of what opens a handle; None for anything else."""
+    return found_in(OPENERS, called)
+
+
+def found_in(known: dict[Any, Any], called: Any) -> Any:
+    try:
+        return known.get(called)
+    except TypeError:  # it has no hash
+        return None
