@@ -26,7 +26,7 @@ from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import forward as F
 from pfabrik.kernels.platform import leg_links, limits
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
-from pfabrik.kernels.platform.nearest import new_nearest_scratch
+from pfabrik.kernels.platform.nearest import NO_STARTS, new_nearest_scratch
 from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
 from pfabrik.model import model_of
@@ -128,7 +128,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     """The gradient from legs with multipliers, and what carries them, equals that from all legs."""
     mechanism, legs, table = table_of(name)
     rng = np.random.default_rng(1)
-    search, n = new_search_scratch(table, table.cones.shape[0], NO_LINKS), E.count_unknowns(table)
+    search, n = new_search_scratch(table, NO_LINKS), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = random_configuration(mechanism, legs, rng).pose
@@ -243,11 +243,9 @@ def test_spheres_are_all_that_legs_leave_once_actuators_are_given(name: str) -> 
 def test_limits_are_weighed_in_more_motions_than_there_are_limits() -> None:
     """For an arm with one limit: scratch memory suffices, and the multiplier is the pull along the limit."""
     table = model_of(published.planar_arm()).legs
-    settings = np.zeros(1, SETTINGS)  # no steps: limits are weighed
-    plan = MultistartPlan(
-        np.zeros(6), settings, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), stays_there(table), NO_LINKS
-    )
-    scratch = new_nearest_scratch(kernel_table(table), plan)
+    settings = np.zeros(1, SETTINGS)
+    plan = MultistartPlan(np.zeros((1, 6)), settings, NO_STARTS, stays_there(table), NO_LINKS)
+    scratch = new_nearest_scratch(kernel_table(table), plan, weighs_limits=True)
     linear = scratch.search.first.linear
     n = len(linear.g)
     assert len(linear.h) < n

@@ -19,7 +19,7 @@ def derived(function: Callable[Concatenate[Owner, P], Value]) -> Callable[Concat
 
     The object does not change, and other arguments are hashable. Threads may compute a value at the same time.
     """
-    name = f"{function.__module__}.{function.__qualname__}"
+    name = _name_of(function)
 
     @wraps(function)
     def once(owner: Owner, /, *args: P.args, **kwargs: P.kwargs) -> Value:
@@ -38,3 +38,12 @@ def derived(function: Callable[Concatenate[Owner, P], Value]) -> Callable[Concat
         return value
 
     return once
+
+
+def is_derived(function: Callable[[Owner], Value], owner: Owner) -> bool:
+    """True if the value of such a function for an object is computed already."""
+    return _name_of(function) in owner.__dict__
+
+
+def _name_of(function: Callable[..., Any]) -> str:
+    return f"{function.__module__}.{function.__qualname__}"

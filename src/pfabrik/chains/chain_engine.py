@@ -17,10 +17,11 @@ from ..closure.closure_engine import ClosureEngine, to_answers
 from ..closure.configurations import Configurations, coordinates_for, joint_coordinates, new_rows, steps_of
 from ..closure.descend import clip_targets
 from ..closure.engine_contract import Engine
-from ..closure.projection import SAME, ProjectionMode, held_parts, projection_modes
+from ..closure.projection import ProjectionMode, held_parts, projection_modes
 from ..closure.stretched import BentConfiguration
 from ..closure.target_closing import CONTINUATION_STEPS, LONGEST_STEP
 from ..description.home_mobility import column_moves
+from ..kernels.release import SAME
 from ..kernels.rows import FAILED, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..model import Model
 from ..options import Options

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..batch import put
 from ..closure.close import Closing, in_lengths
-from ..closure.projection import SAME, Projected, ProjectionMode
+from ..closure.projection import Projected, ProjectionMode
 from ..kernels.chains.chain_records import ChainAim, ChainAnswers
 from ..kernels.closure.loops import PoseObjective
+from ..kernels.release import SAME
 from ..kernels.rows import HOLD_NOTHING
 from ..model import Model
 from ..tolerances import TOLERANCES

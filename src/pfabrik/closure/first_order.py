@@ -20,7 +20,7 @@ from ..motion.singularities import KINDS, Singularity, measures, singularity_of
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
-    from ..kernels.closure.first_order import Tables
+    from ..kernels.closure.first_order import FirstOrderScratch
 
 ROWS_A_BLOCK = 64
 
@@ -82,10 +82,10 @@ def _first_order(model: Model, q: Floats, *, whole: bool) -> FirstOrder:
 
 
 @derived
-def _scratch(model: Model, whole: bool) -> Scratch[Tables]:
-    from ..kernels.closure.first_order import new_tables
+def _scratch(model: Model, whole: bool) -> Scratch[FirstOrderScratch]:
+    from ..kernels.closure.first_order import new_first_order_scratch
 
-    return Scratch(new_tables, model.closure.loops, _plan(model, whole))
+    return Scratch(new_first_order_scratch, model.closure.loops, _plan(model, whole))
 
 
 @derived

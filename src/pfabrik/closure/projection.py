@@ -13,6 +13,7 @@ from ..batch import put
 from ..derived import derived
 from ..description.task import Weights
 from ..kernels.closure.loops import LOCKED
+from ..kernels.release import HOLD_COST, SAME
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.closure import Closure
 from ..motion.displacements import displacements
@@ -23,18 +24,11 @@ from .effort import descents_within
 from .multistart import SEEDS, seeds_of
 from .parasitic import is_flipped
 
-SAME = 1e-7
-"""Relative decrease of the distance by which a later search must improve on an earlier one."""
-
 AGREEMENTS = 7
 """Searches that must end at the nearest configuration found before the multistart stops."""
 
 LONG_CHAIN_STEPS = 20
 """Steps that bring a start of a long chain within its limits."""
-
-HOLD_COST = 1.0
-"""Most that a held component may add to the distance, per unit by which the start differs from the target in that
-component [L per rad, or rad per L]: a rotation about the middle of a machine moves no joint by more."""
 
 
 class ProjectionMode(NamedTuple):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from ..arrays import Floats
+from ..kernels.release import SAME
 from ..kernels.rows import PROJECTED, REACHED, Rows
 from ..model import Model
 from ..options import Options
 from .first_order import are_stretched
 from .parasitic import differences
-from .projection import SAME, projection_modes
+from .projection import projection_modes
 
 SAME_POSE = 1e-7
 """Largest difference of poses that count as equal [L and entries of rotation matrices]."""

@@ -21,7 +21,7 @@ from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.margin_blocks import margins_in_blocks
-from .platform.any_mode import answer_in_any_mode
+from .platform.answer_row import answer_rows
 from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
 from .platform.jacobians import jacobians
@@ -68,11 +68,10 @@ _PASSES = (
 
 _POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i f f i"))
 _CHAINS = ChainAim(_POSE_OBJECTIVE, *_values("F2 F3 i i i f f")), ChainAnswers(*_values("f2 f3 f1 f1 i1"))
-_ANSWERS = tuple(_values("i F3 F3 f2 i1 f3 f2 f2"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, tuple(_values("i F3 F3 F2 i1 f3 f2 f2"))),
-    (answer, _ANSWERS),
+    (answer, tuple(_values("i F3 F3 f2 i1 f3 f2 f2"))),
     (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
     (solve_by_passes, _PASSES),
     (solve_by_half_spaces, _PASSES),
@@ -82,7 +81,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (jacobians, tuple(_values("i F3 i f3"))),
     (first_order, (*_values("i i"), _FIRST_ORDER_PLAN, *_values("F2"), _FIRST_ORDER)),
     (feasibility, tuple(_values("i F3 F3 F2 f1 i1"))),
-    (answer_in_any_mode, _ANSWERS),
+    (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i F2 i i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),

@@ -9,14 +9,16 @@ import numpy as np
 from ..arrays import Floats
 from ..closure.attempts import HELD, Attempt, with_verdicts
 from ..closure.configurations import Configurations, new_rows
+from ..kernels.platform.tables import IN_OTHER_ASSEMBLIES, IN_OTHER_MODES, Start
 from ..kernels.rows import ITERATIONS, REACHED
 from ..model import Model
 from ..options import Options
 from .nearest import endings
 from .nearest_pose import starts_at
 from .reach import reach
-from .seeds import seeds_of, seeds_of_other_assemblies
-from .unreached import Request, Unreached, reach_from_seeds, reach_in_other_modes
+from .seeds import seeds_of
+from .tables import home_of
+from .unreached import Answers, answer_phases
 
 
 def attempts(
@@ -28,21 +30,23 @@ def attempts(
     yield _of_closed_forms("closed forms", "working mode of the start", rows.status[0] == REACHED)
     if rows.status[0] == REACHED:
         return
-    start_poses = model.mechanism.home_pose[None].copy() if start is None else start.rows.poses
-    unreached = Unreached(target, start_poses, sides.copy(), np.full_like(sides, np.nan), rows)
-    if not keep_mode and table.has_sides:
-        reach_in_other_modes(table, unreached)
-        yield _of_closed_forms("closed forms", "other working modes", rows.status[0] == REACHED)
-        if rows.status[0] == REACHED:
-            return
-    if not keep_mode and table.is_completed:
-        seeds = seeds_of_other_assemblies(model)
-        request = Request(model, options, keep_mode, False, start is not None)
-        is_reached = len(seeds.poses) > 0 and not reach_from_seeds(seeds, request, unreached)[0]
-        yield _of_closed_forms("closed forms", "other assemblies", is_reached)
-        if is_reached:
-            return
-    own, seeds = starts_at(model, start_poses, sides), seeds_of(model)
+    home = home_of(model)
+    begin = home._replace(sides=sides) if start is None else Start(start.rows.poses, sides, start.rows.actuators)
+    answers = Answers(rows, np.full_like(sides, np.nan), sides.copy())
+
+    def is_answered(phase: int) -> bool:
+        asked = {"has_start": start is not None, "keep_mode": keep_mode, "nearby": False}
+        answer_phases(model, options, target, begin, answers, np.arange(1), phase, phase, **asked)
+        return bool(rows.status[0] == REACHED)
+
+    phases = [("other working modes", IN_OTHER_MODES, table.has_sides)]
+    phases += [("other assemblies", IN_OTHER_ASSEMBLIES, table.is_completed)]
+    for name, phase, is_tried in phases:
+        if is_tried and not keep_mode:
+            yield _of_closed_forms("closed forms", name, is_answered(phase))
+            if rows.status[0] == REACHED:
+                return
+    own, seeds = starts_at(model, begin.poses, sides), seeds_of(model)
     own = own._replace(q=np.zeros((1, len(table.legs)))) if len(seeds.q) and start is None else own
     for projection, ends in endings(model, options, target, own, keep_mode=keep_mode):
         others = dict(endings(model, options, target, seeds, keep_mode=keep_mode))[projection]

@@ -20,6 +20,7 @@ from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
+from ..kernels.platform.tables import NEAREST, Start
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..model import Model
 from ..motion.outward import centres_at
@@ -34,10 +35,11 @@ from .keep import kept
 from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
-from .reach import count_turns, reach, rest_redundant, turns_repeatedly
+from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
 from .table import table_handle
-from .unreached import Request, Unreached, answer_unreached, project, reach_from_poses
+from .tables import home_of
+from .unreached import Answers, answer_phases, answer_unreached
 
 
 class LegsEngine(Engine):
@@ -133,17 +135,18 @@ class LegsEngine(Engine):
         q_proximal, fallback = None, None
         if n_unsolved and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
-            q_proximal = np.empty_like(sides)
-            q_proximal[:] = np.nan
-            start_poses = self._single.home if start is None else start.rows.poses
-            request = Request(self._model, options, keep_mode, nearby, start is not None)
-            unreached = Unreached(targets, start_poses, sides, q_proximal, rows)
-            is_unsolved = rows.status != REACHED
-            if start is not None and self._table.has_sides:
-                is_unsolved &= ~self._starts_on_target(targets, start.rows.poses)
-            unreached.answer(is_unsolved, partial(answer_unreached, request))
-            if start is not None:
-                count_turns(self._model, start.rows.actuators, rows)
+            q_proximal = np.full_like(sides, np.nan)
+            answer_unreached(
+                self._model,
+                options,
+                targets,
+                self._start_of(start, start_sides),
+                Answers(rows, q_proximal, sides),
+                np.flatnonzero(rows.status != REACHED),
+                has_start=start is not None,
+                keep_mode=keep_mode,
+                nearby=nearby,
+            )
         is_pending = rows.status != REACHED
         if q_proximal is not None:
             is_pending = rows.status >= PENDING  # or UNSURE
@@ -196,8 +199,7 @@ class LegsEngine(Engine):
                 new_rows(self._model, len(targets)),
             )
             sides[:, changed] *= -1.0
-            unreached = Unreached(targets, start_poses, sides, np.empty_like(sides), rows)
-            reach_from_poses(table_handle(table), start_poses, sides.copy(), unreached)
+            reach_on_sides(table_handle(table), targets, start_poses, sides, rows)
             reached = np.flatnonzero(rows.status == REACHED)
             if len(reached):
                 answers = self._answers(rows, sides, None, start, start_sides, np.empty(0, np.intp), None)
@@ -217,13 +219,21 @@ class LegsEngine(Engine):
         With `nearby` they stay around their starts, with `keep_mode` in the working modes of these.
         """
         start_sides, rows = self._sides_of(start), new_rows(self._model, len(targets))
-        sides = np.repeat(start_sides, len(targets) // len(start_sides), axis=0)
-        start_poses = self._single.home if start is None else start.rows.poses
-        request = Request(self._model, options, keep_mode, nearby, start is not None)
-        unreached = Unreached(targets, start_poses, sides, np.full_like(sides, np.nan), rows)
-        project(request, unreached)
-        if start is not None:
-            count_turns(self._model, start.rows.actuators, rows)
+        shape = len(targets), len(self._table.legs)
+        answers = Answers(rows, np.empty(shape), np.empty(shape))
+        answer_phases(
+            self._model,
+            options,
+            targets,
+            self._start_of(start, start_sides),
+            answers,
+            np.arange(len(targets)),
+            NEAREST,
+            NEAREST,
+            has_start=start is not None,
+            keep_mode=keep_mode,
+            nearby=nearby,
+        )
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved):
             begin = start if start is None or len(start) == 1 else start.at(unsolved)
@@ -231,7 +241,7 @@ class LegsEngine(Engine):
             if len(unsolved) == len(targets):
                 return fallback
             put(rows, unsolved, fallback.rows)
-        return self._answers(rows, unreached.sides, unreached.q_proximal, start, start_sides, unsolved, fallback)
+        return self._answers(rows, answers.sides, answers.q, start, start_sides, unsolved, fallback)
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -438,18 +448,11 @@ class LegsEngine(Engine):
             return self._single_forward.home
         return Handle(starts_at(self._model, start.rows.poses, sides))
 
-    def _starts_on_target(self, targets: Floats, poses: Floats) -> Mask:
-        """True for rows whose start, one of as many poses or the only one, is on the target already, (n,).
-
-        At a dead point closed forms may miss these targets; joint coordinates do not.
-        """
-        task, poses = self._model.task, np.broadcast_to(poses, targets.shape)
-        position = np.where(task.axes, (targets - poses)[:, :3, 3], 0.0)
-        is_there = np.asarray(np.abs(position).max(axis=1) <= TOLERANCES.position * self._model.length)
-        if np.count_nonzero(is_there):
-            _, rotation = task.errors(poses[is_there], targets[is_there])
-            is_there[is_there] = rotation <= TOLERANCES.rotation
-        return is_there
+    def _start_of(self, start: Configurations | None, sides: Floats) -> Start:
+        """A start of answers, with the sides of its legs."""
+        if start is None:
+            return home_of(self._model)
+        return Start(start.rows.poses, sides, np.require(start.rows.actuators, requirements=["C", "W"]))
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from ..arrays import Floats, Records
-from ..batch import put, take, take_each
+from ..batch import take, take_each
 from ..closure.close import in_lengths
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
-from ..kernels.platform.search_records import SETTINGS, MultistartPlan, PoseSolutions, Starts
-from ..kernels.rows import LIMIT_EXCESS, N_COUNTERS, PENDING
+from ..kernels.platform.search_records import SETTINGS, MultistartPlan, PoseSolutions, Starts, new_solutions
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..tolerances import TOLERANCES
@@ -45,6 +44,9 @@ configurations."""
 
 ROWS_A_BLOCK = 16
 
+Objective: TypeAlias = tuple[Sequence[float], Mapping[str, float]]
+"""Weights (6,) of the pose, as of `PoseObjective`, and fields of `SETTINGS` that machine and task do not give."""
+
 _NO_WEIGHTS = np.zeros((0, 0))
 
 
@@ -53,12 +55,9 @@ class NearestPose:
 
     Parameters
     ----------
-    weights : of the pose, (6,), as of `PoseObjective`; the rotation of a platform that cannot turn is locked.
-    settings : fields of `SETTINGS` that do not follow from the machine and its task, by name.
+    weights, settings : as of `Objective`.
     seeds : starts tried after each row's own.
     driven : the coordinates that have target values; None where only poses count.
-    keep_pointing : enforce the limits on where crossed hinges can point their rods in every step. Without, only rows
-        that end beyond such a limit are searched again with it: enforcing it may stop a search early.
     """
 
     def __init__(
@@ -69,31 +68,11 @@ class NearestPose:
         settings: Mapping[str, float],
         seeds: Starts,
         driven: Records | None = None,
-        *,
-        keep_pointing: bool = False,
     ) -> None:
-        self._table, searches = table, settings["steps"] > 0
-        pose_weights, is_fixed = np.array(weights, dtype=float), keeps_rotation(model)
-        pose_weights[3:] = LOCKED if is_fixed else pose_weights[3:]
-        is_at_home = table.task[0]["rotations"] == 0 and pose_weights[3] == LOCKED and searches
-        has_idle_legs = is_at_home and not len(table.redundant) and model.mechanism.clearance is None
-        legs = without_idle_legs(table) if has_idle_legs else search_table(table)
-        self._legs = legs if driven is None else Handle(legs.record._replace(driven=driven))
-        cones = self._legs.record.cones
-        n_cones = len(cones) if keep_pointing or not searches else int((cones["leader"] != OF_POINTING).sum())
-        setting = np.zeros(1, SETTINGS)
-        setting["margin"], setting["near"], setting["cones"] = TOLERANCES.inside, TOLERANCES.active, n_cones
-        setting["implied"] = 0 if len(table.redundant) else n_implied_rows(model)
-        setting["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
-        for name, value in {"frame": model.task.frame, **settings}.items():
-            setting[name] = value
-        setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
-        along = stays_there(table) if driven is not None else carriages_along(table)
-        self._plan = Handle(MultistartPlan(pose_weights, setting, *seeds, along, links_of_legs(model)))
-        self._no_values = np.zeros((0, len(self._legs.record.driven)))
-        self._pointing_search: NearestPose | None = None
-        if n_cones < len(cones):
-            self._pointing_search = NearestPose(model, table, weights, settings, seeds, driven, keep_pointing=True)
+        self._table = table
+        legs, plan = search_plan(model, table, [(weights, settings)], seeds, driven)
+        self._legs, self._plan = Handle(legs), Handle(plan)
+        self._no_values = np.zeros((0, len(legs.driven)))
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -105,7 +84,8 @@ class NearestPose:
     def _scratch(self) -> Scratch[NearestScratch]:
         from ..kernels.platform.nearest import new_nearest_scratch
 
-        return Scratch(new_nearest_scratch, self._legs.record, self._plan.record)
+        plan = self._plan.record
+        return Scratch(new_nearest_scratch, self._legs.record, plan, plan.settings[0]["steps"] == 0)
 
     def find(self, targets: Floats, starts: Starts, values: Floats | None = None) -> PoseSolutions:
         """The nearest configurations to targets (n, 4, 4) [length]; parameters as of `fill`."""
@@ -121,16 +101,7 @@ class NearestPose:
         starts : the first start of each row, or one for all.
         values : target values of the driven coordinates, (n, driven) [L or rad].
         """
-        n_unsolved = self._run(targets, starts, solution, self._no_values if values is None else values, _NO_WEIGHTS)
-        if self._pointing_search is not None:
-            is_missed = (solution.measures[:, LIMIT_EXCESS] > TOLERANCES.limit) & (solution.distances < np.inf)
-            if np.count_nonzero(is_missed):
-                solution.status[is_missed] = PENDING
-                block_values, block = None if values is None else values[is_missed], take(solution, is_missed)
-                starts_here = take_each(starts, is_missed)
-                n_unsolved += self._pointing_search.fill(targets[is_missed], starts_here, block, block_values)
-                put(solution, is_missed, block)
-        return n_unsolved
+        return self._run(targets, starts, solution, self._no_values if values is None else values, _NO_WEIGHTS)
 
     def weigh(self, targets: Floats, configurations: Starts) -> Floats:
         """The multipliers of all limits, of legs and pairs of links, at configurations, for targets (n, 4, 4) [length].
@@ -155,6 +126,33 @@ class NearestPose:
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))
 
 
+def search_plan(
+    model: Model,
+    table: LegTable,
+    objectives: Sequence[Objective],
+    seeds: Starts,
+    driven: Records | None = None,
+) -> tuple[K.Table, MultistartPlan]:
+    """The kernel table and the plan of searches by some objectives; the rotation of what cannot turn is locked."""
+    is_fixed = keeps_rotation(model)
+    weights, settings = np.array([each for each, _ in objectives]), np.zeros(len(objectives), SETTINGS)
+    weights[:, 3:] = LOCKED if is_fixed else weights[:, 3:]
+    is_at_home = table.task[0]["rotations"] == 0 and weights[0, 3] == LOCKED and objectives[0][1]["steps"] > 0
+    has_idle_legs = is_at_home and not len(table.redundant) and model.mechanism.clearance is None
+    legs = (without_idle_legs(table) if has_idle_legs else search_table(table)).record
+    settings["margin"], settings["near"], settings["limit"] = TOLERANCES.inside, TOLERANCES.active, TOLERANCES.limit
+    settings["implied"] = 0 if len(table.redundant) else n_implied_rows(model)
+    settings["agreements"] = _agreements(table) if driven is None else AGREEMENTS_OF_VALUES
+    for setting, (_, named) in zip(settings, objectives, strict=True):
+        for name, value in {"frame": model.task.frame, **named}.items():
+            setting[name] = value
+        setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
+        setting["cones"] = (legs.cones["leader"] != OF_POINTING).sum() if setting["steps"] else len(legs.cones)
+    along = stays_there(table) if driven is not None else carriages_along(table)
+    plan = MultistartPlan(weights, settings, seeds, along, links_of_legs(model))
+    return (legs if driven is None else legs._replace(driven=driven)), plan
+
+
 @derived
 def _agreements(table: LegTable) -> int:
     task = table.task[0]
@@ -174,17 +172,7 @@ def _agreements(table: LegTable) -> int:
 
 def new_solution(n: int, table: LegTable) -> PoseSolutions:
     """Allocate n solutions, all PENDING."""
-    legs, actuators = len(table.legs), len(table.driven)
-    return PoseSolutions(
-        np.full(n, np.inf),
-        np.zeros((n, 4, 4)),
-        np.zeros((n, legs)),
-        np.zeros((n, legs)),
-        np.zeros((n, N_COUNTERS), np.int64),
-        np.zeros((n, actuators)),
-        np.zeros((n, 5)),
-        np.full(n, PENDING),
-    )
+    return new_solutions(n, len(table.legs), len(table.driven))
 
 
 def no_starts(table: LegTable) -> Starts:

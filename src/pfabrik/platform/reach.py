@@ -83,7 +83,7 @@ def _lead(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats,
     while len(active := np.flatnonzero((way < 1.0) & (share >= SHORTEST_SHARE))):
         wanted = between(begin[active], targets[unsolved[active]], (way + share)[active, None, None])
         block, block_sides = take(led, active), led_sides[active]
-        _run(False, legs, wanted, present[active], block_sides, block)
+        reach_on_sides(legs, wanted, present[active], block_sides, block)
         is_reached = block.status == REACHED
         reached = active[is_reached]
         put(led, reached, block, is_reached)
@@ -110,7 +110,7 @@ def _reach_by_redundant(
         if not len(moved):
             continue
         block = take(rows, moved)
-        n_unsolved += _run(False, legs, targets[moved], poses, sides[moved], block) - len(moved)
+        n_unsolved += reach_on_sides(legs, targets[moved], poses, sides[moved], block) - len(moved)
         put(rows, moved, block)
         missed = moved[block.status != REACHED]
         sides[missed] = sides_before[missed]
@@ -146,7 +146,7 @@ def rest_redundant(model: Model, start: Configurations | None, start_sides: Floa
         candidate, block = sides.copy(), take(rows, np.arange(len(sides)))
         candidate[:, columns] = rested[:, columns]
         far, before = (np.linalg.norm((each - start_sides)[:, columns], axis=1) for each in (candidate, sides))
-        _run(False, local_table(table), rows.poses, rows.poses, candidate, block)
+        reach_on_sides(local_table(table), rows.poses, rows.poses, candidate, block)
         is_nearer = (block.status == REACHED) & (far < before)
         sides[is_nearer], rows.actuators[is_nearer] = candidate[is_nearer], block.actuators[is_nearer]
         for measure in (RESIDUAL, LIMIT_EXCESS):
@@ -155,6 +155,11 @@ def rest_redundant(model: Model, start: Configurations | None, start_sides: Floa
     if start is not None:
         count_turns(model, start.rows.actuators, rows)
     return is_changed
+
+
+def reach_on_sides(legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
+    """Solve targets one by one by legs on given sides (n, legs), as `legs.answer`; return the number not reached."""
+    return _run(False, legs, targets, start_poses, sides, rows)
 
 
 def _run(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
@@ -186,7 +191,7 @@ def _complete(model: Model, legs: TableHandle, targets: Floats, start_poses: Flo
         return 0
     block = take(rows, is_open)
     start_poses, sides = (array if len(array) == 1 else array[is_open] for array in (start_poses, sides))
-    n_unsolved = _run(False, legs, targets[is_open], start_poses, sides, block)
+    n_unsolved = reach_on_sides(legs, targets[is_open], start_poses, sides, block)
     put(rows, is_open, block)
     return len(is_open) - n_unsolved
 

@@ -25,7 +25,7 @@ ORTHOGONAL, NEARLY = 1e-14, 1e-8
 """Cosine of two rows that count as orthogonal, and cosines that one sweep brings there: it squares them."""
 
 
-class Tables(NamedTuple):
+class FirstOrderScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     state: State
@@ -38,10 +38,10 @@ class Tables(NamedTuple):
     sizes: Floats  # (columns,)
 
 
-def new_tables(loops: Loops, plan: FirstOrderPlan) -> Tables:
+def new_first_order_scratch(loops: Loops, plan: FirstOrderPlan) -> FirstOrderScratch:
     """Scratch memory of one thread."""
     n, m, width = len(loops.lo), 6 * plan.loops.shape[0], plan.twists + plan.actuated.shape[0]
-    return Tables(
+    return FirstOrderScratch(
         new_state(loops),
         new_equations(loops, LAYOUT),
         np.zeros((n, 6)),
@@ -56,7 +56,7 @@ def new_tables(loops: Loops, plan: FirstOrderPlan) -> Tables:
 PLAN = FirstOrderPlan(np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64), 0, 0, 0, 0, 0.0, 0)
 """A plan of the types that kernels are compiled for."""
 
-open_tables = opener(new_tables(LOOPS, PLAN))
+open_scratch = opener(new_first_order_scratch(LOOPS, PLAN))
 
 
 @search
@@ -67,9 +67,9 @@ def first_order(
 
     Parameters
     ----------
-    machine, scratch : see `open_loops` and `new_tables`.
+    machine, scratch : see `open_loops` and `new_first_order_scratch`.
     """
-    loops, scratch = open_loops(machine), open_tables(scratch_address)
+    loops, scratch = open_loops(machine), open_scratch(scratch_address)
     state, eq, screws, table = scratch.state, scratch.eq, scratch.screws, scratch.table
     motions, pairs, conditions, sizes = scratch.motions, scratch.pairs, scratch.conditions, scratch.sizes
     n, m, shown = coordinates.shape[1], 6 * plan.loops.shape[0], plan.shown

@@ -275,15 +275,33 @@ def answer(
     table, total = open_table(machine), 0
     scratch = new_completion(table)
     for row in range(targets.shape[0]):
-        status[row] = PENDING
         begin = begins[row if begins.shape[0] > 1 else 0]
         side = sides[row if sides.shape[0] > 1 else 0]
-        if read_target(targets[row], begin, table.task[0], scratch.pose) and complete_pose(table, side, scratch):
-            status[row] = write_answer(table, scratch, poses[row], actuators[row], measures[row])
-            if table.task[0]["implicit"] == 1 and status[row] == REACHED:
-                copy_row(scratch.sides, side)
+        status[row] = answer_on_sides(
+            table, targets[row], begin, side, scratch, poses[row], actuators[row], measures[row]
+        )
         total += status[row]
     return total // PENDING
+
+
+@routine
+def answer_on_sides(
+    table: Table,
+    target: Floats,
+    begin: Floats,
+    sides: Floats,
+    scratch: Completion,
+    pose: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Solve a target as `answer` does; its status, and outputs where it is REACHED."""
+    if not (read_target(target, begin, table.task[0], scratch.pose) and complete_pose(table, sides, scratch)):
+        return PENDING
+    status = write_answer(table, scratch, pose, actuators, measures)
+    if table.task[0]["implicit"] == 1 and status == REACHED:
+        copy_row(scratch.sides, sides)
+    return status
 
 
 @routine

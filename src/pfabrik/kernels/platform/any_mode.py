@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...arrays import Floats, Ints
-from .._jit import routine, search
+from .._jit import routine
 from ..legs.answer import (
     KEPT,
     Completion,
@@ -13,7 +11,6 @@ from ..legs.answer import (
     cone_cosine,
     deviation,
     excess_of,
-    new_completion,
     place_legs,
     put_rows,
     write_answer,
@@ -22,7 +19,6 @@ from ..legs.complete_poses import read_target
 from ..legs.endings import LEAST_MARGIN
 from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
-from ..legs.open_table import open_table
 from ..legs.records import REDUNDANT, Table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
@@ -78,62 +74,54 @@ def note_choices(table: Table, sides: Floats, choices: Ints) -> int:
     return n
 
 
-@search
+@routine
 def answer_in_any_mode(
-    machine: int,
-    targets: Floats,
-    begins: Floats,
+    table: Table,
+    target: Floats,
+    begin: Floats,
     sides: Floats,
-    status: Ints,
-    poses: Floats,
+    misfits: Floats,
+    choices: Ints,
+    scratch: Completion,
+    pose: Floats,
     actuators: Floats,
     measures: Floats,
 ) -> int:
-    """Solve targets (n, 4, 4) [length] by legs on any sides, within all limits; the others are PENDING, or UNSURE.
+    """Solve a target [length] by legs on any sides, within all limits: its status; else it is PENDING, or UNSURE.
 
-    If a target sets the whole pose, each leg takes the side that fits it; if legs complete the pose together, all
+    If it sets the whole pose, each leg takes the side that fits it; if legs complete the pose together, all
     combinations of their sides are tried.
 
     Parameters
     ----------
-    machine : address of the kernel table.
-    begins : poses that targets are completed from, (n or 1, 4, 4) [length].
-    sides : sides to start from, (n, legs); filled with the solution's.
-
-    Returns
-    -------
-    The number of rows not reached.
+    begin : the pose that the target is completed from, (4, 4) [length].
+    sides : sides to start from, (legs,); filled with the solution's.
+    misfits, choices : scratch memory, (legs,).
     """
-    table = open_table(machine)
-    scratch, legs, n_legs, task, n_unreached = new_completion(table), table.legs, table.legs.shape[0], table.task[0], 0
-    misfits, choices, n_passes = np.zeros(n_legs), np.zeros(n_legs, np.int64), 1
-    for k in range(n_legs):
+    legs, task, n_passes, status = table.legs, table.task[0], 1, PENDING
+    for k in range(legs.shape[0]):
         n_passes = 3 if legs[k]["orients"] == 1 else n_passes
-    n_choices = note_choices(table, sides[0], choices) if sides.shape[0] > 0 else 0
+    n_choices = note_choices(table, sides, choices)
     is_coupled = task["unset"] + task["implicit"] > 0
     n_tries = 2 ** min(n_choices, MOST_CHOICES) - 1 if is_coupled else n_passes
-    for row in range(targets.shape[0]):
-        status[row], begin = PENDING, begins[row if begins.shape[0] > 1 else 0]
-        for attempt in range(1, n_tries + 1):
-            if not is_coupled and read_target(targets[row], begin, task, scratch.pose):
-                set_frames(scratch.pose, task, scratch.frames)
-                place_legs(legs, scratch.frames, sides[row], scratch.values, scratch.lines)
-                put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
-                note_misfits(table, scratch.values, scratch.rows, misfits)
-            for c in range(n_choices):
-                k = choices[c]
-                is_flipped = (attempt ^ (attempt - 1)) >> c & 1 == 1
-                if not is_coupled:  # a rod first, then its orienting joint, then the rod again
-                    is_flipped = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
-                sides[row, k] = -sides[row, k] if is_flipped else sides[row, k]
-            if not read_target(targets[row], begin, task, scratch.pose):
-                break
-            if complete_pose(table, sides[row], scratch):
-                if write_answer(table, scratch, poses[row], actuators[row], measures[row]) == REACHED:
-                    status[row] = REACHED
-                    copy_row(scratch.sides, sides[row])
-                    break
-            elif task["unset"] == 0 and is_singular(table, sides[row], scratch):
-                status[row] = UNSURE
-        n_unreached += 0 if status[row] == REACHED else 1
-    return n_unreached
+    for attempt in range(1, n_tries + 1):
+        if not is_coupled and read_target(target, begin, task, scratch.pose):
+            set_frames(scratch.pose, task, scratch.frames)
+            place_legs(legs, scratch.frames, sides, scratch.values, scratch.lines)
+            put_rows(legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+            note_misfits(table, scratch.values, scratch.rows, misfits)
+        for c in range(n_choices):
+            k = choices[c]
+            is_flipped = (attempt ^ (attempt - 1)) >> c & 1 == 1
+            if not is_coupled:  # a rod first, then its orienting joint, then the rod again
+                is_flipped = misfits[k] == 1.0 and (legs[k]["orients"] == 1) == (attempt == 2)
+            sides[k] = -sides[k] if is_flipped else sides[k]
+        if not read_target(target, begin, task, scratch.pose):
+            break
+        if complete_pose(table, sides, scratch):
+            if write_answer(table, scratch, pose, actuators, measures) == REACHED:
+                copy_row(scratch.sides, sides)
+                return REACHED
+        elif task["unset"] == 0 and is_singular(table, sides, scratch):
+            status = UNSURE
+    return status

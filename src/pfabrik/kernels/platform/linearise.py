@@ -91,7 +91,7 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
             for j in range(slope.shape[0]):
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.leg_eval.slope, reduced)
-    for i in range(half_angles.shape[0]):
+    for i in range(search.n_cones[0]):
         cone = table.cones[i]
         line = vec(values[cone["leg"], cone["place"] :])
         if (

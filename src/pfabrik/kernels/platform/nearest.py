@@ -26,6 +26,7 @@ from ..rows import (
     HOLD_NOTHING,
     ITERATIONS,
     LIMIT_EXCESS,
+    PENDING,
     POSITION_ERROR,
     PROJECTED,
     REACHED,
@@ -62,11 +63,24 @@ TALLY = np.dtype(
 )
 """Agreement counts of the searches for a row."""
 
+EFFORT = np.dtype(
+    [
+        ("steps", "i8"),  # taken by all searches
+        ("searches", "i8"),
+        ("most", "i8"),  # steps after which no further search begins
+    ]
+)
+"""What searches have cost, and may."""
+
+UNBOUNDED = 2**62
+"""More steps than are ever taken."""
+
 
 class NearestScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     search: SearchScratch
+    effort: Records  # (1,): EFFORT
     best: PlatformState
     best_tally: Records  # (1,): TALLY
     phase1_tally: Records  # (1,): TALLY of phase 1 searches that ended away from the held part
@@ -76,23 +90,33 @@ class NearestScratch(NamedTuple):
     natural_gradients: Floats  # (limits, n): inverse metric times the gradients of active limits
 
 
-def new_nearest_scratch(table: Table, plan: MultistartPlan) -> NearestScratch:
-    """Allocate the scratch memory of one thread."""
-    setting, starts = plan.settings[0], plan.poses.shape[0]
-    search, best = new_search_scratch(table, setting["cones"], plan.links), new_platform_state(table.legs.shape[0])
-    k, n = search.first.linear.G.shape
-    k, n = (k, n) if setting["steps"] == 0 else (0, 0)
-    tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
+def new_nearest_scratch(table: Table, plan: MultistartPlan, weighs_limits: bool) -> NearestScratch:
+    """Allocate the scratch memory of one thread, for the multipliers of limits too where these are asked for."""
+    search, best = new_search_scratch(table, plan.links), new_platform_state(table.legs.shape[0])
+    k, n = search.first.linear.G.shape if weighs_limits else (0, 0)
+    effort, tallies = np.zeros(1, EFFORT), (np.zeros(1, TALLY), np.zeros(1, TALLY))
+    effort["most"] = UNBOUNDED
     return NearestScratch(
-        search, best, *tallies, np.zeros(1 + starts), np.zeros(6), new_qp(max(k, n), k), np.zeros((k, n))
+        search,
+        effort,
+        best,
+        *tallies,
+        np.zeros(1 + plan.seeds.poses.shape[0]),
+        np.zeros(6),
+        new_qp(max(k, n), k),
+        np.zeros((k, n)),
     )
 
 
-_STAYS = Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
-_PLAN = MultistartPlan(
-    np.zeros(6), np.zeros(1, SETTINGS), np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), _STAYS, NO_LINKS
+NO_STARTS = Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
+PLAN = MultistartPlan(
+    np.zeros((1, 6)),
+    np.zeros(1, SETTINGS),
+    NO_STARTS,
+    Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2))),
+    NO_LINKS,
 )
-open_plan, open_scratch = opener(_PLAN), opener(new_nearest_scratch(SAMPLE, _PLAN))
+open_plan, open_scratch = opener(PLAN), opener(new_nearest_scratch(SAMPLE, PLAN, False))
 """The plan and scratch memory of `nearest_pose` at the addresses of their handles."""
 
 
@@ -130,19 +154,19 @@ def write_solution(
         distance = math.hypot(distance, pose[i, 3] - target[i, 3] if task["axes"][i] == 1 else 0.0)
     pose[3, 3] = 1.0
     measures[POSITION_ERROR] = min(distance, LARGEST_NUMBER)
-    measures[ROTATION_ERROR] = turned_by(task["rotations"], best.pose, search)
+    measures[ROTATION_ERROR] = turned_by(task["rotations"], best.pose, search.target, search.gradient.turn)
 
 
 @routine
-def turned_by(rotations: int, pose: Floats, search: SearchScratch) -> float:
-    """Angle of a pose from the target, in the rotations that the task sets [rad]."""
+def turned_by(rotations: int, pose: Floats, target: Floats, turn: Floats) -> float:
+    """Angle of a pose from a target, in the rotations that the task sets [rad]; `turn` is scratch memory."""
     if rotations == 3:
-        difference(pose, search.target, search.gradient.turn)
-        return norm(vec(search.gradient.turn))
+        difference(pose, target, turn)
+        return norm(vec(turn))
     if rotations == 2:
-        _, angle = turn_of_tilt(search.target, pose)
+        _, angle = turn_of_tilt(target, pose)
         return angle
-    return abs(yaw_difference(pose, search.target)) if rotations == 1 else 0.0
+    return abs(yaw_difference(pose, target)) if rotations == 1 else 0.0
 
 
 @routine
@@ -203,15 +227,26 @@ def is_agreed(tally: Record, agreements: int) -> bool:
 
 
 @routine
+def count_effort(steps: int, effort: Record) -> None:
+    """Count a search."""
+    effort["steps"] += steps
+    effort["searches"] += 1
+
+
+@routine
+def is_spent(effort: Record) -> bool:
+    """True if no further search is to begin."""
+    return bool(effort["steps"] >= effort["most"])
+
+
+@routine
 def search_from(
     table: Table,
     row: int,
     objective: PlatformObjective,
     sides: Floats,
     stays: int,
-    search: SearchScratch,
-    best: PlatformState,
-    best_tally: Record,
+    scratch: NearestScratch,
 ) -> bool:
     """Descend from `search.best` and count the end, as of `count_ending`; True if no feasible configuration was found.
 
@@ -219,7 +254,9 @@ def search_from(
     ----------
     sides : of the working mode to be kept, if `stays` is 1.
     """
+    search, best, best_tally = scratch.search, scratch.best, scratch.best_tally[0]
     distance = descend(table, row, objective, best_tally["least"], best, search)
+    count_effort(search.control[0]["steps"], scratch.effort[0])
     is_infeasible = distance == math.inf and (best_tally["least"] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
         put_sides(table, search.best, search.leg_eval)
@@ -243,6 +280,7 @@ def search_row(
     phase1_objective: PlatformObjective,
     starts: Starts,
     seeds: Starts,
+    n_seeds: int,
     along: Along,
     agreements: int,
     stays: int,
@@ -250,19 +288,22 @@ def search_row(
 ) -> float:
     """The nearest configuration of a row, into `scratch.best`, and its distance [L].
 
+    Searches begin at its own start, then at so many seeds, the nearest to the target first.
+
     The held part is put in place at once if it is the whole pose, or if there are seeds and no implicit joints;
     otherwise descents bring it there. The other of the two ways is tried last, if the first finds nothing or needed
     restoration. If too few searches agree, starts that were infeasible are searched in two phases: phase 1 for the held
     part alone, then a search with it held.
     """
-    search, best, best_tally, phase1_tally, distances_to_held = (
+    search, best, best_tally, phase1_tally, distances_to_held, effort = (
         scratch.search,
         scratch.best,
         scratch.best_tally[0],
         scratch.phase1_tally[0],
         scratch.distances_to_held,
+        scratch.effort[0],
     )
-    target, n_seeds = search.target, seeds.poses.shape[0]
+    target = search.target
     nearest_seed, by = -1, way_along(table, objective.pose, target, along)
     own_start, kept_sides = row if starts.poses.shape[0] > 1 else 0, search.kept_sides
     sides = starts.sides[own_start]
@@ -271,12 +312,15 @@ def search_row(
     is_placed_first = holds_all(objective.pose) or (n_seeds > 0 and table.task[0]["implicit"] == 0)
     clear_tally(best_tally)
     clear_tally(phase1_tally)
-    for i in range(n_seeds + 1):
+    for i in range(distances_to_held.shape[0]):
         distances_to_held[i] = math.inf
     for start in range(n_seeds + 2):
         if is_agreed(best_tally, agreements) or (start == n_seeds + 1 and best_tally["is_unbroken"] == 1):
             break
-        nearest_seed = nearest_start(objective.pose, by, seeds, search) if start == 1 else nearest_seed
+        if is_spent(effort):
+            break
+        if start == 1 and n_seeds > 0:
+            nearest_seed = nearest_start(objective.pose, by, seeds, search)
         seed = -1
         if 0 < start <= n_seeds:
             seed = nearest_seed if start == 1 else start - 2 + int(start - 2 >= nearest_seed)
@@ -289,10 +333,7 @@ def search_row(
         fix_held(objective.pose, is_in_place, search)
         if is_in_place:
             place_held(table, objective.pose, target, search.leg_eval, search.best)
-        if (
-            search_from(table, row, objective, sides, stays, search, best, best_tally)
-            and phase1_objective.pose.max_iterations > 0
-        ):
+        if search_from(table, row, objective, sides, stays, scratch) and phase1_objective.pose.max_iterations > 0:
             search.gradient.unit[0] = 1.0
             start_pose = starts.poses[own_start] if seed < 0 else seeds.poses[seed]
             distances_to_held[seed + 1], _ = pose_gradient(
@@ -302,10 +343,11 @@ def search_row(
     while (
         phase1_objective.pose.max_iterations > 0
         and not is_agreed(best_tally, agreements)
+        and not is_spent(effort)
         and (best_tally["least"] < math.inf or not is_agreed(phase1_tally, agreements))
     ):
         seed = -1
-        for i in range(n_seeds):
+        for i in range(distances_to_held.shape[0] - 1):
             seed = i if distances_to_held[i + 1] < distances_to_held[seed + 1] else seed
         if distances_to_held[seed + 1] == math.inf:
             break
@@ -321,8 +363,9 @@ def search_row(
             best,
             search,
         )
+        count_effort(search.control[0]["steps"], effort)
         if distance <= HOLDABLE:
-            search_from(table, row, objective, sides, stays, search, best, best_tally)
+            search_from(table, row, objective, sides, stays, scratch)
         elif best_tally["least"] == math.inf and search.control[0]["steps"] > 1:
             count_ending(distance, phase1_tally, search, best)
     least: float = best_tally["least"]
@@ -357,6 +400,72 @@ def put_limit_multipliers(
         weights[linear.which[c]] = scratch.p.x[c]
 
 
+@routine
+def nearest_of_row(
+    table: Table,
+    plan: MultistartPlan,
+    aim: int,
+    most_seeds: int,
+    most_steps: int,
+    stays: int,
+    row: int,
+    targets: Floats,
+    values: Floats,
+    starts: Starts,
+    solutions: PoseSolutions,
+    scratch: NearestScratch,
+    weights: Floats,
+) -> float:
+    """Fill the nearest feasible configuration of a row by one of the plan's objectives; its distance [L].
+
+    Where it ends beyond a cone that was not constrained, it is searched for again with all cones: constraining those
+    that limit where crossed hinges can point their rods may stop a search early.
+    """
+    setting, search = plan.settings[aim], scratch.search
+    frame, margin, near, steps = setting["frame"], setting["margin"], setting["near"], min(setting["steps"], most_steps)
+    pose = PoseObjective(targets, plan.weights[aim], frame, margin, near, steps)
+    objective = PlatformObjective(pose, values, setting["implied"])
+    phase1_steps = steps if holds_some(table, objective, scratch.held) else 0
+    phase1_objective = PlatformObjective(
+        PoseObjective(targets, scratch.held, frame, margin, near, phase1_steps), values, setting["implied"]
+    )
+    solutions.distances[row] = math.inf
+    if not load_target(table, pose, row, search):
+        return math.inf
+    n_seeds, least, n_cones = min(plan.seeds.poses.shape[0], most_seeds), math.inf, setting["cones"]
+    search.n_cones[0] = n_cones
+    if setting["steps"] == 0:
+        put_limit_multipliers(table, row, objective, starts, scratch, weights[row])
+        return math.inf
+    for _attempt in range(2):
+        least = search_row(
+            table,
+            row,
+            objective,
+            phase1_objective,
+            starts,
+            plan.seeds,
+            n_seeds,
+            plan.along,
+            setting["agreements"],
+            stays,
+            scratch,
+        )
+        solutions.distances[row] = least
+        if least == math.inf:
+            solutions.status[row] = PENDING
+            return least
+        solutions.counters[row, ITERATIONS] = search.control[0]["steps"]
+        write_solution(table, row, pose, search, scratch.best, solutions)
+        set_status(setting, row, solutions)
+        solutions.counters[row, HOLD] += CERTAIN if scratch.best_tally[0]["agreements"] == math.inf else 0
+        if n_cones == table.cones.shape[0] or solutions.measures[row, LIMIT_EXCESS] <= setting["limit"]:
+            return least
+        n_cones = table.cones.shape[0]
+        search.n_cones[0] = n_cones
+    return least
+
+
 @search
 def nearest_pose(
     machine: int,
@@ -377,7 +486,7 @@ def nearest_pose(
     status: Ints,
     weights: Floats,
 ) -> int:
-    """Fill the nearest feasible configuration of every row.
+    """Fill the nearest feasible configuration of every row, by the first objective of the plan.
 
     With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs + pairs of links): the
     multipliers of the limits where each row starts, as in `closure.descend.nearest_configuration`.
@@ -395,47 +504,18 @@ def nearest_pose(
     -------
     The number of rows without a solution.
     """
-    table, plan = open_table(machine), open_plan(plan_address)
-    setting, starts, n_unsolved = plan.settings[0], Starts(begins, q, sides), 0
-    seeds, solutions = (
-        Starts(plan.poses, plan.q, plan.sides),
-        PoseSolutions(distances, ends, ends_q, ends_sides, counters, actuators, measures, status),
+    table, plan, scratch, starts, n_unsolved = (
+        open_table(machine),
+        open_plan(plan_address),
+        open_scratch(scratch_address),
+        Starts(begins, q, sides),
+        0,
     )
-    scratch = open_scratch(scratch_address)
-    search, best, held = scratch.search, scratch.best, scratch.held
-    frame, margin, near, weighs_limits = setting["frame"], setting["margin"], setting["near"], setting["steps"] == 0
-    pose = PoseObjective(targets, plan.weights, frame, margin, near, setting["steps"])
-    objective = PlatformObjective(pose, values, setting["implied"])
-    steps = setting["steps"] if holds_some(table, objective, held) else 0
-    phase1_objective = PlatformObjective(
-        PoseObjective(targets, held, frame, margin, near, steps), values, setting["implied"]
-    )
+    stays = plan.settings[0]["stays"]
+    solutions = PoseSolutions(distances, ends, ends_q, ends_sides, counters, actuators, measures, status)
     for row in range(distances.shape[0]):
-        distances[row] = math.inf
-        if not load_target(table, pose, row, search):
-            n_unsolved += 1
-            continue
-        if weighs_limits:
-            put_limit_multipliers(table, row, objective, starts, scratch, weights[row])
-            continue
-        least = search_row(
-            table,
-            row,
-            objective,
-            phase1_objective,
-            starts,
-            seeds,
-            plan.along,
-            setting["agreements"],
-            setting["stays"],
-            scratch,
+        least = nearest_of_row(
+            table, plan, 0, UNBOUNDED, UNBOUNDED, stays, row, targets, values, starts, solutions, scratch, weights
         )
-        distances[row] = least
-        if least < math.inf:
-            counters[row, ITERATIONS] = search.control[0]["steps"]
-            write_solution(table, row, pose, search, best, solutions)
-            set_status(setting, row, solutions)
-            counters[row, HOLD] += CERTAIN if scratch.best_tally[0]["agreements"] == math.inf else 0
-        else:
-            n_unsolved += 1
+        n_unsolved += 1 if least == math.inf else 0
     return n_unsolved

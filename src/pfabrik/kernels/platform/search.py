@@ -52,19 +52,20 @@ class SearchScratch(NamedTuple):
     involved: Ints  # (legs,): 1 for legs that the Lagrangian depends on
     blocking: Ints  # (legs,): 1 for legs that block the incumbent
     near: Floats  # (1,): limits farther away are left out [rad or L]
-    half_angles: Floats  # (n_cones, 3): half angles of the constrained cones, their cosines and sines
+    half_angles: Floats  # (cones, 3): half angles of all cones, their cosines and sines
+    n_cones: Ints  # (1,): how many of these are constrained, the first ones
     links: LinkLimits
 
 
-def new_search_scratch(table: Table, n_cones: int, links: LinkLimits) -> SearchScratch:
-    """Allocate the scratch memory of one thread, for searches that constrain the first `n_cones` cones, and links."""
+def new_search_scratch(table: Table, links: LinkLimits) -> SearchScratch:
+    """Allocate the scratch memory of one thread."""
     n, n_legs = count_unknowns(table), table.legs.shape[0]
     rows, limits = table.task[0]["rows"] + n, 2 * table.limited.shape[0] + table.cones.shape[0] + n_legs
     limits += links.pairs.shape[0]
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
-    half_angles = np.zeros((n_cones, 3))
+    half_angles = np.zeros((table.cones.shape[0], 3))
     for i in range(half_angles.shape[0]):
         angle = table.cones[i]["half_angle"]
         half_angles[i, 0], half_angles[i, 1], half_angles[i, 2] = angle, math.cos(angle), math.sin(angle)
@@ -91,6 +92,7 @@ def new_search_scratch(table: Table, n_cones: int, links: LinkLimits) -> SearchS
         np.zeros(n_legs, np.int64),
         np.full(1, NEAR),
         half_angles,
+        np.full(1, half_angles.shape[0]),
         new_link_limits(links),
     )
 

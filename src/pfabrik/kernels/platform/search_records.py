@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Records
 from ..clearance.link_records import LinkLimits
 from ..closure.loops import PoseObjective
+from ..rows import N_COUNTERS, PENDING
 
 STRETCHED = 1e-4
 """Difference of the two solutions of a proximal joint below which it is at a dead point, and keeps its side [L or rad].
@@ -40,7 +41,8 @@ SETTINGS = np.dtype(
         ("implied", "i8"),  # as in `PlatformObjective`
         ("agreements", "i8"),  # agreements that end a multistart, as counted by `is_agreed`
         ("stays", "i8"),  # 1 to keep the working mode of a row's own start
-        ("cones", "i8"),  # number of cones that searches constrain, the first ones; the excess is that of all cones
+        ("cones", "i8"),  # number of cones that searches constrain, the first ones: all where they end beyond a limit
+        ("limit", "f8"),  # excess up to which a limit counts as kept [L or rad]
         ("position", "f8"),  # tolerance of REACHED [length]
         ("rotation", "f8"),  # tolerance of REACHED [rad]
         ("hold", "i8"),  # held part of the target: HOLD_...
@@ -59,13 +61,11 @@ class Along(NamedTuple):
 
 
 class MultistartPlan(NamedTuple):
-    """Objective weights, settings and seeds of searches, common to all rows."""
+    """The objectives of searches, and what is common to all of these and to all rows."""
 
-    weights: Floats  # (6,): of the pose, as in `PoseObjective`
-    settings: Records  # (1,): SETTINGS
-    poses: Floats  # seeds after a row's own start, for any row, as in `Starts`
-    q: Floats
-    sides: Floats
+    weights: Floats  # (k, 6): of the pose, as in `PoseObjective`
+    settings: Records  # (k,): SETTINGS
+    seeds: Starts  # after a row's own start, for any row
     along: Along
     links: LinkLimits
 
@@ -81,3 +81,17 @@ class PoseSolutions(NamedTuple):
     actuators: Floats  # (n, n_a)
     measures: Floats  # (n, 5): distances from the target [length, rad], the largest equation [length], limit excess
     status: Ints  # (n,): REACHED or PROJECTED
+
+
+def new_solutions(n: int, legs: int, actuators: int) -> PoseSolutions:
+    """Allocate n solutions, all PENDING."""
+    return PoseSolutions(
+        np.full(n, np.inf),
+        np.zeros((n, 4, 4)),
+        np.zeros((n, legs)),
+        np.zeros((n, legs)),
+        np.zeros((n, N_COUNTERS), np.int64),
+        np.zeros((n, actuators)),
+        np.zeros((n, 5)),
+        np.full(n, PENDING),
+    )

@@ -1,0 +1,432 @@
+"""Inverse kinematics of one target: legs in closed form, in any mode if need be, then the nearest feasible pose."""
+
+from __future__ import annotations
+
+import math
+
+from numpy import zeros
+
+from ...arrays import Floats, Ints, Record, Records
+from .._jit import opener, routine, search
+from ..legs.answer import Completion, answer_on_sides
+from ..legs.complete_poses import read_target
+from ..legs.open_table import SAMPLE
+from ..legs.records import Table
+from ..release import brings_nearer, is_too_far
+from ..rows import (
+    CERTAIN,
+    HOLD,
+    HOLD_NOTHING,
+    OPEN,
+    PENDING,
+    POSITION_ERROR,
+    PROJECTED,
+    REACHED,
+    ROTATION_ERROR,
+    UNSURE,
+)
+from ..vectors import copy_row, copy_table
+from .any_mode import answer_in_any_mode
+from .nearest import NO_STARTS, PLAN, nearest_of_row, turned_by
+from .search_records import PoseSolutions, Starts
+from .tables import (
+    BY_LEGS,
+    IN_OTHER_ASSEMBLIES,
+    IN_OTHER_MODES,
+    MACHINE,
+    NEAREST,
+    QUESTION,
+    AnswerScratch,
+    Question,
+    RestingLegs,
+    Start,
+    Tables,
+    new_answer_scratch,
+)
+
+NEARLY = 1e-4
+"""Distance below which a projection is close enough to its target to try to reach it exactly [L]."""
+
+
+@routine
+def count_turns(driven: Records, start_values: Floats, values: Floats) -> None:
+    """Add whole turns to actuators that may turn more than once: nearest to the start's values (n_a,)."""
+    for i in range(driven.shape[0]):
+        lo, hi, column = driven[i]["lo"], driven[i]["hi"], driven[i]["column"]
+        if driven[i]["turns"] == 1 and hi - lo > 2.0 * math.pi:
+            value = values[column]
+            nearest = value - 2.0 * math.pi * round((value - start_values[column]) / (2.0 * math.pi))
+            is_inside = nearest >= driven[i]["home"] + lo and nearest <= driven[i]["home"] + hi
+            values[column] = nearest if is_inside else value
+
+
+@routine
+def put_start(start: Start, answer: PoseSolutions) -> None:
+    """Fill an answer that is not solved yet with the sides of its start."""
+    q, counters, measures = answer.q, answer.counters, answer.measures
+    copy_row(start.sides[0], answer.sides[0])
+    answer.distances[0] = math.inf
+    for k in range(q.shape[1]):
+        q[0, k] = math.nan
+    for k in range(counters.shape[1]):
+        counters[0, k] = 0
+    for k in range(measures.shape[1]):
+        measures[0, k] = 0.0
+
+
+@routine
+def copy_solution(source: PoseSolutions, to: PoseSolutions) -> None:
+    """Copy an answer."""
+    counters = to.counters
+    to.distances[0], to.status[0] = source.distances[0], source.status[0]
+    copy_table(source.poses[0], to.poses[0])
+    copy_row(source.q[0], to.q[0])
+    copy_row(source.sides[0], to.sides[0])
+    copy_row(source.actuators[0], to.actuators[0])
+    copy_row(source.measures[0], to.measures[0])
+    for k in range(counters.shape[1]):
+        counters[0, k] = source.counters[0, k]
+
+
+@routine
+def errors(task: Record, target: Floats, pose: Floats, turn: Floats) -> tuple[float, float]:
+    """Distance [L] and angle [rad] of a pose from a target, both in [length], in what the task sets."""
+    distance = 0.0
+    for i in range(3):
+        distance = math.hypot(distance, pose[i, 3] - target[i, 3] if task["axes"][i] == 1 else 0.0)
+    return distance / task["length"], turned_by(task["rotations"], pose, target, turn)
+
+
+@routine
+def is_on_target(tables: Tables, target: Floats, pose: Floats, turn: Floats) -> bool:
+    """True if a start is on its target already."""
+    task, machine, farthest = tables.legs.task[0], tables.machine[0], 0.0
+    for i in range(3):
+        farthest = max(farthest, abs(target[i, 3] - pose[i, 3]) if task["axes"][i] == 1 else 0.0)
+    if not farthest <= machine["position"] * task["length"]:
+        return False
+    return bool(turned_by(task["rotations"], pose, target, turn) <= machine["rotation"])
+
+
+@routine
+def reach_from(
+    table: Table, target: Floats, begin: Floats, sides: Floats, scratch: Completion, answer: PoseSolutions
+) -> int:
+    """Solve a target by legs on given sides, completed from a pose [length]; the status, and outputs if REACHED."""
+    return answer_on_sides(
+        table, target, begin, sides, scratch, answer.poses[0], answer.actuators[0], answer.measures[0]
+    )
+
+
+@routine
+def reach_at_start(
+    tables: Tables, scratch: AnswerScratch, start: Start, target: Floats, question: Record, answer: PoseSolutions
+) -> int:
+    """Solve a target by legs on the sides of the start; from home with free redundant joints at rest."""
+    if question["has_start"] == 0 and tables.machine[0]["rests"] == 1:
+        copy_row(tables.resting.actuators[0], answer.actuators[0])
+        return reach_from(tables.resting.legs, target, start.poses[0], tables.resting.sides[0], scratch.resting, answer)
+    table = tables.near if question["keeps_mode"] == 1 else tables.legs
+    return reach_from(table, target, start.poses[0], answer.sides[0], scratch.completion, answer)
+
+
+@routine
+def reach_in_other_mode(
+    tables: Tables, scratch: AnswerScratch, start: Start, target: Floats, answer: PoseSolutions
+) -> int:
+    """Solve a target by legs on other sides than those of the start; as `answer_in_any_mode`."""
+    sides = scratch.other.sides[0]
+    copy_row(start.sides[0], sides)
+    status = answer_in_any_mode(
+        tables.legs,
+        target,
+        start.poses[0],
+        sides,
+        scratch.misfits,
+        scratch.choices,
+        scratch.completion,
+        answer.poses[0],
+        answer.actuators[0],
+        answer.measures[0],
+    )
+    if status == REACHED:
+        copy_row(sides, answer.sides[0])
+    return status
+
+
+@routine
+def squared_distance(target: Floats, length: float, pose: Floats) -> float:
+    """Sum of the squared differences of the entries of a target [length] and a pose [L], in the largest entry."""
+    square, scale = 0.0, 1.0
+    for i in range(3):
+        scale = max(scale, abs(target[i, 3] / length))
+    for i in range(3):
+        for j in range(4):
+            entry = target[i, j] / length if j == 3 else target[i, j]
+            square += ((pose[i, j] - entry) / scale) ** 2
+    return square
+
+
+@routine
+def is_flipped(tables: Tables, pose: Floats, completed: Floats) -> bool:
+    """True if the platform has turned over on legs that keep it upright about home.
+
+    Parameters
+    ----------
+    completed : filled with the pose [length] as what the task sets of it is completed from home [L].
+    """
+    task, machine, largest = tables.legs.task[0], tables.machine[0], 0.0
+    if machine["flips"] == 0:
+        return False
+    if not read_target(pose, tables.home.poses[0], task, completed):
+        return True
+    for i in range(3):
+        largest = max(largest, abs(pose[i, 3] / task["length"] - completed[i, 3]))
+        for j in range(3):
+            largest = max(largest, abs(pose[i, j] - completed[i, j]))
+    return bool(largest > machine["same_mode"])
+
+
+@routine
+def reach_in_other_assembly(tables: Tables, scratch: AnswerScratch, target: Floats, answer: PoseSolutions) -> int:
+    """Solve a target in another assembly, completed from the nearest seed that leads to one."""
+    seeds, other, begin, length = tables.others, scratch.other, scratch.begin[0], tables.legs.task[0]["length"]
+    status, nearest = PENDING, math.inf
+    for seed in range(seeds.poses.shape[0]):
+        distance = squared_distance(target, length, seeds.poses[seed])
+        if not distance < nearest:
+            continue
+        copy_table(seeds.poses[seed], begin)
+        for i in range(3):
+            begin[i, 3] *= length
+        copy_row(seeds.sides[seed], other.sides[0])
+        is_reached = reach_from(tables.legs, target, begin, other.sides[0], scratch.completion, other) == REACHED
+        if is_reached and not is_flipped(tables, other.poses[0], scratch.completion.pose):
+            status, nearest = REACHED, distance
+            copy_row(other.sides[0], answer.sides[0])
+            copy_table(other.poses[0], answer.poses[0])
+            copy_row(other.actuators[0], answer.actuators[0])
+            copy_row(other.measures[0], answer.measures[0])
+    return status
+
+
+@routine
+def search_for(
+    tables: Tables,
+    scratch: AnswerScratch,
+    start: Start,
+    target: Floats,
+    question: Record,
+    aim: int,
+    targets: Floats,
+    answer: PoseSolutions,
+) -> float:
+    """Fill the nearest feasible pose by one objective, as of `nearest_of_row`; its distance [L]."""
+    begin, scale = scratch.begin, 1.0 / tables.legs.task[0]["length"]
+    copy_table(start.poses[0], begin[0])
+    for i in range(3):
+        begin[0, i, 3] *= scale
+    return nearest_of_row(
+        tables.search,
+        tables.plan,
+        aim,
+        0 if question["is_nearby"] == 1 else question["seeds"],
+        question["steps"],
+        question["keeps_mode"],
+        0,
+        targets,
+        scratch.no_values,
+        Starts(begin, scratch.no_q, start.sides),
+        answer,
+        scratch.nearest,
+        scratch.no_weights,
+    )
+
+
+@routine
+def project(
+    tables: Tables, scratch: AnswerScratch, start: Start, targets: Floats, question: Record, answer: PoseSolutions
+) -> float:
+    """Fill the nearest feasible pose; its distance [L].
+
+    Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
+    target than a start that was given, nothing is held. Near singularities each of two projections misses some targets.
+    """
+    machine, settings, other = tables.machine[0], tables.plan.settings, scratch.other
+    target, last, distance = targets[0], machine["projections"] - 1, math.inf
+    for aim in range(last + 1):
+        if distance == math.inf:
+            distance = search_for(tables, scratch, start, target, question, aim, targets, answer)
+    if question["has_start"] == 1 and last > 0 and distance < math.inf:
+        holding, weights = settings[0]["hold"], tables.plan.weights
+        if answer.counters[0, HOLD] % CERTAIN == holding:
+            turn = scratch.nearest.search.gradient.turn
+            position, rotation = errors(tables.legs.task[0], target, start.poses[0], turn)
+            if is_too_far(distance, weights[0], holding, position, rotation):
+                released = search_for(tables, scratch, start, target, question, last, targets, other)
+                if brings_nearer(released, weights[last], position, rotation):
+                    distance = released
+                    copy_solution(other, answer)
+    is_doubtful = answer.status[0] == PROJECTED and answer.counters[0, HOLD] < CERTAIN and distance < math.inf
+    if machine["fallback"] >= 0 and is_doubtful:
+        found = search_for(tables, scratch, start, target, question, machine["fallback"], targets, other)
+        if found < math.inf and other.status[0] == REACHED:
+            distance = found
+            copy_solution(other, answer)
+            answer.counters[0, HOLD] = HOLD_NOTHING
+    return distance
+
+
+@routine
+def project_or_reach(
+    tables: Tables, scratch: AnswerScratch, start: Start, targets: Floats, question: Record, answer: PoseSolutions
+) -> int:
+    """Answer a target by the nearest feasible pose; the status.
+
+    From a pose within `NEARLY` of its target, and from every pose where the task leaves some of it open, legs then try
+    to reach the target exactly. What is within `NEARLY`, stays unreached and has no certificate is UNSURE.
+    """
+    distance = project(tables, scratch, start, targets, question, answer)
+    if distance == math.inf:
+        put_start(start, answer)
+        return PENDING
+    status, q, measures = answer.status[0], answer.q, answer.measures
+    if question["last"] == NEAREST:
+        return int(status)
+    if distance <= NEARLY and not (status == PROJECTED and answer.counters[0, HOLD] >= CERTAIN):
+        status = UNSURE
+    if status == UNSURE or tables.machine[0]["is_partial"] == 1:
+        table, begin = tables.near if question["is_nearby"] == 1 else tables.legs, scratch.begin[0]
+        copy_table(answer.poses[0], begin)
+        if reach_from(table, targets[0], begin, answer.sides[0], scratch.completion, answer) == REACHED:
+            for k in range(q.shape[1]):
+                q[0, k] = math.nan
+            measures[0, POSITION_ERROR], measures[0, ROTATION_ERROR] = 0.0, 0.0
+            return REACHED
+    return int(status)
+
+
+@routine
+def answer_by_phases(
+    tables: Tables, scratch: AnswerScratch, start: Start, targets: Floats, question: Record, answer: PoseSolutions
+) -> int:
+    """Answer a target by the phases that are asked for; the status, as of `answer_row`."""
+    machine, first, last, target = tables.machine[0], question["first"], question["last"], targets[0]
+    keeps_mode = question["keeps_mode"] == 1
+    if first == BY_LEGS and reach_at_start(tables, scratch, start, target, question, answer) == REACHED:
+        return REACHED
+    if last == BY_LEGS:
+        return OPEN
+    if machine["searches"] == 0 or (first == BY_LEGS and machine["is_free"] == 1):
+        return PENDING
+    if first <= IN_OTHER_MODES and machine["has_sides"] == 1:
+        turn = scratch.nearest.search.gradient.turn
+        if question["has_start"] == 1 and is_on_target(tables, target, start.poses[0], turn):
+            return PENDING
+        if not keeps_mode:
+            status = reach_in_other_mode(tables, scratch, start, target, answer)
+            if status != PENDING:
+                return REACHED if status == REACHED else PENDING
+    if last == IN_OTHER_MODES:
+        return OPEN
+    is_elsewhere = first <= IN_OTHER_ASSEMBLIES and machine["is_completed"] == 1 and not keeps_mode
+    if is_elsewhere and reach_in_other_assembly(tables, scratch, target, answer) == REACHED:
+        return REACHED
+    if last == IN_OTHER_ASSEMBLIES:
+        return OPEN
+    return project_or_reach(tables, scratch, start, targets, question, answer)
+
+
+@routine
+def answer_row(
+    tables: Tables, scratch: AnswerScratch, start: Start, target: Floats, question: Record, answer: PoseSolutions
+) -> int:
+    """Answer one target (1, 4, 4) [length] from a start, `tables.home` if none is given; the status.
+
+    REACHED by legs in closed form: on the sides of the start; if the mode need not be kept, on others and in other
+    assemblies. Else PROJECTED to the nearest feasible pose found, or REACHED from there. PENDING where no feasible pose
+    was found, or only joint coordinates are exact enough: at a dead point, or on a target that the start is on already.
+    UNSURE where these may come nearer than a projection that nearly reaches. OPEN if the phases asked for do not answer
+    it.
+
+    Parameters
+    ----------
+    scratch : as of `new_answer_scratch`; `scratch.nearest.effort` tells the steps and the searches that it took.
+    answer : filled with one row: the distance [L] of a projection, the pose [length], sides, actuators, measures, and
+        in `counters` the steps of its search and what is held; q is NaN where closed forms answer.
+    """
+    effort = scratch.nearest.effort[0]
+    effort["steps"], effort["searches"], effort["most"] = 0, 0, question["effort"]
+    put_start(start, answer)
+    status = answer_by_phases(tables, scratch, start, target, question, answer)
+    answer.status[0] = status
+    if question["has_start"] == 1 and status != PENDING and status != OPEN:
+        count_turns(tables.legs.driven, start.actuators[0], answer.actuators[0])
+    return status
+
+
+def _sample() -> Tables:
+    """Tables of the array types that kernels are compiled for."""
+    start = Start(zeros((1, 4, 4)), zeros((1, 1)), zeros((1, 1)))
+    resting = RestingLegs(SAMPLE, zeros((1, 1)), zeros((1, 1)))
+    return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, PLAN, NO_STARTS, start)
+
+
+_TABLES = _sample()
+open_tables, open_scratch = opener(_TABLES), opener(new_answer_scratch(_TABLES))
+open_question = opener(Question(zeros(1, QUESTION)))
+"""The arguments of `answer_rows` at the addresses of their handles."""
+
+
+@search
+def answer_rows(
+    tables_address: int,
+    scratch_address: int,
+    question_address: int,
+    targets: Floats,
+    begins: Floats,
+    begin_sides: Floats,
+    begin_actuators: Floats,
+    distances: Floats,
+    poses: Floats,
+    q: Floats,
+    sides: Floats,
+    counters: Ints,
+    actuators: Floats,
+    measures: Floats,
+    status: Ints,
+) -> int:
+    """Answer targets (n, 4, 4) [length] one by one, as `answer_row` does.
+
+    Parameters
+    ----------
+    tables_address, scratch_address, question_address : of `Tables`, of `AnswerScratch`, and of a QUESTION.
+    begins, begin_sides, begin_actuators : as in `Start`, one for each target, or one for all.
+    distances, poses, q, sides, counters, actuators, measures, status : as in `PoseSolutions`.
+
+    Returns
+    -------
+    The number of targets that are not REACHED or PROJECTED.
+    """
+    tables, scratch, question, n_left = (
+        open_tables(tables_address),
+        open_scratch(scratch_address),
+        open_question(question_address).asked[0],
+        0,
+    )
+    for row in range(targets.shape[0]):
+        own, end = row if begins.shape[0] > 1 else 0, row + 1
+        start = Start(begins[own : own + 1], begin_sides[own : own + 1], begin_actuators[own : own + 1])
+        answer = PoseSolutions(
+            distances[row:end],
+            poses[row:end],
+            q[row:end],
+            sides[row:end],
+            counters[row:end],
+            actuators[row:end],
+            measures[row:end],
+            status[row:end],
+        )
+        found = answer_row(tables, scratch, start, targets[row:end], question, answer)
+        n_left += 1 if found > PROJECTED else 0
+    return n_left

@@ -1,0 +1,123 @@
+"""All that kernels need of a machine whose chains are legs in closed form: to answer a target, to assemble actuators.
+
+A `Handle` of these tables, constants in a C file and bytes in a web page are the same, written differently.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Floats, Ints, Records
+from ..legs.answer import Completion, new_completion
+from ..legs.records import Table
+from .nearest import NearestScratch, new_nearest_scratch
+from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
+
+# Phases of an answer, in order: legs on the sides of the start, on others, in other assemblies, by searches for the
+# nearest feasible pose, and exactly from where these ended.
+BY_LEGS, IN_OTHER_MODES, IN_OTHER_ASSEMBLIES, NEAREST, EXACTLY = 0, 1, 2, 3, 4
+
+MACHINE = np.dtype(
+    [
+        ("has_sides", "i8"),  # 1: some legs have two solutions
+        ("is_partial", "i8"),  # 1: the task leaves some of the pose open
+        ("is_completed", "i8"),  # 1: some of the pose, or a redundant joint, is completed from the start
+        ("is_free", "i8"),  # 1: poses leave redundant joints open, which then rest, or are moved
+        ("rests", "i8"),  # 1: `resting` are the legs while free redundant joints stay at home
+        ("searches", "i8"),  # 1: what legs do not reach is searched for in the platform's pose
+        ("flips", "i8"),  # 1: a platform that the legs keep upright about home may turn over on them
+        ("projections", "i8"),  # objectives of `plan` tried in turn, the first ones; the last of these holds nothing
+        ("fallback", "i8"),  # objective that is tried where these leave doubts; -1 if none
+        ("position", "f8"),  # tolerance of a position [L]
+        ("rotation", "f8"),  # tolerance of a rotation [rad]
+        ("same_mode", "f8"),  # largest difference of solutions that count as one [L, and entries of rotations]
+    ]
+)
+"""What is known of a machine, beside its legs."""
+
+QUESTION = np.dtype(
+    [
+        ("first", "i8"),  # phases that are gone through: BY_LEGS ... EXACTLY
+        ("last", "i8"),
+        ("has_start", "i8"),  # 1: the start was given, 0: it is home
+        ("keeps_mode", "i8"),  # 1: answers are in the working mode of the start
+        ("is_nearby", "i8"),  # 1: as along a path, searches stay around the start
+        ("seeds", "i8"),  # most starts of a search beside its own
+        ("steps", "i8"),  # most steps of a search from one start
+        ("effort", "i8"),  # steps of all searches after which no further one begins
+    ]
+)
+"""What is asked of a target."""
+
+
+class Question(NamedTuple):
+    """What is asked of targets."""
+
+    asked: Records  # (1,): QUESTION
+
+
+class Start(NamedTuple):
+    """A configuration that an answer starts from."""
+
+    poses: Floats  # (1, 4, 4) [length]
+    sides: Floats  # (1, legs): which of its two solutions each leg takes; the coordinate of an implicit joint
+    actuators: Floats  # (1, n_a) [length or rad]: turns of actuators that may turn more than once count from there
+
+
+class RestingLegs(NamedTuple):
+    """The legs while free redundant joints stay at home, as of `decomposition.resting`."""
+
+    legs: Table
+    sides: Floats  # (1, legs)
+    actuators: Floats  # (1, n_a): of those that drive redundant joints
+
+
+class Tables(NamedTuple):
+    """All that is needed to answer targets.
+
+    Limits are numbered as multipliers of limits are: 2 k and 2 k + 1 for the low and the high bound of coordinate k of
+    `limited`, then the cones; their names are in `LegTable.limits`.
+    """
+
+    machine: Records  # (1,): MACHINE
+    legs: Table
+    near: Table  # they complete what the task leaves open only near its start
+    resting: RestingLegs
+    search: Table  # as searches take them
+    plan: MultistartPlan
+    others: Starts  # seeds in other assemblies than home's
+    home: Start
+
+
+class AnswerScratch(NamedTuple):
+    """Scratch memory of one thread."""
+
+    completion: Completion
+    resting: Completion
+    nearest: NearestScratch
+    other: PoseSolutions  # one row: an answer to be compared
+    begin: Floats  # (1, 4, 4): a pose, in [L] where a search starts, or [length] where legs do
+    misfits: Floats  # (legs,)
+    choices: Ints  # (legs,)
+    no_q: Floats  # (0, legs)
+    no_values: Floats  # (0, n_a)
+    no_weights: Floats  # (0, 0)
+
+
+def new_answer_scratch(tables: Tables) -> AnswerScratch:
+    """Allocate the scratch memory of one thread."""
+    legs, actuators = tables.legs.legs.shape[0], tables.home.actuators.shape[1]
+    return AnswerScratch(
+        new_completion(tables.legs),
+        new_completion(tables.resting.legs),
+        new_nearest_scratch(tables.search, tables.plan, False),
+        new_solutions(1, legs, actuators),
+        np.zeros((1, 4, 4)),
+        np.zeros(legs),
+        np.zeros(legs, np.int64),
+        np.zeros((0, legs)),
+        np.zeros((0, actuators)),
+        np.zeros((0, 0)),
+    )
