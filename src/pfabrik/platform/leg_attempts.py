@@ -16,9 +16,10 @@ from ..options import Options
 from .nearest import endings
 from .nearest_pose import starts_at
 from .reach import reach
+from .rows_one_by_one import Answers
 from .seeds import seeds_of
 from .tables import home_of
-from .unreached import Answers, answer_phases
+from .unreached import answer_phases
 
 
 def attempts(

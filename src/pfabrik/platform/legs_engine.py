@@ -36,10 +36,11 @@ from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
+from .rows_one_by_one import Answers
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
 from .table import table_handle
 from .tables import home_of
-from .unreached import Answers, answer_phases, answer_unreached
+from .unreached import answer_phases, answer_unreached
 
 
 class LegsEngine(Engine):
@@ -407,7 +408,14 @@ class LegsEngine(Engine):
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
                 return self._single_answer(rows, solution, start, start_sides)
         rows, q_proximal, sides = forward_kinematics(
-            self._model, values, start, start_sides, tolerance, outputs, keep_mode=keep_mode
+            self._model,
+            values,
+            self._start_of(start, start_sides),
+            self._forward_start(start, start_sides).record,
+            tolerance,
+            outputs,
+            has_start=start is not None,
+            keep_mode=keep_mode,
         )
         projected = np.flatnonzero(rows.status == PROJECTED)
         if len(projected) and not keep_mode:  # seeds are few where one freedom goes all round
@@ -426,7 +434,8 @@ class LegsEngine(Engine):
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
         start_sides = self._sides_of(start)
-        rows, q_proximal, sides = project_values(self._model, values, start, start_sides, tolerance)
+        own, has_start = self._start_of(start, start_sides), start is not None
+        rows, q_proximal, sides = project_values(self._model, values, own, tolerance, has_start=has_start)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved):
             begin = start if start is None or len(start) == 1 else start.at(unsolved)

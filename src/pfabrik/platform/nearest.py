@@ -1,4 +1,4 @@
-"""The nearest feasible configurations: the objectives of projections, nearest actuators."""
+"""The objectives of searches for the nearest feasible configurations, of poses and of actuators."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import Floats
-from ..closure.close import in_lengths
 from ..closure.projection import ProjectionMode, projection_modes
 from ..derived import derived
 from ..description.home_mobility import column_joints
@@ -18,11 +17,14 @@ from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .links_of_legs import links_of_legs
-from .nearest_pose import NearestPose, Objective, no_starts
+from .nearest_pose import AGREEMENTS_OF_VALUES, NearestPose, Objective, no_starts
 from .seeds import seeds_of
 
 MOST_STEPS = 200
 """Steps of a search, rejected ones included; most need a dozen."""
+
+OF_VALUES: Objective = (0.0,) * 6, {"frame": BASE_AXES, "steps": MOST_STEPS, "agreements": AGREEMENTS_OF_VALUES}
+"""The objective of actuators nearest to values; the pose does not count."""
 
 
 def objectives_of(
@@ -124,19 +126,3 @@ def _position_search(model: Model, seeds: bool, keep_mode: bool) -> NearestPose:
     }
     seed_starts = seeds_of(model) if seeds else no_starts(model.legs)
     return NearestPose(model, model.legs, model.task.weights(1.0, 0.0), settings, seed_starts)
-
-
-def nearest_actuators(model: Model, values: Floats, starts: Starts, *, seeds: bool) -> PoseSolutions:
-    """Feasible configurations whose actuators are nearest to values (n, n_a), deviations from home [L or rad]."""
-    poses = in_lengths(starts.poses, model.length)
-    poses = poses if len(poses) == len(values) else np.repeat(poses, len(values), axis=0)
-    return _actuator_search(model, seeds).find(poses, starts, values)
-
-
-@derived
-def _actuator_search(model: Model, seeds: bool) -> NearestPose:
-    """The search for actuators nearest to values; the pose does not count."""
-    table = model.legs
-    seed_starts = seeds_of(model) if seeds else no_starts(table)
-    settings = {"frame": BASE_AXES, "steps": MOST_STEPS}
-    return NearestPose(model, table, (0.0,) * 6, settings, seed_starts, table.driven)

@@ -16,7 +16,7 @@ from ..kernels.handle import Handle, Scratch
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import N_COUNTERS, Rows
 from ..model import Model
-from .nearest_pose import home_start, no_starts
+from .nearest_pose import home_start
 from .table import legs_at_rest, local_table, search_table, table_handle
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class SingleAssembly:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self.home, self._no_starts = Handle(home_start(model)), Handle(no_starts(model.legs))
+        self.home = Handle(home_start(model))
         self._legs = search_table(model.legs)
         self._n_actuators, self._n_legs = len(model.mechanism.actuator_names), len(model.legs.legs)
 
@@ -146,7 +146,7 @@ class SingleAssembly:
 
         It is valid while the start, the scratch memory and this object are kept.
         """
-        inputs = self._legs.address, scratch.address, rows.actuators, start.address, self._no_starts.address
+        inputs = self._legs.address, scratch.address, rows.actuators, start.address
         return partial(
             self._kernel, *inputs, rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
         )

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..batch import take
+from ..closure.assemble import NOISE, is_over_determined
 from ..closure.parasitic import follows_task, has_other_assemblies, has_parasitic_motion
 from ..decomposition.leg_table import LegTable
 from ..derived import derived, is_derived
@@ -16,10 +17,10 @@ from ..kernels.platform import tables as T
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
-from .nearest import objectives_of
+from .nearest import OF_VALUES, objectives_of
 from .nearest_pose import no_starts, search_plan
 from .seeds import seeds_of, seeds_of_other_assemblies
-from .table import kernel_table, legs_at_rest, local_table
+from .table import kernel_table, legs_at_rest, local_table, search_table
 
 _UNBOUNDED = 2**62
 
@@ -55,7 +56,9 @@ def _handle(
 ) -> Handle[T.Tables]:
     table = model.legs
     objectives, n_projections, fallback = objectives_of(model, hold, rotation_length, tolerance, rotation_tolerance)
-    search, plan = search_plan(model, table, objectives, seeds_of(model) if with_seeds else no_starts(table))
+    search, plan = search_plan(
+        model, table, [*objectives, OF_VALUES], seeds_of(model) if with_seeds else no_starts(table)
+    )
     resting, closure = legs_at_rest(table), model.path_closure
     machine = np.zeros(1, T.MACHINE)
     fields = {
@@ -68,9 +71,14 @@ def _handle(
         "flips": with_seeds and follows_task(closure) and not has_parasitic_motion(closure),
         "projections": n_projections,
         "fallback": fallback,
+        "values": len(objectives),
+        "turns": not model.mechanism.end_effector_is_joint,
+        "is_over_determined": is_over_determined(model.closure),
         "position": TOLERANCES.position,
         "rotation": TOLERANCES.rotation,
         "same_mode": TOLERANCES.same_mode,
+        "stretched": TOLERANCES.stretched,
+        "noise": NOISE,
     }
     for name, value in fields.items():
         machine[name] = value
@@ -85,6 +93,7 @@ def _handle(
             local_table(table).record,
             at_rest,
             search,
+            search_table(table).record,
             plan,
             seeds_of_other_assemblies(model) if with_seeds and table.is_completed else no_starts(table),
             home_of(model),
@@ -117,8 +126,10 @@ def has_seeds(model: Model) -> bool:
 
 
 @lru_cache(maxsize=64)
-def question(first: int, last: int, *, has_start: bool, keeps_mode: bool, is_nearby: bool) -> Handle[T.Question]:
-    """What is asked of targets, searches being bounded by the machine's own settings alone."""
+def question(
+    first: int, last: int, tolerance: float, *, has_start: bool, keeps_mode: bool, is_nearby: bool
+) -> Handle[T.Question]:
+    """What is asked, searches being bounded by the machine's own settings alone."""
     asked = np.zeros(1, T.QUESTION)
-    asked[0] = first, last, has_start, keeps_mode, is_nearby, _UNBOUNDED, _UNBOUNDED, _UNBOUNDED
+    asked[0] = first, last, has_start, keeps_mode, is_nearby, _UNBOUNDED, _UNBOUNDED, _UNBOUNDED, tolerance
     return Handle(T.Question(asked))

@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..batch import put, take, take_each
-from ..kernels.handle import Handle
-from ..kernels.platform.search_records import PoseSolutions
-from ..kernels.platform.tables import EXACTLY, IN_OTHER_ASSEMBLIES, IN_OTHER_MODES, Start, Tables
-from ..kernels.rows import OPEN, Rows
-from ..kernels.threads import in_blocks
+from ..kernels.platform.tables import EXACTLY, IN_OTHER_ASSEMBLIES, IN_OTHER_MODES, Start
+from ..kernels.rows import OPEN
 from ..model import Model
 from ..options import Options
-from .tables import handle_of, has_seeds, question, scratch_of_answers
-
-ROWS_A_BLOCK = 16
-
-
-class Answers(NamedTuple):
-    """Answers of a batch."""
-
-    rows: Rows
-    q: Floats  # (n, legs): proximal coordinates found by a search, where closed forms are less exact; else NaN
-    sides: Floats  # (n, legs): the side of each leg at the answer; at the start of rows that are not answered
+from .rows_one_by_one import Answers, answer_places
+from .tables import handle_of, has_seeds, question
 
 
 def answer_unreached(
@@ -69,28 +54,9 @@ def answer_phases(
     nearby: bool,
 ) -> None:
     """Answer targets at some places by some of the phases of `answer_row`, from one start for all or one for each."""
-    with_seeds = not nearby and last > IN_OTHER_MODES
-    tables = handle_of(model, options, with_seeds=with_seeds)
-    asked = question(first, last, has_start=has_start, keeps_mode=keep_mode, is_nearby=nearby)
-    if len(places) == len(targets):
-        _run(tables, asked.address, targets, start, answers)
-    else:
-        block = take(answers, places)
-        _run(tables, asked.address, targets[places], take_each(start, places), block)
-        put(answers, places, block)
-
-
-def _run(tables: Handle[Tables], asked: int, targets: Floats, start: Start, answers: Answers) -> None:
-    """Answer targets on all cores."""
     from ..kernels.platform.answer_row import answer_rows
 
-    distances, scratch = np.empty(len(targets)), scratch_of_answers(tables)
-
-    def run(block: slice) -> int:
-        rows, q, sides = take(answers, block)
-        outputs = PoseSolutions(
-            distances[block], rows.poses, q, sides, rows.counters, rows.actuators, rows.measures, rows.status
-        )
-        return answer_rows(tables.address, scratch.address, asked, targets[block], *take_each(start, block), *outputs)
-
-    in_blocks(run, len(targets), ROWS_A_BLOCK)
+    with_seeds = not nearby and last > IN_OTHER_MODES
+    tables = handle_of(model, options, with_seeds=with_seeds)
+    asked = question(first, last, 0.0, has_start=has_start, keeps_mode=keep_mode, is_nearby=nearby)
+    answer_places(answer_rows, tables, asked, targets, start, answers, places)

@@ -369,7 +369,7 @@ def _sample() -> Tables:
     """Tables of the array types that kernels are compiled for."""
     start = Start(zeros((1, 4, 4)), zeros((1, 1)), zeros((1, 1)))
     resting = RestingLegs(SAMPLE, zeros((1, 1)), zeros((1, 1)))
-    return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, PLAN, NO_STARTS, start)
+    return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, SAMPLE, PLAN, NO_STARTS, start)
 
 
 _TABLES = _sample()

@@ -393,39 +393,45 @@ def put_deviations(table: Table, values: Floats, deviations: Floats) -> None:
 
 
 @routine
-def assemble_row(
-    table: Table, actuators: Floats, starts: Starts, row: int, seeds: Starts, deviations: Floats, scratch: NewtonScratch
-) -> int:
+def assemble_from_own(table: Table, wished: Floats, starts: Starts, start: int, scratch: NewtonScratch) -> int:
     """Assemble one row within all limits, into `scratch.state`, with the legs evaluated there; its status.
 
-    From the row's own start in its assembly mode, at once or by continuation; then from the seeds in any, of which the
-    solution nearest to the row's start is taken.
+    From a start in its assembly mode, at once or by continuation: PENDING if that fails, EXCEEDED if it leads beyond a
+    limit.
+
+    Parameters
+    ----------
+    wished : deviations of the actuators from home, (n_a,) [L or rad].
     """
-    own_start, target_values, status = row if starts.poses.shape[0] > 1 else 0, deviations[row], PENDING
-    put_deviations(table, actuators[row], target_values)
     for attempt in range(2):
-        load_start(table, starts, own_start, scratch)
-        copy_row(target_values, scratch.values)
-        worst = newton(table, ASSEMBLED, True, scratch) if attempt == 0 else continue_to(table, target_values, scratch)
+        load_start(table, starts, start, scratch)
+        copy_row(wished, scratch.values)
+        worst = newton(table, ASSEMBLED, True, scratch) if attempt == 0 else continue_to(table, wished, scratch)
         if worst <= NEARLY_ASSEMBLED:
-            if is_feasible(table, target_values, scratch):
-                return REACHED
-            status = EXCEEDED
-            break
-    nearest = math.inf
-    for start in range(seeds.poses.shape[0]):
-        load_start(table, seeds, start, scratch)
-        copy_row(target_values, scratch.values)
-        if newton(table, ASSEMBLED, False, scratch) <= NEARLY_ASSEMBLED and is_feasible(table, target_values, scratch):
-            distance = squared_distance(scratch.state.pose, starts.poses[own_start])
+            return REACHED if is_feasible(table, wished, scratch) else EXCEEDED
+    return PENDING
+
+
+@routine
+def assemble_from_others(
+    table: Table, wished: Floats, starts: Starts, pose: Floats, nearest: float, scratch: NewtonScratch
+) -> float:
+    """Assemble one row as `assemble_from_own` does, from other starts in any mode; the squared distance from a pose.
+
+    Of the solutions, that nearest to the pose (4, 4) [L] is taken if it is nearer than `nearest`.
+    """
+    for start in range(starts.poses.shape[0]):
+        load_start(table, starts, start, scratch)
+        copy_row(wished, scratch.values)
+        if newton(table, ASSEMBLED, False, scratch) <= NEARLY_ASSEMBLED and is_feasible(table, wished, scratch):
+            distance = squared_distance(scratch.state.pose, pose)
             if distance < nearest:
                 nearest = distance
                 copy_platform_state(scratch.state, scratch.best)
     if nearest < math.inf:
         copy_platform_state(scratch.best, scratch.state)
         evaluate_legs(table, scratch.state, scratch.leg_eval)
-        return REACHED
-    return status
+    return nearest
 
 
 @routine
@@ -454,7 +460,6 @@ def assemble(
     scratch_address: int,
     values: Floats,
     starts_address: int,
-    seeds_address: int,
     status: Ints,
     deviations: Floats,
     poses: Floats,
@@ -471,9 +476,7 @@ def assemble(
     ----------
     machine, scratch_address : addresses of the kernel table and of `NewtonScratch`.
     values : (n, n_a) [length or rad].
-    starts_address, seeds_address : addresses of `Starts`: one for each row or one for all; and those tried next, of
-    which
-        the solution nearest to the row's start is taken.
+    starts_address : address of `Starts`: one for each row or one for all.
     deviations : filled by `put_deviations`, (n, n_a).
     poses, q, sides : filled with the configurations, as in `Starts`; poses in [length].
 
@@ -481,15 +484,16 @@ def assemble(
     -------
     The number of rows that are not REACHED.
     """
-    table, starts, seeds, n_unassembled = (
+    table, starts, scratch, n_unassembled = (
         open_table(machine),
         open_starts(starts_address),
-        open_starts(seeds_address),
+        open_newton(scratch_address),
         0,
     )
-    scratch = open_newton(scratch_address)
     for row in range(values.shape[0]):
-        status[row] = assemble_row(table, values, starts, row, seeds, deviations, scratch)
+        put_deviations(table, values[row], deviations[row])
+        own = row if starts.poses.shape[0] > 1 else 0
+        status[row] = assemble_from_own(table, deviations[row], starts, own, scratch)
         if status[row] == REACHED:
             write_assembled(table, row, scratch, Starts(poses, q, sides), measures)
         else:

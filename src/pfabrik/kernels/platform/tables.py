@@ -12,6 +12,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Records
 from ..legs.answer import Completion, new_completion
 from ..legs.records import Table
+from .forward import NewtonScratch, new_newton_scratch
 from .nearest import NearestScratch, new_nearest_scratch
 from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
 
@@ -30,9 +31,14 @@ MACHINE = np.dtype(
         ("flips", "i8"),  # 1: a platform that the legs keep upright about home may turn over on them
         ("projections", "i8"),  # objectives of `plan` tried in turn, the first ones; the last of these holds nothing
         ("fallback", "i8"),  # objective that is tried where these leave doubts; -1 if none
+        ("values", "i8"),  # objective of which actuators near to values count
+        ("turns", "i8"),  # 1: the platform turns; 0: the end effector is a point
+        ("is_over_determined", "i8"),  # 1: there are more actuators than motions, and values contradict each other
         ("position", "f8"),  # tolerance of a position [L]
         ("rotation", "f8"),  # tolerance of a rotation [rad]
         ("same_mode", "f8"),  # largest difference of solutions that count as one [L, and entries of rotations]
+        ("stretched", "f8"),  # and of solutions in one assembly mode, where links are stretched out
+        ("noise", "f8"),  # actuator error that noise alone causes in readings of too many actuators [L or rad]
     ]
 )
 """What is known of a machine, beside its legs."""
@@ -47,9 +53,10 @@ QUESTION = np.dtype(
         ("seeds", "i8"),  # most starts of a search beside its own
         ("steps", "i8"),  # most steps of a search from one start
         ("effort", "i8"),  # steps of all searches after which no further one begins
+        ("tolerance", "f8"),  # of assembly: how close actuators must come to values to be REACHED [L or rad]
     ]
 )
-"""What is asked of a target."""
+"""What is asked of a target, or of actuator values."""
 
 
 class Question(NamedTuple):
@@ -75,7 +82,7 @@ class RestingLegs(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """All that is needed to answer targets.
+    """All that is needed to answer targets, and to assemble actuators.
 
     Limits are numbered as multipliers of limits are: 2 k and 2 k + 1 for the low and the high bound of coordinate k of
     `limited`, then the cones; their names are in `LegTable.limits`.
@@ -86,6 +93,7 @@ class Tables(NamedTuple):
     near: Table  # they complete what the task leaves open only near its start
     resting: RestingLegs
     search: Table  # as searches take them
+    assembly: Table  # as forward kinematics does
     plan: MultistartPlan
     others: Starts  # seeds in other assemblies than home's
     home: Start
@@ -98,9 +106,16 @@ class AnswerScratch(NamedTuple):
     resting: Completion
     nearest: NearestScratch
     other: PoseSolutions  # one row: an answer to be compared
+    newton: NewtonScratch
     begin: Floats  # (1, 4, 4): a pose, in [L] where a search starts, or [length] where legs do
+    own: Floats  # (1, 4, 4): the start of an assembly [L]
+    home: Floats  # (1, 4, 4): home [L]
+    wished: Floats  # (1, n_a): deviations of actuators from home that are asked for [L or rad]
+    trial: Floats  # (n_a,): others
+    way: Floats  # (n_a,): values of actuators on the way to those asked for [length or rad]
     misfits: Floats  # (legs,)
     choices: Ints  # (legs,)
+    home_q: Floats  # (1, legs): 0, the coordinates at home
     no_q: Floats  # (0, legs)
     no_values: Floats  # (0, n_a)
     no_weights: Floats  # (0, 0)
@@ -114,9 +129,16 @@ def new_answer_scratch(tables: Tables) -> AnswerScratch:
         new_completion(tables.resting.legs),
         new_nearest_scratch(tables.search, tables.plan, False),
         new_solutions(1, legs, actuators),
+        new_newton_scratch(tables.assembly, bool(tables.machine["turns"][0])),
         np.zeros((1, 4, 4)),
+        np.zeros((1, 4, 4)),
+        np.zeros((1, 4, 4)),
+        np.zeros((1, actuators)),
+        np.zeros(actuators),
+        np.zeros(actuators),
         np.zeros(legs),
         np.zeros(legs, np.int64),
+        np.zeros((1, legs)),
         np.zeros((0, legs)),
         np.zeros((0, actuators)),
         np.zeros((0, 0)),
