@@ -6,11 +6,20 @@ import math
 from typing import TypeAlias
 
 from ..arrays import Floats
-from ._jit import routine
+from ._jit import inlined, routine
 
 Vec: TypeAlias = tuple[float, float, float]
 # Excess over the end of a range up to which an angle counts as on it, not a turn away [rad].
 ON_BOUND = 1e-9
+
+
+@inlined
+def where(condition: bool, a: float, b: float) -> float:
+    """`a` if the condition holds, else `b`; both are computed, and neither may divide by zero.
+
+    The formulas of legs choose by it wherever they ask something of a number, so that they are expressions.
+    """
+    return a if condition else b
 
 
 @routine

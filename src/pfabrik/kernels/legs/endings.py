@@ -10,7 +10,7 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine
-from ..vectors import Vec, along, angle_between, cross, dot, scale
+from ..vectors import Vec, along, angle_between, cross, dot, scale, where
 
 # Sine of the angle to a dead point, or to aligned hinges, below which a solution loses half of its digits.
 LEAST_MARGIN = 1e-6
@@ -46,26 +46,47 @@ def solve_angle(A: float, B: float, C: float, side: float) -> tuple[float, float
     it is negative where no solution exists, and the angle is then that of the double root.
     """
     square = A * A + B * B
-    if not square > 0.0:
-        return 1.0, 0.0, -1.0
-    discriminant = square - C * C
-    if discriminant < 0.0:
-        C = math.copysign(math.sqrt(square), C)
+    is_determined, discriminant = square > 0.0, square - C * C
+    C = where(discriminant < 0.0, math.copysign(math.sqrt(square), C), C)
     root = side * math.sqrt(max(discriminant, 0.0))
-    return (A * C - B * root) / square, (B * C + A * root) / square, discriminant / square
+    square = where(is_determined, square, 1.0)
+    return (
+        where(is_determined, (A * C - B * root) / square, 1.0),
+        where(is_determined, (B * C + A * root) / square, 0.0),
+        where(is_determined, discriminant / square, -1.0),
+    )
 
 
 @routine
-def universal_angles(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
-    """Fill angles[:2] of two crossed hinges that turn `u`, given at home, into `w`; the singularity margin."""
+def aim(axes: Floats, u: Vec, w: Vec, side: float) -> tuple[Vec, float, float, float]:
+    """Two crossed hinges that turn `u`, given at home, into `w`: `u` turned by the last one; cosine and sine of its
+    angle; the singularity margin."""
     a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
     bu = dot(b, u)
     cosine, sine, singularity_margin = solve_angle(
         dot(a, along(u, -bu, b)), dot(a, cross(b, u)), dot(a, w) - dot(a, b) * bu, side
     )
-    angles[0] = angle_to(a, turned(u, b, cosine, sine), w)
+    return turned(u, b, cosine, sine), cosine, sine, singularity_margin
+
+
+@routine
+def universal_angles(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) -> float:
+    """Fill angles[:2] of two crossed hinges that turn `u`, given at home, into `w`; the singularity margin."""
+    by_last, cosine, sine, singularity_margin = aim(axes, u, w, side)
+    angles[0] = angle_to((axes[0, 0], axes[0, 1], axes[0, 2]), by_last, w)
     angles[1] = math.atan2(sine, cosine)
     return singularity_margin
+
+
+@routine
+def aimed_axis(axes: Floats, u: Vec, w: Vec, side: float) -> Vec:
+    """The last of two crossed hinges that turn `u`, given at home, into `w`."""
+    a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
+    by_last, _, _, _ = aim(axes, u, w, side)
+    sine, cosine = dot(a, cross(by_last, w)), dot(by_last, w) - dot(a, by_last) * dot(a, w)
+    size = math.sqrt(sine * sine + cosine * cosine)
+    size = where(size > 0.0, size, 1.0)
+    return turned(b, a, cosine / size, sine / size)
 
 
 @routine

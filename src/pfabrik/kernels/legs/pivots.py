@@ -10,7 +10,7 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..vectors import Vec, cross, dot, move, put, sub, turn, vec
+from ..vectors import Vec, cross, dot, move, put, sub, turn, vec, where
 from .endings import angle_to, spin_angle, turned, universal_angles
 from .frames import ZERO, put_pose_slope
 from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, TRIPLE
@@ -53,11 +53,11 @@ def last_angle(frame: Floats, axes: Floats, first: float, second: float, last: i
 
 @routine
 def any_across(v: Vec) -> Vec:
-    """A direction normal to a unit vector."""
+    """A direction normal to a unit vector, and to the coordinate axis that it is farthest from."""
     x, y, z = abs(v[0]), abs(v[1]), abs(v[2])
-    if x <= y and x <= z:
-        return cross(v, (1.0, 0.0, 0.0))
-    return cross(v, (0.0, 1.0, 0.0)) if y <= z else cross(v, (0.0, 0.0, 1.0))
+    first = where(x <= y, where(x <= z, 1.0, 0.0), 0.0)
+    second = where(y <= z, 1.0 - first, 0.0)
+    return cross(v, (first, second, 1.0 - first - second))
 
 
 @routine
@@ -70,7 +70,7 @@ def pivot_rows(pivot: Record, frame: Floats, rows: Floats) -> None:
     penalty = 0.0
     for i in range(pivot["upright"]):
         axis = vec(pivot["base_end_axes"][i])
-        penalty = TURNED_OVER if dot(axis, turn(frame, axis)) < 0.0 else penalty
+        penalty = where(dot(axis, turn(frame, axis)) < 0.0, TURNED_OVER, penalty)
     for i in range(pivot["axis_rows"]):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
         rows[n + n_fixed + i] = dot(kept, moved) - pivot["value"][i] + penalty

@@ -17,8 +17,8 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, wrap
-from .endings import angle_to, solve_angle, turned, turned_back, universal_angles
+from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, where, wrap
+from .endings import aimed_axis, angle_to, solve_angle, turned, turned_back, universal_angles
 from .frames import ZERO, put_pose_slope
 from .records import (
     BASE_END,
@@ -118,42 +118,31 @@ def evaluate_rod(
     put(values[BASE_LINE:PLATFORM_LINE], base_line)
     put(values[PLATFORM_LINE:COSINE], platform_line)
     values[SLIDE] = length - rod["length"]
-    if rod["base_end_aimed"] == 1:
-        singularity_margin = min(
-            singularity_margin,
-            ending_angles(
-                rod["base_end"], rod["base_end_axes"], home, base_line, rod["base_end_side"], values[BASE_END:SLIDE]
-            ),
-        )
-    if rod["platform_end_aimed"] == 1:
-        singularity_margin = min(
-            singularity_margin,
-            ending_angles(
-                rod["platform_end"],
-                rod["platform_end_axes"],
-                home,
-                platform_line,
-                rod["platform_end_side"],
-                values[PLATFORM_END:BASE_LINE],
-            ),
-        )
-    is_crossed = rod["base_end"] == CROSS or rod["platform_end"] == CROSS
-    if (
-        rod["twists"] == 1
-        and is_crossed
-        and abs(twist_of(rod, proximal, frame, proximal_values, values, u)) > 0.5 * math.pi
-    ):
+    base_side, platform_side = rod["base_end_side"], rod["platform_end_side"]
+    if rod["twists"] == 1 and (rod["base_end"] == CROSS or rod["platform_end"] == CROSS):
+        base_mark = aimed_mark(rod["base_end"], rod["base_end_axes"], home, base_line, base_side)
+        platform_mark = aimed_mark(rod["platform_end"], rod["platform_end_axes"], home, platform_line, platform_side)
+        twist = twist_between(rod, proximal, frame, proximal_values, base_mark, platform_mark, u)
+        flip = where(abs(twist) > 0.5 * math.pi, -1.0, 1.0)
         if rod["platform_end"] == CROSS:
-            ending_angles(
-                CROSS,
-                rod["platform_end_axes"],
-                home,
-                platform_line,
-                -rod["platform_end_side"],
-                values[PLATFORM_END:BASE_LINE],
-            )
+            platform_side *= flip
         else:
-            ending_angles(CROSS, rod["base_end_axes"], home, base_line, -rod["base_end_side"], values[BASE_END:SLIDE])
+            base_side *= flip
+    if rod["base_end_aimed"] == 1:
+        margin = ending_angles(
+            rod["base_end"], rod["base_end_axes"], home, base_line, base_side, values[BASE_END:SLIDE]
+        )
+        singularity_margin = min(singularity_margin, margin)
+    if rod["platform_end_aimed"] == 1:
+        margin = ending_angles(
+            rod["platform_end"],
+            rod["platform_end_axes"],
+            home,
+            platform_line,
+            platform_side,
+            values[PLATFORM_END:BASE_LINE],
+        )
+        singularity_margin = min(singularity_margin, margin)
     return singularity_margin
 
 
@@ -167,6 +156,12 @@ def ending_angles(ending: int, axes: Floats, home: Vec, line: Vec, side: float, 
 
 
 @routine
+def aimed_mark(ending: int, axes: Floats, home: Vec, line: Vec, side: float) -> Vec:
+    """The `twist_mark` of an ending that points its rod along a line."""
+    return (axes[0, 0], axes[0, 1], axes[0, 2]) if ending == HINGE else aimed_axis(axes, home, line, side)
+
+
+@routine
 def twist_mark(ending: int, axes: Floats, angles: Floats) -> Vec:
     """The last hinge of an ending, which moves with the rod, in the body that the ending is on."""
     first = (axes[0, 0], axes[0, 1], axes[0, 2])
@@ -176,15 +171,20 @@ def twist_mark(ending: int, axes: Floats, angles: Floats) -> Vec:
 
 
 @routine
-def twist_of(rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, values: Floats, u: Vec) -> float:
+def twist_between(
+    rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, base_mark: Vec, platform_mark: Vec, u: Vec
+) -> float:
     """Angle about a rod's line between the twist marks of its two endings, less that at home."""
-    base_end = turned_by_proximal(
-        proximal, proximal_values, twist_mark(rod["base_end"], rod["base_end_axes"], values[BASE_END:SLIDE]), 1.0
-    )
-    platform_end = turn(
-        frame, twist_mark(rod["platform_end"], rod["platform_end_axes"], values[PLATFORM_END:BASE_LINE])
-    )
-    return wrap(angle_to(u, base_end, platform_end) - rod["twist"], 0.0)
+    base_end = turned_by_proximal(proximal, proximal_values, base_mark, 1.0)
+    return wrap(angle_to(u, base_end, turn(frame, platform_mark)) - rod["twist"], 0.0)
+
+
+@routine
+def twist_of(rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, values: Floats, u: Vec) -> float:
+    """The twist of a rod by the angles of its endings."""
+    base_mark = twist_mark(rod["base_end"], rod["base_end_axes"], values[BASE_END:SLIDE])
+    platform_mark = twist_mark(rod["platform_end"], rod["platform_end_axes"], values[PLATFORM_END:BASE_LINE])
+    return twist_between(rod, proximal, frame, proximal_values, base_mark, platform_mark, u)
 
 
 @routine
