@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import copy
+import importlib.util
 import inspect
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import pytest
 from pfabrik.kernels._jit import SOURCES
 from pfabrik.to_c import Program, Unsupported
 from subset import constructs, refused
+from subset.random_programs import Writer
 
 WARNINGS = [
     "-std=c99",
@@ -182,3 +185,43 @@ def test_arithmetic_that_is_not_ieee_is_refused(tmp_path: Path, flag: str) -> No
     if "-m32" in flag and "IEEE" not in ran.stderr and "x87" not in ran.stderr:
         pytest.skip("no compiler for x87 here")
     assert ran.returncode != 0 and "kernels need" in ran.stderr
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 40))])
+def test_random_programs_answer_as_in_python(tmp_path: Path, seed: int) -> None:
+    made_of, program, main = imported(tmp_path / f"random_{seed}.py", Writer(seed).program(120)), Program(), ""
+    rng, sent, expected = np.random.default_rng(seed), [], []
+    for k in range(120):
+        function = getattr(made_of, f"f{k}")
+        try:
+            made = program.add(function, np.zeros(6), np.zeros(2, np.int64))
+        except Unsupported as told:
+            assert "may not be evaluated" in str(told)
+            continue
+        main += "    if (!fread(x, sizeof x, 1, stdin) || !fread(n, sizeof n, 1, stdin)) return 1;\n"
+        main += f"    {made.name}((Floats1){{x, {{6}}}}, (Ints1){{n, {{2}}}}), fwrite(x, sizeof x, 1, stdout);\n"
+        x, n = rng.normal(size=6), rng.integers(-9, 9, 2)
+        sent.append(x.tobytes() + n.tobytes())
+        SOURCES[function].function(x, n)
+        expected.append(x)
+    main = f"#include <stdio.h>\nint main(void) {{\n    real x[6];\n    integer n[2];\n{main}    return 0;\n}}\n"
+    (tmp_path / "random.c").write_text(program.text(main))
+    made_file = tmp_path / "random"
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-DCHECKED", "-lm"]
+    subprocess.run(
+        [COMPILERS[seed % len(COMPILERS)], str(tmp_path / "random.c"), "-o", str(made_file), *flags], check=True
+    )
+    ran = subprocess.run([str(made_file)], input=b"".join(sent), capture_output=True, check=False)
+    assert ran.returncode == 0 and len(expected) > 40
+    np.testing.assert_array_equal(np.frombuffer(ran.stdout).reshape(-1, 6), expected)
+
+
+def imported(path: Path, text: str) -> Any:
+    """The module of a text."""
+    path.write_text(text)
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module

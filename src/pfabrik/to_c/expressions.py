@@ -38,7 +38,7 @@ class Expressions:
         self.reads: frozenset[str] = NONE
         self.writes: frozenset[str] = NONE
         self.allocates = False
-        self._spilled: frozenset[str] = NONE  # what lines that were put before an expression write
+        self._before = Value("", None)  # what lines that were put before an expression read and write
 
     # ---- lines ----
 
@@ -58,32 +58,31 @@ class Expressions:
         kind = f"const {spell.value(value.type)} " if value.is_held else spell.variable(value.type)
         place = len(self.lines) if at is None else at
         self.lines.insert(place, "    " * self.indent + f"{kind}{name} = {value.text};")
-        self._spilled |= value.writes
+        self._before = Value("", None, **effects([self._before, value]))
         if value.is_held:
             return Value(f"&{name}", value.type, UNARY)
         return Value(name, value.type, is_lasting=value.is_lasting, possible=value.possible)
 
     def evaluate(self, nodes: Sequence[ast.expr], wants: Sequence[Any] = ()) -> list[Value]:
         """Values of several expressions, in Python's order: C evaluates the parts of an expression in any."""
-        before, self._spilled = self._spilled, NONE
+        before = self._before
         values: list[Value] = []
         for k, node in enumerate(nodes):
-            at, self._spilled = len(self.lines), NONE
+            at, self._before = len(self.lines), Value("", None)
             value = self.expression(node, wants[k] if wants else None)
-            if self._spilled and any((v.reads | v.writes) & self._spilled for v in values):
+            if any(conflict([v, self._before]) for v in values):
                 for j, earlier in enumerate(values):
                     if earlier.has_effect:
                         values[j] = self.keep(earlier, at)
                         at += 1
-            before |= self._spilled
+            before = Value("", None, **effects([before, self._before]))
             values.append(value)
-        self._spilled = NONE
+        self._before = before
         if conflict(values):
             last = max(k for k, v in enumerate(values) if v.writes)
             for k, v in enumerate(values[: last + 1]):
                 if v.has_effect:
                     values[k] = self.keep(v)
-        self._spilled |= before
         return values
 
     def expression(self, node: ast.expr, want: Any = None) -> Value:

@@ -99,5 +99,5 @@ class Function(Statements):
         return f"{told}{head} {{\n" + "\n".join([*unused, *self.lines]) + "\n}\n"
 
     def _mentions(self, name: str) -> bool:
-        pattern = re.compile(rf"\b{name}\b")
+        pattern = re.compile(rf"(?<![.>])\b{name}\b")
         return any(pattern.search(re.sub(r"/\*.*?\*/", "", line)) for line in self.lines)

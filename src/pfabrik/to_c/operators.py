@@ -25,6 +25,7 @@ from .values import (
     UNARY,
     UNKNOWN,
     Value,
+    conflict,
     effects,
 )
 
@@ -124,8 +125,12 @@ class Operators(Expressions):
     def on_Compare(self, node: ast.Compare, want: Any) -> Value:
         if isinstance(node.ops[0], (ast.In, ast.NotIn)):
             return self.member(node)
-        values = self.evaluate([node.left, *node.comparators])
-        values[1:-1] = [self.keep(v) if v.writes else v for v in values[1:-1]]  # they are compared twice
+        values = self.evaluate([node.left, node.comparators[0]])
+        values += [self.perhaps(each) for each in node.comparators[1:]]  # only if what is before it holds
+        if any(v.writes for v in values[1:-1]) or (len(values) > 2 and conflict(values[1:])):
+            values[1] = self.keep(values[1])
+            if conflict(values[2:]):
+                raise self.fault(node, "a chain of comparisons whose order matters")
         parts = [self.compared(values[k], op, values[k + 1], node) for k, op in enumerate(node.ops)]
         if all(p.is_constant for p in parts):
             return self.boolean(all(p.constant for p in parts))

@@ -231,7 +231,7 @@ class Statements(Calls):
         return f"{spell.value(t)} " if name in self.by_value else spell.variable(t)
 
     def _declare(self, name: str) -> None:
-        if name not in self._declared and self.types.get(name) is not None:
+        if name not in self._declared and name in self.flow.read and self.types.get(name) is not None:
             self.emit(f"{self._kind_of(name)}{c_name(name)};")
         self._declared.add(name)
 
