@@ -358,6 +358,7 @@ def answer_row(
     effort = scratch.nearest.effort[0]
     effort["steps"], effort["searches"], effort["most"] = 0, 0, question["effort"]
     put_start(start, answer)
+    put_start(start, scratch.other)
     status = answer_by_phases(tables, scratch, start, target, question, answer)
     answer.status[0] = status
     if question["has_start"] == 1 and status != PENDING and status != OPEN:

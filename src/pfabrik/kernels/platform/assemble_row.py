@@ -219,6 +219,7 @@ def assemble_row(
     status, measures = answer.status[0], answer.measures
     load_own(start, tables.legs.task[0]["length"], own[0])
     put_start(start, answer)
+    put_start(start, scratch.other)
     copy_row(values[0], answer.actuators[0])
     put_deviations(table, values[0], scratch.wished[0])
     if first == BY_LEGS:
