@@ -8,6 +8,7 @@ from numpy import zeros
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import opener, routine, search
+from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
 from ..legs.open_table import SAMPLE
@@ -27,8 +28,9 @@ from ..rows import (
 )
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode
-from .nearest import NO_STARTS, PLAN, nearest_of_row, turned_by
-from .search_records import PoseSolutions, Starts
+from .nearest import NO_STARTS, PLAN, NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
+from .search_records import PlatformObjective, PoseSolutions, Starts
+from .starts import load_target
 from .tables import (
     BY_LEGS,
     IN_OTHER_ASSEMBLIES,
@@ -364,6 +366,41 @@ def answer_row(
     if question["has_start"] == 1 and status != PENDING and status != OPEN:
         count_turns(tables.legs.driven, start.actuators[0], answer.actuators[0])
     return status
+
+
+@routine
+def weigh_limits(
+    tables: Tables,
+    scratch: AnswerScratch,
+    weighing: NearestScratch,
+    targets: Floats,
+    answer: PoseSolutions,
+    weights: Floats,
+) -> None:
+    """Fill the multipliers of all limits (n,), numbered as in `Tables`, at a projection that a search found.
+
+    By how much of the distance [L] the answer would come nearer, per unit [L or rad] by which the limit gives way.
+
+    Parameters
+    ----------
+    weighing : as of `new_weighing_scratch`.
+    targets : that of the answer, (1, 4, 4) [length].
+    """
+    table, plan, begin, aim = tables.assembly, tables.plan, scratch.begin, 0
+    search, scale = weighing.search, 1.0 / table.task[0]["length"]
+    for k in range(tables.machine[0]["projections"]):
+        aim = k if k == 0 or plan.settings[k]["hold"] == answer.counters[0, HOLD] % CERTAIN else aim
+    setting = plan.settings[aim]
+    pose = PoseObjective(targets, plan.weights[aim], setting["frame"], setting["margin"], setting["near"], 0)
+    objective = PlatformObjective(pose, scratch.no_values, setting["implied"])
+    copy_table(answer.poses[0], begin[0])
+    for i in range(3):
+        begin[0, i, 3] *= scale
+    for k in range(weights.shape[0]):
+        weights[k] = 0.0
+    search.n_cones[0] = table.cones.shape[0]
+    if load_target(table, pose, 0, search):
+        put_limit_multipliers(table, 0, objective, Starts(begin, answer.q, answer.sides), weighing, weights)
 
 
 def _sample() -> Tables:

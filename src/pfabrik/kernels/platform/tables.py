@@ -143,3 +143,8 @@ def new_answer_scratch(tables: Tables) -> AnswerScratch:
         np.zeros((0, actuators)),
         np.zeros((0, 0)),
     )
+
+
+def new_weighing_scratch(tables: Tables) -> NearestScratch:
+    """Allocate the scratch memory of one thread for `weigh_limits`."""
+    return new_nearest_scratch(tables.assembly, tables.plan, True)
