@@ -11,6 +11,7 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine
+from ..legs.endings import turned
 from ..vectors import Vec, along, cross, dot, norm, put, scale, sub, vec
 from .pose_cells import N_PARAMETERS, ROUNDING
 
@@ -99,50 +100,87 @@ def put_along(v: Floats, axis: Vec, n: int, a: Floats) -> None:
 
 
 @routine
-def put_cosine(v: Floats, axis: Vec, n: int, a: Floats) -> None:
-    """Cosine of the angle between v and a unit vector n.
-
-    With d the change of v, m = |c + d| = |c| + u . d + t: the cosine is k + ((n - k u) . d - k t) / m, and 1 / m
-    differs from 1 / |c| by at most |d| / (m |c|). So the error of its linear part is at most |d|^2 / (m |c|) (sin + |k|
-    / 2).
-    """
-    c, away, error = vec(v[CENTRE]), v[BOUNDS, AWAY], v[BOUNDS, ERROR]
-    length = norm(c)
-    nearest = length - away
-    if not nearest > 0.1 * length:
-        put_unknown(a, -1.0, 1.0)
+def put_product(v: Floats, w: Floats, n: int, a: Floats) -> None:
+    """v . w = c . d + c . (change of w) + d . (change of v) + the product of both changes."""
+    c, d, away, other_away = vec(v[CENTRE]), vec(w[CENTRE]), v[BOUNDS, AWAY], w[BOUNDS, AWAY]
+    if not away + other_away < math.inf:
+        put_unknown(a, -math.inf, math.inf)
         return
-    u = scale(1.0 / length, c)
-    k = dot(axis, u)
-    across = along(axis, -k, u)
-    sine = norm(across)
     for i in range(n):
-        a[i] = dot(across, vec(v[i])) / length
-    slack = away * away / (nearest * length) * (sine + 0.5 * abs(k)) + error * sine / length + 4.0 * ROUNDING
-    a[CENTRE], a[BELOW], a[ABOVE] = k, -slack, slack
+        a[i] = dot(vec(v[i]), d) + dot(c, vec(w[i]))
+    slack = norm(d) * v[BOUNDS, ERROR] + norm(c) * w[BOUNDS, ERROR] + away * other_away
+    slack += ROUNDING * (norm(c) + away) * (norm(d) + other_away)
+    a[CENTRE], a[BELOW], a[ABOVE] = dot(c, d), -slack, slack
 
 
 @routine
-def put_heading(v: Floats, axis: Vec, reference: Vec, n: int, a: Floats) -> None:
-    """Angle of v about a unit vector, from a reference; components along the axis are ignored.
+def put_cosine(along_axis: Floats, length: Floats, cosine: float, n: int, a: Floats) -> None:
+    """The cosine of a vector's angle from an axis, less another one, from the vector's part along the axis and length.
 
-    In the plane across the axis, log(c + d) - log(c) = d / c - ..., whose error is at most s^2 / (2 (1 - s)), s = |d /
-    c|.
+    With x = part - cosine length, which is affine where the vector and its length are, it is x / length.
     """
-    start = along(reference, -dot(axis, reference), axis)
-    c = along(vec(v[CENTRE]), -dot(axis, vec(v[CENTRE])), axis)
-    distance, away = norm(c), v[BOUNDS, AWAY]
-    if not away < 0.5 * distance or not norm(start) > 0.0:
+    shortest, longest = least(length, n), most(length, n)
+    if not shortest > 0.1 * longest or not longest < math.inf:
+        put_unknown(a, -1.0 - cosine, 1.0 - cosine)
+        return
+    combine(along_axis, -cosine, length, n, a)
+    lowest, highest, range_of_share = min(least(a, n), 0.0), max(most(a, n), 0.0), 1.0 / shortest - 1.0 / longest
+    for i in range(n):
+        a[i] /= longest
+    a[CENTRE] /= longest
+    a[BELOW] = a[BELOW] / longest + lowest * range_of_share - 4.0 * ROUNDING
+    a[ABOVE] = a[ABOVE] / longest + highest * range_of_share + 4.0 * ROUNDING
+
+
+@routine
+def put_heading(x: Floats, y: Floats, n: int, a: Floats) -> None:
+    """Angle of the direction (x, y).
+
+    Of complex numbers, log(c + d) - log(c) = d / c - ..., whose error is at most s^2 / (2 (1 - s)), s = |d / c|.
+    """
+    c, s = x[CENTRE], y[CENTRE]
+    away = math.hypot(most_change(x, n), most_change(y, n))
+    square = c * c + s * s
+    distance = math.sqrt(square)
+    if not away < 0.5 * distance:
         put_unknown(a, -math.inf, math.inf)
         return
-    ahead = scale(1.0 / (distance * distance), cross(axis, c))
     for i in range(n):
-        a[i] = dot(ahead, vec(v[i]))
+        a[i] = (c * y[i] - s * x[i]) / square
     share = away / distance
-    slack = 0.5 * share * share / (1.0 - share) + v[BOUNDS, ERROR] / distance
-    slack += ROUNDING * (4.0 + norm(vec(v[CENTRE])) / distance)
-    a[CENTRE] = math.atan2(dot(axis, cross(start, c)), dot(start, c))
-    a[BELOW], a[ABOVE] = -slack, slack
+    error = abs(c) * max(-y[BELOW], y[ABOVE]) + abs(s) * max(-x[BELOW], x[ABOVE])
+    slack = 0.5 * share * share / (1.0 - share) + error / square + 8.0 * ROUNDING
+    a[CENTRE], a[BELOW], a[ABOVE] = math.atan2(s, c), -slack, slack
+
+
+@routine
+def most_change(a: Floats, n: int) -> float:
+    """The most by which a number differs from its centre."""
+    away = max(-a[BELOW], a[ABOVE])
+    for i in range(n):
+        away += abs(a[i])
+    return away
+
+
+@routine
+def put_root(a: Floats, least_square: float, n: int, b: Floats) -> bool:
+    """b = square root of a number; False if that may be below `least_square`, where b is of what is positive.
+
+    The root is concave: above its chords, and below its tangents.
+    """
+    lowest, highest, c = least(a, n), most(a, n), a[CENTRE]
+    if not lowest > least_square:
+        rounded = ROUNDING * (1.0 + abs(highest))
+        put_unknown(b, math.sqrt(max(lowest, 0.0)) - rounded, math.sqrt(max(highest, 0.0)) + rounded)
+        return False
+    root = math.sqrt(c)
+    slope = 0.5 / root
+    for i in range(n):
+        b[i] = slope * a[i]
+    bend = max(root + slope * (lowest - c) - math.sqrt(lowest), root + slope * (highest - c) - math.sqrt(highest))
+    rounded = ROUNDING * (root + slope * (c + highest))
+    b[CENTRE], b[BELOW], b[ABOVE] = root, slope * a[BELOW] - bend - rounded, slope * a[ABOVE] + rounded
+    return True
 
 
 @routine
@@ -198,3 +236,41 @@ def put_moved(v: Floats, by: Vec, n: int, w: Floats) -> None:
     c = vec(v[CENTRE])
     put(w[CENTRE], sub(c, by))
     put_bounds(w, n, v[BOUNDS, ERROR] + ROUNDING * (norm(c) + norm(by)), v[BOUNDS, AWAY])
+
+
+@routine
+def put_difference(v: Floats, w: Floats, n: int, x: Floats) -> None:
+    """x = v - w."""
+    for i in range(n):
+        put(x[i], sub(vec(v[i]), vec(w[i])))
+    put(x[CENTRE], sub(vec(v[CENTRE]), vec(w[CENTRE])))
+    rounded = ROUNDING * (norm(vec(v[CENTRE])) + norm(vec(w[CENTRE])) + v[BOUNDS, AWAY] + w[BOUNDS, AWAY])
+    put_bounds(x, n, v[BOUNDS, ERROR] + w[BOUNDS, ERROR] + rounded, v[BOUNDS, AWAY] + w[BOUNDS, AWAY] + rounded)
+
+
+@routine
+def put_fixed(at: Vec, error: float, n: int, v: Floats) -> None:
+    """A vector known to an error."""
+    for i in range(n):
+        put(v[i], (0.0, 0.0, 0.0))
+    put(v[CENTRE], at)
+    put_bounds(v, n, error, error)
+
+
+@routine
+def put_turned(v: Vec, axis: Vec, cosine: float, sine: float, at: float, q: Floats, n: int, w: Floats) -> None:
+    """A fixed vector turned about a unit vector by the number q; cosine and sine are those of `at`, near its centre.
+
+    A chord is at most as long as its arc, and as the diameter.
+    """
+    c = turned(v, axis, cosine, sine)
+    ahead = cross(axis, c)
+    speed, linear, unknown = norm(ahead), 0.0, max(-q[BELOW], q[ABOVE]) + abs(q[CENTRE] - at)
+    for i in range(n):
+        put(w[i], scale(q[i], ahead))
+        linear += abs(q[i])
+    put(w[CENTRE], c)
+    travel = linear + unknown
+    chord, rounded = min(travel, 2.0), ROUNDING * norm(v)
+    error = min(unknown + 0.5 * travel * travel, chord + linear)
+    put_bounds(w, n, speed * error + rounded, speed * chord + rounded)

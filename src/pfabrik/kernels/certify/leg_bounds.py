@@ -1,6 +1,7 @@
 """Rods over a cell of poses: their platform ends, their proximal coordinates, their lines.
 
-A proximal coordinate q solves |H - E(q)| = l, with E(q) the rod's base end. With v = H - E at the cell's centre,
+The coordinate of a carriage is in closed form. That of a crank, q, solves |H - E(q)| = l, with E(q) the rod's base end;
+Newton's method bounds it closer than its closed form. With v = H - E at the cell's centre,
 q_c + sum s_i J_i, J_i = (v . h_i) / (v . E'), solves it to first order. If the rod is shorter than l with q there a
 little less, and longer with q a little more (or the other way round), for every pose of the cell, then each pose has a
 solution between; as there is one solution only with the same sign, it is that of the same branch. Its reach is then
@@ -33,10 +34,14 @@ from .affine_forms import (
     put_across,
     put_along,
     put_bounds,
+    put_difference,
+    put_fixed,
     put_heading,
     put_length,
     put_moved,
+    put_root,
     put_square,
+    put_turned,
     put_unknown,
 )
 from .pose_cells import CHORD, CURVATURE, ROUNDING, SHIFT, PoseCell, moved_by
@@ -50,29 +55,23 @@ class LegBounds(NamedTuple):
     """Scratch memory: forms of one leg over a cell."""
 
     values: Floats  # (N_VALUES,): the leg at the cell's centre
+    base: Floats  # (8, 3): base end
     end: Floats  # (8, 3): platform end
-    offset: Floats  # (8, 3): platform end from a point of its proximal joint; scratch
     span: Floats  # (8, 3): from base end to platform end
-    line: Floats  # (8, 3): the span, in the body of one of its ends; scratch
+    v: Floats  # (8, 3): scratch
+    w: Floats  # (8, 3): scratch
     q: Floats  # (9,): proximal coordinate
+    length: Floats  # (9,): of the span
     a: Floats  # (9,): scratch
     b: Floats  # (9,): scratch
     c: Floats  # (9,): scratch
+    d: Floats  # (9,): scratch
 
 
 def new_bounds() -> LegBounds:
     """Allocate the forms of a leg."""
-    return LegBounds(
-        np.zeros(N_VALUES),
-        np.zeros((8, 3)),
-        np.zeros((8, 3)),
-        np.zeros((8, 3)),
-        np.zeros((8, 3)),
-        np.zeros(9),
-        np.zeros(9),
-        np.zeros(9),
-        np.zeros(9),
-    )
+    vectors, numbers = [np.zeros((8, 3)) for _ in range(5)], [np.zeros(9) for _ in range(6)]
+    return LegBounds(np.zeros(N_VALUES), *vectors, *numbers)
 
 
 @routine
@@ -110,80 +109,105 @@ def put_platform_point(point: Vec, reference: Vec, cell: PoseCell, n: int, uncer
 @routine
 def put_rod(rod: Record, side: float, n: int, uncertain: float, bounds: LegBounds) -> bool:
     """Proximal coordinate and span of a rod from its platform end; False if its reach remains to be proved."""
-    kind = rod["proximal"]
-    if kind != CRANK and kind != CARRIAGE:
-        put_moved(bounds.end, vec(rod["base_end_point"]), n, bounds.span)
-        return True
-    end, q, span = bounds.end, bounds.q, bounds.span
-    solve_proximal(rod, vec(end[CENTRE]), side, bounds.values)
-    bounds.values[COSINE], bounds.values[SINE] = (
-        (bounds.values[COSINE], bounds.values[SINE]) if kind == CRANK else (1.0, 0.0)
-    )
-    base_end = base_end_of(rod, rod, bounds.values)
-    v, velocity = sub(vec(end[CENTRE]), base_end), base_end_velocity(rod, base_end)
-    speed, bend, length = norm(velocity), norm(velocity) if kind == CRANK else 0.0, norm(v)
-    D = dot(v, velocity)
-    q[CENTRE] = bounds.values[Q_PROXIMAL]
-    if abs(D) > NEAR_DEAD_POINT * length * speed:
-        travel = 0.0
+    is_proved = True
+    if rod["proximal"] == CRANK:
+        solve_proximal(rod, vec(bounds.end[CENTRE]), side, bounds.values)
+        is_proved = put_crank(rod, n, uncertain, bounds)
+        if not is_proved:
+            enclose_crank(rod, side, n, uncertain, bounds)
+    elif rod["proximal"] == CARRIAGE:
+        is_proved = put_carriage(rod, side, n, uncertain, bounds)
+    put_span(rod, rod, n, bounds)
+    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
+        put_unknown(bounds.length, rod["length"] - uncertain, rod["length"] + uncertain)
+    return is_proved
+
+
+@routine
+def put_span(rod: Record, owner: Record, n: int, bounds: LegBounds) -> None:
+    """Base end, span and length of a rod, on the proximal joint of `owner`, whose coordinate is known."""
+    put_proximal_point(owner, vec(rod["base_end_point"]), n, 0.0, bounds, bounds.base)
+    put_difference(bounds.end, bounds.base, n, bounds.span)
+    put_length(bounds.span, n, bounds.length)
+
+
+@routine
+def put_proximal_point(owner: Record, at: Vec, n: int, uncertain: float, bounds: LegBounds, point: Floats) -> None:
+    """A point on a leg's crank or carriage, given at home, by its coordinate; without one a point of the base."""
+    q, values, axis, centre = bounds.q, bounds.values, vec(owner["proximal_axis"]), vec(owner["proximal_point"])
+    put_fixed(at, uncertain + ROUNDING * (1.0 + norm(at) + norm(centre)), n, point)
+    error = point[BOUNDS, ERROR]
+    if owner["proximal"] == CRANK:
+        put_turned(sub(at, centre), axis, values[COSINE], values[SINE], values[Q_PROXIMAL], q, n, point)
+        put(point[CENTRE], add(vec(point[CENTRE]), centre))
+        put_bounds(point, n, point[BOUNDS, ERROR] + error, point[BOUNDS, AWAY] + error)
+    elif owner["proximal"] == CARRIAGE:
         for i in range(n):
-            q[i] = dot(v, vec(end[i])) / D
-            travel += abs(q[i])
-        gap = abs(length - rod["length"]) * (length + rod["length"]) + 2.0 * uncertain * (length + uncertain)
-        gap += ROUNDING * (1.0 + length + norm(base_end)) ** 2
-        error = 0.0
-        for _ in range(2):
-            bent = end[BOUNDS, ERROR] + 0.5 * bend * (travel + error) * (travel + error)
-            away = end[BOUNDS, AWAY] + speed * travel + bent + speed * error
-            error = 0.75 * (gap + 2.0 * length * bent + away * away) / abs(D)
-        bent = end[BOUNDS, ERROR] + 0.5 * bend * (travel + error) * (travel + error)
-        away = end[BOUNDS, AWAY] + speed * travel + bent + speed * error
-        if gap + 2.0 * length * bent + away * away < 1.9 * abs(D) * error and travel + error < 1.0:
-            for i in range(n):
-                put(span[i], along(vec(end[i]), -q[i], velocity))
-            put(span[CENTRE], v)
-            put_bounds(span, n, bent + speed * error, away)
-            q[BELOW], q[ABOVE] = -error, error
-            return True
-    enclose_coordinate(rod, side, n, uncertain, bounds)
+            put(point[i], scale(q[i], axis))
+        put(point[CENTRE], along(at, q[CENTRE], axis))
+        put_bounds(point, n, max(-q[BELOW], q[ABOVE]) + error, math.inf)
+
+
+@routine
+def put_carriage(rod: Record, side: float, n: int, uncertain: float, bounds: LegBounds) -> bool:
+    """Coordinate of a carriage, axis . x + side root(l^2 - |part of x across the axis|^2), as `solve_proximal` does.
+
+    False if the root may be zero: `a` is positive where the rod reaches its platform end.
+    """
+    axis, length, a = vec(rod["proximal_axis"]), rod["length"], bounds.a
+    put_moved(bounds.end, vec(rod["base_end_point"]), n, bounds.v)
+    put_across(bounds.v, axis, n, bounds.w)
+    put_square(bounds.w, n, bounds.b)
+    slack = uncertain * (2.0 * length + uncertain)
+    put_unknown(a, length * length - slack, length * length + slack)
+    combine(a, -1.0, bounds.b, n, a)
+    is_proved = put_root(a, (NEAR_DEAD_POINT * length) ** 2, n, bounds.b)
+    put_along(bounds.v, axis, n, bounds.c)
+    combine(bounds.c, side, bounds.b, n, bounds.q)
+    return is_proved
+
+
+@routine
+def put_crank(rod: Record, n: int, uncertain: float, bounds: LegBounds) -> bool:
+    """Coordinate of a crank, from that at the cell's centre; False if it is not proved to be that of each pose."""
+    end, q = bounds.end, bounds.q
+    base_end = base_end_of(rod, rod, bounds.values)
+    v, velocity = (
+        sub(vec(end[CENTRE]), base_end),
+        cross(vec(rod["proximal_axis"]), sub(base_end, vec(rod["proximal_point"]))),
+    )
+    speed, length = norm(velocity), norm(v)
+    D = dot(v, velocity)
+    if not abs(D) > NEAR_DEAD_POINT * length * speed:
+        return False
+    travel = 0.0
     for i in range(n):
-        put(span[i], vec(end[i]))
-    put(span[CENTRE], v)
-    travel = speed * max(abs(least(q, n) - bounds.values[Q_PROXIMAL]), abs(most(q, n) - bounds.values[Q_PROXIMAL]))
-    put_bounds(span, n, end[BOUNDS, ERROR] + travel, end[BOUNDS, AWAY] + travel)
-    return False
+        q[i] = dot(v, vec(end[i])) / D
+        travel += abs(q[i])
+    gap = abs(length - rod["length"]) * (length + rod["length"]) + 2.0 * uncertain * (length + uncertain)
+    gap += ROUNDING * (1.0 + length + norm(base_end)) ** 2
+    error, bent, away = 0.0, 0.0, 0.0
+    for step in range(3):
+        bent = end[BOUNDS, ERROR] + 0.5 * speed * (travel + error) * (travel + error)
+        away = end[BOUNDS, AWAY] + speed * travel + bent + speed * error
+        if step < 2:
+            error = 0.75 * (gap + 2.0 * length * bent + away * away) / abs(D)
+    q[CENTRE], q[BELOW], q[ABOVE] = bounds.values[Q_PROXIMAL], -error, error
+    return gap + 2.0 * length * bent + away * away < 1.9 * abs(D) * error and travel + error < 1.0
 
 
 @routine
-def base_end_velocity(rod: Record, base_end: Vec) -> Vec:
-    """Derivative of a rod's base end by its own proximal coordinate."""
-    axis = vec(rod["proximal_axis"])
-    if rod["proximal"] == CARRIAGE:
-        return axis
-    return cross(axis, sub(base_end, vec(rod["proximal_point"])))
-
-
-@routine
-def enclose_coordinate(rod: Record, side: float, n: int, uncertain: float, bounds: LegBounds) -> None:
-    """An interval that has the proximal coordinate of every pose of the cell that the rod reaches."""
+def enclose_crank(rod: Record, side: float, n: int, uncertain: float, bounds: LegBounds) -> None:
+    """An interval that has the coordinate of a crank at every pose of the cell that its rod reaches."""
     q, a, b = bounds.q, bounds.a, bounds.b
-    if rod["proximal"] == CARRIAGE:
-        axis = vec(rod["proximal_axis"])
-        put_moved(bounds.end, vec(rod["base_end_point"]), n, bounds.offset)
-        put_across(bounds.offset, axis, n, bounds.line)
-        put_length(bounds.line, n, a)
-        nearest, length = max(least(a, n), 0.0), rod["length"] + uncertain
-        half = math.sqrt(max(length * length - nearest * nearest, 0.0)) + ROUNDING
-        put_along(bounds.offset, axis, n, a)
-        low, high = least(a, n) - uncertain, most(a, n) + uncertain
-        put_unknown(q, low if side > 0.0 else low - half, high + half if side > 0.0 else high)
-        return
     put_crank_offset(rod, n, bounds)
-    put_heading(bounds.line, vec(rod["proximal_axis"]), vec(rod["crank"]), n, a)
-    low, high = least(a, n), most(a, n)
-    put_length(bounds.line, n, b)
+    put_along(bounds.v, vec(rod["crank"]), n, a)
+    put_along(bounds.v, vec(rod["crank_across"]), n, b)
+    put_heading(a, b, n, bounds.c)
+    low, high = least(bounds.c, n), most(bounds.c, n)
+    put_length(bounds.w, n, b)
     radius, nearest, farthest = norm(vec(rod["crank"])), least(b, n), most(b, n)
-    put_square(bounds.offset, n, b)
+    put_square(bounds.v, n, b)
     shift = 0.5 * (radius * radius - rod["length"] * rod["length"])
     C_low, C_high = 0.5 * least(b, n) + shift, 0.5 * most(b, n) + shift
     if uncertain > 0.0 or not nearest > 0.0 or not low > -math.inf:
@@ -199,34 +223,23 @@ def enclose_coordinate(rod: Record, side: float, n: int, uncertain: float, bound
 
 @routine
 def put_crank_offset(rod: Record, n: int, bounds: LegBounds) -> None:
-    """The platform end from the centre of its crank (`offset`), and the part of it across the crank's axis (`line`)."""
-    put_moved(bounds.end, vec(rod["proximal_point"]), n, bounds.offset)
-    put_across(bounds.offset, vec(rod["proximal_axis"]), n, bounds.line)
+    """The platform end from the centre of its crank (`v`), and the part of it across the crank's axis (`w`)."""
+    put_moved(bounds.end, vec(rod["proximal_point"]), n, bounds.v)
+    put_across(bounds.v, vec(rod["proximal_axis"]), n, bounds.w)
 
 
 @routine
-def put_reach(rod: Record, n: int, uncertain: float, bounds: LegBounds) -> None:
-    """Numbers `a` and `b` that are positive where a rod on a proximal joint reaches its platform end.
+def put_reach_of_crank(rod: Record, n: int, uncertain: float, bounds: LegBounds) -> None:
+    """Numbers `a` and `b` that are positive where a rod on a crank reaches its platform end.
 
-    A carriage: the rod's length less the distance from the rail. A crank of radius r, with d the distance across its
-    axis and x that from its centre: l^2 - (nearest distance of its circle)^2 = 2 r d + l^2 - r^2 - x^2, and the same
-    with (farthest distance)^2 - l^2 = 2 r d - l^2 + r^2 + x^2.
+    With r the crank's radius, d the distance across its axis and x that from its centre: l^2 - (nearest distance of its
+    circle)^2 = 2 r d + l^2 - r^2 - x^2, and the same with (farthest distance)^2 - l^2 = 2 r d - l^2 + r^2 + x^2.
     """
     a, b, length = bounds.a, bounds.b, rod["length"]
-    if rod["proximal"] == CARRIAGE:
-        put_moved(bounds.end, vec(rod["base_end_point"]), n, bounds.offset)
-        put_across(bounds.offset, vec(rod["proximal_axis"]), n, bounds.line)
-        put_length(bounds.line, n, bounds.c)
-        put_unknown(a, length, length)
-        combine(a, -1.0, bounds.c, n, a)
-        a[BELOW] -= 2.0 * uncertain
-        a[ABOVE] += 2.0 * uncertain
-        put_unknown(b, 1.0, 1.0)
-        return
     put_crank_offset(rod, n, bounds)
     radius = norm(vec(rod["crank"]))
-    put_square(bounds.offset, n, bounds.c)
-    put_length(bounds.line, n, a)
+    put_square(bounds.v, n, bounds.c)
+    put_length(bounds.w, n, a)
     for i in range(n):
         a[i] *= 2.0 * radius
     for i in range(CENTRE, ABOVE + 1):
@@ -236,27 +249,7 @@ def put_reach(rod: Record, n: int, uncertain: float, bounds: LegBounds) -> None:
     combine(a, -1.0, bounds.c, n, b)
     a[CENTRE] -= 2.0 * shift
     combine(a, 1.0, bounds.c, n, a)
-    slack = (
-        8.0 * uncertain * (length + radius + uncertain + norm(vec(bounds.offset[CENTRE])) + bounds.offset[BOUNDS, AWAY])
-    )
+    slack = 8.0 * uncertain * (length + radius + uncertain + norm(vec(bounds.v[CENTRE])) + bounds.v[BOUNDS, AWAY])
     for form in (a, b):
         form[BELOW] -= slack
         form[ABOVE] += slack
-
-
-@routine
-def put_shared_span(rod: Record, owner: Record, n: int, bounds: LegBounds) -> None:
-    """The span of a rod on the proximal joint of another, whose coordinate is known."""
-    base_end, q, end, span = base_end_of(rod, owner, bounds.values), bounds.q, bounds.end, bounds.span
-    axis, travel = vec(owner["proximal_axis"]), q[ABOVE] + abs(q[CENTRE] - bounds.values[Q_PROXIMAL])
-    for i in range(n):
-        travel += abs(q[i])
-    is_crank = owner["proximal"] == CRANK
-    velocity = cross(axis, sub(base_end, vec(owner["proximal_point"]))) if is_crank else axis
-    speed = norm(velocity)
-    for i in range(n):
-        put(span[i], along(vec(end[i]), -q[i], velocity))
-    put(span[CENTRE], sub(vec(end[CENTRE]), base_end))
-    error = end[BOUNDS, ERROR] + speed * (q[ABOVE] + abs(q[CENTRE] - bounds.values[Q_PROXIMAL]))
-    error += 0.5 * speed * travel * travel if is_crank else 0.0
-    put_bounds(span, n, error + ROUNDING * (1.0 + norm(base_end)), end[BOUNDS, AWAY] + speed * travel)

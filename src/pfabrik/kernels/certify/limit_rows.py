@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints, Record
+from ...arrays import Floats, Ints
 from .._jit import routine
-from ..legs.endings import turned
 from ..legs.records import (
     BASE_END,
     BASE_LINE,
@@ -28,32 +27,23 @@ from ..legs.records import (
     SLIDE,
     Table,
 )
-from ..vectors import Vec, cross, dot, norm, put, scale, sub, vec, wrap_into
+from ..vectors import along, cross, dot, norm, vec, wrap_into
 from .affine_forms import (
     ABOVE,
     BELOW,
     CENTRE,
     combine,
-    least,
-    most,
     put_along,
     put_arc_cosine,
-    put_bounds,
     put_cosine,
     put_heading,
-    put_length,
     put_moved,
+    put_turned,
     put_unknown,
 )
-from .leg_bounds import (
-    LegBounds,
-    put_end,
-    put_reach,
-    put_rod,
-    put_shared_span,
-)
+from .leg_bounds import LegBounds, put_end, put_reach_of_crank, put_rod, put_span
 from .pose_cells import ROUNDING, PoseCell
-from .rod_lines import put_base_line, put_platform_line
+from .rod_lines import put_along_line
 
 # Reach [L] by which a rod must be away from a dead point: beyond it, the closed form keeps its digits.
 LEAST_REACH = 1e-9
@@ -88,9 +78,11 @@ def put_limits(table: Table, sides: Floats, uncertain: float, k: int, n: int, ro
         if leg["kind"] == PIVOT:
             put_moved(bounds.end, vec(leg["base_end_point"]), n, bounds.span)
         elif leg["kind"] == ROD and m > k:
-            put_shared_span(leg, legs[k], n, bounds)
+            put_span(leg, legs[k], n, bounds)
         elif leg["kind"] == ROD and not put_rod(leg, sides[m], n, 2.0 * uncertain, bounds):
-            put_reach(leg, n, uncertain, bounds)
+            put_unknown(bounds.b, 1.0, 1.0)
+            if leg["proximal"] == CRANK:
+                put_reach_of_crank(leg, n, uncertain, bounds)
             for i in range(9):
                 a[i], b[i] = bounds.a[i], bounds.b[i]
             a[CENTRE], b[CENTRE] = a[CENTRE] - LEAST_REACH, b[CENTRE] - LEAST_REACH
@@ -98,7 +90,7 @@ def put_limits(table: Table, sides: Floats, uncertain: float, k: int, n: int, ro
         for i in range(n):
             rows.spreads[m, i] = norm(vec(bounds.end[i])) + length * norm(vec(cell.motions[i, 3:]))
         put_ranges(table, m, k, n, uncertain, rows)
-        put_cones(table, m, k, n, rows)
+        put_cones(table, m, k, n, uncertain, rows)
 
 
 @routine
@@ -122,7 +114,7 @@ def put_ranges(table: Table, m: int, k: int, n: int, uncertain: float, rows: Lim
         if coordinate["leg"] != m:
             continue
         value = bounds.c
-        put_coordinate(table.legs[m], table.legs[k], coordinate["place"], rows.cell, n, bounds, value)
+        put_coordinate(table, m, k, coordinate["place"], uncertain, n, rows, value)
         middle = coordinate["sense"] * value[CENTRE]
         if coordinate["turns"] == 1:
             middle = wrap_into(middle, coordinate["lo"], coordinate["hi"])
@@ -142,9 +134,10 @@ def put_ranges(table: Table, m: int, k: int, n: int, uncertain: float, rows: Lim
 
 @routine
 def put_coordinate(
-    leg: Record, owner: Record, place: int, cell: PoseCell, n: int, bounds: LegBounds, value: Floats
+    table: Table, m: int, k: int, place: int, uncertain: float, n: int, rows: LimitRows, value: Floats
 ) -> None:
-    """A coordinate of a leg over a cell; unknown where its place has no bounds yet."""
+    """A coordinate of leg `m`, on the proximal joint of leg `k`; unknown where its place has no bounds yet."""
+    leg, bounds = table.legs[m], rows.bounds
     if leg["kind"] == PIVOT and place >= PLATFORM_END and place < PLATFORM_END + leg["slides"]:
         put_along(bounds.span, vec(leg["slide_rows"][place - PLATFORM_END]), n, value)
     elif leg["kind"] != ROD:
@@ -153,94 +146,75 @@ def put_coordinate(
         for i in range(9):
             value[i] = bounds.q[i]
     elif place == SLIDE:
-        put_length(bounds.span, n, value)
+        for i in range(9):
+            value[i] = bounds.length[i]
         value[CENTRE] -= leg["length"]
-    elif place < SLIDE:
-        put_base_line(owner, n, bounds)
-        put_ending_angle(
-            leg["base_end"],
-            leg["base_end_axes"],
-            vec(leg["line"]),
-            leg["base_end_side"],
-            leg["twists"],
-            place - BASE_END,
-            n,
-            bounds,
-            value,
-        )
     else:
-        put_platform_line(leg, cell, n, bounds)
-        put_ending_angle(
-            leg["platform_end"],
-            leg["platform_end_axes"],
-            vec(leg["line"]),
-            leg["platform_end_side"],
-            leg["twists"],
-            place - PLATFORM_END,
-            n,
-            bounds,
-            value,
-        )
+        put_ending_angle(table, m, k, place, uncertain, n, rows, value)
 
 
 @routine
 def put_ending_angle(
-    ending: int, axes: Floats, home: Vec, side: float, twists: int, which: int, n: int, bounds: LegBounds, value: Floats
+    table: Table, m: int, k: int, place: int, uncertain: float, n: int, rows: LimitRows, value: Floats
 ) -> None:
-    """Angle of a hinge at an end of a rod: of a single one, or of two that cross, from the form of the rod's line.
+    """Angle of a hinge at an end of a rod: of a single one, or of two that cross.
 
     Of two hinges a, b: a . Rot(b, q1) u = a . w gives q1 = q0 + side acos(C / h), as `solve_angle` does; then a turns
     Rot(b, q1) u into w.
     """
-    line = bounds.line
-    if ending == HINGE:
-        put_heading(line, vec(axes[0]), home, n, value)
-        return
+    leg, bounds, at_base_end = table.legs[m], rows.bounds, place < SLIDE
+    ending, axes, side, which = (
+        (leg["base_end"], leg["base_end_axes"], leg["base_end_side"], place - BASE_END)
+        if at_base_end
+        else (leg["platform_end"], leg["platform_end_axes"], leg["platform_end_side"], place - PLATFORM_END)
+    )
     put_unknown(value, -math.inf, math.inf)
-    if ending != CROSS or twists == 1:
+    if ending != HINGE and (ending != CROSS or leg["twists"] == 1):
         return
-    a, b = vec(axes[0]), vec(axes[1])
+    a, home, x, y = vec(axes[0]), vec(leg["line"]), bounds.a, bounds.b
+    flat, across = along(home, -dot(a, home), a), cross(a, home)
+    if ending == HINGE or which == 0:
+        put_along_line(table, m, k, at_base_end, flat, uncertain, n, rows.cell, bounds, x)
+        put_along_line(table, m, k, at_base_end, across, uncertain, n, rows.cell, bounds, y)
+        put_heading(x, y, n, value)
+        if ending == HINGE:
+            return
+    b, angle = vec(axes[1]), bounds.d
     along_b = dot(b, home)
-    flat = sub(home, scale(along_b, b))
-    A, B = dot(a, flat), dot(a, cross(b, home))
+    A, B = dot(a, along(home, -along_b, b)), dot(a, cross(b, home))
     h = math.hypot(A, B)
-    if not h > 0.0:
+    put_along_line(table, m, k, at_base_end, a, uncertain, n, rows.cell, bounds, x)
+    if not h > 0.0 or not abs(x[CENTRE]) < math.inf:
+        put_unknown(value, -math.inf, math.inf)
         return
-    cosine, angle = bounds.a, bounds.b
-    put_cosine(line, a, n, cosine)
+    cosine = x[CENTRE] / bounds.length[CENTRE]
+    put_cosine(x, bounds.length, cosine, n, y)
+    y[CENTRE] += cosine - dot(a, b) * along_b
     for i in range(9):
-        cosine[i] /= h
-    cosine[CENTRE] -= dot(a, b) * along_b / h
-    if not put_arc_cosine(cosine, n, angle):
+        y[i] /= h
+    if not put_arc_cosine(y, n, angle):
+        put_unknown(value, -math.inf, math.inf)
         return
     if side < 0.0:
-        for i in range(n):
-            angle[i] = -angle[i]
-        below, above = -angle[ABOVE], -angle[BELOW]
-        angle[CENTRE], angle[BELOW], angle[ABOVE] = -angle[CENTRE], below, above
+        put_unknown(x, 0.0, 0.0)
+        combine(x, -1.0, angle, n, angle)
     angle[CENTRE] += math.atan2(B, A)
     if which == 1:
         for i in range(9):
             value[i] = angle[i]
         return
-    put_heading(line, a, home, n, value)
     q = angle[CENTRE]
-    x = turned(home, b, math.cos(q), math.sin(q))
-    ahead = cross(b, x)
-    speed, error = norm(ahead), max(-angle[BELOW], angle[ABOVE])
-    travel = max(most(angle, n) - q, q - least(angle, n))
-    for i in range(n):
-        put(line[i], scale(angle[i], ahead))
-    put(line[CENTRE], x)
-    put_bounds(line, n, speed * (error + 0.5 * travel * travel) + ROUNDING, speed * travel + ROUNDING)
-    put_heading(line, a, home, n, cosine)
-    combine(value, -1.0, cosine, n, value)
+    put_turned(home, b, math.cos(q), math.sin(q), q, angle, n, bounds.v)
+    put_along(bounds.v, flat, n, x)
+    put_along(bounds.v, across, n, y)
+    put_heading(x, y, n, angle)
+    combine(value, -1.0, angle, n, value)
 
 
 @routine
-def put_cones(table: Table, m: int, k: int, n: int, rows: LimitRows) -> None:
+def put_cones(table: Table, m: int, k: int, n: int, uncertain: float, rows: LimitRows) -> None:
     """Fill the rows of all cones of leg `m`, on the proximal joint of leg `k`."""
-    first = 2 * table.limited.shape[0]
+    first, bounds = 2 * table.limited.shape[0], rows.bounds
     for c in range(table.cones.shape[0]):
         cone = table.cones[c]
         if cone["leg"] != m:
@@ -249,12 +223,13 @@ def put_cones(table: Table, m: int, k: int, n: int, rows: LimitRows) -> None:
         if cone["half_angle"] >= OPEN_CONE:
             put_unknown(row, 1.0, 1.0)
             continue
-        if cone["place"] == BASE_LINE:
-            put_base_line(table.legs[k], n, rows.bounds)
-        else:
-            put_platform_line(table.legs[m], rows.cell, n, rows.bounds)
-        put_cosine(rows.bounds.line, vec(cone["axis"]), n, row)
-        row[CENTRE] -= math.cos(cone["half_angle"])
+        cosine = math.cos(cone["half_angle"])
+        if table.legs[m]["kind"] != ROD:
+            put_unknown(row, -1.0 - cosine, 1.0 - cosine)
+            continue
+        at_base_end = cone["place"] == BASE_LINE
+        put_along_line(table, m, k, at_base_end, vec(cone["axis"]), uncertain, n, rows.cell, bounds, bounds.a)
+        put_cosine(bounds.a, bounds.length, cosine, n, row)
 
 
 @routine

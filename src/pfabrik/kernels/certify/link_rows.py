@@ -16,11 +16,10 @@ from ...arrays import Floats, Ints
 from .._jit import routine
 from ..clearance.link_records import BASE, PLATFORM
 from ..clearance.segments import between_segments
-from ..legs.endings import turned
-from ..legs.records import COSINE, CRANK, Q_PROXIMAL, SINE, Table
-from ..vectors import Vec, add, along, cross, dot, norm, put, scale, sub, vec
-from .affine_forms import ABOVE, AWAY, BELOW, BOUNDS, CENTRE, ERROR, least, put_along, put_bounds
-from .leg_bounds import LegBounds, put_end, put_platform_point, put_rod
+from ..legs.records import Table
+from ..vectors import Vec, along, dot, norm, scale, sub, vec
+from .affine_forms import ABOVE, AWAY, BELOW, BOUNDS, CENTRE, ERROR, least, put_along, put_difference, put_fixed
+from .leg_bounds import put_end, put_platform_point, put_proximal_point, put_rod
 from .limit_rows import LimitRows, first_link_row
 from .pose_cells import CURVATURE, ROUNDING, PoseCell
 
@@ -66,44 +65,11 @@ def put_link_ends(table: Table, sides: Floats, uncertain: float, n: int, rows: L
             if body == PLATFORM:
                 put_platform_point(sub(at, reference), reference, rows.cell, n, uncertain, end)
             elif body == BASE:
-                put_fixed_point(at, n, uncertain, end)
+                put_fixed(at, uncertain, n, end)
             else:
                 put_end(table.legs[body], reference, rows.cell, n, 4.0 * uncertain, rows.bounds.end)
                 put_rod(table.legs[body], sides[body], n, 2.0 * uncertain, rows.bounds)
-                put_proximal_point(table, body, at, n, 3.0 * uncertain, rows.bounds, end)
-
-
-@routine
-def put_fixed_point(at: Vec, n: int, uncertain: float, end: Floats) -> None:
-    """A point of the base."""
-    for i in range(n):
-        put(end[i], (0.0, 0.0, 0.0))
-    put(end[CENTRE], at)
-    put_bounds(end, n, uncertain, uncertain)
-
-
-@routine
-def put_proximal_point(
-    table: Table, body: int, at: Vec, n: int, uncertain: float, bounds: LegBounds, end: Floats
-) -> None:
-    """A point of the crank or carriage of a leg, given at home, from the form of the leg's proximal coordinate."""
-    leg, q, values = table.legs[body], bounds.q, bounds.values
-    axis, point = vec(leg["proximal_axis"]), vec(leg["proximal_point"])
-    is_crank = leg["proximal"] == CRANK
-    if is_crank:
-        lever = turned(sub(at, point), axis, values[COSINE], values[SINE])
-        x, velocity = add(point, lever), cross(axis, lever)
-    else:
-        x, velocity = along(at, values[Q_PROXIMAL], axis), axis
-    speed, unknown = norm(velocity), q[ABOVE] + abs(q[CENTRE] - values[Q_PROXIMAL])
-    travel = unknown
-    for i in range(n):
-        put(end[i], scale(q[i], velocity))
-        travel += abs(q[i])
-    put(end[CENTRE], x)
-    rounded = ROUNDING * (1.0 + norm(x) + norm(at) + norm(point))
-    error = speed * unknown + (0.5 * speed * travel * travel if is_crank else 0.0)
-    put_bounds(end, n, error + uncertain + rounded, speed * travel + uncertain + rounded)
+                put_proximal_point(table.legs[body], at, n, 3.0 * uncertain, rows.bounds, end)
 
 
 @routine
@@ -122,7 +88,7 @@ def put_pair(
     nearest = sub(along(x, t, sub(y, x)), along(p, s, sub(q, p)))
     apart = links.radii[links.pairs[pair, 0]] + links.radii[links.pairs[pair, 1]] + links.clearance[0]
     for k in range(ROWS_A_PAIR):
-        put_gap(first[k // 2], second[k % 2], n, links.gaps[k])
+        put_difference(second[k % 2], first[k // 2], n, links.gaps[k])
         one, other = links.bodies[links.pairs[pair, 0], k // 2], links.bodies[links.pairs[pair, 1], k % 2]
         if one == PLATFORM and other == PLATFORM:
             put_bounds_of_turned(rows.cell, uncertain, links.gaps[k])
@@ -166,16 +132,6 @@ def unit(v: Vec) -> Vec:
     """v / |v|; zero of zero."""
     length = norm(v)
     return scale(1.0 / length if length > 0.0 else 0.0, v)
-
-
-@routine
-def put_gap(a: Floats, b: Floats, n: int, gap: Floats) -> None:
-    """b - a, of two points."""
-    for i in range(n):
-        put(gap[i], sub(vec(b[i]), vec(a[i])))
-    put(gap[CENTRE], sub(vec(b[CENTRE]), vec(a[CENTRE])))
-    rounded = ROUNDING * (norm(vec(a[CENTRE])) + norm(vec(b[CENTRE])) + a[BOUNDS, AWAY] + b[BOUNDS, AWAY])
-    put_bounds(gap, n, a[BOUNDS, ERROR] + b[BOUNDS, ERROR] + rounded, a[BOUNDS, AWAY] + b[BOUNDS, AWAY] + rounded)
 
 
 @routine

@@ -1,54 +1,86 @@
-"""The line of a rod over a cell of poses, in the bodies at its ends: what cones and hinges there limit."""
+"""The line of a rod over a cell of poses, in the bodies at its ends: what cones and hinges there limit.
+
+The part of a line along an axis fixed in a body is formed without turning the line. With R the rotation of the body
+and H = p + R h the platform end, (R a) . (H - E) = (R a) . (p - E) + a . h: what is turned is the axis alone.
+"""
 
 from __future__ import annotations
 
-from ...arrays import Record
+from ...arrays import Floats
 from .._jit import routine
-from ..legs.endings import turned, turned_back
-from ..legs.records import COSINE, CRANK, FROM_BASE, Q_PROXIMAL, SINE
-from ..vectors import add, along, cross, norm, put, sub, turn, vec
-from .affine_forms import ABOVE, AWAY, BOUNDS, CENTRE, ERROR, put_bounds
+from ..legs.endings import turned_back
+from ..legs.records import COSINE, CRANK, FROM_BASE, Q_PROXIMAL, SINE, Table
+from ..vectors import Vec, cross, dot, norm, put, scale, sub, turn, vec
+from .affine_forms import (
+    ABOVE,
+    AWAY,
+    BELOW,
+    BOUNDS,
+    CENTRE,
+    ERROR,
+    put_along,
+    put_bounds,
+    put_moved,
+    put_product,
+    put_turned,
+)
 from .leg_bounds import LegBounds
-from .pose_cells import CHORD, CURVATURE, ROUNDING, PoseCell
+from .pose_cells import CHORD, CURVATURE, ROUNDING, SHIFT, PoseCell
 
 
 @routine
-def put_base_line(owner: Record, n: int, bounds: LegBounds) -> None:
-    """The span in the body at its base end, which a crank turns."""
-    span, line, q = bounds.span, bounds.line, bounds.q
-    if owner["proximal"] != CRANK:
-        for i in range(n):
-            put(line[i], vec(span[i]))
-        for i in range(CENTRE, BOUNDS + 1):
-            put(line[i], vec(span[i]))
-        return
-    axis, cosine, sine = vec(owner["proximal_axis"]), bounds.values[COSINE], bounds.values[SINE]
-    v = vec(span[CENTRE])
-    aside, still = cross(axis, v), q[ABOVE] + abs(q[CENTRE] - bounds.values[Q_PROXIMAL])
-    travel = still
-    for i in range(n):
-        put(line[i], turned(along(vec(span[i]), -q[i], aside), axis, cosine, -sine))
-        travel += abs(q[i])
-    put(line[CENTRE], turned(v, axis, cosine, -sine))
-    error, length = span[BOUNDS, ERROR] + travel * span[BOUNDS, AWAY], norm(aside)
-    error += length * (still + 0.5 * travel * travel) + ROUNDING * norm(v)
-    put_bounds(line, n, error, span[BOUNDS, AWAY] + travel * length)
-
-
-@routine
-def put_platform_line(rod: Record, cell: PoseCell, n: int, bounds: LegBounds) -> None:
-    """The span in the body at its platform end."""
-    span, line, pose, sizes = bounds.span, bounds.line, cell.pose, cell.sizes
-    v = vec(span[CENTRE])
-    length = norm(v)
-    if rod["frame"] != FROM_BASE:  # from the body at the base end, the platform, into the base
-        base_v = turn(pose, v)
-        put(line[CENTRE], base_v)
-        for i in range(n):
-            put(line[i], add(turn(pose, vec(span[i])), cross(vec(cell.motions[i, 3:]), base_v)))
+def put_along_line(
+    table: Table,
+    m: int,
+    k: int,
+    at_base_end: bool,
+    axis: Vec,
+    uncertain: float,
+    n: int,
+    cell: PoseCell,
+    bounds: LegBounds,
+    a: Floats,
+) -> None:
+    """The part of the line of rod `m`, on the proximal joint of leg `k`, along an axis fixed in the body at one end."""
+    rod, owner, values = table.legs[m], table.legs[k], bounds.values
+    if not at_base_end:
+        put_along_platform_line(table, m, axis, uncertain, n, cell, bounds, a)
+    elif owner["proximal"] == CRANK:
+        centre, joint = vec(owner["proximal_point"]), vec(owner["proximal_axis"])
+        put_moved(bounds.end, centre, n, bounds.v)
+        put_turned(axis, joint, values[COSINE], values[SINE], values[Q_PROXIMAL], bounds.q, n, bounds.w)
+        put_product(bounds.w, bounds.v, n, a)
+        a[CENTRE] -= dot(axis, sub(vec(rod["base_end_point"]), centre))
     else:
-        put(line[CENTRE], turned_back(pose, v))
+        put_along(bounds.span, axis, n, a)
+
+
+@routine
+def put_along_platform_line(
+    table: Table, m: int, axis: Vec, uncertain: float, n: int, cell: PoseCell, bounds: LegBounds, a: Floats
+) -> None:
+    """The part along an axis fixed in the body at the platform end: the base, of a leg read from the platform."""
+    rod, pose, sizes, v, w = table.legs[m], cell.pose, cell.sizes, bounds.v, bounds.w
+    is_from_base, p, reach = rod["frame"] == FROM_BASE, (pose[0, 3], pose[1, 3], pose[2, 3]), norm(axis)
+    start = p if is_from_base else vec(table.task[0]["reference"])
+    for i in range(n):
+        motion = cell.motions[i]
+        put(v[i], sub(vec(motion), vec(bounds.base[i])) if is_from_base else scale(-1.0, vec(bounds.base[i])))
+        turning = cross(vec(motion[3:]), turn(pose, axis) if is_from_base else axis)
+        put(w[i], turning if is_from_base else scale(-1.0, turned_back(pose, turning)))
+    put(v[CENTRE], sub(start, vec(bounds.base[CENTRE])))
+    put(w[CENTRE], turn(pose, axis) if is_from_base else turned_back(pose, axis))
+    rounded = 4.0 * uncertain + ROUNDING * (norm(start) + norm(vec(bounds.base[CENTRE])))
+    shift = sizes[SHIFT] if is_from_base else 0.0
+    put_bounds(v, n, bounds.base[BOUNDS, ERROR] + rounded, bounds.base[BOUNDS, AWAY] + shift + rounded)
+    put_bounds(w, n, (sizes[CURVATURE] + ROUNDING) * reach, (sizes[CHORD] + ROUNDING) * reach)
+    put_product(w, v, n, a)
+    point = vec(rod["platform_end_point"])
+    if not is_from_base:
+        point = sub(point, p)
         for i in range(n):
-            put(line[i], turned_back(pose, sub(vec(span[i]), cross(vec(cell.motions[i, 3:]), v))))
-    error = span[BOUNDS, ERROR] + sizes[CURVATURE] * length + sizes[CHORD] * span[BOUNDS, AWAY] + ROUNDING * length
-    put_bounds(line, n, error, span[BOUNDS, AWAY] + sizes[CHORD] * length + ROUNDING * length)
+            a[i] -= dot(axis, vec(cell.motions[i]))
+    a[CENTRE] += dot(axis, point)
+    rounded = ROUNDING * reach * (norm(point) + norm(p))
+    a[BELOW] -= rounded
+    a[ABOVE] += rounded
