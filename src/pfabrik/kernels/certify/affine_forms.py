@@ -25,12 +25,18 @@ REGULAR = 1.0 - 1e-9
 
 @routine
 def put_bounds(v: Floats, n: int, error: float, away: float) -> None:
-    """Set the bounds of a vector: `away` by its linear part if that is less."""
-    linear = 0.0
+    """Set the bounds of a vector: `away` by its linear part if that is less.
+
+    Of the linear part, |sum s_i l_i|^2 is at most the sum of all |l_i . l_j|.
+    """
+    square = 0.0
     for i in range(n):
-        linear += norm(vec(v[i]))
+        x = vec(v[i])
+        square += dot(x, x)
+        for j in range(i):
+            square += 2.0 * abs(dot(x, vec(v[j])))
     v[BOUNDS, ERROR] = error
-    v[BOUNDS, AWAY] = min(away, (linear + error) * (1.0 + ROUNDING))
+    v[BOUNDS, AWAY] = min(away, (math.sqrt(square) + error) * (1.0 + ROUNDING))
 
 
 @routine
@@ -100,66 +106,48 @@ def put_along(v: Floats, axis: Vec, n: int, a: Floats) -> None:
 
 
 @routine
-def put_product(v: Floats, w: Floats, n: int, a: Floats) -> None:
-    """v . w = c . d + c . (change of w) + d . (change of v) + the product of both changes."""
-    c, d, away, other_away = vec(v[CENTRE]), vec(w[CENTRE]), v[BOUNDS, AWAY], w[BOUNDS, AWAY]
-    if not away + other_away < math.inf:
-        put_unknown(a, -math.inf, math.inf)
-        return
-    for i in range(n):
-        a[i] = dot(vec(v[i]), d) + dot(c, vec(w[i]))
-    slack = norm(d) * v[BOUNDS, ERROR] + norm(c) * w[BOUNDS, ERROR] + away * other_away
-    slack += ROUNDING * (norm(c) + away) * (norm(d) + other_away)
-    a[CENTRE], a[BELOW], a[ABOVE] = dot(c, d), -slack, slack
+def put_cosine(v: Floats, axis: Vec, cosine: float, shortest: float, longest: float, n: int, a: Floats) -> None:
+    """Cosine of the angle between v and a unit vector, less another one: x / |v|, x = axis . v - cosine |v|.
 
-
-@routine
-def put_cosine(along_axis: Floats, length: Floats, cosine: float, n: int, a: Floats) -> None:
-    """The cosine of a vector's angle from an axis, less another one, from the vector's part along the axis and length.
-
-    With x = part - cosine length, which is affine where the vector and its length are, it is x / length.
+    By `put_length`, x = (axis - cosine u) . v - cosine t. The bounds are those of |v|.
     """
-    shortest, longest = least(length, n), most(length, n)
-    if not shortest > 0.1 * longest or not longest < math.inf:
+    c, away = vec(v[CENTRE]), v[BOUNDS, AWAY]
+    length = norm(c)
+    if not away < math.inf or not shortest > 0.1 * longest or not length > 0.0:
         put_unknown(a, -1.0 - cosine, 1.0 - cosine)
         return
-    combine(along_axis, -cosine, length, n, a)
-    lowest, highest, range_of_share = min(least(a, n), 0.0), max(most(a, n), 0.0), 1.0 / shortest - 1.0 / longest
+    put_along(v, along(axis, -cosine / length, c), n, a)
+    bend = 0.5 * cosine * away * away / length
+    a[BELOW], a[ABOVE] = a[BELOW] - max(bend, 0.0), a[ABOVE] - min(bend, 0.0)
+    lowest, highest, spread = min(least(a, n), 0.0), max(most(a, n), 0.0), 1.0 / shortest - 1.0 / longest
     for i in range(n):
         a[i] /= longest
     a[CENTRE] /= longest
-    a[BELOW] = a[BELOW] / longest + lowest * range_of_share - 4.0 * ROUNDING
-    a[ABOVE] = a[ABOVE] / longest + highest * range_of_share + 4.0 * ROUNDING
+    a[BELOW] = a[BELOW] / longest + lowest * spread - 4.0 * ROUNDING
+    a[ABOVE] = a[ABOVE] / longest + highest * spread + 4.0 * ROUNDING
 
 
 @routine
-def put_heading(x: Floats, y: Floats, n: int, a: Floats) -> None:
-    """Angle of the direction (x, y).
+def put_heading(v: Floats, axis: Vec, reference: Vec, n: int, a: Floats) -> None:
+    """Angle of v about a unit vector, from a reference; components along the axis are ignored.
 
-    Of complex numbers, log(c + d) - log(c) = d / c - ..., whose error is at most s^2 / (2 (1 - s)), s = |d / c|.
+    In the plane across the axis, log(c + d) - log(c) = d / c - ..., whose error is at most s^2 / (2 (1 - s)), s = |d /
+    c|.
     """
-    c, s = x[CENTRE], y[CENTRE]
-    away = math.hypot(most_change(x, n), most_change(y, n))
-    square = c * c + s * s
-    distance = math.sqrt(square)
-    if not away < 0.5 * distance:
+    start = along(reference, -dot(axis, reference), axis)
+    c = along(vec(v[CENTRE]), -dot(axis, vec(v[CENTRE])), axis)
+    distance, away = norm(c), v[BOUNDS, AWAY]
+    if not away < 0.5 * distance or not norm(start) > 0.0:
         put_unknown(a, -math.inf, math.inf)
         return
+    ahead = scale(1.0 / (distance * distance), cross(axis, c))
     for i in range(n):
-        a[i] = (c * y[i] - s * x[i]) / square
+        a[i] = dot(ahead, vec(v[i]))
     share = away / distance
-    error = abs(c) * max(-y[BELOW], y[ABOVE]) + abs(s) * max(-x[BELOW], x[ABOVE])
-    slack = 0.5 * share * share / (1.0 - share) + error / square + 8.0 * ROUNDING
-    a[CENTRE], a[BELOW], a[ABOVE] = math.atan2(s, c), -slack, slack
-
-
-@routine
-def most_change(a: Floats, n: int) -> float:
-    """The most by which a number differs from its centre."""
-    away = max(-a[BELOW], a[ABOVE])
-    for i in range(n):
-        away += abs(a[i])
-    return away
+    slack = 0.5 * share * share / (1.0 - share) + v[BOUNDS, ERROR] / distance
+    slack += ROUNDING * (4.0 + norm(vec(v[CENTRE])) / distance)
+    a[CENTRE] = math.atan2(dot(axis, cross(start, c)), dot(start, c))
+    a[BELOW], a[ABOVE] = -slack, slack
 
 
 @routine

@@ -201,10 +201,8 @@ def enclose_crank(rod: Record, side: float, n: int, uncertain: float, bounds: Le
     """An interval that has the coordinate of a crank at every pose of the cell that its rod reaches."""
     q, a, b = bounds.q, bounds.a, bounds.b
     put_crank_offset(rod, n, bounds)
-    put_along(bounds.v, vec(rod["crank"]), n, a)
-    put_along(bounds.v, vec(rod["crank_across"]), n, b)
-    put_heading(a, b, n, bounds.c)
-    low, high = least(bounds.c, n), most(bounds.c, n)
+    put_heading(bounds.w, vec(rod["proximal_axis"]), vec(rod["crank"]), n, a)
+    low, high = least(a, n), most(a, n)
     put_length(bounds.w, n, b)
     radius, nearest, farthest = norm(vec(rod["crank"])), least(b, n), most(b, n)
     put_square(bounds.v, n, b)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, Record
 from .._jit import routine
 from ..legs.records import (
     BASE_END,
@@ -27,12 +27,14 @@ from ..legs.records import (
     SLIDE,
     Table,
 )
-from ..vectors import along, cross, dot, norm, vec, wrap_into
+from ..vectors import Vec, cross, dot, norm, scale, sub, vec, wrap_into
 from .affine_forms import (
     ABOVE,
     BELOW,
     CENTRE,
     combine,
+    least,
+    most,
     put_along,
     put_arc_cosine,
     put_cosine,
@@ -43,7 +45,7 @@ from .affine_forms import (
 )
 from .leg_bounds import LegBounds, put_end, put_reach_of_crank, put_rod, put_span
 from .pose_cells import ROUNDING, PoseCell
-from .rod_lines import put_along_line
+from .rod_lines import put_base_line, put_platform_line
 
 # Reach [L] by which a rod must be away from a dead point: beyond it, the closed form keeps its digits.
 LEAST_REACH = 1e-9
@@ -90,7 +92,7 @@ def put_limits(table: Table, sides: Floats, uncertain: float, k: int, n: int, ro
         for i in range(n):
             rows.spreads[m, i] = norm(vec(bounds.end[i])) + length * norm(vec(cell.motions[i, 3:]))
         put_ranges(table, m, k, n, uncertain, rows)
-        put_cones(table, m, k, n, uncertain, rows)
+        put_cones(table, m, k, n, rows)
 
 
 @routine
@@ -114,7 +116,7 @@ def put_ranges(table: Table, m: int, k: int, n: int, uncertain: float, rows: Lim
         if coordinate["leg"] != m:
             continue
         value = bounds.c
-        put_coordinate(table, m, k, coordinate["place"], uncertain, n, rows, value)
+        put_coordinate(table.legs[m], table.legs[k], coordinate["place"], rows.cell, n, bounds, value)
         middle = coordinate["sense"] * value[CENTRE]
         if coordinate["turns"] == 1:
             middle = wrap_into(middle, coordinate["lo"], coordinate["hi"])
@@ -134,10 +136,9 @@ def put_ranges(table: Table, m: int, k: int, n: int, uncertain: float, rows: Lim
 
 @routine
 def put_coordinate(
-    table: Table, m: int, k: int, place: int, uncertain: float, n: int, rows: LimitRows, value: Floats
+    leg: Record, owner: Record, place: int, cell: PoseCell, n: int, bounds: LegBounds, value: Floats
 ) -> None:
-    """A coordinate of leg `m`, on the proximal joint of leg `k`; unknown where its place has no bounds yet."""
-    leg, bounds = table.legs[m], rows.bounds
+    """A coordinate of a leg over a cell; unknown where its place has no bounds yet."""
     if leg["kind"] == PIVOT and place >= PLATFORM_END and place < PLATFORM_END + leg["slides"]:
         put_along(bounds.span, vec(leg["slide_rows"][place - PLATFORM_END]), n, value)
     elif leg["kind"] != ROD:
@@ -149,70 +150,84 @@ def put_coordinate(
         for i in range(9):
             value[i] = bounds.length[i]
         value[CENTRE] -= leg["length"]
+    elif place < SLIDE:
+        put_base_line(leg, owner, n, bounds)
+        put_ending_angle(
+            leg["base_end"],
+            leg["base_end_axes"],
+            vec(leg["line"]),
+            leg["base_end_side"],
+            leg["twists"],
+            place - BASE_END,
+            n,
+            bounds,
+            value,
+        )
     else:
-        put_ending_angle(table, m, k, place, uncertain, n, rows, value)
+        put_platform_line(leg, cell, n, bounds)
+        put_ending_angle(
+            leg["platform_end"],
+            leg["platform_end_axes"],
+            vec(leg["line"]),
+            leg["platform_end_side"],
+            leg["twists"],
+            place - PLATFORM_END,
+            n,
+            bounds,
+            value,
+        )
 
 
 @routine
 def put_ending_angle(
-    table: Table, m: int, k: int, place: int, uncertain: float, n: int, rows: LimitRows, value: Floats
+    ending: int, axes: Floats, home: Vec, side: float, twists: int, which: int, n: int, bounds: LegBounds, value: Floats
 ) -> None:
-    """Angle of a hinge at an end of a rod: of a single one, or of two that cross.
+    """Angle of a hinge at an end of a rod: of a single one, or of two that cross, from the form of the rod's line.
 
     Of two hinges a, b: a . Rot(b, q1) u = a . w gives q1 = q0 + side acos(C / h), as `solve_angle` does; then a turns
     Rot(b, q1) u into w.
     """
-    leg, bounds, at_base_end = table.legs[m], rows.bounds, place < SLIDE
-    ending, axes, side, which = (
-        (leg["base_end"], leg["base_end_axes"], leg["base_end_side"], place - BASE_END)
-        if at_base_end
-        else (leg["platform_end"], leg["platform_end_axes"], leg["platform_end_side"], place - PLATFORM_END)
-    )
+    line = bounds.v
+    if ending == HINGE:
+        put_heading(line, vec(axes[0]), home, n, value)
+        return
     put_unknown(value, -math.inf, math.inf)
-    if ending != HINGE and (ending != CROSS or leg["twists"] == 1):
+    if ending != CROSS or twists == 1:
         return
-    a, home, x, y = vec(axes[0]), vec(leg["line"]), bounds.a, bounds.b
-    flat, across = along(home, -dot(a, home), a), cross(a, home)
-    if ending == HINGE or which == 0:
-        put_along_line(table, m, k, at_base_end, flat, uncertain, n, rows.cell, bounds, x)
-        put_along_line(table, m, k, at_base_end, across, uncertain, n, rows.cell, bounds, y)
-        put_heading(x, y, n, value)
-        if ending == HINGE:
-            return
-    b, angle = vec(axes[1]), bounds.d
+    a, b = vec(axes[0]), vec(axes[1])
     along_b = dot(b, home)
-    A, B = dot(a, along(home, -along_b, b)), dot(a, cross(b, home))
+    flat = sub(home, scale(along_b, b))
+    A, B = dot(a, flat), dot(a, cross(b, home))
     h = math.hypot(A, B)
-    put_along_line(table, m, k, at_base_end, a, uncertain, n, rows.cell, bounds, x)
-    if not h > 0.0 or not abs(x[CENTRE]) < math.inf:
-        put_unknown(value, -math.inf, math.inf)
+    if not h > 0.0:
         return
-    cosine = x[CENTRE] / bounds.length[CENTRE]
-    put_cosine(x, bounds.length, cosine, n, y)
-    y[CENTRE] += cosine - dot(a, b) * along_b
+    cosine, angle = bounds.a, bounds.b
+    centre = dot(a, vec(line[CENTRE])) / norm(vec(line[CENTRE]))
+    put_cosine(line, a, centre, least(bounds.length, n), most(bounds.length, n), n, cosine)
+    cosine[CENTRE] += centre - dot(a, b) * along_b
     for i in range(9):
-        y[i] /= h
-    if not put_arc_cosine(y, n, angle):
-        put_unknown(value, -math.inf, math.inf)
+        cosine[i] /= h
+    if not put_arc_cosine(cosine, n, angle):
         return
     if side < 0.0:
-        put_unknown(x, 0.0, 0.0)
-        combine(x, -1.0, angle, n, angle)
+        for i in range(n):
+            angle[i] = -angle[i]
+        below, above = -angle[ABOVE], -angle[BELOW]
+        angle[CENTRE], angle[BELOW], angle[ABOVE] = -angle[CENTRE], below, above
     angle[CENTRE] += math.atan2(B, A)
     if which == 1:
         for i in range(9):
             value[i] = angle[i]
         return
+    put_heading(line, a, home, n, value)
     q = angle[CENTRE]
-    put_turned(home, b, math.cos(q), math.sin(q), q, angle, n, bounds.v)
-    put_along(bounds.v, flat, n, x)
-    put_along(bounds.v, across, n, y)
-    put_heading(x, y, n, angle)
-    combine(value, -1.0, angle, n, value)
+    put_turned(home, b, math.cos(q), math.sin(q), q, angle, n, line)
+    put_heading(line, a, home, n, cosine)
+    combine(value, -1.0, cosine, n, value)
 
 
 @routine
-def put_cones(table: Table, m: int, k: int, n: int, uncertain: float, rows: LimitRows) -> None:
+def put_cones(table: Table, m: int, k: int, n: int, rows: LimitRows) -> None:
     """Fill the rows of all cones of leg `m`, on the proximal joint of leg `k`."""
     first, bounds = 2 * table.limited.shape[0], rows.bounds
     for c in range(table.cones.shape[0]):
@@ -227,9 +242,11 @@ def put_cones(table: Table, m: int, k: int, n: int, uncertain: float, rows: Limi
         if table.legs[m]["kind"] != ROD:
             put_unknown(row, -1.0 - cosine, 1.0 - cosine)
             continue
-        at_base_end = cone["place"] == BASE_LINE
-        put_along_line(table, m, k, at_base_end, vec(cone["axis"]), uncertain, n, rows.cell, bounds, bounds.a)
-        put_cosine(bounds.a, bounds.length, cosine, n, row)
+        if cone["place"] == BASE_LINE:
+            put_base_line(table.legs[m], table.legs[k], n, bounds)
+        else:
+            put_platform_line(table.legs[m], rows.cell, n, bounds)
+        put_cosine(bounds.v, vec(cone["axis"]), cosine, least(bounds.length, n), most(bounds.length, n), n, row)
 
 
 @routine

@@ -1,86 +1,53 @@
-"""The line of a rod over a cell of poses, in the bodies at its ends: what cones and hinges there limit.
-
-The part of a line along an axis fixed in a body is formed without turning the line. With R the rotation of the body
-and H = p + R h the platform end, (R a) . (H - E) = (R a) . (p - E) + a . h: what is turned is the axis alone.
-"""
+"""The line of a rod over a cell of poses, in the bodies at its ends: what cones and hinges there limit."""
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...arrays import Record
 from .._jit import routine
-from ..legs.endings import turned_back
-from ..legs.records import COSINE, CRANK, FROM_BASE, Q_PROXIMAL, SINE, Table
-from ..vectors import Vec, cross, dot, norm, put, scale, sub, turn, vec
-from .affine_forms import (
-    ABOVE,
-    AWAY,
-    BELOW,
-    BOUNDS,
-    CENTRE,
-    ERROR,
-    put_along,
-    put_bounds,
-    put_moved,
-    put_product,
-    put_turned,
-)
+from ..legs.endings import turned, turned_back
+from ..legs.records import COSINE, CRANK, FROM_BASE, Q_PROXIMAL, SINE
+from ..vectors import add, along, cross, norm, put, sub, turn, vec
+from .affine_forms import ABOVE, AWAY, BELOW, BOUNDS, CENTRE, ERROR, put_bounds, put_moved
 from .leg_bounds import LegBounds
-from .pose_cells import CHORD, CURVATURE, ROUNDING, SHIFT, PoseCell
+from .pose_cells import CHORD, CURVATURE, ROUNDING, PoseCell
 
 
 @routine
-def put_along_line(
-    table: Table,
-    m: int,
-    k: int,
-    at_base_end: bool,
-    axis: Vec,
-    uncertain: float,
-    n: int,
-    cell: PoseCell,
-    bounds: LegBounds,
-    a: Floats,
-) -> None:
-    """The part of the line of rod `m`, on the proximal joint of leg `k`, along an axis fixed in the body at one end."""
-    rod, owner, values = table.legs[m], table.legs[k], bounds.values
-    if not at_base_end:
-        put_along_platform_line(table, m, axis, uncertain, n, cell, bounds, a)
-    elif owner["proximal"] == CRANK:
-        centre, joint = vec(owner["proximal_point"]), vec(owner["proximal_axis"])
-        put_moved(bounds.end, centre, n, bounds.v)
-        put_turned(axis, joint, values[COSINE], values[SINE], values[Q_PROXIMAL], bounds.q, n, bounds.w)
-        put_product(bounds.w, bounds.v, n, a)
-        a[CENTRE] -= dot(axis, sub(vec(rod["base_end_point"]), centre))
-    else:
-        put_along(bounds.span, axis, n, a)
-
-
-@routine
-def put_along_platform_line(
-    table: Table, m: int, axis: Vec, uncertain: float, n: int, cell: PoseCell, bounds: LegBounds, a: Floats
-) -> None:
-    """The part along an axis fixed in the body at the platform end: the base, of a leg read from the platform."""
-    rod, pose, sizes, v, w = table.legs[m], cell.pose, cell.sizes, bounds.v, bounds.w
-    is_from_base, p, reach = rod["frame"] == FROM_BASE, (pose[0, 3], pose[1, 3], pose[2, 3]), norm(axis)
-    start = p if is_from_base else vec(table.task[0]["reference"])
+def put_base_line(rod: Record, owner: Record, n: int, bounds: LegBounds) -> None:
+    """The span in the body at its base end: on a crank, Rot(-q) (H - centre) less the lever at home."""
+    line, q, values, point = bounds.v, bounds.q, bounds.values, vec(rod["base_end_point"])
+    if owner["proximal"] != CRANK:
+        put_moved(bounds.span, (0.0, 0.0, 0.0), n, line)
+        return
+    axis, cosine, sine, centre = vec(owner["proximal_axis"]), values[COSINE], values[SINE], vec(owner["proximal_point"])
+    put_moved(bounds.end, centre, n, bounds.w)
+    c = vec(bounds.w[CENTRE])
+    aside, linear, still = cross(axis, c), 0.0, max(-q[BELOW], q[ABOVE]) + abs(q[CENTRE] - values[Q_PROXIMAL])
     for i in range(n):
-        motion = cell.motions[i]
-        put(v[i], sub(vec(motion), vec(bounds.base[i])) if is_from_base else scale(-1.0, vec(bounds.base[i])))
-        turning = cross(vec(motion[3:]), turn(pose, axis) if is_from_base else axis)
-        put(w[i], turning if is_from_base else scale(-1.0, turned_back(pose, turning)))
-    put(v[CENTRE], sub(start, vec(bounds.base[CENTRE])))
-    put(w[CENTRE], turn(pose, axis) if is_from_base else turned_back(pose, axis))
-    rounded = 4.0 * uncertain + ROUNDING * (norm(start) + norm(vec(bounds.base[CENTRE])))
-    shift = sizes[SHIFT] if is_from_base else 0.0
-    put_bounds(v, n, bounds.base[BOUNDS, ERROR] + rounded, bounds.base[BOUNDS, AWAY] + shift + rounded)
-    put_bounds(w, n, (sizes[CURVATURE] + ROUNDING) * reach, (sizes[CHORD] + ROUNDING) * reach)
-    put_product(w, v, n, a)
-    point = vec(rod["platform_end_point"])
-    if not is_from_base:
-        point = sub(point, p)
+        put(line[i], turned(along(vec(bounds.w[i]), -q[i], aside), axis, cosine, -sine))
+        linear += abs(q[i])
+    put(line[CENTRE], sub(turned(c, axis, cosine, -sine), sub(point, centre)))
+    travel = linear + still
+    chord, speed, away = min(travel, 2.0), norm(aside), bounds.w[BOUNDS, AWAY]
+    rounded = ROUNDING * (norm(c) + norm(point) + norm(centre))
+    error = bounds.w[BOUNDS, ERROR] + chord * away + speed * min(still + 0.5 * travel * travel, chord + linear)
+    put_bounds(line, n, error + rounded, away + speed * chord + rounded)
+
+
+@routine
+def put_platform_line(rod: Record, cell: PoseCell, n: int, bounds: LegBounds) -> None:
+    """The span in the body at its platform end."""
+    span, line, pose, sizes = bounds.span, bounds.v, cell.pose, cell.sizes
+    v = vec(span[CENTRE])
+    length = norm(v)
+    if rod["frame"] != FROM_BASE:  # from the body at the base end, the platform, into the base
+        base_v = turn(pose, v)
+        put(line[CENTRE], base_v)
         for i in range(n):
-            a[i] -= dot(axis, vec(cell.motions[i]))
-    a[CENTRE] += dot(axis, point)
-    rounded = ROUNDING * reach * (norm(point) + norm(p))
-    a[BELOW] -= rounded
-    a[ABOVE] += rounded
+            put(line[i], add(turn(pose, vec(span[i])), cross(vec(cell.motions[i, 3:]), base_v)))
+    else:
+        put(line[CENTRE], turned_back(pose, v))
+        for i in range(n):
+            put(line[i], turned_back(pose, sub(vec(span[i]), cross(vec(cell.motions[i, 3:]), v))))
+    error = span[BOUNDS, ERROR] + sizes[CURVATURE] * length + sizes[CHORD] * span[BOUNDS, AWAY] + ROUNDING * length
+    put_bounds(line, n, error, span[BOUNDS, AWAY] + sizes[CHORD] * length + ROUNDING * length)
