@@ -1,7 +1,8 @@
 """Compile all kernels to one extension module, in place: `python building/compile_kernels.py`.
 
-Needs NumPy and a C compiler with Python's headers. Kernels are translated to C, in `build/kernels`; objects are kept
-there by what they are made of: after an edit only the files that depend on it are compiled again.
+Needs NumPy and a C compiler with Python's headers. Kernels are translated to C, in `build/kernels`, where that has not
+been done from the same sources: an sdist has the C with it. Objects are kept there by what they are made of: after an
+edit only the files that depend on it are compiled again.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from typing import Any, NamedTuple
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 BUILD = ROOT / "build" / "kernels"
-os.environ["PFABRIK_KERNELS"] = "python"
-sys.path.insert(0, str(ROOT / "src"))
+SOURCES = BUILD / "sources.sha256"
+"""Hash of what the C text was made of."""
 
 LEVELLED = ("legs.answer_blocks", "legs.margins_in_blocks", "clearance.capsule_clearance")
 """Kernels whose loops are vectors: compiled for each level of processors. On all others a level has no effect."""
@@ -36,6 +37,9 @@ FLAGS = ["-std=c99", "-O3", "-fvisibility=hidden", "-ffp-contract=off", "-fno-ma
 """Without contraction the same arithmetic everywhere; what sets `errno` or traps could not be a vector."""
 
 CHECKS = ["-DCHECKED", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+
+ALONE = {"platform.nearest_pose": "nearest", "closure.close": "close", "closure.first_order": "first_order"}
+"""Kernels whose C is a file of its own, by the file's name; else it has all of a folder."""
 
 UNABLE = 3
 """Exit code where no compiler is."""
@@ -111,29 +115,44 @@ def entry(made: Any, symbol: str, spell: Any) -> tuple[str, int]:
     return f"{text}int {symbol}({takes}) {{\n    {call}\n}}\n", at
 
 
-def translate() -> tuple[dict[str, str], list[Kernel]]:
-    """C text by its group, and all kernels; one group is compiled for each level."""
+def hash_of_sources() -> str:
+    """Hash of all that the C text is made of."""
+    package = ROOT / "src" / "pfabrik"
+    files = [*(package / "kernels").rglob("*.py"), *(package / "to_c").glob("*.*"), HERE / "host.h", Path(__file__)]
+    return hashlib.sha256(b"".join(hashlib.sha256(path.read_bytes()).digest() for path in sorted(files))).hexdigest()
+
+
+def translate() -> None:
+    """Write C text by groups of kernels, and their table; what is there from the same sources stays."""
+    made_of = hash_of_sources()
+    if SOURCES.exists() and SOURCES.read_text(encoding="utf-8") == made_of:
+        return
+    os.environ["PFABRIK_KERNELS"] = "python"
+    sys.path.insert(0, str(ROOT / "src"))
     from pfabrik.kernels._shipped import name_of
     from pfabrik.kernels.ahead import KERNELS
     from pfabrik.to_c import Program
 
-    texts, table, host = {}, [], (HERE / "host.h").read_text(encoding="utf-8")
-    names = {kernel: name_of(kernel) for kernel, _ in KERNELS}
-    groups = {name: "blocks" if name in LEVELLED else name.partition(".")[0] for name in names.values()}
-    for group in dict.fromkeys(groups.values()):
-        program, entries = Program(), []
-        for kernel, arguments in KERNELS:
-            name = names[kernel]
-            if groups[name] != group:
-                continue
-            made = program.add(kernel, *arguments)
-            symbol = f"pf_{name.replace('.', '_')}"
-            text, words = entry(made, f"LEVELLED({symbol})" if group == "blocks" else symbol, program.spell)
-            entries.append(text.replace(f"run_LEVELLED({symbol})", f"run_{symbol}"))
-            table.append(Kernel(name, "".join(map(code_of, arguments)), made.gives, words, group))
-        head = "#define JOINED(a, b) a##_##b\n#define NAMED(a, b) JOINED(a, b)\n#define LEVELLED(a) NAMED(a, LEVEL)\n"
-        texts[group] = program.text("\n".join([host, head if group == "blocks" else "", *entries]))
-    return texts, table
+    program, table, entries = Program(), [], {}
+    for kernel, arguments in KERNELS:
+        name = name_of(kernel)
+        group = "blocks" if name in LEVELLED else ALONE.get(name) or name.partition(".")[0]
+        made, symbol = program.add(kernel, *arguments), f"pf_{name.replace('.', '_')}"
+        text, words = entry(made, f"LEVELLED({symbol})" if group == "blocks" else symbol, program.spell)
+        entries.setdefault(group, []).append(text.replace(f"run_LEVELLED({symbol})", f"run_{symbol}"))
+        table.append(Kernel(name, "".join(map(code_of, arguments)), made.gives, words, group))
+    for path in BUILD.glob("*.c"):
+        path.unlink()
+    for group, texts in entries.items():
+        write(BUILD / f"{group}.c", program.text("\n".join([host(group), *texts])).encode())
+    write(BUILD / "table.h", table_of(table).encode())
+    write(SOURCES, made_of.encode())
+
+
+def host(group: str) -> str:
+    """What stands between the functions of a group and those that Python calls."""
+    head = "#define JOINED(a, b) a##_##b\n#define NAMED(a, b) JOINED(a, b)\n#define LEVELLED(a) NAMED(a, LEVEL)\n"
+    return "\n".join([(HERE / "host.h").read_text(encoding="utf-8"), head if group == "blocks" else ""])
 
 
 def write(path: Path, data: bytes) -> None:
@@ -144,37 +163,48 @@ def write(path: Path, data: bytes) -> None:
     os.replace(beside, path)
 
 
-def table_of(kernels: list[Kernel], levels: list[str]) -> str:
-    """The C text of the table of kernels."""
-    rows = []
+def table_of(kernels: list[Kernel]) -> str:
+    """The C text of the table of kernels; of those that are there for each level of a processor, too."""
+    declared, rows = [], []
     for kernel in kernels:
-        for k, level in enumerate(levels if kernel.group == "blocks" else [""]):
-            symbol = "_".join([kernel.name.replace(".", "_"), *([level] if level else [])])
-            place = k + 1 if level else 0
-            rows.append(
-                (symbol, f'"{symbol}", pf_{symbol}, "{kernel.takes}", \'{kernel.gives}\', {kernel.words}, {place}')
-            )
-    names = ", ".join(f'"{level}"' for level in levels if level) or "0"
-    most_arrays = max(kernel.takes.count(";") for kernel in kernels)
+        plain = kernel.name.replace(".", "_")
+        rest = f"\"{kernel.takes}\", '{kernel.gives}', {kernel.words}"
+        by_level = {f"{plain}_{level}": k for k, level in enumerate(LEVELS, 1)} if kernel.group == "blocks" else {}
+        both = ["#ifdef __x86_64__"], ["#else"], ["#endif"]
+        for lines, row in (
+            (declared, "int pf_{0}(const word *, word *);"),
+            (rows, f'    {{{{"{{1}}", pf_{{0}}, {rest}, {{2}}}}}},'),
+        ):
+            usual = [row.format(f"{plain}_" if by_level else plain, plain, 0)]
+            levelled = [row.format(name, name, k) for name, k in by_level.items()]
+            lines += [*both[0], *levelled, *both[1], *usual, *both[2]] if by_level else usual
+    levels = ", ".join(f'"{level}"' for level in LEVELS)
     return "\n".join(
         [
-            *(f"int pf_{symbol}(const word *, word *);" for symbol, _ in rows),
+            *declared,
             "static const struct kernel KERNELS[] = {",
-            *(f"    {{{row}}}," for _, row in rows),
+            *rows,
             "};",
-            f"static const char *const LEVELS[] = {{{names}}};",
-            f"enum {{ N_KERNELS = {len(rows)}, N_LEVELS = {sum(map(bool, levels))},",
-            f"       MOST_WORDS = {max(kernel.words for kernel in kernels)}, MOST_ARRAYS = {most_arrays} }};",
+            "#ifdef __x86_64__",
+            f"static const char *const LEVELS[] = {{{levels}}};",
+            f"enum {{ N_LEVELS = {len(LEVELS)} }};",
+            "#else",
+            "static const char *const LEVELS[] = {0};",
+            "enum { N_LEVELS = 0 };",
+            "#endif",
+            "enum { N_KERNELS = sizeof KERNELS / sizeof KERNELS[0],",
+            f"       MOST_WORDS = {max(kernel.words for kernel in kernels) or 1},",
+            f"       MOST_ARRAYS = {max(kernel.takes.count(';') for kernel in kernels) or 1} }};",
             "",
         ]
     )
 
 
-def compiled(group: str, text: str, flags: list[str], name: str) -> Path:
+def compiled(source: Path, flags: list[str], name: str) -> Path:
     """The object of a C file; compiled, if there is none yet of the same text and command."""
     command = [*compiler(), *flags]
-    key = hashlib.sha256("\n".join([text, *command]).encode()).hexdigest()[:16]
-    source, made = BUILD / f"{group}.c", BUILD / f"{name}-{key}.o"
+    key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *command]).encode()).hexdigest()[:16]
+    made = BUILD / f"{name}-{key}.o"
     if not made.exists():
         sys.stderr.write(".")
         sys.stderr.flush()
@@ -184,39 +214,50 @@ def compiled(group: str, text: str, flags: list[str], name: str) -> Path:
     return made
 
 
-def build(platform: dict[str, str], into: Path, more: list[str]) -> Path:
-    """Translate, compile what has changed, and link; where the module is."""
-    texts, kernels = translate()
-    levels = list(LEVELS) if "__x86_64__" in platform else [""]
-    flags = [*FLAGS, *([] if "_WIN32" in platform else ["-fPIC"]), *more]
+def link(platform: dict[str, str], files: list[Path], tables: Path, module: Path, more: list[str]) -> None:
+    """Make an extension module from C files or objects, with the table of their kernels in a folder."""
+    flags = [*more, "-O2", "-fvisibility=hidden", f"-I{sysconfig.get_path('include')}", f"-I{tables}"]
+    if "_WIN32" in platform:
+        flags += ["-shared", f"-L{Path(sys.base_prefix) / 'libs'}"]
+    elif "__APPLE__" in platform:
+        flags += ["-bundle", "-undefined", "dynamic_lookup"]
+    else:
+        flags += ["-shared", "-fPIC", "-s", "-Wl,-z,noexecstack", "-lm"]
+    made = tables / f"{module.name}.{os.getpid()}"
+    subprocess.run([*compiler(), str(HERE / "entry.c"), *map(str, files), *flags, "-o", str(made)], check=True)
+    os.replace(made, module) if made.stat().st_dev == module.parent.stat().st_dev else write(module, made.read_bytes())
+
+
+def file_name(platform: dict[str, str]) -> str:
+    """How the module's file is called."""
+    return "_compiled.pyd" if "_WIN32" in platform else "_compiled.abi3.so"
+
+
+def flags_for(platform: dict[str, str]) -> list[str]:
+    """How C is compiled to objects of a module."""
+    return [*FLAGS, *([] if "_WIN32" in platform else ["-fPIC"])]
+
+
+def build(platform: dict[str, str], into: Path, more: list[str]) -> None:
+    """Translate, compile what has changed, and link."""
+    translate()
+    levels = LEVELS if "__x86_64__" in platform else {"": []}
     jobs = []
-    for group, text in texts.items():
-        write(BUILD / f"{group}.c", text.encode())
-        for level in levels if group == "blocks" else levels[:1]:
-            own = [
-                *flags,
-                *LEVELS.get(level, []),
-                *([f"-DLEVEL={level}" if level else "-DLEVEL="] if group == "blocks" else []),
+    for source in sorted(BUILD.glob("*.c"), key=lambda path: -path.stat().st_size):  # what takes longest first
+        group, flags = source.stem, [*flags_for(platform), *more]
+        if group == "blocks":
+            jobs += [
+                (source, [*flags, *own, f"-DLEVEL={level}"], f"{group}-{level}".rstrip("-"))
+                for level, own in levels.items()
             ]
-            jobs.append((group, text, own, f"{group}-{level}" if group == "blocks" else group))
-    write(BUILD / "table.h", table_of(kernels, levels).encode())
+        else:
+            jobs.append((source, flags, group))
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         objects = list(pool.map(lambda job: compiled(*job), jobs))
     sys.stderr.write("\n" if sys.stderr.isatty() else "")
     for path in set() if more else set(BUILD.glob("*.o")) - set(objects):  # of sources that are no more
         path.unlink()
-    module = into / ("_compiled.pyd" if "_WIN32" in platform else "_compiled.abi3.so")
-    link = [*more, "-O2", "-fvisibility=hidden", f"-I{sysconfig.get_path('include')}", f"-I{BUILD}"]
-    if "_WIN32" in platform:
-        link += ["-shared", f"-L{Path(sys.base_prefix) / 'libs'}"]
-    elif "__APPLE__" in platform:
-        link += ["-bundle", "-undefined", "dynamic_lookup"]
-    else:
-        link += ["-shared", "-fPIC", "-s", "-Wl,-z,noexecstack", "-lm"]
-    made = BUILD / f"{module.name}.{os.getpid()}"
-    subprocess.run([*compiler(), str(HERE / "entry.c"), *map(str, objects), *link, "-o", str(made)], check=True)
-    os.replace(made, module) if made.stat().st_dev == into.stat().st_dev else write(module, made.read_bytes())
-    return module
+    link(platform, objects, BUILD, into / file_name(platform), more)
 
 
 def main() -> int:
