@@ -21,7 +21,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +30,7 @@ from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.model import model_of
 from table import Row, machine
 from timing import best_times
+from yardstick import kernel, routine
 
 Array = NDArray[np.float64]
 CASES = ((7, 60.0), (20, 30.0), (60, 15.0), (100, 10.0))
@@ -91,7 +91,7 @@ def share(q: Array, targets: Array, most: float, in_space: bool, near: float = N
     return 100.0 * float(np.mean((away <= near * q.shape[1]) & (np.abs(q).max(axis=1) <= most + 1e-9)))
 
 
-@numba.njit(error_model="numpy")
+@routine
 def fabrik(q: Array, target: Array, most: float, passes: int, close_enough: float) -> int:
     """FABRIK in the plane, inward and outward with ranges, from angles and to angles (n,); the number of passes."""
     n = len(q)
@@ -127,12 +127,13 @@ def fabrik(q: Array, target: Array, most: float, passes: int, close_enough: floa
     before = 0.0
     for k in range(n):
         angle = math.atan2(y[k + 1] - y[k], x[k + 1] - x[k])
-        q[k] = (angle - before + math.pi) % (2.0 * math.pi) - math.pi
+        q[k] = angle - before
+        q[k] -= 2.0 * math.pi * math.floor((q[k] + math.pi) / (2.0 * math.pi))
         before = angle
     return done
 
 
-@numba.njit
+@kernel
 def fabrik_all(q: Array, targets: Array, most: float, passes: int, close_enough: float) -> int:
     """FABRIK for all rows; the passes of all."""
     done = 0

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 
@@ -55,6 +54,6 @@ def machine() -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    versions = f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__}"
+    versions = f"Python {platform.python_version()}, NumPy {np.__version__}"
     cores, load = len(os.sched_getaffinity(0)), os.getloadavg()[0]
     return f"{names[0] if names else platform.processor()}, {cores} cores; {versions}; load at the start {load:.1f}"

@@ -1,4 +1,4 @@
-"""What the benchmarks take from the folder `paper` beside them, which is not installed: its yardstick, and one core."""
+"""What the benchmarks take from folders beside them, which are not installed: the yardstick, one core, kernels."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from building.on_call import kernel, routine
 from paper import geometric
 from paper.timing import one_core
 
-__all__ = ["geometric", "one_core"]
+__all__ = ["geometric", "kernel", "one_core", "routine"]

@@ -155,6 +155,11 @@ def host(group: str) -> str:
     return "\n".join([(HERE / "host.h").read_text(encoding="utf-8"), head if group == "blocks" else ""])
 
 
+def run(command: list[str]) -> None:
+    """Run the compiler."""
+    subprocess.run(command, check=True)
+
+
 def write(path: Path, data: bytes) -> None:
     """Write a file whole, or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -209,7 +214,7 @@ def compiled(source: Path, flags: list[str], name: str) -> Path:
         sys.stderr.write(".")
         sys.stderr.flush()
         beside = made.with_name(f"{made.name}.{os.getpid()}")
-        subprocess.run([*command, "-c", str(source), "-o", str(beside)], check=True)
+        run([*command, "-c", str(source), "-o", str(beside)])
         os.replace(beside, made)
     return made
 
@@ -224,7 +229,7 @@ def link(platform: dict[str, str], files: list[Path], tables: Path, module: Path
     else:
         flags += ["-shared", "-fPIC", "-s", "-Wl,-z,noexecstack", "-lm"]
     made = tables / f"{module.name}.{os.getpid()}"
-    subprocess.run([*compiler(), str(HERE / "entry.c"), *map(str, files), *flags, "-o", str(made)], check=True)
+    run([*compiler(), str(HERE / "entry.c"), *map(str, files), *flags, "-o", str(made)])
     os.replace(made, module) if made.stat().st_dev == module.parent.stat().st_dev else write(module, made.read_bytes())
 
 

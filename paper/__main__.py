@@ -9,7 +9,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
-NEEDED = ("matplotlib", "numba", "scipy")
+NEEDED = ("matplotlib", "scipy")
 PAGE = Path(__file__).parents[1] / "docs" / "reproduction.md"
 
 

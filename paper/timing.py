@@ -63,12 +63,11 @@ def _once(call: Callable[[], object], count: int) -> float:
 
 def machine() -> str:
     """What this runs on."""
-    import numba
     import numpy
 
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     processor = names[0] if names else platform.processor() or platform.machine()
-    versions = f"Python {platform.python_version()}, NumPy {numpy.__version__}, Numba {numba.__version__}"
+    versions = f"Python {platform.python_version()}, NumPy {numpy.__version__}"
     return f"{processor}, {'one core' if HAS_CORES else 'all cores'}; {versions}"

@@ -50,7 +50,7 @@ def test_every_topology_has_an_example_is_told_from_its_sub_chains_and_says_wher
     assert {str(chain) for chain in pf.decompose(mechanism)} == {topology.chain}
     assert closed_form(dataclasses.replace(mechanism, name="anything")).kernel is topology.kernel
     assert f"`{topology.chain}`" in (DOCS / "geometric.md").read_text(encoding="utf-8")
-    said = getattr(topology.kernel, "py_func", topology.kernel).__doc__
+    said = topology.kernel.__doc__
     assert "solution" in said and ("Degenerate" in said or "rule" in said)
     source = said.split("Source: ")[1].split()[0].rstrip(".")
     assert f"**{source}**" in (DOCS / "references.md").read_text(encoding="utf-8")
@@ -333,7 +333,7 @@ def test_batches_rows_and_every_form_of_a_target_are_answered_alike(name: str) -
     if name == "five_bar":  # a tip has no orientation
         np.testing.assert_array_equal(level.actuators, flat.actuators)
     if not INTERPRETED:
-        assert len(closed_form(mechanism).kernel.signatures) == 1
+        assert len(closed_form(mechanism).kernel.compiled) == 1
 
 
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # of interpreted kernels

@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from building.on_call import kernel, routine
 from pfabrik import Mechanism, SubChain
 
 from ..arrays import Floats, Records
 from ..step import Step
 from ..tolerances import LIMIT
-from .compiled import kernel, routine
 from .facts import Interval, centre, home_of, range_of, require, tolerances
 from .struts import FOOT_SIZE, measure_strut, read_strut, strut_records, write_status, write_strut
 from .targets import BLOCK, FREE, OVER, Statuses, load_block
@@ -135,7 +135,8 @@ def solve_arms(
     feet = np.zeros((n_struts, FOOT_SIZE))
     block = BLOCK if starts.shape[0] == 1 else 1
     invalid = 0
-    for row in range(0, targets.shape[0], block):
+    row = 0
+    while row < targets.shape[0]:
         n = min(block, targets.shape[0] - row)
         start = starts[row if block == 1 else 0]
         if row == 0 or block == 1:
@@ -151,6 +152,7 @@ def solve_arms(
                     actuators[row + i, plan.arms[m]["columns"][0]] = math.nan
                     actuators[row + i, plan.arms[m]["columns"][1]] = math.nan
         write_status(row, n, table, status)
+        row += block
     return invalid
 
 

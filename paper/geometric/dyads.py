@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from building.on_call import kernel, routine
 from pfabrik import Mechanism, SubChain
 
 from ..arrays import Floats, Records
 from ..step import Step
 from ..tolerances import ALIGNMENT, LIMIT
-from .compiled import kernel, routine
 from .facts import Interval, centre, home_of, is_parallel, range_of, require, tolerances
 from .struts import write_status
 from .targets import BLOCK, FREE, OVER, Statuses, load_block
@@ -34,7 +34,7 @@ DYAD = np.dtype(
         # of home's branch, and of the other: +1 with the elbow to the left of the line from shoulder to tip; two
         # intervals in one of which the squared distance from shoulder to tip must lie
         ("side", "f8", (2,)),
-        ("square", "f8", (2, 2, 2)),
+        ("square", "f8", (2, 4)),
         ("low", "f8"),  # turn of the crank from home, tolerance included
         ("high", "f8"),
         ("sense", "f8"),  # coordinate = home + sense * turn
@@ -83,7 +83,7 @@ def _read_dyad(mechanism: Mechanism, steps: Sequence[Step], dyad: np.void) -> No
     bend_home = math.atan2(float(normal @ np.cross(crank, forearm)), float(crank @ forearm))
     turns = _turns(mechanism, elbow, normal)
     bends = [(*_bends(*turns, bend_home, each), NOWHERE, NOWHERE)[:2] for each in dyad["side"]]
-    dyad["square"] = [[_squares(*links, bend, slack) for bend in own] for own in bends]
+    dyad["square"] = [[end for bend in own for end in _squares(*links, bend, slack)] for own in bends]
     dyad["low"], dyad["high"] = low, high
     dyad["sense"], dyad["home"] = _sense(shoulder, normal), home_of(mechanism, shoulder)
     dyad["column"] = mechanism.actuator_names.index(shoulder.joint.name)
@@ -183,8 +183,8 @@ def place_elbow(dyad: Records, branch: int, first: int, last: int, table: Floats
     nx, ny, nz = dyad["normal"][0], dyad["normal"][1], dyad["normal"][2]
     r1, r2, side, off_plane = dyad["crank"], dyad["forearm"], dyad["side"][branch], dyad["off_plane"]
     nearest, farthest = (r1 - r2) * (r1 - r2), (r1 + r2) * (r1 + r2)
-    low, high = dyad["square"][branch, 0, 0], dyad["square"][branch, 0, 1]
-    low2, high2 = dyad["square"][branch, 1, 0], dyad["square"][branch, 1, 1]
+    low, high = dyad["square"][branch, 0], dyad["square"][branch, 1]
+    low2, high2 = dyad["square"][branch, 2], dyad["square"][branch, 3]
     for i in range(first, last):
         dx, dy, dz = table[3, i] - px, table[7, i] - py, table[11, i] - pz
         x = xx * dx + xy * dy + xz * dz

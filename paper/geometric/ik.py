@@ -64,7 +64,7 @@ def solve_ik(mechanism: Mechanism, target: Any, *, start: Any = None) -> Geometr
     targets, shape = as_poses(target)
     n_actuators = len(mechanism.actuator_names)
     starts = form.home if start is None else as_starts(start, shape, n_actuators)
-    actuators, status = np.empty((len(targets), n_actuators)), np.empty(len(targets), np.int8)
+    actuators, status = np.empty((len(targets), n_actuators)), np.empty(len(targets), np.int64)
 
     def run(block: slice) -> int:
         own = starts if len(starts) == 1 else starts[block]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
+from building.on_call import for_each
 from pfabrik import Mechanism
 
 from ..arrays import Floats
-from .compiled import kernel
 from .ik import Geometric
 from .targets import Statuses
 from .topologies import closed_form
@@ -20,23 +21,22 @@ from .topologies import closed_form
 def one_by_one(mechanism: Mechanism, targets: Floats, starts: Geometric | None = None) -> Callable[[], object]:
     """What answers targets (n, 4, 4), each by a whole call of the kernel from a start of its own; default: home."""
     form = closed_form(mechanism)
-    loop = _loop(form.kernel)
-    actuators, status = np.empty((len(targets), len(mechanism.actuator_names))), np.empty(len(targets), np.int8)
+    call = _call(form.kernel)
+    actuators, status = np.empty((len(targets), len(mechanism.actuator_names))), np.empty(len(targets), np.int64)
     seeds = np.asarray(form.home if starts is None else starts.actuators)
-    return lambda: loop(form.plan, targets, seeds, starts is None, actuators, status)
+    return lambda: call(form.plan, targets, seeds, starts is None, actuators, status, len(targets))
 
 
 @lru_cache(maxsize=8)
-def _loop(closed_form: Any) -> Any:
-    """The compiled loop over a kernel; returns how many targets are no poses."""
+def _call(solve: Any) -> Any:
+    """What calls a closed form for one of its targets."""
+    return for_each(FunctionType(call_for_one.__code__, globals() | {"solve": solve}, call_for_one.__name__))
 
-    @kernel
-    def loop(plan: Any, targets: Floats, seeds: Floats, at_home: bool, actuators: Floats, status: Statuses) -> int:
-        invalid = 0
-        for i in range(targets.shape[0]):
-            k = i if seeds.shape[0] > 1 else 0
-            own, status_of_it = actuators[i : i + 1], status[i : i + 1]
-            invalid += closed_form(plan, targets[i : i + 1], seeds[k : k + 1], at_home, own, status_of_it)
-        return invalid
 
-    return loop
+def call_for_one(
+    plan: Any, targets: Floats, seeds: Floats, at_home: bool, actuators: Floats, status: Statuses, i: int
+) -> int:
+    """A call of `solve`, a global of the function that is compiled, for target `i`; 1 if that is no pose."""
+    k = i if seeds.shape[0] > 1 else 0
+    own, status_of_it = actuators[i : i + 1], status[i : i + 1]
+    return solve(plan, targets[i : i + 1], seeds[k : k + 1], at_home, own, status_of_it)  # type: ignore[name-defined]  # noqa: F821

@@ -8,11 +8,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from building.on_call import routine
+
 from ..arrays import Floats
 from ..tolerances import ROTATION_MATRIX
-from .compiled import routine
 
-Statuses: TypeAlias = NDArray[np.int8]
+Statuses: TypeAlias = NDArray[np.int64]
 
 # What became of a row.
 MISSED, REACHED, INVALID = 0, 1, 2
