@@ -29,12 +29,9 @@ docs: $(STAMP)
 	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@$(BIN)/zensical build --clean --strict
 
-# In parallel. The routines that kernels are made of are tested as plain Python: compiled alone, each would take longer
-# than its tests.
-ROUTINES := tests/test_kernels.py tests/test_quadratic.py tests/test_platform_kernels.py
-
+# In parallel. What kernels with handles are made of is tested as plain Python.
 test: $(STAMP) $(MODULE)
-	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(ROUTINES)
+	@PFABRIK_KERNELS=python $(BIN)/python -m pytest tests/test_platform_kernels.py
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 # The programs of the pages again, with the linear algebra of other processors.
@@ -53,13 +50,10 @@ test-tensors: $(STAMP)
 
 # The same tests with the kernels as plain Python: this run sees every line, so it measures coverage.
 test-interpreted: $(STAMP)
-	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not slow and not campaign" --cov --cov-report=term
+	@PFABRIK_KERNELS=python $(BIN)/python -m pytest -m "not slow and not campaign" --cov --cov-report=term
 
 # Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
 campaign: $(STAMP) $(MODULE)
-	@PFABRIK_KERNELS=numba $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or not campaign" \
-		tests/test_kernels.py tests/test_quadratic.py tests/test_compiling_ahead.py tests/test_compiled_and_interpreted.py \
-		tests/test_warm_up.py
 	@PFABRIK_HYPOTHESIS=explore $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or hypothesis"
 
 check: $(STAMP)
@@ -83,7 +77,7 @@ $(READY): pyproject.toml
 	@printf 'installing pfabrik into .venv ' >&2
 	@(while sleep 2 && kill -0 $$$$ 2>/dev/null; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
 		$(PYTHON) -m venv .venv && \
-		$(PIP) hatchling editables && $(PIP) --no-build-isolation --editable '.[jit,plot]' && echo >&2
+		$(PIP) hatchling editables numpy && $(PIP) --no-build-isolation --editable '.[plot]' && echo >&2
 	@touch $@
 
 $(MODULE): $(READY) $(KERNELS)

@@ -3,7 +3,7 @@
     .venv/bin/python .ci/wheel.py
 
 The wheel is built from the sdist, so that what the sdist lacks is missed. It is installed outside the checkout, for
-each Python from 3.11 on that is found, without Numba: the kernels are in it, as `building/try_wheel.py` shows.
+each Python from 3.11 on that is found: the kernels are in it, as `building/try_wheel.py` shows.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ NOT_PACKED = (".ci/", ".github/", ".gitignore")
 """Beginnings of tracked names that the sdist leaves out."""
 ADDED = ("PKG-INFO", ".gitignore")
 """Files that a build adds to an sdist."""
+TRANSLATED = "build/kernels/"
+"""Where an sdist has the kernels in C, which are not tracked."""
 BUILT = "pfabrik/kernels/"
 """Where a wheel may have files that are made when it is built: kernels compiled ahead."""
 
@@ -74,7 +76,10 @@ def differences(sdist: Path, wheel: Path) -> Iterator[str]:
     with tarfile.open(sdist) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames()}
     expected = {name for name in tracked if not name.startswith(NOT_PACKED)}
-    yield from compared(sdist.name, packed - set(ADDED), expected)
+    translated = {name for name in packed if name.startswith(TRANSLATED)}
+    if not {f"{TRANSLATED}table.h", f"{TRANSLATED}sources.sha256"} < translated:
+        yield f"{sdist.name}: the kernels in C are missing"
+    yield from compared(sdist.name, packed - set(ADDED) - translated, expected)
     with zipfile.ZipFile(wheel) as zipped:
         installed = {name for name in zipped.namelist() if ".dist-info/" not in name}
     package = {name.removeprefix("src/") for name in tracked if name.startswith("src/")}

@@ -40,7 +40,6 @@ def viewer(runs: int) -> Iterator[Row]:
     if find_spec("viser") is None:
         return
     machine = pf.load("stewart")
-    pf.warm_up(machine)
     with pf.view(machine, port=18280) as shown:
         targets = [pf.pose((0.0, 0.0, z)) for z in np.linspace(150.0, 290.0, 50)]
 

@@ -269,7 +269,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--into", type=Path, default=ROOT / "src" / "pfabrik" / "kernels", help="folder of the module")
     parser.add_argument("--checked", action="store_true", help="stop at an index outside its array, and for sanitizers")
+    parser.add_argument("--translate", action="store_true", help="write the C only")
     given = parser.parse_args()
+    if given.translate:
+        translate()
+        return 0
     platform = macros()
     if platform is None:
         return UNABLE

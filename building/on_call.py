@@ -124,7 +124,7 @@ def compiled(function: Callable[..., Any], arguments: tuple[Any, ...], is_repeat
         building.write(module.with_name("table.h"), table.encode())
         object_file = source.with_suffix(".o")
         building.run([*command, "-c", str(source), "-o", str(object_file)])
-        building.link(defined, [object_file], module.parent, module)
+        building.link(defined, [object_file], module.parent, module, [])
     return cast(Callable[..., Any], getattr(load(module), name))
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-os.environ["NUMBA_DISABLE_JIT"] = "1"
+os.environ["PFABRIK_KERNELS"] = "python"
 os.environ["PFABRIK_KERNELS"] = "python"
 sys.path.insert(0, str(Path(__file__).parents[1] / "src"))
 

@@ -6,7 +6,6 @@ Twice, from what an answer tells: by the positions of joint centres, and by the 
 from __future__ import annotations
 
 import dataclasses
-import os
 from functools import lru_cache
 from itertools import combinations
 
@@ -18,9 +17,10 @@ import pfabrik as pf
 from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.description.home_mobility import universal_axes
 from pfabrik.description.task import task_of
+from pfabrik.kernels._shipped import IS_INTERPRETED
 
 Array = NDArray[np.float64]
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+INTERPRETED = IS_INTERPRETED
 """Kernels run as plain Python, a hundred times slower."""
 
 

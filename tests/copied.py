@@ -26,9 +26,7 @@ def copied(folder: Path, name: str) -> ModuleType:
 
 
 def copy_kernels(folder: Path) -> None:
-    """Copy what compiles kernels, without the compiled ones: Numba compiles there."""
-    own = Path(kernels.__file__).parent
-    for source in [*own.glob("*.py"), *own.glob("_numba/*.py")]:
-        copy = folder / source.relative_to(own)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_bytes(source.read_bytes())
+    """Copy what chooses the code that runs, without the compiled kernels."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for source in Path(kernels.__file__).parent.glob("*.py"):
+        (folder / source.name).write_bytes(source.read_bytes())

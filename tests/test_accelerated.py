@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,12 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import excess_of_joints, gap_of_joints
+from checks import INTERPRETED, excess_of_joints, gap_of_joints
 from machines import MACHINES
 from machines.trunks import ARMS, TRUNKS
 from pfabrik import Mechanism, Options, Status
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
 ACCELERATED = replace(Options.accelerated(), working_mode="any")

@@ -19,7 +19,6 @@ import click
 
 import pfabrik as pf
 from pfabrik.cli import main
-from pfabrik.kernels._shipped import COMPILES
 
 PACKAGE = Path(pf.__file__).parent
 SOURCES = sorted(path for path in PACKAGE.rglob("*.py") if path.stem != "__main__")
@@ -193,7 +192,7 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
     return [tuple(each) for each in json.loads(told)], said
 
 
-HEAVY = "numpy numba scipy matplotlib rich mujoco viser trimesh yaml"
+HEAVY = "numpy scipy matplotlib rich mujoco viser trimesh yaml"
 HELP = [["--help"], *[[command, "--help"] for command in main.subcommands]]
 WRONG = [
     ["chek"],
@@ -220,8 +219,8 @@ def test_the_help_of_all_commands_says_what_theirs_says() -> None:
         assert line == " ".join(command.help.partition("\n\n")[0].split()), name
 
 
-def test_wrong_input_loads_no_kernels_and_no_pictures() -> None:
-    told, said = loaded_by("numba matplotlib scipy", WRONG)
+def test_wrong_input_loads_no_pictures() -> None:
+    told, said = loaded_by("matplotlib scipy", WRONG)
     assert told == [(None, []), *[(2, [])] * len(WRONG)]
     assert "Traceback" not in said
 
@@ -231,11 +230,10 @@ def test_no_command_loads_what_it_does_not_use(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     height = str(pf.load("delta").reference_point[2])
     path.write_text(f"x,y,z\n0,0,{height}\n1,0,{height}\n", encoding="utf-8")
-    kernels = "numpy numba" if COMPILES else "numpy"
     groups = {
         "": [["catalog"], ["new"], ["new", "hexapod"]],
         "numpy ": [["info", "stewart"], ["check", "stewart"], ["export", "stewart", "mjcf"]],
-        kernels: [
+        "numpy": [
             *(["ik", "delta", "--position", "0", "0", height], ["fk", "delta", "0", "0", "0"], ["travel", "delta"]),
             *(["speed", "delta", "--speed", "5"], ["track", "delta", str(path), "-o", "-"]),
             ["time", "delta", str(path), "--speed", "5", "--acceleration", "50"],
@@ -243,19 +241,19 @@ def test_no_command_loads_what_it_does_not_use(tmp_path: Path) -> None:
         ],
     }
     lines = [line for group in groups.values() for line in group]
-    told, _ = loaded_by("numpy numba matplotlib rich mujoco viser trimesh", lines)
+    told, _ = loaded_by("numpy matplotlib rich mujoco viser trimesh", lines)
     assert [loaded for _, loaded in told[1:]] == [names.split() for names, group in groups.items() for _ in group]
     assert [code for code, _ in told[1:]] == [0] * len(lines)
 
 
-def test_pictures_need_no_kernels_and_checks_no_pictures(tmp_path: Path) -> None:
+def test_checks_need_no_pictures(tmp_path: Path) -> None:
     lines = [["info", "delta"], ["plot", "delta", "-o", str(tmp_path / "delta.png")]]
-    told, _ = loaded_by("numba matplotlib", lines)
+    told, _ = loaded_by("matplotlib", lines)
     assert told == [(None, []), (0, []), (0, ["matplotlib"])]
 
 
-def test_a_wrong_name_is_told_without_the_kernels() -> None:
-    told, said = loaded_by("numba", [["fk", "stewart", "1", "2"], ["ik", "stewrt", "--rpy", "0", "0", "1"]])
+def test_a_wrong_name_is_told() -> None:
+    told, said = loaded_by("scipy", [["fk", "stewart", "1", "2"], ["ik", "stewrt", "--rpy", "0", "0", "1"]])
     assert told == [(None, []), (2, []), (2, [])]
     assert "did you mean 'stewart'" in said
 

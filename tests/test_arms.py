@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
-from checks import actuator_units, excess_of_joints, gap_of_joints
+from checks import INTERPRETED, actuator_units, excess_of_joints, gap_of_joints
 from machines.trunks import arms
 from oracles.arms import redundant_margin
 from pfabrik.closure.closure_engine import ClosureEngine
@@ -27,7 +26,7 @@ from pfabrik.platform.legs_engine import LegsEngine
 from pfabrik.platform.redundant_joints import step_redundant_joints
 from pfabrik.platform.table import table_handle
 
-slow_interpreted = pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"), reason="minutes")
+slow_interpreted = pytest.mark.skipif(INTERPRETED, reason="minutes")
 
 RAILS = """
 schema = 1

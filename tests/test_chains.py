@@ -5,7 +5,6 @@ Poses are checked by products of rotations written here, limits by own arithmeti
 
 from __future__ import annotations
 
-import os
 import time
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from checks import INTERPRETED
 from pfabrik import Cone, Joint, Mechanism, Status
 from pfabrik.chains.chain_engine import ChainEngine
 from pfabrik.closure.closure_engine import ClosureEngine
@@ -22,7 +22,6 @@ from pfabrik.engine import engine_of
 from pfabrik.model import model_of
 
 Array = NDArray[np.float64]
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 FEW, MANY = (4, 8) if INTERPRETED else (40, 200)
 

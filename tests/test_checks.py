@@ -70,7 +70,6 @@ WRONG: dict[str, Callable[[pf.Mechanism], Any]] = {
     "orientation: found": lambda machine: pf.workspace(machine, orientation=10**400),
     "start: found a ragged nest": lambda machine: pf.workspace(machine, start=[[1, 2], [3]]),
     "on_progress: found": lambda machine: pf.track(machine, ARRAY, on_progress=3),
-    "on_step: found": lambda machine: pf.warm_up(machine, on_step=3),
     "no joint named '3'": lambda machine: pf.solve_ik(machine, {3: 4}),
     "limits: found": lambda machine: machine.with_limits(3),
     "no joint named": lambda machine: machine.joint([]),

@@ -4,7 +4,6 @@ same."""
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from checks import INTERPRETED
 from in_mujoco import Model, mujoco
 from machines import closure
 from pfabrik.description.links import links_of
@@ -20,7 +20,6 @@ from pfabrik.files.units import metres_of
 from pfabrik.interop import from_mjcf, to_mjcf, verify
 from pfabrik.interop.referee_configurations import reached_at_random
 
-INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 NAMES = pf.catalog()
 FEW, ALL = (1 if INTERPRETED else 4), 100
 POSES = [FEW, pytest.param(ALL, marks=pytest.mark.campaign)]

@@ -1,7 +1,6 @@
 """The routines that kernels are made of, one by one, against NumPy, SciPy, brute force and finite differences.
 
-Routines are only callable from compiled code: each is called through a kernel of its own here. To compile these takes
-longer than all else, so `make test` runs them as plain Python, and a campaign compiled.
+They are plain Python here, whichever code the kernels are: a translation is compared with its source elsewhere.
 """
 
 from __future__ import annotations
@@ -16,74 +15,55 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from checks import INTERPRETED
 from machines import MACHINES
 from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, quaternions, vectors
-from pfabrik.kernels._jit import kernel
-from pfabrik.kernels._shipped import LIBRARY
 from pfabrik.kernels.legs import complete_poses
 from pfabrik.kernels.reaching import half_spaces, moving_frames, restrict, solve
 from pfabrik.kernels.reaching import passes as reach
 from pfabrik.kernels.reaching import plan as P
 
-if LIBRARY is not None:
-    pytest.skip("only Numba compiles kernels of tests", allow_module_level=True)
-
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),
-    *([] if INTERPRETED else [pytest.mark.campaign]),
-]
+pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
 
-@kernel
 def clamp_cone(axis, half_angle, d):
     return restrict.clamp_cone(axis, half_angle, d)
 
 
-@kernel
 def clamp_stroke(length, lo, hi):
     return restrict.clamp_stroke(length, lo, hi)
 
 
-@kernel
 def angle_between(a, b):
     return vectors.angle_between(a, b)
 
 
-@kernel
 def wrap(angle, centre):
     return vectors.wrap(angle, centre)
 
 
-@kernel
 def difference(A, B, out):
     quaternions.difference(A, B, out)
 
 
-@kernel
 def turn_pose(T, w):
     complete_poses.turn_pose(T, w)
     complete_poses.orthonormalise(T)
 
 
-@kernel
 def solve_spd(A, n, damping):
     return linear.solve_spd(A, n, damping)
 
 
-@kernel
 def room(plan):
     return solve.new_configuration(plan)
 
 
-@kernel
 def move_carriers(plan, now):
     moving_frames.move_carriers(plan, now)
 
 
-@kernel
 def pass_once(plan, b, now, forward):
     if forward:
         reach.reach_forward(plan, b, now)
@@ -91,7 +71,6 @@ def pass_once(plan, b, now, forward):
         reach.reach_backward(plan, b, now)
 
 
-@kernel
 def asks_of(plan, b, now, settings, column, free, goal):
     asks = half_spaces.new_asks(plan)
     asks.goal[:] = goal
@@ -101,7 +80,6 @@ def asks_of(plan, b, now, settings, column, free, goal):
     return gap, asks.problem.G[:k, :-1].copy(), asks.problem.h[:k].copy(), asks.equal[:k].copy()
 
 
-@kernel
 def least_step(plan, rows, h, equal):
     asks = half_spaces.new_asks(plan)
     k, n = rows.shape
@@ -114,7 +92,6 @@ def least_step(plan, rows, h, equal):
     return asks.x[:n].copy()
 
 
-@kernel
 def place_ends(plan, now):
     for c in range(plan.chains.shape[0]):
         moving_frames.place_ends(plan, c, now)

@@ -13,8 +13,6 @@ from typing import Any
 
 import pytest
 
-import pfabrik as pf
-
 pytest.importorskip("matplotlib")
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
@@ -78,19 +76,6 @@ def test_cells_of_notebooks_run_one_after_the_other(path: Path, capsys: pytest.C
             html.parser.HTMLParser().feed(text)
             tables += "<table" in text
     assert tables >= 2
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=IDS)
-@pytest.mark.usefixtures("folder")
-def test_the_first_cell_compiles_everything_in_silence(
-    path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def announce() -> None:
-        sys.stderr.write("pfabrik: compiling a kernel ...")
-
-    monkeypatch.setattr(pf, "warm_up", announce)  # without a machine: it is all that is compiled then
-    run_cell("".join(cells_of(path, "code")[0]["source"]), {"__name__": "__main__"})
     assert capsys.readouterr().err == ""
 
 

@@ -5,18 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from checks import INTERPRETED
-from pfabrik.kernels._jit import kernel
-from pfabrik.kernels._shipped import LIBRARY
 from pfabrik.kernels.qp import factorise, new_qp, solve_qp
 
-if LIBRARY is not None:
-    pytest.skip("only Numba compiles kernels of tests", allow_module_level=True)
 
-pytestmark = [] if INTERPRETED else [pytest.mark.campaign]  # a kernel of its own, as in `test_kernels`
-
-
-@kernel
 def solve(
     H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray, x: np.ndarray, multipliers: np.ndarray
 ) -> tuple[bool, bool]:

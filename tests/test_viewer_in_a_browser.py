@@ -81,7 +81,6 @@ def in_the_scene(page: Any, path: Path) -> np.ndarray:
 
 def test_a_target_dragged_beyond_a_stroke_names_the_limit_and_nothing_leaves_this_computer(browser: Any) -> None:
     machine = pf.load("stewart")
-    pf.warm_up(machine)
     with pf.view(machine, port=18180) as viewer:
         page, asked = opened(browser, viewer.url)
         page.add_style_tag(content=WITHOUT_NOTICES)

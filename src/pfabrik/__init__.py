@@ -100,7 +100,6 @@ _NAMES = {
     "view.machine": ("plot",),
     "view.plot_track": ("plot_track",),
     "view.plot_travel": ("plot_travel",),
-    "warm_up": ("warm_up",),
     "workspace.ask": ("workspace",),
     "workspace.inscribed": ("Inscribed",),
     "workspace.largest": ("Largest", "largest"),
@@ -187,7 +186,6 @@ if TYPE_CHECKING:
     from .view.machine import plot as plot
     from .view.plot_track import plot_track as plot_track
     from .view.plot_travel import plot_travel as plot_travel
-    from .warm_up import warm_up as warm_up
     from .workspace.ask import workspace as workspace
     from .workspace.inscribed import Inscribed as Inscribed
     from .workspace.largest import Largest as Largest, largest as largest

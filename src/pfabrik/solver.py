@@ -16,6 +16,7 @@ from .closure.configurations import new_rows
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of, inverse_engine_of
 from .errors import InvalidArgument
+from .first_answers import prepare
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
 from .model import model_of
@@ -23,7 +24,6 @@ from .motion.tilt_axis import along_tilt, tilt_axis
 from .options import Options, checked_options
 from .poses import DOUBLE
 from .targets import Target
-from .warm_up import warm_up
 
 
 class Solver:
@@ -44,7 +44,7 @@ class Solver:
     """
 
     def __init__(self, mechanism: Mechanism, *, start: Start | None = None, options: Options | None = None) -> None:
-        """Compile or load all kernels.
+        """Prepare what answers need, which takes tenths of a second.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Solver:
         """
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
         self._start, begin = start, start_of(mechanism, start, ())
-        warm_up(mechanism)
+        prepare(mechanism)
         inverse, keep_mode = inverse_engine_of(mechanism, self.options), keeps_mode(self.options, start)
         self._rows, self._target = new_rows(model_of(mechanism), 1), np.eye(4)[None]
         self._prepared = inverse.prepared(self._target, begin, self._rows, keep_mode=keep_mode)

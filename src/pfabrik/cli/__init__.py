@@ -31,7 +31,6 @@ __all__ = ["main"]
         "import": "Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.",
         "export": "Write a mechanism for another program.",
         "verify": "Compare answers with those of MuJoCo.",
-        "compile": "Compile all kernels ahead.",
         "demo": "Follow circles that leave the workspace.",
     },
     invoke_without_command=True,

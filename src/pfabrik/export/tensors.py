@@ -27,7 +27,7 @@ def export_tensors(
     backend: Backend = "numpy",
     joints: str | Sequence[str] = TASK,
 ) -> Path:
-    """Write a mechanism's kinematics as one Python file of tensors, which needs neither this library nor Numba.
+    """Write a mechanism's kinematics as one Python file of tensors, which needs this library no more.
 
     Its functions take any leading shape, float64 or float32, and the device of what they are given; with PyTorch and
     JAX they have derivatives, by the machine's dimensions too. Actuators, Jacobians and margins come in closed form, in

@@ -10,14 +10,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from . import NoKernels
+
 HERE = Path(__file__).parent
 
 CHOICE = "PFABRIK_KERNELS"
 """Environment variable: `python`, `compiled`, or a level of the compiled kernels, `v2`; else what is there."""
-
-
-class NoKernels(ImportError):
-    """The compiled kernels that were asked for are not there; the message says what to do."""
 
 
 def name_of(function: Callable[..., Any]) -> str:
@@ -87,3 +85,6 @@ def choose() -> Library | None:
 
 
 LIBRARY = choose()
+
+IS_INTERPRETED = LIBRARY is None
+"""Kernels run as plain Python, which needs no compiler: the same answers, far slower."""

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from . import IS_INTERPRETED
+from ._shipped import IS_INTERPRETED
 
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays, and of such NamedTuples
 

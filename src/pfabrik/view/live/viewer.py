@@ -17,7 +17,7 @@ from ...description.mechanism import Mechanism
 from ...errors import InvalidArgument, PfabrikError
 from ...extras import require
 from ...files import load
-from ...warm_up import warm_up
+from ...first_answers import prepare
 from ...whole_files import whole_path
 from .live_machine import LiveMachine, Shown, checked
 from .newest import Newest
@@ -243,11 +243,11 @@ class Viewer:
             self._prepare()
 
     def _prepare(self) -> None:
-        """Compile the kernels of answers ahead, since that takes longer than a motion of the mouse."""
+        """Do ahead what first answers prepare, since that takes longer than a motion of the mouse."""
         mechanism, panel = self.mechanism, self._stage.panel
         if mechanism != self._ready:
-            panel.tell("getting ready; a new version compiles what answers need, once …")
-            warm_up(mechanism)
+            panel.tell("getting ready …")
+            prepare(mechanism)
             self._ready = mechanism
             panel.tell("")
         with self._lock:
