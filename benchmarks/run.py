@@ -6,7 +6,6 @@ import argparse
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -53,13 +52,6 @@ start = time.process_time()
 import pfabrik as pf
 m = pf.load("{}")
 pf.solve_ik(m, m.home_pose)
-print(time.process_time() - start)
-"""
-COMPILE = """
-import time
-start = time.process_time()
-from pfabrik.kernels.ahead import compile_all
-compile_all()
 print(time.process_time() - start)
 """
 IMPORT = "import time; start = time.perf_counter(); import pfabrik; print(time.perf_counter() - start)"
@@ -174,35 +166,29 @@ def projected(
 
 
 def start_up(runs: int) -> Iterator[Row]:
-    """New processes: with an empty kernel cache, then with a full one."""
-    with tempfile.TemporaryDirectory() as cache:
-        environment = os.environ | {"NUMBA_CACHE_DIR": cache, "PYTHONPATH": os.pathsep.join(sys.path)}
+    """New processes."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
-        def measured(code: str, variables: dict[str, str] = environment) -> float:
-            command = [sys.executable, "-c", code]
-            return float(subprocess.run(command, env=variables, check=True, capture_output=True, text=True).stdout)
+    def measured(code: str) -> float:
+        command = [sys.executable, "-c", code]
+        return float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
 
-        def run(*arguments: str) -> None:
-            subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True)
+    def run(*arguments: str) -> None:
+        subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True)
 
-        command_line = partial(run, "-m", "pfabrik", "ik", "stewart", "--position", "10", "0", "190")
-        for name, what in (("stewart", "6-UPS"), ("delta", "delta")):
-            with tempfile.TemporaryDirectory() as empty:
-                first = environment | {"NUMBA_CACHE_DIR": empty}
-                yield Row(f"{what}: first answer, in an empty cache", 1, measured(FIRST_ANSWER.format(name), first))
-        with tempfile.TemporaryDirectory() as empty:
-            compiled = measured(COMPILE, environment | {"NUMBA_CACHE_DIR": empty})
-            yield Row("every kernel compiled, processor time", 1, compiled)
-        yield Row("compile and use what most questions need, in an empty cache", 1, measured(USE_EVERYTHING))
-        yield Row("the same with the cache filled", 1, min(measured(USE_EVERYTHING) for _ in range(runs)))
-        ours, theirs = best_times(runs, command_line, partial(run, "-c", "import numba"))
-        yield Row("pfabrik ik stewart --position 10 0 190, warm", 1, ours, 'python -c "import numba"', theirs)
-        yield Row("import pfabrik", 1, min(measured(IMPORT) for _ in range(runs)))
+    for name, what in (("stewart", "6-UPS"), ("delta", "delta")):
+        first = min(measured(FIRST_ANSWER.format(name)) for _ in range(runs))
+        yield Row(f"{what}: first answer of a process", 1, first)
+    yield Row("what most questions need, in a new process", 1, min(measured(USE_EVERYTHING) for _ in range(runs)))
+    command_line = partial(run, "-m", "pfabrik", "ik", "stewart", "--position", "10", "0", "190")
+    ours, theirs = best_times(runs, command_line, partial(run, "-c", "import numpy"))
+    yield Row("pfabrik ik stewart --position 10 0 190", 1, ours, 'python -c "import numpy"', theirs)
+    yield Row("import pfabrik", 1, min(measured(IMPORT) for _ in range(runs)))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer poses and runs, kernels not compiled anew")
+    parser.add_argument("--quick", action="store_true", help="fewer poses and runs, no new processes")
     parser.add_argument("--markdown", action="store_true", help="the table as the page docs/benchmarks.md")
     given = parser.parse_args()
     where, runs, rng = machine(), (3 if given.quick else 15), np.random.default_rng(1)

@@ -1,9 +1,11 @@
-"""Answers of compiled kernels, at every level of the processor, against Numba's: how many numbers differ in a bit.
+"""Answers of compiled kernels, at every level of the processor, against saved ones: how many numbers differ in a bit.
 
-python benchmarks/same_bits.py [--targets 2000] [--only NAME …] [--against numba]
+python benchmarks/same_bits.py --save FILE.npz [--targets 2000] [--only NAME …]
+python benchmarks/same_bits.py --against FILE.npz
 
 Every machine of the catalogue is asked for targets near home and for some far away: inverse and forward kinematics, a
-path, all joint coordinates, margins. It ends with 1 where anything differs.
+path, all joint coordinates, margins. Save before a change, and compare after it, on one processor: the second asks for
+what the file has. It ends with 1 where anything differs.
 """
 
 from __future__ import annotations
@@ -55,7 +57,11 @@ def write(path: Path, counts: dict[str, int]) -> None:
     """Answer in this process, and write what was answered."""
     warnings.simplefilter("ignore")
     kept = {f"{name}|{what}": array for name, n in counts.items() for what, array in answers(name, n).items()}
-    np.savez(path, **kept)
+    np.savez(path, **kept, **{f"{name}{COUNT}": np.array(n) for name, n in counts.items()})
+
+
+COUNT = "|targets"
+"""Ends the names of what says how many targets a machine is asked for."""
 
 
 def run(choice: str, path: Path, counts: dict[str, int]) -> None:
@@ -78,8 +84,10 @@ def main() -> int:
     parser.add_argument("--targets", type=int, default=2000)
     parser.add_argument("--seconds", type=float, default=20.0, help="most for a machine, about")
     parser.add_argument("--only", nargs="+", metavar="NAME")
-    parser.add_argument("--against", default="numba", help="a value of PFABRIK_KERNELS")
-    parser.add_argument("--write", nargs="+", help=argparse.SUPPRESS)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--save", type=Path, metavar="FILE", help="write the answers of the best level")
+    what.add_argument("--against", type=Path, metavar="FILE", help="compare the answers of every level with these")
+    what.add_argument("--write", nargs="+", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.write:
         path, *counts = given.write
@@ -90,21 +98,29 @@ def main() -> int:
     if LIBRARY is None:
         sys.exit("there are no compiled kernels to compare: run `make`")
     warnings.simplefilter("ignore")
-    counts = {name: affordable(name, given.targets, given.seconds) for name in given.only or pf.catalog()}
-    print(f"{len(counts)} machines, {sum(counts.values())} targets", flush=True)
+    if given.save:
+        asked = {name: affordable(name, given.targets, given.seconds) for name in given.only or pf.catalog()}
+        run("compiled", given.save, asked)
+        return 0
+    return compare(given.against, LIBRARY.module.LEVELS or ("compiled",), given.only)
+
+
+def compare(path: Path, choices: tuple[str, ...], only: list[str] | None) -> int:
+    """Print how many numbers of each choice differ from those of a file; 1 if any does."""
+    saved, failed = np.load(path), 0
+    asked = {key.removesuffix(COUNT): int(saved[key]) for key in saved.files if key.endswith(COUNT)}
+    asked = {name: n for name, n in asked.items() if only is None or name in only}
+    keys = [key for key in saved.files if key.partition("|")[0] in asked and not key.endswith(COUNT)]
+    print(f"{len(asked)} machines, {sum(asked.values())} targets", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        run(given.against, Path(folder) / "one.npz", counts)
-        one, failed = np.load(Path(folder) / "one.npz"), 0
-        for choice in LIBRARY.module.LEVELS or ("compiled",):
-            run(choice, Path(folder) / "other.npz", counts)
+        for choice in choices:
+            run(choice, Path(folder) / "other.npz", asked)
             other = np.load(Path(folder) / "other.npz")
-            off = {key: different(one[key], other[key]) for key in one.files}
+            off = {key: different(saved[key], other[key]) if key in other else saved[key].size for key in keys}
             told = [f"{key} {count}" for key, count in off.items() if count]
             failed += len(told)
-            total = sum(one[key].size for key in one.files)
-            print(
-                f"{choice} against {given.against}: {total} numbers, {sum(off.values())} differ", *told[:8], flush=True
-            )
+            total = sum(saved[key].size for key in keys)
+            print(f"{choice} against {path}: {total} numbers, {sum(off.values())} differ", *told[:8], flush=True)
     return int(failed > 0)
 
 
