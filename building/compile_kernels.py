@@ -133,7 +133,8 @@ def translate() -> None:
     from pfabrik.kernels.ahead import KERNELS
     from pfabrik.to_c import Program
 
-    program, table, entries = Program(), [], {}
+    program, table = Program(), list[Kernel]()
+    entries: dict[str, list[str]] = {}
     for kernel, arguments in KERNELS:
         name = name_of(kernel)
         group = "blocks" if name in LEVELLED else ALONE.get(name) or name.partition(".")[0]
@@ -170,7 +171,7 @@ def write(path: Path, data: bytes) -> None:
 
 def table_of(kernels: list[Kernel]) -> str:
     """The C text of the table of kernels; of those that are there for each level of a processor, too."""
-    declared, rows = [], []
+    declared, rows = list[str](), list[str]()
     for kernel in kernels:
         plain = kernel.name.replace(".", "_")
         rest = f"\"{kernel.takes}\", '{kernel.gives}', {kernel.words}"

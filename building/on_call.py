@@ -49,9 +49,12 @@ def for_each(function: F) -> F:
 
     Each has memory of its own, as a call from Python has.
     """
-    if LIBRARY is None:
-        return cast(F, lambda *given: sum(function(*given[:-1], index) for index in range(given[-1])))
-    return cast(F, OnCall(function, is_repeated=True))
+    return cast(F, repeated(function) if LIBRARY is None else OnCall(function, is_repeated=True))
+
+
+def repeated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same in plain Python."""
+    return lambda *given: sum(function(*given[:-1], index) for index in range(given[-1]))
 
 
 REPEATED = """
@@ -103,7 +106,7 @@ def compiled(function: Callable[..., Any], arguments: tuple[Any, ...], is_repeat
     """A function for arguments of these types, compiled now or kept from before; itself without a compiler."""
     defined = platform()
     if defined is None:
-        return function
+        return repeated(function) if is_repeated else function
     program, name = Program(), function.__name__
     program.records = named_records() | records_of(function.__module__.partition(".")[0])
     SOURCES.setdefault(function, Source(function, "kernel"))

@@ -21,7 +21,6 @@ COLOURS = 64  # enough for smooth edges, and a third of the file
 def main() -> None:
     """Write the picture: a target beyond a machine's strokes."""
     machine = pf.load("stewart")
-    pf.warm_up(machine)
     with pf.view(machine) as viewer, sync_playwright() as started:
         chromium = started.chromium.launch(executable_path=shutil.which("chromium"), args=SOFTWARE)
         page = chromium.new_page(viewport=SIZE)
