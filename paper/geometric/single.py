@@ -15,7 +15,7 @@ from pfabrik import Mechanism
 from ..arrays import Floats
 from .ik import Geometric
 from .targets import Statuses
-from .topologies import closed_form
+from .topologies import Kernel, closed_form
 
 
 def one_by_one(mechanism: Mechanism, targets: Floats, starts: Geometric | None = None) -> Callable[[], object]:
@@ -33,10 +33,14 @@ def _call(solve: Any) -> Any:
     return for_each(FunctionType(call_for_one.__code__, globals() | {"solve": solve}, call_for_one.__name__))
 
 
+solve: Kernel
+"""Bound where `call_for_one` is compiled for a closed form."""
+
+
 def call_for_one(
     plan: Any, targets: Floats, seeds: Floats, at_home: bool, actuators: Floats, status: Statuses, i: int
 ) -> int:
     """A call of `solve`, a global of the function that is compiled, for target `i`; 1 if that is no pose."""
     k = i if seeds.shape[0] > 1 else 0
     own, status_of_it = actuators[i : i + 1], status[i : i + 1]
-    return solve(plan, targets[i : i + 1], seeds[k : k + 1], at_home, own, status_of_it)  # type: ignore[name-defined]  # noqa: F821
+    return solve(plan, targets[i : i + 1], seeds[k : k + 1], at_home, own, status_of_it)  # noqa: F821
