@@ -209,7 +209,8 @@ def table_of(kernels: list[Kernel]) -> str:
 def compiled(source: Path, flags: list[str], name: str) -> Path:
     """The object of a C file; compiled, if there is none yet of the same text and command."""
     command = [*compiler(), *flags]
-    key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *command]).encode()).hexdigest()[:16]
+    text = re.sub(r"/\*.*?\*/", "", source.read_text(encoding="utf-8"), flags=re.DOTALL)  # comments have line numbers
+    key = hashlib.sha256("\n".join([text, *command]).encode()).hexdigest()[:16]
     made = BUILD / f"{name}-{key}.o"
     if not made.exists():
         sys.stderr.write(".")
