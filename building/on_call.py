@@ -19,10 +19,10 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from pfabrik.kernels._jit import SOURCES, Source, inlined
+from pfabrik.kernels._jit import SOURCES, Marked, inlined
 from pfabrik.kernels._shipped import LIBRARY
 from pfabrik.to_c import Program
-from pfabrik.to_c.program import named_records
+from pfabrik.to_c.c_file import named_records
 
 from . import compile_kernels as building
 
@@ -40,7 +40,7 @@ def kernel(function: F) -> F:
     if LIBRARY is None:
         return function
     made = OnCall(function)
-    SOURCES[made] = Source(function, "kernel")
+    SOURCES[made] = Marked(function, "kernel")
     return cast(F, made)
 
 
@@ -109,7 +109,7 @@ def compiled(function: Callable[..., Any], arguments: tuple[Any, ...], is_repeat
         return repeated(function) if is_repeated else function
     program, name = Program(), function.__name__
     program.records = named_records() | records_of(function.__module__.partition(".")[0])
-    SOURCES.setdefault(function, Source(function, "kernel"))
+    SOURCES.setdefault(function, Marked(function, "kernel"))
     made = program.add(function, *arguments)
     text, words = building.entry(made, f"pf_one_{name}" if is_repeated else f"pf_{name}", program.spell)
     text += REPEATED.format(name, words) if is_repeated else ""

@@ -42,7 +42,7 @@ def drawn(rng: np.random.Generator) -> dict[str, Any]:
     """An argument for each name that constructs have."""
     links = np.zeros(3, constructs.LINK)
     links["kind"], links["length"] = rng.integers(0, 3, 3), rng.normal(size=3)
-    for field in ("axis", "frame", "places"):
+    for field in ("axis", "frame", "places", "cube"):
         links[field] = rng.integers(-9, 9, links[field].shape)
     table = constructs.Table(rng.normal(size=4), links.copy(), rng.normal(size=(2, 2)))
     other = constructs.Table(rng.normal(size=5), links.copy(), rng.normal(size=(3, 1)))

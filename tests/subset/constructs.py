@@ -11,9 +11,8 @@ from pfabrik.kernels._jit import allocator, inlined, routine
 
 Floats = Any
 Ints = Any
-LINK = np.dtype(
-    [("kind", "i8"), ("length", "f8"), ("axis", "f8", (3,)), ("frame", "f8", (3, 3)), ("places", "i8", (2,))]
-)
+LINK_FIELDS = [("kind", "i8"), ("length", "f8"), ("axis", "f8", (3,)), ("frame", "f8", (3, 3)), ("places", "i8", (2,))]
+LINK = np.dtype([*LINK_FIELDS, ("cube", "f8", (2, 2, 2))])
 FIRST, SECOND, THIRD = range(3)
 WEIGHTS = (0.5, -2.0, 3.25)
 PLACES = (2, 0, 1)
@@ -198,6 +197,7 @@ def records(links: Any, x: Floats, out: Floats) -> None:
         total += link["length"] * link["frame"][1, 2] + link["axis"][k % 3] + link["places"][1]
         if link["kind"] == SECOND:
             total -= first_of(link["axis"]) + first_of(link["frame"][2])
+    links[2]["cube"][1, 0, 1] += links[2]["cube"][0][1][0]
     longest = links[0] if links[0]["length"] > links[1]["length"] else links[1]
     out[0], out[1] = total, longest["length"]
 

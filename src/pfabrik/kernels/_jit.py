@@ -15,14 +15,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 R = TypeVar("R", bound=tuple[Any, ...])  # a NamedTuple of arrays
 
 
-class Source(NamedTuple):
+class Marked(NamedTuple):
     """A function of Python that a decorator was given, and the decorator's name."""
 
     function: Any
     kind: str
 
 
-SOURCES: dict[Any, Source] = {}
+SOURCES: dict[Any, Marked] = {}
 """What each decorated function was made of, for the translation to C."""
 
 OPENERS: dict[Any, tuple[Any, ...]] = {}
@@ -30,7 +30,7 @@ OPENERS: dict[Any, tuple[Any, ...]] = {}
 
 
 def _marked(function: F, kind: str, made: Any) -> F:
-    SOURCES[made] = Source(function, kind)
+    SOURCES[made] = Marked(function, kind)
     return cast(F, made)
 
 

@@ -7,15 +7,13 @@ import builtins
 import math
 from collections.abc import Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .c_file import File
 from .flow import Flow
 from .naming import c_name, is_simple
 from .types import BOOL, INTEGER, NUMBERS, REAL, Array, Struct, Tuple, Unsupported, join
 from .values import EQUAL, NONE, POSTFIX, UNARY, UNKNOWN, Value, conflict, effects
-
-if TYPE_CHECKING:
-    from .program import Program
 
 ANNOTATED = {"float": REAL, "int": INTEGER, "bool": BOOL}
 
@@ -23,7 +21,7 @@ ANNOTATED = {"float": REAL, "int": INTEGER, "bool": BOOL}
 class Expressions:
     """Translates the expressions of one function; what must be computed before one goes into `lines`."""
 
-    program: Program
+    program: File
     flow: Flow
     path: str
     globals: dict[str, Any]

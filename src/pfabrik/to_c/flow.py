@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Any
 
 State = tuple[frozenset[str], frozenset[str]] | None
 """Names that are set on every way to a place, and on some way; None where no way leads."""
 
 
-def names_in(node: ast.AST, context: type[ast.expr_context] | None = None) -> set[str]:
+@cache
+def names_in(node: ast.AST, context: type[ast.expr_context] | None = None) -> frozenset[str]:
     """Names within a node, of all that read or set them, or of one kind."""
-    return {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and (context is None or isinstance(n.ctx, context))}
+    return frozenset(
+        {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and (context is None or isinstance(n.ctx, context))}
+    )
 
 
 def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
@@ -74,6 +78,10 @@ class Flow:
             if len(inner) == 1 and not any(name in names_in(part) for part in head):
                 return self._home(name, inner[0])
         return mentions[0]
+
+    def at_home(self, s: ast.stmt) -> list[str]:
+        """Variables that are declared at a statement; counters of loops are declared in them."""
+        return sorted(name for name, home in self.homes.items() if home is s and name not in self.counters)
 
     def _counters(self, function: ast.FunctionDef) -> set[str]:
         """Names that only count loops: every mention is in a loop over a range that sets it, and no body sets it."""

@@ -5,17 +5,15 @@ from __future__ import annotations
 import ast
 import re
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .c_file import File
 from .expressions import ANNOTATED
 from .flow import Flow
 from .naming import c_name, comment
 from .sources import comments_of, short_path, tree_of
 from .statements import Statements
 from .types import NOTHING, Unsupported
-
-if TYPE_CHECKING:
-    from .program import Program
 
 STRANGE = (
     ast.ListComp,
@@ -38,7 +36,7 @@ MOST_PASSES = 8
 class Function(Statements):
     """A function: its text, its name, what it takes, gives, reads and writes, and whether it takes memory."""
 
-    def __init__(self, program: Program, source: Any, arguments: tuple[Any, ...]) -> None:
+    def __init__(self, program: File, source: Any, arguments: tuple[Any, ...]) -> None:
         super().__init__()
         self.program, self.source, self.arguments = program, source, arguments
         function = source.function

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from ..kernels._jit import OPENERS, SOURCES, Source
+from ..kernels._jit import OPENERS, SOURCES, Marked
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -41,9 +41,9 @@ def short_path(path: str) -> str:
     return where.relative_to(PACKAGE).as_posix() if PACKAGE in where.parents else where.name
 
 
-def source_of(called: Any) -> Source | None:
+def source_of(called: Any) -> Marked | None:
     """The function of Python that a decorator of kernels was given, with its kind; None for anything else."""
-    source: Source | None = found_in(SOURCES, called)
+    source: Marked | None = found_in(SOURCES, called)
     return source
 
 

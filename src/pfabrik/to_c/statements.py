@@ -34,9 +34,8 @@ class Statements(Calls):
             self._tell(s)
             is_whole = isinstance(s, WITH_BLOCKS)
             if is_whole or isinstance(s, ast.AugAssign):
-                for name in sorted(self.flow.homes):
-                    if self.flow.homes[name] is s and name not in self.flow.counters:
-                        self._declare(name)
+                for name in self.flow.at_home(s):
+                    self._declare(name)
             n = len(self.lines)
             getattr(self, f"do_{type(s).__name__}", self._unknown)(s)
             told = self.comments.get(s.lineno if is_whole else s.end_lineno or s.lineno)
@@ -356,7 +355,7 @@ class Statements(Calls):
         self.inside(s.body)
         self.emit("}")
 
-    def _stays(self, node: ast.expr, stop: Value, assigned: set[str]) -> bool:
+    def _stays(self, node: ast.expr, stop: Value, assigned: frozenset[str]) -> bool:
         """Whether the end of a range is the same at each turn, and costs nothing."""
         if stop.is_constant:
             return True

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 from .naming import c_name, is_simple
 from .operators import Operators
 from .types import BOOL, INTEGER, Array, Record, Tuple, element_of
-from .values import POSTFIX, PRODUCT, SUM, UNARY, Value, conflict, effects
+from .values import POSTFIX, SUM, UNARY, Value, conflict, effects
 
 
 class Subscripts(Operators):
@@ -64,9 +65,8 @@ class Subscripts(Operators):
         t, more = v.type, effects([v, *indices])
         if v.inner:
             path, shape = v.inner
-            text = indices[0].text
-            if len(shape) > 1:
-                text = f"{indices[0].at(PRODUCT)} * {shape[1]} + {indices[1].at(SUM)}"
+            inside = [f"IN({i.text}, {length})" for i, length in zip(indices, shape, strict=True)]
+            text = reduce(lambda before, k: f"({before}) * {shape[k]} + {inside[k]}", range(1, len(shape)), inside[0])
             return self.read(f"{path}[{text}]", t.element, more)
         text = v.text if is_simple(v.text) else self.keep(v).text
         places = ", ".join(i.at(SUM) for i in indices)
