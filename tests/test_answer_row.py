@@ -10,7 +10,9 @@ from oracles import targets_about
 from pfabrik import Options
 from pfabrik.kernels.handle import Handle
 from pfabrik.kernels.platform import tables as T
-from pfabrik.kernels.platform.answer_row import answer_rows, weigh_limits
+from pfabrik.kernels.platform.answer_row import weigh_limits
+from pfabrik.kernels.platform.answer_rows import answer_rows
+from pfabrik.kernels.platform.nearest import UNBOUNDED
 from pfabrik.kernels.platform.search_records import PoseSolutions, new_solutions
 from pfabrik.kernels.rows import PENDING, PROJECTED, REACHED, UNSURE
 from pfabrik.model import model_of
@@ -18,7 +20,6 @@ from pfabrik.platform.nearest import MOST_STEPS
 from pfabrik.platform.tables import limit_names, tables_of
 from pfabrik.tolerances import TOLERANCES
 
-UNBOUNDED = 2**62
 MACHINES = ("stewart", "delta", "servo_hexapod", "orthoglide", "agile_eye")
 
 
@@ -26,7 +27,7 @@ def answered(name: str, targets: np.ndarray, effort: int) -> tuple[T.Tables, T.A
     """Answers from home to targets one by one, and the steps that each took."""
     tables = tables_of(model_of(pf.load(name)), Options())
     scratch, question = T.new_answer_scratch(tables), T.Question(np.zeros(1, T.QUESTION))
-    question.asked[0] = T.BY_LEGS, T.EXACTLY, 0, 0, 0, UNBOUNDED, UNBOUNDED, effort, 0.0
+    question.asked[0] = 0, T.BY_LEGS, T.EXACTLY, 0, 0, 0, UNBOUNDED, UNBOUNDED, effort, 0.0
     handles = [Handle(each) for each in (tables, scratch, question)]
     answers, steps = new_solutions(len(targets), len(tables.legs.legs), len(tables.legs.driven)), []
     for row in range(len(targets)):

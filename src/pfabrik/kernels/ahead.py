@@ -21,8 +21,7 @@ from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.margin_blocks import margins_in_blocks
-from .platform.answer_row import answer_rows
-from .platform.assemble_row import assemble_rows
+from .platform.answer_rows import answer_rows
 from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
 from .platform.jacobians import jacobians
@@ -85,7 +84,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i F2 i i1 f2 f3 f2 f2 f2"))),
-    (assemble_rows, tuple(_values("i i i F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),
     (walk_chains, (*_values("i i"), _CHAINS[1], *_values("f3"))),
     (reach_in_chains, (*_values("i i"), *_CHAINS)),

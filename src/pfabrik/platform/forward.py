@@ -9,60 +9,41 @@ from ..batch import take, take_each
 from ..closure.configurations import new_rows
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.platform.tables import EXACTLY, IN_OTHER_MODES, NEAREST, Start
+from ..kernels.platform.tables import EXACTLY, IN_OTHER_MODES, NEAREST
 from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from ..options import Options
-from .rows_one_by_one import Answers, answer_places
+from .rows_one_by_one import Answers, Request, answer_phases
 from .single import AssemblyOutputs, scratch_of
 from .table import search_table
-from .tables import handle_of, question
 
 ROWS_A_BLOCK = 256
 
 
 def forward_kinematics(
-    model: Model,
-    values: Floats,
-    start: Start,
-    starts: Starts,
-    tolerance: float,
-    given: tuple[Rows, AssemblyOutputs] | None,
-    *,
-    has_start: bool,
-    keep_mode: bool,
+    request: Request, values: Floats, starts: Starts, given: tuple[Rows, AssemblyOutputs] | None
 ) -> Answers:
     """Configurations within all limits at actuated values (n, n_a), as of `assemble_row`; rows may be PENDING.
 
+    Readings of more actuators than freedoms, which fit nowhere else, are looked for in every assembly mode.
+
     Parameters
     ----------
-    starts : as `start`, for `assemble`.
-    keep_mode : stay in the assembly mode of the start. Readings of more actuators than freedoms, which fit nowhere
-        else, are looked for everywhere.
+    starts : the start of the request, for `assemble`.
     given : the outputs of a single row whose assembly from the start failed already.
     """
-    rows, (_, q, sides) = given or _assembled(model, values, starts)
+    rows, (_, q, sides) = given or _assembled(request.model, values, starts)
     answers, missed = Answers(rows, q, sides), np.flatnonzero(rows.status)
     if len(missed):
-        from ..kernels.platform.assemble_row import assemble_rows
-
-        tables = handle_of(model, Options(), with_seeds=not (has_start and keep_mode))
-        modes = {"has_start": has_start, "keeps_mode": keep_mode, "is_nearby": False}
-        asked = question(IN_OTHER_MODES, EXACTLY, tolerance, **modes)
-        answer_places(assemble_rows, tables, asked, values, start, answers, missed)
+        answer_phases(request, values, answers, missed, IN_OTHER_MODES, EXACTLY)
     return answers
 
 
-def project_values(model: Model, values: Floats, start: Start, tolerance: float, *, has_start: bool) -> Answers:
+def project_values(request: Request, values: Floats) -> Answers:
     """The feasible configurations whose actuators are nearest to values (n, n_a); the rest as `forward_kinematics`."""
-    from ..kernels.platform.assemble_row import assemble_rows
-
-    shape = len(values), len(model.legs.legs)
-    answers = Answers(new_rows(model, len(values)), np.empty(shape), np.empty(shape))
-    tables = handle_of(model, Options(), with_seeds=not has_start)
-    asked = question(NEAREST, NEAREST, tolerance, has_start=has_start, keeps_mode=False, is_nearby=False)
-    answer_places(assemble_rows, tables, asked, values, start, answers, np.arange(len(values)))
+    shape = len(values), len(request.model.legs.legs)
+    answers = Answers(new_rows(request.model, len(values)), np.empty(shape), np.empty(shape))
+    answer_phases(request, values, answers, np.arange(len(values)), NEAREST, NEAREST)
     return answers
 
 

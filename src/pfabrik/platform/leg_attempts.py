@@ -16,10 +16,9 @@ from ..options import Options
 from .nearest import endings
 from .nearest_pose import starts_at
 from .reach import reach
-from .rows_one_by_one import Answers
+from .rows_one_by_one import Answers, Request, answer_phases
 from .seeds import seeds_of
 from .tables import home_of
-from .unreached import answer_phases
 
 
 def attempts(
@@ -36,8 +35,8 @@ def attempts(
     answers = Answers(rows, np.full_like(sides, np.nan), sides.copy())
 
     def is_answered(phase: int) -> bool:
-        asked = {"has_start": start is not None, "keep_mode": keep_mode, "nearby": False}
-        answer_phases(model, options, target, begin, answers, np.arange(1), phase, phase, **asked)
+        request = Request(model, options, begin, start is not None, keep_mode, nearby=False)
+        answer_phases(request, target, answers, np.arange(1), phase, phase)
         return bool(rows.status[0] == REACHED)
 
     phases = [("other working modes", IN_OTHER_MODES, table.has_sides)]

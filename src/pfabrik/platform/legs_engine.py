@@ -36,11 +36,11 @@ from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
-from .rows_one_by_one import Answers
+from .rows_one_by_one import Answers, Request, answer_phases
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
 from .table import table_handle
 from .tables import home_of
-from .unreached import answer_phases, answer_unreached
+from .unreached import answer_unreached
 
 
 class LegsEngine(Engine):
@@ -137,17 +137,9 @@ class LegsEngine(Engine):
         if n_unsolved and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
             q_proximal = np.full_like(sides, np.nan)
-            answer_unreached(
-                self._model,
-                options,
-                targets,
-                self._start_of(start, start_sides),
-                Answers(rows, q_proximal, sides),
-                np.flatnonzero(rows.status != REACHED),
-                has_start=start is not None,
-                keep_mode=keep_mode,
-                nearby=nearby,
-            )
+            request = self._request(start, start_sides, options, keep_mode, nearby)
+            unreached = np.flatnonzero(rows.status != REACHED)
+            answer_unreached(request, targets, Answers(rows, q_proximal, sides), unreached)
         is_pending = rows.status != REACHED
         if q_proximal is not None:
             is_pending = rows.status >= PENDING  # or UNSURE
@@ -222,19 +214,8 @@ class LegsEngine(Engine):
         start_sides, rows = self._sides_of(start), new_rows(self._model, len(targets))
         shape = len(targets), len(self._table.legs)
         answers = Answers(rows, np.empty(shape), np.empty(shape))
-        answer_phases(
-            self._model,
-            options,
-            targets,
-            self._start_of(start, start_sides),
-            answers,
-            np.arange(len(targets)),
-            NEAREST,
-            NEAREST,
-            has_start=start is not None,
-            keep_mode=keep_mode,
-            nearby=nearby,
-        )
+        request = self._request(start, start_sides, options, keep_mode, nearby)
+        answer_phases(request, targets, answers, np.arange(len(targets)), NEAREST, NEAREST)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved):
             begin = start if start is None or len(start) == 1 else start.at(unsolved)
@@ -407,16 +388,10 @@ class LegsEngine(Engine):
             rows.actuators[:] = values
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
                 return self._single_answer(rows, solution, start, start_sides)
-        rows, q_proximal, sides = forward_kinematics(
-            self._model,
-            values,
-            self._start_of(start, start_sides),
-            self._forward_start(start, start_sides).record,
-            tolerance,
-            outputs,
-            has_start=start is not None,
-            keep_mode=keep_mode,
-        )
+        nearby = start is not None and keep_mode
+        request = self._request(start, start_sides, Options(), keep_mode, nearby, tolerance)
+        starts = self._forward_start(start, start_sides).record
+        rows, q_proximal, sides = forward_kinematics(request, values, starts, outputs)
         projected = np.flatnonzero(rows.status == PROJECTED)
         if len(projected) and not keep_mode:  # seeds are few where one freedom goes all round
             begin = start if start is None or len(start) == 1 else start.at(projected)
@@ -434,8 +409,8 @@ class LegsEngine(Engine):
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
         start_sides = self._sides_of(start)
-        own, has_start = self._start_of(start, start_sides), start is not None
-        rows, q_proximal, sides = project_values(self._model, values, own, tolerance, has_start=has_start)
+        request = self._request(start, start_sides, Options(), False, start is not None, tolerance)
+        rows, q_proximal, sides = project_values(request, values)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved):
             begin = start if start is None or len(start) == 1 else start.at(unsolved)
@@ -457,11 +432,20 @@ class LegsEngine(Engine):
             return self._single_forward.home
         return Handle(starts_at(self._model, start.rows.poses, sides))
 
-    def _start_of(self, start: Configurations | None, sides: Floats) -> Start:
-        """A start of answers, with the sides of its legs."""
-        if start is None:
-            return home_of(self._model)
-        return Start(start.rows.poses, sides, np.require(start.rows.actuators, requirements=["C", "W"]))
+    def _request(
+        self,
+        start: Configurations | None,
+        sides: Floats,
+        options: Options,
+        keep_mode: bool,
+        nearby: bool,
+        tolerance: float | None = None,
+    ) -> Request:
+        """What is asked of rows from a start with legs on some sides."""
+        own = home_of(self._model)
+        if start is not None:
+            own = Start(start.rows.poses, sides, np.require(start.rows.actuators, requirements=["C", "W"]))
+        return Request(self._model, options, own, start is not None, keep_mode, nearby, tolerance)
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""

@@ -1,8 +1,7 @@
-"""Rows answered one by one by a kernel, on all cores."""
+"""Rows of targets or actuated values answered one by one, by the kernel that knows all phases of an answer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +9,13 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..batch import put, take, take_each
-from ..kernels.handle import Handle
 from ..kernels.platform.search_records import PoseSolutions
-from ..kernels.platform.tables import Question, Start, Tables
+from ..kernels.platform.tables import IN_OTHER_MODES, Start
 from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
-from .tables import scratch_of_answers
+from ..model import Model
+from ..options import Options
+from .tables import handle_of, question_of, scratch_of_answers
 
 ROWS_A_BLOCK = 16
 
@@ -28,33 +28,39 @@ class Answers(NamedTuple):
     sides: Floats  # (n, legs): the side of each leg at the answer; at the start of rows that are not answered
 
 
-def answer_places(
-    kernel: Callable[..., int],
-    tables: Handle[Tables],
-    question: Handle[Question],
-    asked: Floats,
-    start: Start,
-    answers: Answers,
-    places: NDArray[np.intp],
-) -> None:
-    """Answer some rows of what is asked: targets by `answer_rows`, or values by `assemble_rows`.
+class Request(NamedTuple):
+    """A machine, and what is asked of all rows."""
 
-    Parameters
-    ----------
-    start : one for all rows or one for each.
-    """
+    model: Model
+    options: Options
+    start: Start  # one for all rows or one for each
+    has_start: bool  # it was given, and is not home
+    keep_mode: bool  # answers are in its working mode, or its assembly mode
+    nearby: bool  # searches stay around it, as along a path
+    tolerance: float | None = None  # of actuated values that are asked for [L or rad]; None where targets are
+
+
+def answer_phases(
+    request: Request, asked: Floats, answers: Answers, places: NDArray[np.intp], first: int, last: int
+) -> None:
+    """Answer targets (n, 4, 4), or values (n, n_a), at some places by some of the phases of `answer_row`."""
+    model, options, start, has_start, keep_mode, nearby, tolerance = request
     if len(places) < len(asked):
-        block = take(answers, places)
-        answer_places(kernel, tables, question, asked[places], take_each(start, places), block, np.arange(len(places)))
+        block, start = take(answers, places), take_each(start, places)
+        answer_phases(request._replace(start=start), asked[places], block, np.arange(len(places)), first, last)
         put(answers, places, block)
         return
-    distances, scratch = np.empty(len(asked)), scratch_of_answers(tables)
+    from ..kernels.platform.answer_rows import answer_rows
+
+    tables = handle_of(model, options, with_seeds=not nearby and last > IN_OTHER_MODES)
+    question = question_of(tolerance is not None, first, last, has_start, keep_mode, nearby, tolerance or 0.0)
+    scratch, distances, rows = scratch_of_answers(tables), np.empty(len(asked)), answers.rows
+    found = rows.counters, rows.actuators, rows.measures, rows.status
+    outputs = PoseSolutions(distances, rows.poses, answers.q, answers.sides, *found)
+    given = asked if tolerance is None else asked[:, None]
 
     def run(part: slice) -> int:
-        rows, q, sides = take(answers, part)
-        found = rows.counters, rows.actuators, rows.measures, rows.status
-        outputs = PoseSolutions(distances[part], rows.poses, q, sides, *found)
-        own = take_each(start, part)
-        return kernel(tables.address, scratch.address, question.address, asked[part], *own, *outputs)
+        arrays = *take_each(start, part), *take(outputs, part)
+        return answer_rows(tables.address, scratch.address, question.address, given[part], *arrays)
 
     in_blocks(run, len(asked), ROWS_A_BLOCK)

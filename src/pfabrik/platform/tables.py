@@ -14,6 +14,7 @@ from ..derived import derived, is_derived
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..kernels.platform import tables as T
+from ..kernels.platform.nearest import UNBOUNDED
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
@@ -21,8 +22,6 @@ from .nearest import OF_VALUES, objectives_of
 from .nearest_pose import no_starts, search_plan
 from .seeds import seeds_of, seeds_of_other_assemblies
 from .table import kernel_table, legs_at_rest, local_table, search_table
-
-_UNBOUNDED = 2**62
 
 
 def tables_of(model: Model, options: Options, *, with_seeds: bool = True) -> T.Tables:
@@ -126,10 +125,10 @@ def has_seeds(model: Model) -> bool:
 
 
 @lru_cache(maxsize=64)
-def question(
-    first: int, last: int, tolerance: float, *, has_start: bool, keeps_mode: bool, is_nearby: bool
+def question_of(
+    assembles: bool, first: int, last: int, has_start: bool, keeps_mode: bool, is_nearby: bool, tolerance: float
 ) -> Handle[T.Question]:
     """What is asked, searches being bounded by the machine's own settings alone."""
     asked = np.zeros(1, T.QUESTION)
-    asked[0] = first, last, has_start, keeps_mode, is_nearby, _UNBOUNDED, _UNBOUNDED, _UNBOUNDED, tolerance
+    asked[0] = assembles, first, last, has_start, keeps_mode, is_nearby, UNBOUNDED, UNBOUNDED, UNBOUNDED, tolerance
     return Handle(T.Question(asked))

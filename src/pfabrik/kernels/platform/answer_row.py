@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 
-from numpy import zeros
-
-from ...arrays import Floats, Ints, Record, Records
-from .._jit import opener, routine, search
+from ...arrays import Floats, Record, Records
+from .._jit import routine
 from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
-from ..legs.open_table import SAMPLE
 from ..legs.records import Table
 from ..release import brings_nearer, is_too_far
 from ..rows import (
@@ -28,22 +25,17 @@ from ..rows import (
 )
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode
-from .nearest import NO_STARTS, PLAN, NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
+from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
 from .search_records import PlatformObjective, PoseSolutions, Starts
 from .starts import load_target
 from .tables import (
     BY_LEGS,
     IN_OTHER_ASSEMBLIES,
     IN_OTHER_MODES,
-    MACHINE,
     NEAREST,
-    QUESTION,
     AnswerScratch,
-    Question,
-    RestingLegs,
     Start,
     Tables,
-    new_answer_scratch,
 )
 
 NEARLY = 1e-4
@@ -401,70 +393,3 @@ def weigh_limits(
     search.n_cones[0] = table.cones.shape[0]
     if load_target(table, pose, 0, search):
         put_limit_multipliers(table, 0, objective, Starts(begin, answer.q, answer.sides), weighing, weights)
-
-
-def _sample() -> Tables:
-    """Tables of the array types that kernels are compiled for."""
-    start = Start(zeros((1, 4, 4)), zeros((1, 1)), zeros((1, 1)))
-    resting = RestingLegs(SAMPLE, zeros((1, 1)), zeros((1, 1)))
-    return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, SAMPLE, PLAN, NO_STARTS, start)
-
-
-_TABLES = _sample()
-open_tables, open_scratch = opener(_TABLES), opener(new_answer_scratch(_TABLES))
-open_question = opener(Question(zeros(1, QUESTION)))
-"""The arguments of `answer_rows` at the addresses of their handles."""
-
-
-@search
-def answer_rows(
-    tables_address: int,
-    scratch_address: int,
-    question_address: int,
-    targets: Floats,
-    begins: Floats,
-    begin_sides: Floats,
-    begin_actuators: Floats,
-    distances: Floats,
-    poses: Floats,
-    q: Floats,
-    sides: Floats,
-    counters: Ints,
-    actuators: Floats,
-    measures: Floats,
-    status: Ints,
-) -> int:
-    """Answer targets (n, 4, 4) [length] one by one, as `answer_row` does.
-
-    Parameters
-    ----------
-    tables_address, scratch_address, question_address : of `Tables`, of `AnswerScratch`, and of a QUESTION.
-    begins, begin_sides, begin_actuators : as in `Start`, one for each target, or one for all.
-    distances, poses, q, sides, counters, actuators, measures, status : as in `PoseSolutions`.
-
-    Returns
-    -------
-    The number of targets that are not REACHED or PROJECTED.
-    """
-    tables, scratch, question, n_left = (
-        open_tables(tables_address),
-        open_scratch(scratch_address),
-        open_question(question_address).asked[0],
-        0,
-    )
-    for row in range(targets.shape[0]):
-        own, end = row if begins.shape[0] > 1 else 0, row + 1
-        start = Start(begins[own : own + 1], begin_sides[own : own + 1], begin_actuators[own : own + 1])
-        answer = PoseSolutions(
-            distances[row:end],
-            poses[row:end],
-            q[row:end],
-            sides[row:end],
-            counters[row:end],
-            actuators[row:end],
-            measures[row:end],
-            status[row:end],
-        )
-        found = answer_row(tables, scratch, start, targets[row:end], question, answer)
-        n_left += 1 if found > PROJECTED else 0
-    return n_left

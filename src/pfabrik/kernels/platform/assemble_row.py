@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints, Record
-from .._jit import routine, search
+from ...arrays import Floats, Record
+from .._jit import routine
 from ..rows import (
     ACTUATOR_ERROR,
     EXCEEDED,
@@ -18,7 +18,7 @@ from ..rows import (
     ROTATION_ERROR,
 )
 from ..vectors import copy_row, copy_table
-from .answer_row import copy_solution, open_question, open_scratch, open_tables, put_start
+from .answer_row import copy_solution, put_start
 from .forward import assemble_from_others, assemble_from_own, put_deviations, write_assembled
 from .nearest import nearest_of_row
 from .search_records import PoseSolutions, Starts
@@ -247,51 +247,3 @@ def assemble_row(
     if is_missed and answer.status[0] != REACHED:
         assemble_elsewhere(tables, scratch, start, values, question, answer)
     return int(answer.status[0])
-
-
-@search
-def assemble_rows(
-    tables_address: int,
-    scratch_address: int,
-    question_address: int,
-    values: Floats,
-    begins: Floats,
-    begin_sides: Floats,
-    begin_actuators: Floats,
-    distances: Floats,
-    poses: Floats,
-    q: Floats,
-    sides: Floats,
-    counters: Ints,
-    actuators: Floats,
-    measures: Floats,
-    status: Ints,
-) -> int:
-    """Assemble rows at actuated values (n, n_a) one by one, as `assemble_row` does; the parameters as of `answer_rows`.
-
-    Returns
-    -------
-    The number of rows that are not REACHED or PROJECTED.
-    """
-    tables, scratch, question, n_left = (
-        open_tables(tables_address),
-        open_scratch(scratch_address),
-        open_question(question_address).asked[0],
-        0,
-    )
-    for row in range(values.shape[0]):
-        own, end = row if begins.shape[0] > 1 else 0, row + 1
-        start = Start(begins[own : own + 1], begin_sides[own : own + 1], begin_actuators[own : own + 1])
-        answer = PoseSolutions(
-            distances[row:end],
-            poses[row:end],
-            q[row:end],
-            sides[row:end],
-            counters[row:end],
-            actuators[row:end],
-            measures[row:end],
-            status[row:end],
-        )
-        found = assemble_row(tables, scratch, start, values[row:end], question, answer)
-        n_left += 1 if found > PROJECTED else 0
-    return n_left

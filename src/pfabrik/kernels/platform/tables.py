@@ -45,6 +45,7 @@ MACHINE = np.dtype(
 
 QUESTION = np.dtype(
     [
+        ("assembles", "i8"),  # 1: of actuated values, 0: of a target
         ("first", "i8"),  # phases that are gone through: BY_LEGS ... EXACTLY
         ("last", "i8"),
         ("has_start", "i8"),  # 1: the start was given, 0: it is home
