@@ -12,8 +12,8 @@ from pfabrik.kernels.handle import Handle
 from pfabrik.kernels.platform import tables as T
 from pfabrik.kernels.platform.answer_row import weigh_limits
 from pfabrik.kernels.platform.answer_rows import answer_rows
-from pfabrik.kernels.platform.nearest import UNBOUNDED
 from pfabrik.kernels.platform.search_records import PoseSolutions, new_solutions
+from pfabrik.kernels.projecting import UNBOUNDED
 from pfabrik.kernels.rows import PENDING, PROJECTED, REACHED, UNSURE
 from pfabrik.model import model_of
 from pfabrik.platform.nearest import MOST_STEPS

@@ -21,7 +21,7 @@ from ..closure.projection import ProjectionMode, held_parts, projection_modes
 from ..closure.stretched import BentConfiguration
 from ..closure.target_closing import CONTINUATION_STEPS, LONGEST_STEP
 from ..description.home_mobility import column_moves
-from ..kernels.release import SAME
+from ..kernels.projecting import SAME
 from ..kernels.rows import FAILED, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..model import Model
 from ..options import Options

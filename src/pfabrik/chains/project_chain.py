@@ -13,7 +13,7 @@ from ..closure.close import Closing, in_lengths
 from ..closure.projection import Projected, ProjectionMode
 from ..kernels.chains.chain_records import ChainAim, ChainAnswers
 from ..kernels.closure.loops import PoseObjective
-from ..kernels.release import SAME
+from ..kernels.projecting import SAME
 from ..kernels.rows import HOLD_NOTHING
 from ..model import Model
 from ..tolerances import TOLERANCES

@@ -13,7 +13,7 @@ from ..batch import put
 from ..derived import derived
 from ..description.task import Weights
 from ..kernels.closure.loops import LOCKED
-from ..kernels.release import HOLD_COST, SAME
+from ..kernels.projecting import HOLD_COST, SAME
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.closure import Closure
 from ..motion.displacements import displacements

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..arrays import Floats
-from ..kernels.release import SAME
+from ..kernels.projecting import SAME
 from ..kernels.rows import PROJECTED, REACHED, Rows
 from ..model import Model
 from ..options import Options

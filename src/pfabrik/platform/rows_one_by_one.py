@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,8 +59,12 @@ def answer_phases(
     outputs = PoseSolutions(distances, rows.poses, answers.q, answers.sides, *found)
     given = asked if tolerance is None else asked[:, None]
 
-    def run(part: slice) -> int:
-        arrays = *take_each(start, part), *take(outputs, part)
-        return answer_rows(tables.address, scratch.address, question.address, given[part], *arrays)
+    def run(given: Floats, *arrays: Any) -> int:
+        return answer_rows(tables.address, scratch.address, question.address, given, *arrays)
 
-    in_blocks(run, len(asked), ROWS_A_BLOCK)
+    if len(asked) <= ROWS_A_BLOCK:
+        run(given, *start, *outputs)
+    else:
+        in_blocks(
+            lambda part: run(given[part], *take_each(start, part), *take(outputs, part)), len(asked), ROWS_A_BLOCK
+        )

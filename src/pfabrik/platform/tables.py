@@ -14,7 +14,7 @@ from ..derived import derived, is_derived
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..kernels.platform import tables as T
-from ..kernels.platform.nearest import UNBOUNDED
+from ..kernels.projecting import UNBOUNDED
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES

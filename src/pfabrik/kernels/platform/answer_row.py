@@ -10,7 +10,7 @@ from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
 from ..legs.records import Table
-from ..release import brings_nearer, is_too_far
+from ..projecting import brings_nearer, is_too_far
 from ..rows import (
     CERTAIN,
     HOLD,

@@ -18,6 +18,17 @@ from ..legs.answer import deviation, excess_of
 from ..legs.complete_poses import orthonormalise
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import REDUNDANT, Table
+from ..projecting import (
+    EFFORT,
+    TALLY,
+    UNBOUNDED,
+    clear_tally,
+    count_effort,
+    count_ending,
+    is_agreed,
+    is_spent,
+    seed_of,
+)
 from ..qp import QP, new_qp
 from ..quaternions import difference, yaw_difference
 from ..rows import (
@@ -49,31 +60,6 @@ LARGEST_NUMBER = 1.7976931348623157e308
 
 HOLDABLE = 1e-3
 """Largest phase 1 distance from which a search with the held part held is started [L or rad]."""
-
-SAME_DISTANCE = 1e-7
-"""Relative difference of distances below which two searches agree."""
-
-TALLY = np.dtype(
-    [
-        ("least", "f8"),  # least distance [L]
-        ("agreements", "f8"),  # searches that ended there; infinite if certified the nearest
-        ("disagreements", "f8"),  # searches that ended farther away
-        ("is_unbroken", "i8"),  # 1 if some search needed no second descent with restoration
-    ]
-)
-"""Agreement counts of the searches for a row."""
-
-EFFORT = np.dtype(
-    [
-        ("steps", "i8"),  # taken by all searches
-        ("searches", "i8"),
-        ("most", "i8"),  # steps after which no further search begins
-    ]
-)
-"""What searches have cost, and may."""
-
-UNBOUNDED = 2**62
-"""More steps than are ever taken."""
 
 
 class NearestScratch(NamedTuple):
@@ -199,44 +185,12 @@ def holds_some(table: Table, objective: PlatformObjective, weights: Floats) -> b
 
 
 @routine
-def clear_tally(tally: Record) -> None:
-    """Reset a tally."""
-    tally["least"], tally["agreements"], tally["disagreements"], tally["is_unbroken"] = math.inf, 0.0, 0.0, 0
-
-
-@routine
-def count_ending(distance: float, tally: Record, search: SearchScratch, best: PlatformState) -> None:
+def keep_ending(distance: float, tally: Record, search: SearchScratch, best: PlatformState) -> None:
     """Count the end of a search in a tally, and keep its configuration in `best` if it is nearer."""
-    least = tally["least"]
-    if distance < (1.0 - SAME_DISTANCE) * least:
-        tally["disagreements"] += tally["agreements"]
-        tally["least"], tally["agreements"] = distance, 1.0
+    if count_ending(distance, tally):
         copy_platform_state(search.best, best)
         for k in range(search.blocking.shape[0]):
             search.blocking[k] = search.involved[k]
-    elif distance <= (1.0 + SAME_DISTANCE) * least and least < math.inf:
-        tally["agreements"] += 1.0
-    else:
-        tally["disagreements"] += 1.0
-
-
-@routine
-def is_agreed(tally: Record, agreements: int) -> bool:
-    """True if enough searches agree: as many as asked for, plus one for each that ended elsewhere."""
-    return bool(tally["agreements"] >= agreements + tally["disagreements"])
-
-
-@routine
-def count_effort(steps: int, effort: Record) -> None:
-    """Count a search."""
-    effort["steps"] += steps
-    effort["searches"] += 1
-
-
-@routine
-def is_spent(effort: Record) -> bool:
-    """True if no further search is to begin."""
-    return bool(effort["steps"] >= effort["most"])
 
 
 @routine
@@ -248,7 +202,7 @@ def search_from(
     stays: int,
     scratch: NearestScratch,
 ) -> bool:
-    """Descend from `search.best` and count the end, as of `count_ending`; True if no feasible configuration was found.
+    """Descend from `search.best` and count the end, as of `keep_ending`; True if no feasible configuration was found.
 
     Parameters
     ----------
@@ -261,7 +215,7 @@ def search_from(
     if distance < math.inf:
         put_sides(table, search.best, search.leg_eval)
         if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
-            count_ending(distance, best_tally, search, best)
+            keep_ending(distance, best_tally, search, best)
             best_tally["is_unbroken"] = max(best_tally["is_unbroken"], 1 - search.control[0]["is_restoring"])
             if (
                 best_tally["agreements"] == 1.0
@@ -321,9 +275,7 @@ def search_row(
             break
         if start == 1 and n_seeds > 0:
             nearest_seed = nearest_start(objective.pose, by, seeds, search)
-        seed = -1
-        if 0 < start <= n_seeds:
-            seed = nearest_seed if start == 1 else start - 2 + int(start - 2 >= nearest_seed)
+        seed = seed_of(start, n_seeds, nearest_seed)
         load_start(table, starts if seed < 0 else seeds, own_start if seed < 0 else seed, search)
         if seed >= 0:
             take_along(by, along, search.best)
@@ -367,7 +319,7 @@ def search_row(
         if distance <= HOLDABLE:
             search_from(table, row, objective, sides, stays, scratch)
         elif best_tally["least"] == math.inf and search.control[0]["steps"] > 1:
-            count_ending(distance, phase1_tally, search, best)
+            keep_ending(distance, phase1_tally, search, best)
     least: float = best_tally["least"]
     return least
 

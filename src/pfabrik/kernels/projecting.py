@@ -1,0 +1,124 @@
+"""Projections in any unknowns: from which starts, how many, and when what is held leads too far and is released."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays import Floats, Record
+from ._jit import routine
+from .closure.loops import LOCKED
+from .rows import HOLD_ORIENTATION
+
+SAME = 1e-7
+"""Relative decrease of the distance by which a later search must improve on an earlier one."""
+
+HOLD_COST = 1.0
+"""Most that a held component may add to the distance, per unit by which the start differs from the target in that
+component [L per rad, or rad per L]: a rotation about the middle of a machine moves no joint by more."""
+
+SAME_DISTANCE = 1e-7
+"""Relative difference of distances below which two searches agree."""
+
+TALLY = np.dtype(
+    [
+        ("least", "f8"),  # least distance [L]
+        ("agreements", "f8"),  # searches that ended there; infinite if certified the nearest
+        ("disagreements", "f8"),  # searches that ended farther away
+        ("is_unbroken", "i8"),  # 1 if some search needed no second descent with restoration
+    ]
+)
+"""Agreement counts of the searches for a row."""
+
+EFFORT = np.dtype(
+    [
+        ("steps", "i8"),  # taken by all searches
+        ("searches", "i8"),
+        ("most", "i8"),  # steps after which no further search begins
+    ]
+)
+"""What searches have cost, and may."""
+
+UNBOUNDED = 2**62
+"""More steps than are ever taken."""
+
+
+@routine
+def seed_of(search: int, n_seeds: int, nearest_seed: int) -> int:
+    """The seed of a search: after that from a row's own start come the nearest, then the others in order; else -1."""
+    if search <= 0 or search > n_seeds:
+        return -1
+    other = search - 2
+    return nearest_seed if search == 1 else other + int(other >= nearest_seed)
+
+
+@routine
+def clear_tally(tally: Record) -> None:
+    """Reset a tally."""
+    tally["least"], tally["agreements"], tally["disagreements"], tally["is_unbroken"] = math.inf, 0.0, 0.0, 0
+
+
+@routine
+def count_ending(distance: float, tally: Record) -> bool:
+    """Count the end of a search in a tally; True if it is nearer than all before."""
+    least = tally["least"]
+    if distance < (1.0 - SAME_DISTANCE) * least:
+        tally["disagreements"] += tally["agreements"]
+        tally["least"], tally["agreements"] = distance, 1.0
+        return True
+    if distance <= (1.0 + SAME_DISTANCE) * least and least < math.inf:
+        tally["agreements"] += 1.0
+    else:
+        tally["disagreements"] += 1.0
+    return False
+
+
+@routine
+def is_agreed(tally: Record, agreements: int) -> bool:
+    """True if enough searches agree: as many as asked for, plus one for each that ended elsewhere."""
+    return bool(tally["agreements"] >= agreements + tally["disagreements"])
+
+
+@routine
+def count_effort(steps: int, effort: Record) -> None:
+    """Count a search."""
+    effort["steps"] += steps
+    effort["searches"] += 1
+
+
+@routine
+def is_spent(effort: Record) -> bool:
+    """True if no further search is to begin."""
+    return bool(effort["steps"] >= effort["most"])
+
+
+@routine
+def weighted_distance(weights: Floats, position: float, rotation: float) -> float:
+    """Distance of a pose from a target [L], from its errors [L], [rad]; held components do not count."""
+    turning = 0.0
+    for i in range(3, 6):
+        turning = turning if weights[i] == LOCKED else max(turning, weights[i])
+    return math.hypot(position, math.sqrt(turning) * rotation)
+
+
+@routine
+def is_too_far(distance: float, weights: Floats, hold: int, position: float, rotation: float) -> bool:
+    """True if an answer is farther from its target than holding a part of that may cost.
+
+    That is d > d0 + e0, where d and d0 are the distances of the answer and of the start in components that are not
+    held, and e0 is the error of the start in those that are.
+
+    Parameters
+    ----------
+    position, rotation : errors of the start [L], [rad].
+    """
+    held_error = rotation if hold == HOLD_ORIENTATION else position
+    allowed = weighted_distance(weights, position, rotation) + HOLD_COST * held_error
+    return distance < math.inf and distance > (1.0 + SAME) * allowed
+
+
+@routine
+def brings_nearer(distance: float, weights: Floats, position: float, rotation: float) -> bool:
+    """True if an answer that holds nothing is no farther from its target than the start, whose errors are given."""
+    return distance <= (1.0 + SAME) * weighted_distance(weights, position, rotation)
