@@ -20,7 +20,7 @@ from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.platform.tables import NEAREST, Start
+from ..kernels.platform.tables import NEAREST
 from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..model import Model
 from ..motion.outward import centres_at
@@ -36,10 +36,9 @@ from .leg_attempts import attempts
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
-from .rows_one_by_one import Answers, Request, answer_phases
+from .rows_one_by_one import Answers, answer_phases, request_from
 from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
 from .table import table_handle
-from .tables import home_of
 from .unreached import answer_unreached
 
 
@@ -137,7 +136,7 @@ class LegsEngine(Engine):
         if n_unsolved and self._searches:
             sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
             q_proximal = np.full_like(sides, np.nan)
-            request = self._request(start, start_sides, options, keep_mode, nearby)
+            request = request_from(self._model, options, start, start_sides, keep_mode, nearby)
             unreached = np.flatnonzero(rows.status != REACHED)
             answer_unreached(request, targets, Answers(rows, q_proximal, sides), unreached)
         is_pending = rows.status != REACHED
@@ -214,7 +213,7 @@ class LegsEngine(Engine):
         start_sides, rows = self._sides_of(start), new_rows(self._model, len(targets))
         shape = len(targets), len(self._table.legs)
         answers = Answers(rows, np.empty(shape), np.empty(shape))
-        request = self._request(start, start_sides, options, keep_mode, nearby)
+        request = request_from(self._model, options, start, start_sides, keep_mode, nearby)
         answer_phases(request, targets, answers, np.arange(len(targets)), NEAREST, NEAREST)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved):
@@ -389,7 +388,7 @@ class LegsEngine(Engine):
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
                 return self._single_answer(rows, solution, start, start_sides)
         nearby = start is not None and keep_mode
-        request = self._request(start, start_sides, Options(), keep_mode, nearby, tolerance)
+        request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
         starts = self._forward_start(start, start_sides).record
         rows, q_proximal, sides = forward_kinematics(request, values, starts, outputs)
         projected = np.flatnonzero(rows.status == PROJECTED)
@@ -409,7 +408,7 @@ class LegsEngine(Engine):
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
         start_sides = self._sides_of(start)
-        request = self._request(start, start_sides, Options(), False, start is not None, tolerance)
+        request = request_from(self._model, Options(), start, start_sides, False, start is not None, tolerance)
         rows, q_proximal, sides = project_values(request, values)
         unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
         if len(unsolved):
@@ -431,21 +430,6 @@ class LegsEngine(Engine):
         if start is None:
             return self._single_forward.home
         return Handle(starts_at(self._model, start.rows.poses, sides))
-
-    def _request(
-        self,
-        start: Configurations | None,
-        sides: Floats,
-        options: Options,
-        keep_mode: bool,
-        nearby: bool,
-        tolerance: float | None = None,
-    ) -> Request:
-        """What is asked of rows from a start with legs on some sides."""
-        own = home_of(self._model)
-        if start is not None:
-            own = Start(start.rows.poses, sides, np.require(start.rows.actuators, requirements=["C", "W"]))
-        return Request(self._model, options, own, start is not None, keep_mode, nearby, tolerance)
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""

@@ -10,11 +10,14 @@ from ..closure.assemble import SHORTEST_SHARE
 from ..closure.configurations import Configurations
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
+from ..kernels.platform.tables import BY_LEGS
 from ..kernels.rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
+from ..options import Options
 from ..poses import between
-from .redundant_joints import search_redundant_joints, split_by_redundant, step_redundant_joints
+from .redundant_joints import split_by_redundant, step_redundant_joints
+from .rows_one_by_one import Answers, answer_phases, request_from
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -52,9 +55,7 @@ def reach(
         n_unsolved -= _complete(model, legs, targets, start_poses, sides, rows)
     if n_unsolved and model.legs.has_free_redundant:
         sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
-        n_unsolved -= _reach_by_redundant(model, legs, targets, start_poses, sides, rows)
-        if n_unsolved and start is not None and not keep_mode:
-            n_unsolved -= _reach_from_home(model, legs, targets, sides, rows)
+        n_unsolved = _move_redundant(model, targets, start, sides, keep_mode, rows)
     if start is not None:
         count_turns(model, start.rows.actuators, rows)
     return n_unsolved, sides
@@ -96,40 +97,15 @@ def _lead(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats,
     return len(solved)
 
 
-def _reach_by_redundant(
-    model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
+def _move_redundant(
+    model: Model, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
 ) -> int:
-    """Solve rows by moving the redundant joints, and write their coordinates; return the number of rows solved.
-
-    Half-spaces first: they take a tenth of the time of a search, which solves what they miss.
-    """
-    n_unsolved = n_before = int(np.count_nonzero(rows.status != REACHED))
-    for move in (step_redundant_joints, search_redundant_joints):
-        sides_before, unsolved = sides.copy(), np.flatnonzero(rows.status != REACHED)
-        moved, poses = move(model, targets, start_poses, sides, unsolved)
-        if not len(moved):
-            continue
-        block = take(rows, moved)
-        n_unsolved += reach_on_sides(legs, targets[moved], poses, sides[moved], block) - len(moved)
-        put(rows, moved, block)
-        missed = moved[block.status != REACHED]
-        sides[missed] = sides_before[missed]
-        if not n_unsolved:
-            break
-    return n_before - n_unsolved
-
-
-def _reach_from_home(model: Model, legs: TableHandle, targets: Floats, sides: Floats, rows: Rows) -> int:
-    """Solve rows by moving the redundant joints from home, where limits bar the way from the start.
-
-    Return the number of rows solved.
-    """
-    is_unsolved, home_sides, redundant = rows.status != REACHED, sides.copy(), model.legs.implicit_joints["leg"]
-    home_sides[:, redundant] = model.legs.home_sides[:, redundant]
-    n_reached = _reach_by_redundant(model, legs, targets, model.mechanism.home_pose[None], home_sides, rows)
-    is_reached = is_unsolved & (rows.status == REACHED)
-    sides[is_reached] = home_sides[is_reached]
-    return n_reached
+    """Solve rows by moving free redundant joints, and write their coordinates; return the number of unsolved rows."""
+    unsolved = np.flatnonzero(rows.status != REACHED)
+    request = request_from(model, Options(), start, sides.copy(), keep_mode, nearby=False)
+    answer_phases(request, targets, Answers(rows, np.empty_like(sides), sides), unsolved, BY_LEGS, BY_LEGS)
+    rows.status[rows.status == OPEN] = PENDING
+    return int(np.count_nonzero(rows.status != REACHED))
 
 
 def rest_redundant(model: Model, start: Configurations | None, start_sides: Floats, sides: Floats, rows: Rows) -> Mask:

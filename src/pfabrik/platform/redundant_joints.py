@@ -8,24 +8,36 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Records
+from ..arrays import Floats
 from ..decomposition.leg_forms import RedundantJoint
 from ..decomposition.leg_table import LegTable
 from ..decomposition.plan import compile_trunks
 from ..derived import derived
+from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.legs import records as K
-from ..kernels.platform.search_records import PoseSolutions, Starts
+from ..kernels.platform import redundant_sets as R
+from ..kernels.platform.nearest import NO_STARTS
+from ..kernels.platform.search_records import SETTINGS, Along, MultistartPlan
 from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..tolerances import TOLERANCES
 from .nearest import MOST_STEPS
-from .nearest_pose import NearestPose, new_solution, no_starts, starts_at
+from .nearest_pose import no_starts, search_plan
+from .table import without_legs
 
 PASSES_ALONG = 100
 """Most passes along a branch of three parts or more, as by default."""
 
 ROWS_A_BLOCK = 256
+
+
+MOST_SETS = len(R.RedundantSets._fields) - 2
+
+_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
+NO_TRUNKS = R.MovedTrunks._make(
+    (*(np.zeros(0, each) for each in _RECORDS), np.zeros(1, R.MOVING), np.zeros(0, int), np.zeros(0))
+)
 
 
 class Trunks(NamedTuple):
@@ -75,7 +87,7 @@ def step_redundant_joints(
     sides: Floats,
     places: NDArray[np.intp],
 ) -> tuple[NDArray[np.intp], Floats]:
-    """Move redundant joints by the least steps that keep the limits of the legs on them; as `search_redundant_joints`.
+    """Move redundant joints by the least steps that keep the limits of the legs on them; `places` are the rows.
 
     A step keeps limits to first order, and few suffice. Where they do not, or no trunk has these joints, limits stay
     exceeded: rows are solved only if legs say so.
@@ -109,70 +121,37 @@ def _of_base(model: Model, targets: Floats) -> Floats:
     return poses
 
 
-def search_redundant_joints(
-    model: Model,
-    targets: Floats,
-    start_poses: Floats,
-    sides: Floats,
-    places: NDArray[np.intp],
-) -> tuple[NDArray[np.intp], Floats]:
-    """Move the redundant joints of some rows, as little as possible, until legs reach their targets within all limits.
-
-    Parameters
-    ----------
-    targets, start_poses : (n, 4, 4) and (n or 1, 4, 4) [length].
-    sides : coordinates of the redundant joints, (n, legs), before and after.
-    places : the rows to solve.
-
-    Returns
-    -------
-    The rows solved, and the poses at which their searches ended, (rows, 4, 4) [length].
-    """
-    starts = starts_at(model, start_poses if len(start_poses) == 1 else start_poses[places], sides[places])
-    solution = _nearest_redundant(model, targets[places], starts)
-    is_solved = np.isfinite(solution.distances)
-    sides[places[is_solved]] = solution.sides[is_solved]
-    return places[is_solved], solution.poses[is_solved]
-
-
-def _nearest_redundant(model: Model, targets: Floats, starts: Starts) -> PoseSolutions:
-    """Feasible configurations at targets (n, 4, 4) [length] whose redundant joints are nearest to those of starts (n,).
-
-    Searches start there alone; what they miss, projections from seeds find. A row without a solution for one set of
-    redundant joints is not searched for the next.
-
-    Parameters
-    ----------
-    starts : poses (n or 1, 4, 4), sides (n, legs), and no coordinates.
-    """
-    best = new_solution(len(targets), model.legs)
-    best.distances[:], best.sides[:] = 0.0, starts.sides
-    unsolved = np.arange(len(targets))
-    for redundant, legs, nearest_pose in _redundant_searches(model):
-        poses = starts.poses if len(starts.poses) == 1 else starts.poses[unsolved]
-        block_starts = Starts(
-            poses, np.ascontiguousarray(starts.q[:, legs]), np.ascontiguousarray(starts.sides[unsolved][:, legs])
-        )
-        values = np.ascontiguousarray(redundant["sense"] * block_starts.sides[:, redundant["leg"]])
-        solution = nearest_pose.find(targets[unsolved], block_starts, values)
-        best.distances[unsolved] = np.maximum(best.distances[unsolved], solution.distances)
-        best.poses[unsolved], best.sides[unsolved, legs] = solution.poses, solution.sides
-        unsolved = unsolved[np.isfinite(solution.distances)]
-    return best
-
-
 @derived
-def _redundant_searches(model: Model) -> tuple[tuple[Records, slice, NearestPose], ...]:
-    """A search for each independent set of redundant joints, at a held pose: their coordinates, and their legs."""
-    held = model.task.held
-    return tuple(
-        (
-            part_table.redundant,
-            legs,
-            NearestPose(model, part_table, held, {"steps": MOST_STEPS}, no_starts(part_table), part_table.redundant),
-        )
-        for part_table, legs in split_by_redundant(model.legs)
-    )
+def redundant_sets(model: Model) -> R.RedundantSets:
+    """The free redundant joints of a machine as kernels take them; nothing if there are none.
+
+    More sets than kernels have places for are one: searches for these are longer.
+    """
+    table, none = model.legs, _no_set(model.legs)
+    parts = split_by_redundant(table) if table.has_free_redundant else ()
+    parts = ((table, slice(None)),) if len(parts) > MOST_SETS else parts
+    sets = [none] * MOST_SETS
+    for place, (part, legs) in enumerate(parts):
+        objective = model.task.held, {"steps": MOST_STEPS}
+        searched = search_plan(model, part, [objective], no_starts(part), part.redundant)
+        sets[place] = R.RedundantSet(*searched, np.array([legs.start or 0]))
+    trunks = {each.are_on_platform: _moving(model, each) for each in (_trunks(model) if len(parts) else ())}
+    return R.RedundantSets._make((trunks.get(False, NO_TRUNKS), trunks.get(True, NO_TRUNKS), *sets))
+
+
+def _moving(model: Model, trunks: Trunks) -> R.MovedTrunks:
+    """Trunks as kernels take them."""
+    moving = np.zeros(1, R.MOVING)
+    moving[0] = trunks.are_on_platform, PASSES_ALONG, TOLERANCES.inside * model.length, model.length
+    records = (np.require(record, requirements=["C", "W"]) for record in trunks.plan[:6])
+    return R.MovedTrunks._make((*records, moving, trunks.legs, trunks.units))
+
+
+def _no_set(table: LegTable) -> R.RedundantSet:
+    """No redundant joints."""
+    legs, along = without_legs(table), Along(np.zeros((3, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
+    plan = MultistartPlan(np.zeros((0, 6)), np.zeros(0, SETTINGS), NO_STARTS, along, NO_LINKS)
+    return R.RedundantSet(legs, plan, np.zeros(1, np.int64))
 
 
 @derived

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..batch import put, take, take_each
+from ..closure.configurations import Configurations
 from ..kernels.platform.search_records import PoseSolutions
 from ..kernels.platform.tables import IN_OTHER_MODES, Start
 from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..options import Options
-from .tables import handle_of, question_of, scratch_of_answers
+from .tables import handle_of, home_of, question_of, scratch_of_answers
 
 ROWS_A_BLOCK = 16
 
@@ -38,6 +39,22 @@ class Request(NamedTuple):
     keep_mode: bool  # answers are in its working mode, or its assembly mode
     nearby: bool  # searches stay around it, as along a path
     tolerance: float | None = None  # of actuated values that are asked for [L or rad]; None where targets are
+
+
+def request_from(
+    model: Model,
+    options: Options,
+    start: Configurations | None,
+    sides: Floats,
+    keep_mode: bool,
+    nearby: bool,
+    tolerance: float | None = None,
+) -> Request:
+    """What is asked of rows from a start, one or one for each, with legs on some sides; None for home."""
+    own = home_of(model)
+    if start is not None:
+        own = Start(start.rows.poses, sides, np.require(start.rows.actuators, requirements=["C", "W"]))
+    return Request(model, options, own, start is not None, keep_mode, nearby, tolerance)
 
 
 def answer_phases(

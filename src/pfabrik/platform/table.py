@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..arrays import Records
+from ..batch import take
 from ..closure.target_closing import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
@@ -37,6 +38,12 @@ def kernel_table(table: LegTable) -> K.Table:
     columns[proximal_legs] = 6 + np.arange(len(proximal_legs))
     columns[is_mirror] = columns[table.legs["mirror_of"][is_mirror]]
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
+
+
+def without_legs(table: LegTable) -> K.Table:
+    """A kernel table with the task alone."""
+    full = kernel_table(table)
+    return take(full, slice(0, 0))._replace(task=full.task)
 
 
 @derived

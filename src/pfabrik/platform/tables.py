@@ -6,13 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..batch import take
 from ..closure.assemble import NOISE, is_over_determined
 from ..closure.parasitic import follows_task, has_other_assemblies, has_parasitic_motion
-from ..decomposition.leg_table import LegTable
 from ..derived import derived, is_derived
 from ..kernels.handle import Handle, Scratch
-from ..kernels.legs import records as K
 from ..kernels.platform import tables as T
 from ..kernels.projecting import UNBOUNDED
 from ..model import Model
@@ -20,8 +17,9 @@ from ..options import Options
 from ..tolerances import TOLERANCES
 from .nearest import OF_VALUES, objectives_of
 from .nearest_pose import no_starts, search_plan
+from .redundant_joints import redundant_sets
 from .seeds import seeds_of, seeds_of_other_assemblies
-from .table import kernel_table, legs_at_rest, local_table, search_table
+from .table import kernel_table, legs_at_rest, local_table, search_table, without_legs
 
 
 def tables_of(model: Model, options: Options, *, with_seeds: bool = True) -> T.Tables:
@@ -81,7 +79,7 @@ def _handle(
     }
     for name, value in fields.items():
         machine[name] = value
-    at_rest = T.RestingLegs(_without_legs(table), np.zeros((1, 0)), np.zeros((1, len(table.driven))))
+    at_rest = T.RestingLegs(without_legs(table), np.zeros((1, 0)), np.zeros((1, len(table.driven))))
     if resting is not None:
         actuators = resting.actuators[None].copy()
         at_rest = T.RestingLegs(kernel_table(resting.table), resting.table.home_sides, actuators)
@@ -95,15 +93,10 @@ def _handle(
             search_table(table).record,
             plan,
             seeds_of_other_assemblies(model) if with_seeds and table.is_completed else no_starts(table),
+            redundant_sets(model),
             home_of(model),
         )
     )
-
-
-def _without_legs(table: LegTable) -> K.Table:
-    """A kernel table with the task alone."""
-    full = kernel_table(table)
-    return take(full, slice(0, 0))._replace(task=full.task)
 
 
 @derived

@@ -9,7 +9,7 @@ from .._jit import routine
 from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
-from ..legs.records import Table
+from ..legs.records import REDUNDANT, Table
 from ..projecting import brings_nearer, is_too_far
 from ..rows import (
     CERTAIN,
@@ -26,6 +26,7 @@ from ..rows import (
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode
 from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
+from .redundant_sets import search_sets, step_trunks
 from .search_records import PlatformObjective, PoseSolutions, Starts
 from .starts import load_target
 from .tables import (
@@ -83,6 +84,15 @@ def copy_solution(source: PoseSolutions, to: PoseSolutions) -> None:
 
 
 @routine
+def load_own(pose: Floats, length: float, to: Floats) -> None:
+    """Fill a pose (4, 4) [L] with one in [length]."""
+    scale = 1.0 / length
+    copy_table(pose, to)
+    for i in range(3):
+        to[i, 3] *= scale
+
+
+@routine
 def errors(task: Record, target: Floats, pose: Floats, turn: Floats) -> tuple[float, float]:
     """Distance [L] and angle [rad] of a pose from a target, both in [length], in what the task sets."""
     distance = 0.0
@@ -122,6 +132,59 @@ def reach_at_start(
         return reach_from(tables.resting.legs, target, start.poses[0], tables.resting.sides[0], scratch.resting, answer)
     table = tables.near if question["keeps_mode"] == 1 else tables.legs
     return reach_from(table, target, start.poses[0], answer.sides[0], scratch.completion, answer)
+
+
+@routine
+def reach_by_redundant(
+    tables: Tables,
+    scratch: AnswerScratch,
+    table: Table,
+    targets: Floats,
+    begin: Floats,
+    question: Record,
+    answer: PoseSolutions,
+) -> int:
+    """Solve a target by legs whose free redundant joints move from where the sides of the answer have them.
+
+    Half-spaces first: they take a tenth of the time of a search, which solves what they miss.
+
+    Parameters
+    ----------
+    begin : the pose where a search starts, (4, 4) [length].
+    """
+    sets, spare, moved, own, pose = tables.sets, scratch.sets, scratch.moved[0], scratch.own, scratch.home[0]
+    home, target, status = tables.home.poses[0], targets[0], PENDING
+    copy_row(answer.sides[0], moved)
+    if sets.from_base.legs.shape[0] + sets.from_platform.legs.shape[0] > 0:
+        step_trunks(sets.from_base, spare.from_base, home, target, moved)
+        step_trunks(sets.from_platform, spare.from_platform, home, target, moved)
+        status = reach_from(table, target, begin, moved, scratch.completion, answer)
+    if status != REACHED:
+        copy_row(answer.sides[0], moved)
+        load_own(begin, table.task[0]["length"], own[0])
+        if search_sets(sets, spare, targets, own, question, moved, pose):
+            status = reach_from(table, target, pose, moved, scratch.completion, answer)
+    if status == REACHED:
+        copy_row(moved, answer.sides[0])
+    return status
+
+
+@routine
+def reach_moved(
+    tables: Tables, scratch: AnswerScratch, start: Start, targets: Floats, question: Record, answer: PoseSolutions
+) -> int:
+    """Solve a target with free redundant joints moved: from the start; then from home, where limits bar that way."""
+    table, legs, sides = tables.near if question["keeps_mode"] == 1 else tables.legs, tables.legs.legs, answer.sides
+    status = reach_by_redundant(tables, scratch, table, targets, start.poses[0], question, answer)
+    if status == REACHED or question["has_start"] == 0 or question["keeps_mode"] == 1:
+        return status
+    for k in range(legs.shape[0]):
+        if legs[k]["kind"] == REDUNDANT and legs[k]["orients"] == 0:
+            sides[0, k] = tables.home.sides[0, k]
+    status = reach_by_redundant(tables, scratch, table, targets, tables.home.poses[0], question, answer)
+    if status != REACHED:
+        copy_row(start.sides[0], sides[0])
+    return status
 
 
 @routine
@@ -216,10 +279,8 @@ def search_for(
     answer: PoseSolutions,
 ) -> float:
     """Fill the nearest feasible pose by one objective, as of `nearest_of_row`; its distance [L]."""
-    begin, scale = scratch.begin, 1.0 / tables.legs.task[0]["length"]
-    copy_table(start.poses[0], begin[0])
-    for i in range(3):
-        begin[0, i, 3] *= scale
+    begin = scratch.begin
+    load_own(start.poses[0], tables.legs.task[0]["length"], begin[0])
     return nearest_of_row(
         tables.search,
         tables.plan,
@@ -309,9 +370,12 @@ def answer_by_phases(
     keeps_mode = question["keeps_mode"] == 1
     if first == BY_LEGS and reach_at_start(tables, scratch, start, target, question, answer) == REACHED:
         return REACHED
+    is_moved = first == BY_LEGS and machine["is_free"] == 1
+    if is_moved and reach_moved(tables, scratch, start, targets, question, answer) == REACHED:
+        return REACHED
     if last == BY_LEGS:
         return OPEN
-    if machine["searches"] == 0 or (first == BY_LEGS and machine["is_free"] == 1):
+    if machine["searches"] == 0:
         return PENDING
     if first <= IN_OTHER_MODES and machine["has_sides"] == 1:
         turn = scratch.nearest.search.gradient.turn
@@ -337,11 +401,11 @@ def answer_row(
 ) -> int:
     """Answer one target (1, 4, 4) [length] from a start, `tables.home` if none is given; the status.
 
-    REACHED by legs in closed form: on the sides of the start; if the mode need not be kept, on others and in other
-    assemblies. Else PROJECTED to the nearest feasible pose found, or REACHED from there. PENDING where no feasible pose
-    was found, or only joint coordinates are exact enough: at a dead point, or on a target that the start is on already.
-    UNSURE where these may come nearer than a projection that nearly reaches. OPEN if the phases asked for do not answer
-    it.
+    REACHED by legs in closed form: on the sides of the start, free redundant joints being moved if need be; if the mode
+    need not be kept, on others and in other assemblies. Else PROJECTED to the nearest feasible pose found, or REACHED
+    from there. PENDING where no feasible pose was found, or only joint coordinates are exact enough: at a dead point,
+    or on a target that the start is on already. UNSURE where these may come nearer than a projection that nearly
+    reaches. OPEN if the phases asked for do not answer it.
 
     Parameters
     ----------
@@ -379,15 +443,13 @@ def weigh_limits(
     targets : that of the answer, (1, 4, 4) [length].
     """
     table, plan, begin, aim = tables.assembly, tables.plan, scratch.begin, 0
-    search, scale = weighing.search, 1.0 / table.task[0]["length"]
+    search = weighing.search
     for k in range(tables.machine[0]["projections"]):
         aim = k if k == 0 or plan.settings[k]["hold"] == answer.counters[0, HOLD] % CERTAIN else aim
     setting = plan.settings[aim]
     pose = PoseObjective(targets, plan.weights[aim], setting["frame"], setting["margin"], setting["near"], 0)
     objective = PlatformObjective(pose, scratch.no_values, setting["implied"])
-    copy_table(answer.poses[0], begin[0])
-    for i in range(3):
-        begin[0, i, 3] *= scale
+    load_own(answer.poses[0], table.task[0]["length"], begin[0])
     for k in range(weights.shape[0]):
         weights[k] = 0.0
     search.n_cones[0] = table.cones.shape[0]

@@ -7,19 +7,24 @@ from numpy import zeros
 from ...arrays import Floats, Ints
 from .._jit import opener, search
 from ..legs.open_table import SAMPLE
+from ..reaching import plan as P
 from ..rows import PROJECTED
 from .answer_row import answer_row
 from .assemble_row import assemble_row
 from .nearest import NO_STARTS, PLAN
+from .redundant_sets import MOVING, MovedTrunks, RedundantSet, RedundantSets
 from .search_records import PoseSolutions
 from .tables import MACHINE, QUESTION, Question, RestingLegs, Start, Tables, new_answer_scratch
 
 
 def _sample() -> Tables:
     """Tables of the array types that kernels are compiled for."""
-    start = Start(zeros((1, 4, 4)), zeros((1, 1)), zeros((1, 1)))
+    start, count = Start(zeros((1, 4, 4)), zeros((1, 1)), zeros((1, 1))), zeros(1, int)
     resting = RestingLegs(SAMPLE, zeros((1, 1)), zeros((1, 1)))
-    return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, SAMPLE, PLAN, NO_STARTS, start)
+    records = (zeros(0, record) for record in (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT))
+    trunks = MovedTrunks._make((*records, zeros(1, MOVING), zeros(0, int), zeros(0)))
+    sets = RedundantSets(trunks, trunks, *(RedundantSet(SAMPLE, PLAN, count),) * 6)
+    return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, SAMPLE, PLAN, NO_STARTS, sets, start)
 
 
 _TABLES = _sample()

@@ -17,8 +17,8 @@ from ..rows import (
     REACHED,
     ROTATION_ERROR,
 )
-from ..vectors import copy_row, copy_table
-from .answer_row import copy_solution, put_start
+from ..vectors import copy_row
+from .answer_row import copy_solution, load_own, put_start
 from .forward import assemble_from_others, assemble_from_own, put_deviations, write_assembled
 from .nearest import nearest_of_row
 from .search_records import PoseSolutions, Starts
@@ -26,14 +26,6 @@ from .tables import BY_LEGS, NEAREST, AnswerScratch, Start, Tables
 
 WAY_HALVINGS = 12
 """Halvings that find the last configuration of an assembly mode on the way to values beyond."""
-
-
-@routine
-def load_own(start: Start, length: float, to: Floats) -> None:
-    """Fill a pose (4, 4) [L] with that of a start."""
-    copy_table(start.poses[0], to)
-    for i in range(3):
-        to[i, 3] *= 1.0 / length
 
 
 @routine
@@ -184,7 +176,7 @@ def assemble_elsewhere(
 ) -> None:
     """Assemble a row that its start does not lead to: from home and from seeds, or by a search from these."""
     table, newton, home, wished = tables.assembly, scratch.newton, scratch.home, scratch.wished[0]
-    load_own(tables.home, tables.legs.task[0]["length"], home[0])
+    load_own(tables.home.poses[0], tables.legs.task[0]["length"], home[0])
     at_home = Starts(home, scratch.home_q, tables.home.sides)
     nearest = assemble_from_others(table, wished, at_home, scratch.own[0], math.inf, newton)
     nearest = assemble_from_others(table, wished, tables.plan.seeds, scratch.own[0], nearest, newton)
@@ -217,7 +209,7 @@ def assemble_row(
     is_cold, own, newton = question["has_start"] == 0, scratch.own, scratch.newton
     keeps_mode = question["keeps_mode"] == 1 and machine["is_over_determined"] == 0
     status, measures = answer.status[0], answer.measures
-    load_own(start, tables.legs.task[0]["length"], own[0])
+    load_own(start.poses[0], tables.legs.task[0]["length"], own[0])
     put_start(start, answer)
     put_start(start, scratch.other)
     copy_row(values[0], answer.actuators[0])

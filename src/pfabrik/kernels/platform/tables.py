@@ -14,6 +14,7 @@ from ..legs.answer import Completion, new_completion
 from ..legs.records import Table
 from .forward import NewtonScratch, new_newton_scratch
 from .nearest import NearestScratch, new_nearest_scratch
+from .redundant_sets import RedundantSets, SetsScratch, new_sets_scratch
 from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
 
 # Phases of an answer, in order: legs on the sides of the start, on others, in other assemblies, by searches for the
@@ -25,7 +26,7 @@ MACHINE = np.dtype(
         ("has_sides", "i8"),  # 1: some legs have two solutions
         ("is_partial", "i8"),  # 1: the task leaves some of the pose open
         ("is_completed", "i8"),  # 1: some of the pose, or a redundant joint, is completed from the start
-        ("is_free", "i8"),  # 1: poses leave redundant joints open, which then rest, or are moved
+        ("is_free", "i8"),  # 1: poses leave redundant joints open: they stay where they are, or are moved
         ("rests", "i8"),  # 1: `resting` are the legs while free redundant joints stay at home
         ("searches", "i8"),  # 1: what legs do not reach is searched for in the platform's pose
         ("flips", "i8"),  # 1: a platform that the legs keep upright about home may turn over on them
@@ -97,6 +98,7 @@ class Tables(NamedTuple):
     assembly: Table  # as forward kinematics does
     plan: MultistartPlan
     others: Starts  # seeds in other assemblies than home's
+    sets: RedundantSets
     home: Start
 
 
@@ -108,6 +110,8 @@ class AnswerScratch(NamedTuple):
     nearest: NearestScratch
     other: PoseSolutions  # one row: an answer to be compared
     newton: NewtonScratch
+    sets: SetsScratch
+    moved: Floats  # (1, legs): sides, with redundant joints moved
     begin: Floats  # (1, 4, 4): a pose, in [L] where a search starts, or [length] where legs do
     own: Floats  # (1, 4, 4): the start of an assembly [L]
     home: Floats  # (1, 4, 4): home [L]
@@ -131,6 +135,8 @@ def new_answer_scratch(tables: Tables) -> AnswerScratch:
         new_nearest_scratch(tables.search, tables.plan, False),
         new_solutions(1, legs, actuators),
         new_newton_scratch(tables.assembly, bool(tables.machine["turns"][0])),
+        new_sets_scratch(tables.sets),
+        np.zeros((1, legs)),
         np.zeros((1, 4, 4)),
         np.zeros((1, 4, 4)),
         np.zeros((1, 4, 4)),

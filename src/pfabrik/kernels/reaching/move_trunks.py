@@ -6,7 +6,7 @@ from ...arrays import Floats
 from .._jit import routine, search
 from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import PATIENT, reach_from_start
-from .half_spaces import new_asks
+from .half_spaces import Asks, new_asks
 from .moving_frames import move_carriers
 from .plan import Configuration, Plan, Settings
 from .solve import new_configuration
@@ -21,6 +21,23 @@ def stand_as_at_home(plan: Plan, config: Configuration) -> None:
             put(config.nodes[k], move(config.carriers[branch["carrier"]], vec(plan.nodes[k]["home"])))
 
 
+@routine
+def move_trunk(
+    plan: Plan, target: Floats, trunks: Floats, settings: Settings, margin: float, config: Configuration, asks: Asks
+) -> None:
+    """Move the trunks of one configuration, (n_trunk_joints,), as `move_trunks` does."""
+    copy_table(target, config.pose)
+    copy_row(trunks, config.trunks)
+    move_carriers(plan, config)
+    stand_as_at_home(plan, config)
+    for k in range(asks.normals.shape[0]):
+        for j in range(asks.normals.shape[1]):
+            asks.normals[k, j] = 0.0
+    for c in range(plan.chains.shape[0]):
+        reach_from_start(plan, c, config, settings, asks, margin, PATIENT, True)
+    copy_row(config.trunks, trunks)
+
+
 @search
 def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings, margin: float) -> None:
     """Move trunks (n, n_trunk_joints), deviations from home, until their branches reach targets (n, 4, 4), if they can.
@@ -33,13 +50,4 @@ def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings,
     """
     config, asks = new_configuration(plan), new_asks(plan)
     for i in range(targets.shape[0]):
-        copy_table(targets[i], config.pose)
-        copy_row(trunks[i], config.trunks)
-        move_carriers(plan, config)
-        stand_as_at_home(plan, config)
-        for k in range(asks.normals.shape[0]):
-            for j in range(asks.normals.shape[1]):
-                asks.normals[k, j] = 0.0
-        for c in range(plan.chains.shape[0]):
-            reach_from_start(plan, c, config, settings, asks, margin, PATIENT, True)
-        copy_row(config.trunks, trunks[i])
+        move_trunk(plan, targets[i], trunks[i], settings, margin, config, asks)
