@@ -107,7 +107,9 @@ def nearest_positions(model: Model, targets: Floats, starts: Starts, *, seeds: b
 
     Parameters
     ----------
-    starts, seeds, keep_mode : as of `nearest_poses`.
+    starts : the first start of each row, or one for all.
+    seeds : search from the machine's seeds too.
+    keep_mode : stay in the working mode of the first start.
     """
     search = _position_search(model, seeds, keep_mode)
     return search.find(np.require(targets, requirements=["C", "W"]), starts)
