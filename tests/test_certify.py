@@ -109,6 +109,18 @@ def test_a_stewart_platform_reaches_a_box_that_is_proved_and_not_a_slightly_larg
     assert 0.0 <= proved.margin <= close.margin
 
 
+@pytest.mark.parametrize(
+    ("name", "half", "degrees", "cells"), [("hexaglide", 15.0, 4.0, 20), ("servo_hexapod", 2.0, 0.5, 600)]
+)
+def test_boxes_at_their_cones_and_ranges_take_few_cells(name: str, half: float, degrees: float, cells: int) -> None:
+    machine = pf.load(name)
+    centre = machine.home_pose[:3, 3]
+    region = PoseRegion.box(centre - half, centre + half, rotation=math.radians(degrees))
+    certificate = pf.certify(machine, region, budget=cells)
+    assert certificate
+    assert_holds(certificate, 3 if INTERPRETED else 20_000, np.random.default_rng(6))
+
+
 @pytest.mark.parametrize("name", POSITIONED)
 def test_verdicts_on_random_regions_hold(name: str) -> None:
     rng, machine = np.random.default_rng(len(name)), pf.load(name)

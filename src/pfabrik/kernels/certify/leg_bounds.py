@@ -55,7 +55,6 @@ class LegBounds(NamedTuple):
     """Scratch memory: forms of one leg over a cell."""
 
     values: Floats  # (N_VALUES,): the leg at the cell's centre
-    base: Floats  # (8, 3): base end
     end: Floats  # (8, 3): platform end
     span: Floats  # (8, 3): from base end to platform end
     v: Floats  # (8, 3): scratch
@@ -65,12 +64,11 @@ class LegBounds(NamedTuple):
     a: Floats  # (9,): scratch
     b: Floats  # (9,): scratch
     c: Floats  # (9,): scratch
-    d: Floats  # (9,): scratch
 
 
 def new_bounds() -> LegBounds:
     """Allocate the forms of a leg."""
-    vectors, numbers = [np.zeros((8, 3)) for _ in range(5)], [np.zeros(9) for _ in range(6)]
+    vectors, numbers = [np.zeros((8, 3)) for _ in range(4)], [np.zeros(9) for _ in range(5)]
     return LegBounds(np.zeros(N_VALUES), *vectors, *numbers)
 
 
@@ -125,9 +123,9 @@ def put_rod(rod: Record, side: float, n: int, uncertain: float, bounds: LegBound
 
 @routine
 def put_span(rod: Record, owner: Record, n: int, bounds: LegBounds) -> None:
-    """Base end, span and length of a rod, on the proximal joint of `owner`, whose coordinate is known."""
-    put_proximal_point(owner, vec(rod["base_end_point"]), n, 0.0, bounds, bounds.base)
-    put_difference(bounds.end, bounds.base, n, bounds.span)
+    """Span and length of a rod on the proximal joint of `owner`, whose coordinate is known."""
+    put_proximal_point(owner, vec(rod["base_end_point"]), n, 0.0, bounds, bounds.v)
+    put_difference(bounds.end, bounds.v, n, bounds.span)
     put_length(bounds.span, n, bounds.length)
 
 

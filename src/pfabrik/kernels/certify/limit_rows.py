@@ -199,10 +199,10 @@ def put_ending_angle(
     flat = sub(home, scale(along_b, b))
     A, B = dot(a, flat), dot(a, cross(b, home))
     h = math.hypot(A, B)
-    if not h > 0.0:
+    length = norm(vec(line[CENTRE]))
+    if not h > 0.0 or not length > 0.0:
         return
-    cosine, angle = bounds.a, bounds.b
-    centre = dot(a, vec(line[CENTRE])) / norm(vec(line[CENTRE]))
+    cosine, angle, centre = bounds.a, bounds.b, dot(a, vec(line[CENTRE])) / length
     put_cosine(line, a, centre, least(bounds.length, n), most(bounds.length, n), n, cosine)
     cosine[CENTRE] += centre - dot(a, b) * along_b
     for i in range(9):
