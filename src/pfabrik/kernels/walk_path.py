@@ -29,23 +29,28 @@ def walk_path(motions: Floats, end: Floats, deviations: Floats, poses: Floats, t
     twists : filled with [velocity of the end point; angular velocity] by coordinates, (n, 6, k).
     """
     for row in range(deviations.shape[0]):
-        T, columns = poses[row], twists[row]
-        for i in range(4):
-            for j in range(4):
-                T[i, j] = 1.0 if i == j else 0.0
-        for k in range(motions.shape[0]):
-            motion, values = motions[k], deviations[row, int(motions[k, PLACE]) :]
-            put_axes(motion, values, T, columns[:, int(motion[PLACE]) :])
-            move_on(motion, values, T)
-        x = move(T, (end[0], end[1], end[2]))
-        for i in range(3):
-            T[i, 3] = x[i]
-        for k in range(motions.shape[0]):
-            place = int(motions[k, PLACE])
-            for j in range(place, place + (3 if motions[k, KIND] == BALL else 1)):
-                if motions[k, KIND] != SLIDE:
-                    arm = sub(x, (columns[0, j], columns[1, j], columns[2, j]))
-                    put(columns[:3, j], cross((columns[3, j], columns[4, j], columns[5, j]), arm))
+        walk_row(motions, end, deviations[row], poses[row], twists[row])
+
+
+@routine
+def walk_row(motions: Floats, end: Floats, deviations: Floats, T: Floats, columns: Floats) -> None:
+    """Fill the displacement (4, 4) and the twists (6, k) of one row, as of `walk_path`."""
+    for i in range(4):
+        for j in range(4):
+            T[i, j] = 1.0 if i == j else 0.0
+    for k in range(motions.shape[0]):
+        motion, values = motions[k], deviations[int(motions[k, PLACE]) :]
+        put_axes(motion, values, T, columns[:, int(motion[PLACE]) :])
+        move_on(motion, values, T)
+    x = move(T, (end[0], end[1], end[2]))
+    for i in range(3):
+        T[i, 3] = x[i]
+    for k in range(motions.shape[0]):
+        place = int(motions[k, PLACE])
+        for j in range(place, place + (3 if motions[k, KIND] == BALL else 1)):
+            if motions[k, KIND] != SLIDE:
+                arm = sub(x, (columns[0, j], columns[1, j], columns[2, j]))
+                put(columns[:3, j], cross((columns[3, j], columns[4, j], columns[5, j]), arm))
 
 
 @routine

@@ -9,7 +9,9 @@ _KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
     "false integer real arena memory take place near far huge small y0 y1 yn j0 j1 jn gamma round floor sqrt sin cos "
-    "tan atan2 acos asin atan hypot fabs log exp pow fmin fmax fma remainder signbit isnan isfinite index div abs"
+    "tan atan2 acos asin atan hypot fabs log exp pow fmin fmax fma remainder signbit isnan isfinite index div abs "
+    "catch class delete explicit export friend mutable namespace new operator private protected public template this "
+    "throw try typename using virtual"
 )
 RESERVED = frozenset(_KEYWORDS.split())
 

@@ -78,6 +78,7 @@ class NewtonScratch(NamedTuple):
     best: PlatformState
     behind: PlatformState  # the last configuration of a continuation
     spheres: Spheres  # none if there are other equations
+    steps: Ints  # (1,): Newton steps taken
 
 
 def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
@@ -111,6 +112,7 @@ def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
         new_platform_state(n_legs),
         new_platform_state(n_legs),
         new_spheres(table),
+        np.zeros(1, np.int64),
     )
 
 
@@ -289,6 +291,7 @@ def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) 
         for a in range(m):
             step[free[a]] = normal[a, m]
             size += normal[a, m] * normal[a, m]
+        scratch.steps[0] += 1
         if not take_step(table, scratch) and stays:
             return math.inf
         if stays and worst > NEARLY_ASSEMBLED and not math.sqrt(size) <= longest_step:
