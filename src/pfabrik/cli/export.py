@@ -46,9 +46,9 @@ def text_of(
         from ..export.tensors import TASK, tensor_source
 
         return tensor_source(mechanism, backend=cast(Any, form), joints=joints or TASK)
-    from ..export.export_c import PARTS, c_source
+    from ..export.export_c import c_source
 
-    chosen, precision = cast(Any, parts or PARTS), cast(Any, "float" if form == "c-float" else "double")
+    chosen, precision = cast(Any, parts or None), cast(Any, "float" if form == "c-float" else "double")
     return c_source(mechanism, precision=precision, parts=chosen, name=name, joints=joints, file=file)
 
 

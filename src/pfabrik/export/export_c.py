@@ -19,7 +19,7 @@ from .named_joints import fitting_path
 from .source import source
 from .wording import Precision
 
-Part: TypeAlias = Literal["ik", "limits", "fk", "rates"]
+Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest"]
 PARTS: tuple[Part, ...] = get_args(Part)
 NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -29,16 +29,16 @@ def export_c(
     path: str | PathLike[str],
     *,
     precision: Precision = "double",
-    parts: Sequence[Part] = PARTS,
+    parts: Sequence[Part] | None = None,
     name: str = "pfk",
     joints: str | Sequence[str] | None = None,
 ) -> Path:
     """Write a mechanism's kinematics as one file of C99, for a controller.
 
-    The file uses the stack alone and keeps nothing between calls; it needs only the C library's mathematics.
-    Its comment lists units, limits and legs. Actuators, limits and poses are those of the
-    library, in home's working mode; compiled with `PFK_SELF_TEST` defined it becomes a program that compares itself
-    with the library's answers to 50 poses.
+    The file is the library's own kernels for this machine; it allocates nothing, and needs only the C library's
+    mathematics. Its comment lists units, limits and legs. Actuators, limits and poses are those of the library, in
+    home's working mode; compiled with `PFK_SELF_TEST` defined it becomes a program that compares itself with the
+    library's answers to 50 poses.
 
     Parameters
     ----------
@@ -47,7 +47,8 @@ def export_c(
     parts : "ik" from poses to actuators, completed where the task leaves something open; "limits" every limit, with the
         number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
         number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
-        "rates" the Jacobian, speeds of actuators, and torques of them and back.
+        "rates" the Jacobian, speeds of actuators, and torques of them and back; "nearest", with "ik" and "limits", the
+        nearest feasible pose to a target out of reach. All that the machine has, if left out.
     name : prefix of all names in the file; lower-case letters, digits and underscores.
     joints : names of joints in series from the base to the end effector: then there are functions of these too, and
         rates are by them.
@@ -72,7 +73,7 @@ def c_source(
     mechanism: Mechanism,
     *,
     precision: Precision = "double",
-    parts: Sequence[Part] = PARTS,
+    parts: Sequence[Part] | None = None,
     name: str = "pfk",
     joints: str | Sequence[str] | None = None,
     file: str = "FILE",
@@ -81,11 +82,18 @@ def c_source(
     checked_mechanism(mechanism)
     if not isinstance(precision, str) or precision not in get_args(Precision):
         raise InvalidArgument("precision", repr(precision), "'double' or 'float'")
-    if not (names := require_names("parts", parts)) or not set(names) <= set(PARTS):
+    if parts is not None and not set(PARTS) >= set(require_names("parts", parts)) > set():
         raise InvalidArgument("parts", repr(parts), f"some of {', '.join(map(repr, PARTS))}")
+    if parts is not None and "nearest" in parts and not {"ik", "limits"} <= set(parts):
+        raise InvalidArgument("parts", repr(parts), "'ik' and 'limits' too, for 'nearest' is made of them")
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")
     machine = Machine(mechanism)
+    if parts is None:
+        parts = [part for part in PARTS if part != "nearest" or not machine.why_no_nearest]
+    if "nearest" in parts and machine.why_no_nearest:
+        reason = f"{machine.why_no_nearest}: leave 'nearest' out of `parts` (--parts ik,limits,fk,rates)"
+        raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     if "fk" in parts and machine.uncontrolled:
         left = counted(machine.uncontrolled, "freedom")
         reason = f"its actuators leave the end effector {left}: leave 'fk' out of `parts` (--parts ik,limits,rates)"

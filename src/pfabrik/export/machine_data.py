@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Record
+from ..closure.parasitic import has_other_assemblies
 from ..decomposition.leg_forms import RedundantJoint, Rod
 from ..decomposition.leg_records import row_counts
 from ..decomposition.leg_table import LegTable
@@ -17,6 +18,7 @@ from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
 from ..model import model_of
 from ..motion.mobility import generic_of
+from ..platform.links_of_legs import keeps_links
 from ..rotations import square_to
 from .exported_links import ExportedLinks, exported_links
 
@@ -116,19 +118,17 @@ class Machine:
         return self.links if "limits" in parts else None
 
     @property
+    def why_no_nearest(self) -> str:
+        """The reason why no search in the platform's pose finds the nearest feasible poses; empty if one does."""
+        model = model_of(self.mechanism)
+        if has_other_assemblies(model.path_closure):
+            return "its nearest feasible poses are searched for in all joint coordinates"
+        return "" if keeps_links(model) else "its links are kept apart by searches in all joint coordinates alone"
+
+    @property
     def completes(self) -> bool:
         """True if a target must be completed: some of the pose, or implicit joints, follow from the legs' equations."""
         return self.unset > 0 or self.has_implicit_joints
-
-    @property
-    def n_frames(self) -> int:
-        """The number of frames that legs are read in, as of `kernels.legs.frames`."""
-        return max(K.FROM_ITSELF, *(int(leg.record["makes"]) + 1 for leg in self.legs))
-
-    @property
-    def drive_equations(self) -> int:
-        """The number of further equations at given actuators: of all but proximal joints."""
-        return sum(driven.place != K.Q_PROXIMAL for driven in self.driven)
 
     @property
     def uncontrolled(self) -> int:

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import resources
 
+import numpy as np
+
+from ..arrays import Floats
 from ..motion.joint_path import JointPath
+from ..tolerances import TOLERANCES
+from .controller_tables import ControllerTables, controller_tables
 from .machine_data import Machine
-from .self_test import AGREEMENT, checks_of
-from .tables import checks_h, features, machine_h, tables_h
-from .wording import Precision, comment, in_words
+from .self_test import AGREEMENT, Checks, checks_of
+from .translated import Translated, translated
+from .wording import Precision, comment, in_words, literal, table, words
 
 NOTICE = """\
 Permission to use, copy, modify, and distribute this file for any purpose with or without fee is hereby granted. It is
 provided "as is" and without any warranty; its authors are not liable for anything that comes of its use."""
+
+ACTIVE: dict[Precision, float] = {"double": TOLERANCES.active, "float": 1e-5}
+"""Slack below which a pose is at a limit [L or rad]."""
+
+RANK: dict[Precision, float] = {"double": 1e-9, "float": 1e-5}
+"""Share of a row of a Jacobian below which it follows from others."""
 
 
 def source(
@@ -25,20 +36,36 @@ def source(
     path: JointPath | None = None,
     file: str = "FILE",
 ) -> str:
-    """The text of the file: header, tables and routines."""
-    routines = resources.files(__package__).joinpath("kinematics.c").read_text(encoding="utf-8")
+    """The text of the file: header, kernels, tables and routines."""
+    routines = resources.files(__package__).joinpath("controller.c").read_text(encoding="utf-8")
     checks = checks_of(machine, "limits" in parts) if "ik" in parts else None
-    is_checked = {"CHECKED"} if checks is not None and len(checks.targets) else set()
-    text = selected(routines[routines.index("#ifndef") :], features(machine, parts, path) | is_checked)
+    conditions = features(machine, parts, path) | ({"CHECKED"} if checks is not None and len(checks.targets) else set())
+    tables = controller_tables(machine, parts, path)
+    made = translated(tables, conditions, precision)
     included = {
-        "machine.h": machine_h(machine, parts, path),
-        "tables.h": tables_h(machine, precision, parts, text, path),
+        "machine.h": _machine_h(machine, tables, parts, path),
+        "kernels.h": made.kernels,
+        "tables.h": "\n".join([made.data, *_tables(machine, precision, parts, path, len(tables.reaching.ways))]),
     }
     if checks is not None:
-        included["checks.h"] = checks_h(checks, AGREEMENT[precision])
+        included["checks.h"] = _checks_h(checks, _units(machine), AGREEMENT[precision])
+    text = selected(routines[routines.index("#ifndef") :], conditions)
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
-    words = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, parts, path)}\n{text}"), name, precision)
-    return words.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)
+    body = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, made, parts, path)}\n{text}"), name, precision)
+    return body.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)
+
+
+def features(machine: Machine, parts: Sequence[str], path: JointPath | None = None) -> set[str]:
+    """The names of conditions in `controller.c` that hold for a machine, the parts asked for and named joints."""
+    conditions: dict[str, object] = {
+        "TURNS": "ik" in parts and any(driven.may_turn for driven in machine.driven),
+        "CLEARANCE": machine.links_kept(parts) is not None,
+        "JOINTS": path is not None,
+        "TO_ACTUATORS": path is not None and "ik" in parts,
+        "TO_JOINTS": path is not None and "fk" in parts,
+        "RESTS": {"limits", "nearest"} & {*parts} or (path is not None and "ik" in parts),
+    }
+    return {part.upper() for part in parts} | {name for name, holds in conditions.items() if holds}
 
 
 def selected(routines: str, conditions: set[str]) -> str:
@@ -58,21 +85,96 @@ def selected(routines: str, conditions: set[str]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _header(machine: Machine, parts: Sequence[str], path: JointPath | None) -> str:
+def _machine_h(machine: Machine, tables: ControllerTables, parts: Sequence[str], path: JointPath | None) -> str:
+    """Constants for callers of the file."""
+    counts = {"PFK_ACTUATORS": len(machine.driven), "PFK_LIMITS": len(machine.limits) if "limits" in parts else 0}
+    counts |= {} if path is None else {"PFK_JOINTS": len(path.coordinates)}
+    counts |= {"PFK_RATES": 6 if path is None else len(path.coordinates)} if "rates" in parts else {}
+    counts |= {} if tables.projecting is None else {"PFK_STARTS": len(tables.projecting.tables.plan.seeds.poses)}
+    links = machine.links_kept(parts)
+    counts |= {} if links is None else {"PFK_PAIRS": len(links.pairs)}
+    constants = f"enum {{ {', '.join(f'{name} = {count}' for name, count in counts.items())} }};\n"
+    if links is None:
+        return constants
+    return f"#define PFK_CLEARANCE {literal(links.clearance)} /* least distance between links [length] */\n{constants}"
+
+
+def _tables(
+    machine: Machine, precision: Precision, parts: Sequence[str], path: JointPath | None, n_ways: int
+) -> Iterator[str]:
+    """What the routines around the kernels read."""
+    size, turning = machine.mechanism.characteristic_length, not machine.mechanism.end_effector_is_joint
+    yield "/* L, the radius of the smallest sphere around the joints; units are L of lengths, 1 of angles. */"
+    yield f"#define PFK_SIZE {literal(size)}"
+    yield f"#define PFK_ACTIVE {literal(ACTIVE[precision])} /* a pose is at a limit whose slack is less [L or rad] */"
+    yield f"#define PFK_RANK {literal(RANK[precision])} /* a row of a Jacobian that is less follows from others */"
+    counts = {
+        "LEGS": len(machine.legs),
+        "COLUMNS": 6 + machine.n_redundant,
+        "TURNING": int(turning),
+        "ATTEMPTS": n_ways,
+    }
+    yield f"enum {{ {', '.join(f'PFK_{name} = {count}' for name, count in counts.items())} }};"
+    yield f"static const pfk_real pfk_reference[3] = {literal(np.asarray(machine.mechanism.reference_point))};"
+    if "rates" in parts:
+        yield f"static const pfk_real pfk_units[PFK_ACTUATORS] = {literal(_units(machine))};"
+        yield f"static const pfk_real pfk_rate_units[] = {literal(rate_units(machine, path))};"
+    if "nearest" in parts:
+        of_ranges = [size if each.is_length else 1.0 for each in machine.limited for _ in range(2)]
+        values = np.array([*of_ranges, *(1.0 for _ in machine.cones)] or [1.0])
+        yield f"static const pfk_real pfk_limit_units[] = {literal(values)};"
+    if "limits" in parts:
+        yield from words("limit", [f"beyond a limit: joint {joint}, {bound}" for joint, bound in machine.limits])
+    if (links := machine.links_kept(parts)) is not None:
+        yield from words("pair", [f"links too near: {' and '.join(names)}" for *_, names in links.pairs])
+    joints = [", ".join(leg.joints) for leg in machine.legs]
+    yield from words("leg", [f"does not reach, or does not close: the leg of {each}" for each in joints])
+
+
+def _units(machine: Machine) -> Floats:
+    """L of actuators that are lengths, 1 of angles."""
+    size = machine.mechanism.characteristic_length
+    return np.array([size if driven.is_length else 1.0 for driven in machine.driven])
+
+
+def rate_units(machine: Machine, path: JointPath | None) -> Floats:
+    """The units of rates: L of lengths, 1 of angles."""
+    size = machine.mechanism.characteristic_length
+    if path is None:
+        return np.array([size] * 3 + [1.0] * 3)
+    return np.array([1.0 if each.kind == "angle" else size for each in path.coordinates])
+
+
+def _checks_h(checks: Checks, units: Floats, exact: float) -> str:
+    """Poses for the self-test, and the tolerance of actuators [L or rad]."""
+    lines = [f"#define PFK_EXACT {literal(exact)}", f"enum {{ PFK_CHECKS = {len(checks.targets)} }};"]
+    lines += [f"static const pfk_real pfk_check_units[PFK_ACTUATORS] = {literal(units)};", ""]
+    distances = [""] * len(checks.targets)
+    if checks.distances is not None:
+        distances = [f", {literal(float(distance))}" for distance in checks.distances]
+    rows = (
+        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, {int(kept)}{distance}}}"
+        for target, actuators, kept, distance in zip(*checks[:3], distances, strict=True)
+    )
+    return "\n".join([*lines, *table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
+
+
+def _header(machine: Machine, made: Translated, parts: Sequence[str], path: JointPath | None) -> str:
     """The comment at the top: conventions, actuators, limits and legs, and the notice."""
     mechanism, unit = machine.mechanism, machine.mechanism.length_unit
     lines = [
         f"The kinematics of '{mechanism.name}', written by pfabrik from its description.",
         "",
-        "C99, and C++ as it is; no memory but the stack, nothing that changes between calls, only the C library's",
-        "mathematics.",
+        "C99, and C++ as it is; only the C library's mathematics. Nothing is allocated, and no answer depends on an",
+        "earlier one; but the memory of a call is static, so that one call is to end before the next begins.",
+        f"On 32 bits this is {made.memory:,} bytes of RAM, and tables are {made.constants:,} bytes of constants.",
         f"Lengths in {unit}, angles in radians. A pose maps platform coordinates, as at home and from the reference",
         "point, to base coordinates: p is where the reference point is, R the rotation.",
         f"Task: {' '.join(mechanism.task)}."
         + (" What it leaves open follows from the machine." if machine.unset else ""),
         "All of it in the working mode of home: each crank and carriage on the side where it is there.",
         "",
-        "The tables are of this machine alone; the functions are the same for all machines with such legs.",
+        "The tables are of this machine; of the functions, what it never needs is left out.",
         "Include it with PFK_DECLARATIONS_ONLY defined for the declarations alone; with PFK_SELF_TEST defined it is a",
         "program that checks itself:",
         "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -15,32 +15,6 @@ Precision = Literal["double", "float"]
 _MATHS = re.compile(r"\b(sqrt|fabs|sin|cos|atan2|floor)\(")
 _LITERAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])")
 _COMMENT = re.compile(r"(/\*.*?\*/|\"(?:[^\"\\]|\\.)*\")", re.DOTALL)
-
-
-class Accuracy(NamedTuple):
-    """Thresholds of the exported file; lengths as shares of L.
-
-    Attributes
-    ----------
-    kept : excess up to which a limit counts as kept [L or rad].
-    closed, close : equations as small as rounding leaves them; those that count as closed [L or rad].
-    dead : singularity margin below which a proximal joint does not follow.
-    rank : share of the largest pivot below which an equation does not determine the pose.
-    rotation : sum of the deviations from an orthonormal matrix up to which a target is a pose.
-    """
-
-    kept: float
-    closed: float
-    close: float
-    dead: float
-    rank: float
-    rotation: float
-
-
-ACCURACY: dict[Precision, Accuracy] = {
-    "double": Accuracy(1e-9, 1e-13, 1e-10, 1e-12, 1e-9, 2e-6),
-    "float": Accuracy(1e-6, 2e-7, 5e-6, 1e-6, 1e-5, 2e-5),
-}
 
 
 def in_words(text: str, name: str, precision: Precision) -> str:

@@ -1,0 +1,617 @@
+/* What surrounds the kernels in every exported file. `source.py` puts the machine's constants, the kernels, tables and
+   checks in place of the included files, keeps the blocks between #if and #endif whose conditions hold, and writes names
+   and numbers with the prefix and in the precision asked for. */
+
+#ifndef PFK_H
+#define PFK_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef double pfk_real;
+
+typedef struct {
+    pfk_real p[3];
+    pfk_real R[3][3];
+} pfk_pose;
+
+/* Return codes: 0 on success, the number of the limit that is exceeded most, PFK_LEG + the number of a leg that does
+   not reach or close, or one of those below. */
+enum {
+    PFK_LEG = 1000,
+#if CLEARANCE
+    PFK_PAIR = 10000,      /* + the number of a pair of links, the nearest: they are nearer than PFK_CLEARANCE */
+#endif
+    PFK_NO_POSE = -1,      /* not finite, or not a rotation */
+    PFK_NO_ACTUATORS = -2, /* not finite */
+    PFK_OTHER_MODE = -3,   /* closed, but not in the working mode of home */
+    PFK_PROJECTED = -4,    /* out of reach: the nearest feasible pose */
+    PFK_BUDGET = -5        /* steps were spent before the search ended: the nearest feasible pose so far, if any */
+};
+
+#include "machine.h"
+
+/* The pose at home. */
+void pfk_home(pfk_pose *pose);
+/* A pose from a position and from turns about the fixed x, y and z axes, in this order [rad]. */
+void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose);
+/* The angles of a pose: roll, pitch, yaw [rad]. */
+void pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
+/* The meaning of a return code, in words. */
+const char *pfk_what(int code);
+#if IK
+/* Actuators for a target. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
+   there, and `pose` becomes the pose reached. Nothing is written unless 0 is returned. */
+int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
+#endif
+#if NEAREST
+/* The feasible pose nearest to a target: 0 where it is reached, PFK_PROJECTED, or PFK_BUDGET. `pose` must hold a feasible
+   pose, the last one or home: the search starts there, and it becomes the nearest, with its actuators; nothing is written
+   where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from each of up to `starts`
+   more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together. `holding`, which may be 0,
+   is filled with 1 for the limits, of PFK_LIMITS, that the pose is at. */
+int pfk_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding);
+/* What a control loop calls: pfk_ik, and pfk_nearest where that has no answer. */
+int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding);
+#endif
+#if TURNS
+/* Adds whole turns to actuators that may turn more than once: nearest to those before. */
+void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS]);
+#endif
+#if LIMITS
+/* Fills the slack of a whole pose in each of PFK_LIMITS limits, negative beyond it [length or rad]. */
+int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
+#endif
+#if CLEARANCE
+/* The least distance between two links of a whole pose, negative where they overlap, and the number of their pair, from
+   1; where it is less than PFK_CLEARANCE, PFK_PAIR + this number is returned. Nothing is written where legs do not
+   reach or close. */
+int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair);
+#endif
+#if FK
+/* The pose at given actuators, by Newton's method from `pose`; `steps` may be 0, or is set to the number of its steps.
+   Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
+#if CLEARANCE
+/* Where links are too near the pose is written too, and PFK_PAIR + the number of their pair returned. */
+#endif
+int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
+#endif
+#if JOINTS
+/* The pose at coordinates of the joints in series from the base to the end effector. */
+void pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose *pose);
+#endif
+#if TO_ACTUATORS
+/* Actuators at joint coordinates; nothing is written unless 0 is returned. */
+int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS]);
+#endif
+#if TO_JOINTS
+/* Joint coordinates at which actuators are, by Newton's method from those in `joints`; `steps` may be 0, or is set to
+   their number. Limits are not checked. Nothing is written to `joints` unless 0 is returned. */
+#if CLEARANCE
+/* Where links are too near the coordinates are written too, and PFK_PAIR + the number of their pair returned. */
+#endif
+int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps);
+#endif
+#if RATES
+/* Return codes are those of pfk_limits without its limits; nothing is written unless 0 is returned. A crank or carriage at
+   its dead point has rate 0. */
+#if JOINTS
+typedef const pfk_real *pfk_at; /* joint coordinates; rates are those of the joints, torques also forces of slides */
+#else
+typedef const pfk_pose *pfk_at; /* a whole pose; rates are a twist: the velocity of the reference point and the angular
+   velocity, in base coordinates, or the nearest that the legs allow; torques a force there and a moment */
+#endif
+/* Rates of actuators by each of the rates. */
+int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES]);
+/* Rates of actuators, and back. */
+int pfk_speeds(pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS]);
+int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES]);
+/* Torques and forces of actuators, the least that give those wanted, and back: what they give. */
+int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS]);
+int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES]);
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+
+#ifndef PFK_DECLARATIONS_ONLY
+
+#include "kernels.h"
+#include "tables.h"
+
+/* A pose as kernels take it. */
+static pfk_Floats2 pfk_opened(const pfk_pose *pose, pfk_real at[16])
+{
+    pfk_Floats2 opened = {0, {4, 4}};
+    int i, j;
+    opened.data = at;
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j)
+            at[4 * i + j] = pose->R[i][j];
+        at[4 * i + 3] = pose->p[i];
+        at[12 + i] = 0.0;
+    }
+    at[15] = 1.0;
+    return opened;
+}
+
+#if IK || FK || JOINTS
+static void pfk_close(const pfk_real at[16], pfk_pose *pose)
+{
+    int i, j;
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = at[4 * i + j];
+        pose->p[i] = at[4 * i + 3];
+    }
+}
+
+/* Numbers as kernels take them; those of the caller are only read where they are constants. */
+static pfk_Floats1 pfk_opened_row(const pfk_real *values, int n)
+{
+    pfk_Floats1 opened = {0, {0}};
+    opened.data = (pfk_real *)values;
+    opened.n[0] = n;
+    return opened;
+}
+
+#endif
+void pfk_home(pfk_pose *pose)
+{
+    int i, j;
+    for (i = 0; i < 3; ++i) {
+        pose->p[i] = pfk_reference[i];
+        for (j = 0; j < 3; ++j)
+            pose->R[i][j] = i == j ? 1.0 : 0.0;
+    }
+}
+
+void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose)
+{
+    const pfk_real cr = cos(roll), sr = sin(roll), cp = cos(pitch), sp = sin(pitch), cy = cos(yaw), sy = sin(yaw);
+    pose->p[0] = x;
+    pose->p[1] = y;
+    pose->p[2] = z;
+    pose->R[0][0] = cy * cp;
+    pose->R[0][1] = cy * sp * sr - sy * cr;
+    pose->R[0][2] = cy * sp * cr + sy * sr;
+    pose->R[1][0] = sy * cp;
+    pose->R[1][1] = sy * sp * sr + cy * cr;
+    pose->R[1][2] = sy * sp * cr - cy * sr;
+    pose->R[2][0] = -sp;
+    pose->R[2][1] = cp * sr;
+    pose->R[2][2] = cp * cr;
+}
+
+void pfk_rpy(const pfk_pose *pose, pfk_real angles[3])
+{
+    const pfk_real level = sqrt(pose->R[0][0] * pose->R[0][0] + pose->R[1][0] * pose->R[1][0]);
+    angles[0] = atan2(pose->R[2][1], pose->R[2][2]);
+    angles[1] = atan2(-pose->R[2][0], level);
+    angles[2] = atan2(pose->R[1][0], pose->R[0][0]);
+}
+
+const char *pfk_what(int code)
+{
+    if (code == 0)
+        return "reached";
+    if (code == PFK_NO_POSE)
+        return "not a pose";
+    if (code == PFK_NO_ACTUATORS)
+        return "actuators that are not finite";
+    if (code == PFK_OTHER_MODE)
+        return "closed, but not in the working mode of home";
+    if (code == PFK_PROJECTED)
+        return "out of reach: the nearest feasible pose";
+    if (code == PFK_BUDGET)
+        return "steps were spent before the search ended";
+#if LIMITS
+    if (code > 0 && code <= PFK_LIMITS)
+        return pfk_limit_words[code - 1];
+#endif
+#if CLEARANCE
+    if (code > PFK_PAIR && code - PFK_PAIR <= PFK_PAIRS)
+        return pfk_pair_words[code - PFK_PAIR - 1];
+#endif
+    if (code > PFK_LEG && code - PFK_LEG <= PFK_LEGS)
+        return pfk_leg_words[code - PFK_LEG - 1];
+    return "no code of this file";
+}
+
+#if IK
+static int pfk_ik_in(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS], int attempts)
+{
+    pfk_real wanted[16], own[16];
+    const int code = (int)pfk_reach(&pfk_reaching, pfk_opened(target, wanted), pfk_opened(pose, own), attempts);
+    if (code)
+        return code;
+    pfk_put_reached(&pfk_reaching, pfk_opened(pose, own), pfk_opened_row(actuators, PFK_ACTUATORS));
+    pfk_close(own, pose);
+    return 0;
+}
+
+int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])
+{
+    return pfk_ik_in(target, pose, actuators, PFK_ATTEMPTS);
+}
+
+#endif
+#if NEAREST
+int pfk_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding)
+{
+    pfk_real wanted[16], own[16];
+    int i, code;
+    starts = starts < 0 ? 0 : (starts > PFK_STARTS ? PFK_STARTS : starts);
+    steps = steps < 1 ? 1 : (steps > 10000 ? 10000 : steps);
+    code = (int)pfk_project_target(&pfk_projecting, &pfk_reaching, pfk_opened(target, wanted), pfk_opened(pose, own),
+                                   pfk_opened_row(actuators, PFK_ACTUATORS), steps, starts);
+    if (code == PFK_NO_POSE)
+        return code;
+    pfk_close(own, pose);
+    for (i = 0; i < PFK_LIMITS && holding; ++i)
+        holding[i] = 0;
+    if (!holding || pfk_rest(&pfk_reaching, pfk_opened(pose, own)) >= PFK_LEG)
+        return code;
+    for (i = 0; i < PFK_LIMITS; ++i)
+        holding[i] = pfk_reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
+    return code;
+}
+
+int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding)
+{
+    int i, code = pfk_ik_in(target, pose, actuators, 1);
+    if (code && code != PFK_NO_POSE)
+        return pfk_nearest(target, pose, actuators, steps, starts, holding);
+    for (i = 0; i < PFK_LIMITS && holding; ++i)
+        holding[i] = !code && pfk_reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
+    return code;
+}
+
+#endif
+#if TURNS
+void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS])
+{
+    pfk_put_turns(&pfk_reaching, pfk_opened_row(before, PFK_ACTUATORS), pfk_opened_row(now, PFK_ACTUATORS));
+}
+
+#endif
+#if LIMITS
+int pfk_limits(const pfk_pose *pose, pfk_real slack[])
+{
+    pfk_real own[16];
+    const int code = (int)pfk_rest(&pfk_reaching, pfk_opened(pose, own));
+    int i;
+    for (i = 0; i < PFK_LIMITS; ++i)
+        slack[i] = code < 0 || (code >= PFK_LEG && code < 10 * PFK_LEG) ? slack[i] : pfk_reaching_slack[i];
+    return code;
+}
+
+#endif
+#if CLEARANCE
+int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair)
+{
+    pfk_real own[16];
+    int code = (int)pfk_rest(&pfk_reaching, pfk_opened(pose, own));
+    if (code < 0 || (code >= PFK_LEG && code < PFK_PAIR))
+        return code;
+    *pair = 1 + (int)pfk_measure(&pfk_reaching);
+    *distance = pfk_reaching_distance[0] * PFK_SIZE;
+    return pfk_reaching_distance[0] >= pfk_reaching_links_least[0] - pfk_KEPT ? 0 : PFK_PAIR + *pair;
+}
+
+#endif
+#if FK
+int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
+{
+    pfk_real own[16];
+    const int code = (int)pfk_assemble(&pfk_assembling, &pfk_reaching, pfk_opened_row(actuators, PFK_ACTUATORS),
+                                       pfk_opened(pose, own));
+    if (steps)
+        *steps = (int)pfk_assembling_scratch_steps[0];
+    pfk_close(own, pose);
+    return code;
+}
+
+#endif
+#if JOINTS
+void pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose *pose)
+{
+    pfk_walk(&pfk_series, pfk_opened_row(joints, PFK_JOINTS));
+    pfk_close(pfk_series_pose, pose);
+}
+
+#endif
+#if TO_ACTUATORS
+int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS])
+{
+    pfk_pose pose;
+    pfk_real own[16];
+    int code;
+    if (!pfk_walk(&pfk_series, pfk_opened_row(joints, PFK_JOINTS)))
+        return PFK_NO_POSE;
+    pfk_close(pfk_series_pose, &pose);
+    code = (int)pfk_rest(&pfk_reaching, pfk_opened(&pose, own));
+    if (code)
+        return code;
+    pfk_put_reached(&pfk_reaching, pfk_opened(&pose, own), pfk_opened_row(actuators, PFK_ACTUATORS));
+    return 0;
+}
+
+#endif
+#if TO_JOINTS
+int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps)
+{
+    const int code = (int)pfk_put_joints(&pfk_series, &pfk_assembling, &pfk_reaching,
+                                         pfk_opened_row(actuators, PFK_ACTUATORS), pfk_opened_row(joints, PFK_JOINTS));
+    if (steps)
+        *steps = (int)pfk_assembling_scratch_steps[0];
+    return code;
+}
+
+#endif
+#if RATES
+#if JOINTS
+int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
+{
+    pfk_pose pose;
+    pfk_real own[16];
+    int i, j, k, code;
+    if (!pfk_walk(&pfk_series, pfk_opened_row(at, PFK_JOINTS)))
+        return PFK_NO_POSE;
+    pfk_close(pfk_series_pose, &pose);
+    code = (int)pfk_put_rates(&pfk_rating, &pfk_reaching, pfk_opened(&pose, own), 1, PFK_TURNING);
+    for (i = 0; i < PFK_ACTUATORS && !code; ++i)
+        for (j = 0; j < PFK_JOINTS; ++j)
+            for (jacobian[i][j] = 0.0, k = 0; k < 6; ++k)
+                jacobian[i][j] += pfk_rating_drives[i * PFK_COLUMNS + k] * pfk_series_twists[k * PFK_JOINTS + j];
+    return code;
+}
+#else
+int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
+{
+    pfk_real own[16];
+    const int code = (int)pfk_put_rates(&pfk_rating, &pfk_reaching, pfk_opened(at, own), 0, PFK_TURNING);
+    int i, j;
+    for (i = 0; i < PFK_ACTUATORS && !code; ++i)
+        for (j = 0; j < 6; ++j)
+            jacobian[i][j] = pfk_rating_drives[i * PFK_COLUMNS + j];
+    return code;
+}
+#endif
+
+/* Takes orthonormal vectors (`count` of them, `width` numbers each) off v, once more where most of it goes; fills their
+   shares; the length left. */
+static pfk_real pfk_off_basis(const pfk_real *basis, int count, int width, pfk_real *v, pfk_real *shares)
+{
+    pfk_real share[6], size = 0.0, before;
+    int j, k, again;
+    for (k = 0; k < count; ++k)
+        shares[k] = 0.0;
+    for (j = 0; j < width; ++j)
+        size += v[j] * v[j];
+    for (again = 0; count && again < 2; ++again) {
+        for (k = 0; k < count; ++k)
+            for (share[k] = 0.0, j = 0; j < width; ++j)
+                share[k] += basis[k * width + j] * v[j];
+        for (k = 0; k < count; ++k) {
+            for (j = 0; j < width; ++j)
+                v[j] -= share[k] * basis[k * width + j];
+            shares[k] += share[k];
+        }
+        before = size;
+        for (size = 0.0, j = 0; j < width; ++j)
+            size += v[j] * v[j];
+        if (size > 0.01 * before)
+            break; /* no more than a digit has cancelled */
+    }
+    return sqrt(size);
+}
+
+/* A Jacobian, its lengths over L, as u t q: orthonormal rows q and columns u, `rank` of each, a triangle t. */
+typedef struct {
+    int rank;
+    pfk_real u[PFK_RATES][PFK_ACTUATORS], t[PFK_RATES][PFK_RATES], q[PFK_RATES][PFK_RATES];
+} pfk_factors;
+
+static pfk_real pfk_per_unit(int actuator)
+{
+    return 1.0 / pfk_units[actuator];
+}
+
+static void pfk_put_factors(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_factors *own)
+{
+    pfk_real row[PFK_RATES], shares[PFK_RATES], left[PFK_ACTUATORS][PFK_RATES], size, whole;
+    int i, j, k;
+    own->rank = 0;
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        whole = 0.0;
+        for (j = 0; j < PFK_RATES; ++j) {
+            row[j] = jacobian[i][j] * (pfk_rate_units[j] * pfk_per_unit(i));
+            whole += row[j] * row[j];
+            left[i][j] = 0.0;
+        }
+        size = pfk_off_basis(&own->q[0][0], own->rank, PFK_RATES, row, shares);
+        for (k = 0; k < own->rank; ++k)
+            left[i][k] = shares[k];
+        if (own->rank < PFK_RATES && size > PFK_RANK * sqrt(whole)) {
+            left[i][own->rank] = size;
+            for (j = 0; j < PFK_RATES; ++j)
+                own->q[own->rank][j] = row[j] * (1.0 / size);
+            ++own->rank;
+        }
+    }
+    for (k = 0; k < own->rank && own->rank == PFK_ACTUATORS; ++k) { /* a triangle: put upside down it is t */
+        for (i = 0; i < PFK_ACTUATORS; ++i) {
+            own->u[k][i] = i == own->rank - 1 - k ? 1.0 : 0.0;
+            own->t[k][i] = left[own->rank - 1 - k][own->rank - 1 - i];
+        }
+        for (j = 0; j < PFK_RATES && 2 * k < own->rank; ++j) {
+            size = own->q[k][j];
+            own->q[k][j] = own->q[own->rank - 1 - k][j];
+            own->q[own->rank - 1 - k][j] = size;
+        }
+    }
+    for (k = 0; k < own->rank && own->rank < PFK_ACTUATORS; ++k) {
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            own->u[k][i] = left[i][k];
+        size = pfk_off_basis(&own->u[0][0], k, PFK_ACTUATORS, own->u[k], shares);
+        for (j = 0; j < k; ++j)
+            own->t[j][k] = shares[j];
+        own->t[k][k] = size;
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            own->u[k][i] /= size;
+    }
+}
+
+int pfk_speeds(pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES];
+    int i, j, code = pfk_jacobian(at, jacobian);
+    for (i = 0; i < PFK_ACTUATORS && !code; ++i)
+        for (speeds[i] = 0.0, j = 0; j < PFK_RATES; ++j)
+            speeds[i] += jacobian[i][j] * rates[j];
+    return code;
+}
+
+int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES];
+    int i, j, code = pfk_jacobian(at, jacobian);
+    for (j = 0; j < PFK_RATES && !code; ++j)
+        for (given[j] = 0.0, i = 0; i < PFK_ACTUATORS; ++i)
+            given[j] += jacobian[i][j] * torques[i];
+    return code;
+}
+
+int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], z[PFK_RATES];
+    pfk_factors own;
+    int i, j, k, code = pfk_jacobian(at, jacobian);
+    if (code)
+        return code;
+    pfk_put_factors(jacobian, &own);
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        torques[i] = 0.0;
+    for (k = 0; k < own.rank; ++k) {
+        z[k] = 0.0;
+        for (j = 0; j < PFK_RATES; ++j)
+            z[k] += own.q[k][j] * wanted[j] * pfk_rate_units[j];
+        for (j = 0; j < k; ++j)
+            z[k] -= own.t[j][k] * z[j];
+        z[k] /= own.t[k][k];
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            torques[i] += z[k] * own.u[k][i] * pfk_per_unit(i);
+    }
+    return 0;
+}
+
+int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES])
+{
+    pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], z[PFK_RATES];
+    pfk_factors own;
+    int i, j, k, code = pfk_jacobian(at, jacobian);
+    if (code)
+        return code;
+    pfk_put_factors(jacobian, &own);
+    for (j = 0; j < PFK_RATES; ++j)
+        rates[j] = 0.0;
+    for (k = own.rank - 1; k >= 0; --k) {
+        z[k] = 0.0;
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            z[k] += own.u[k][i] * speeds[i] * pfk_per_unit(i);
+        for (j = k + 1; j < own.rank; ++j)
+            z[k] -= own.t[k][j] * z[j];
+        z[k] /= own.t[k][k];
+        for (j = 0; j < PFK_RATES; ++j)
+            rates[j] += z[k] * own.q[k][j] * pfk_rate_units[j];
+    }
+    return 0;
+}
+
+#endif
+#if IK
+#ifdef PFK_SELF_TEST
+
+#include <stdio.h>
+
+#if CHECKED
+/* A pose, the actuators there, and whether those are within all limits. */
+#if CLEARANCE
+/* And the least distance between its links. */
+#endif
+typedef struct {
+    pfk_pose target;
+    pfk_real actuators[PFK_ACTUATORS];
+    int kept;
+#if CLEARANCE
+    pfk_real distance;
+#endif
+} pfk_check;
+
+#include "checks.h"
+
+int main(void)
+{
+    pfk_real found[PFK_ACTUATORS], size;
+#if CLEARANCE
+    pfk_real distance;
+#endif
+    pfk_pose pose;
+    int i, j, code, wrong = 0;
+    for (i = 0; i < PFK_CHECKS; ++i) {
+        pfk_home(&pose);
+        code = pfk_ik(&pfk_checks[i].target, &pose, found);
+        if ((code == 0) != pfk_checks[i].kept) {
+            printf("pose %d: %s\n", i, pfk_what(code));
+            ++wrong;
+        }
+        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j) {
+            size = pfk_check_units[j];
+            if (!(fabs(found[j] - pfk_checks[i].actuators[j]) <= PFK_EXACT * size)) {
+                printf("pose %d, actuator %d: %.9g\n", i, j, (double)found[j]);
+                ++wrong;
+            }
+        }
+#if CLEARANCE
+        if (code == 0) {
+            pfk_clearance(&pose, &distance, &j);
+            if (!(fabs(distance - pfk_checks[i].distance) <= PFK_EXACT * PFK_SIZE)) {
+                printf("pose %d, links: %.9g\n", i, (double)distance);
+                ++wrong;
+            }
+        }
+#endif
+#if FK
+        if (code == 0) {
+            pfk_pose back = pose;
+            if (pfk_fk(found, &back, 0) != 0) {
+                printf("pose %d: no way back\n", i);
+                ++wrong;
+            }
+            for (j = 0; j < 3; ++j)
+                if (!(fabs(back.p[j] - pose.p[j]) <= PFK_EXACT * PFK_SIZE)) {
+                    printf("pose %d, back: %.9g\n", i, (double)back.p[j]);
+                    ++wrong;
+                }
+        }
+#endif
+    }
+    printf("%d poses, %d wrong\n", PFK_CHECKS, wrong);
+    return wrong != 0;
+}
+#else
+int main(void)
+{
+    printf("nothing is checked: no pose near home has one answer alone\n");
+    return 2;
+}
+#endif
+
+#endif
+#endif
+#endif

@@ -1,0 +1,232 @@
+"""A machine as the kernels of a controller take it: its tables, and the memory of a call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arrays import Records
+from ..closure.assemble import is_over_determined
+from ..decomposition.leg_table import COMPLETED_WITHIN
+from ..kernels.clearance.solids import CAPSULE, KIND
+from ..kernels.controller.assembled import Assembling
+from ..kernels.controller.joints import Series
+from ..kernels.controller.placed_links import PlacedLinks
+from ..kernels.controller.projected import Projecting
+from ..kernels.controller.rates import Rating
+from ..kernels.controller.reached import Reaching
+from ..kernels.legs.answer import Completion, new_completion
+from ..kernels.platform.equations import LegEvaluation, new_leg_evaluation
+from ..kernels.platform.forward import NewtonScratch, new_newton_scratch
+from ..kernels.platform.search_records import Starts, new_solutions
+from ..kernels.platform.tables import EXACTLY, NEAREST, QUESTION, Question, Start, new_answer_scratch
+from ..model import Model, model_of
+from ..motion.joint_path import JointPath
+from ..motion.tilt_axis import tilt_axis
+from ..options import Options
+from ..platform.nearest_pose import home_start, no_starts
+from ..platform.rotation import keeps_rotation
+from ..platform.seeds import seeds_of
+from ..platform.table import kernel_table
+from ..platform.tables import tables_of
+from .exported_links import angles_needed
+from .machine_data import Machine
+
+NEAR = 0.5
+"""How far implicit joints, which allow more poses, move at once [L or rad]."""
+
+ASKED = {"first": NEAREST, "last": EXACTLY, "has_start": 1, "keeps_mode": 1, "is_nearby": 0}
+"""What a controller asks where legs do not reach: seeds and steps are those of a call."""
+
+
+class ControllerTables(NamedTuple):
+    """What the parts of a file take; None of parts that it has not."""
+
+    reaching: Reaching
+    assembling: Assembling | None
+    rating: Rating | None
+    series: Series | None
+    projecting: Projecting | None
+
+
+def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | None = None) -> ControllerTables:
+    """The tables of a machine for some parts of a file."""
+    model = model_of(machine.mechanism)
+    reaching = _reaching(machine, model, parts)
+    start = Starts(np.zeros((1, 4, 4)), np.zeros((0, len(machine.legs))), np.zeros((1, len(machine.legs))))
+    assembling = rating = series = projecting = None
+    if "fk" in parts:
+        n_a, stays = np.zeros((1, len(machine.driven))), not is_over_determined(model.closure)
+        assembling = Assembling(
+            reaching.near,
+            start,
+            no_starts(model.legs) if stays else seeds_of(model),
+            np.array([int(stays)]),
+            n_a,
+            _newton_scratch(model, reaching),
+        )
+    if "rates" in parts:
+        rating = _rating(machine, reaching)
+    if path is not None:
+        series = _series(path)
+    if "nearest" in parts:
+        projecting = _projecting(model, reaching)
+    return ControllerTables(reaching, assembling, rating, series, projecting)
+
+
+def _reaching(machine: Machine, model: Model, parts: Sequence[str]) -> Reaching:
+    table, n = kernel_table(model.legs), len(machine.legs)
+    links = _placed_links(machine, parts)
+    if len(links.pairs):
+        table = table._replace(legs=_aimed(machine, table.legs))
+    if "limits" not in parts:
+        table = table._replace(limited=table.limited[:0], cones=table.cones[:0])
+    far = table
+    near = far._replace(task=_within(far.task, NEAR)) if machine.has_implicit_joints else far
+    whole_near, whole_far = near, far
+    if machine.has_implicit_joints and machine.unset:
+        whole_near, whole_far = (each._replace(task=_whole(each.task)) for each in (near, far))
+    n_ways = 1 if _follows_at_once(machine, model) else 3 if not machine.has_implicit_joints else 6
+    axis = tilt_axis(machine.mechanism) if machine.completes else None
+    return Reaching(
+        near,
+        far,
+        whole_near,
+        whole_far,
+        home=home_start(model),
+        ways=np.zeros(n_ways),
+        tilt=np.zeros((0, 3)) if axis is None else np.array(axis)[None],
+        links=links,
+        scratch=new_completion(table),
+        wanted=np.zeros((4, 4)),
+        present=np.zeros((4, 4)),
+        step=np.zeros((4, 4)),
+        begin=np.zeros(n),
+        sides=np.zeros(n),
+        turn=np.zeros(3),
+        slack=np.zeros(2 * len(table.limited) + len(table.cones)),
+        distance=np.zeros(1),
+    )
+
+
+def _follows_at_once(machine: Machine, model: Model) -> bool:
+    """True if the task sets the pose, or its position alone of a platform that keeps its orientation."""
+    return not machine.completes or (not machine.has_implicit_joints and keeps_rotation(model) and all(model.task.axes))
+
+
+def _within(task: Records, farthest: float) -> Records:
+    task = task.copy()
+    task["farthest"] = min(farthest, COMPLETED_WITHIN)
+    return task
+
+
+def _whole(task: Records) -> Records:
+    """The task that sets the whole pose."""
+    task = task.copy()
+    task["axes"], task["rotations"], task["unset"] = 1, 3, 0
+    return task
+
+
+def _aimed(machine: Machine, legs: Records) -> Records:
+    """Legs whose angles are computed where links need them."""
+    legs = legs.copy()
+    for k, leg in enumerate(legs):
+        for end, start in (("base_end", 1), ("platform_end", 5)):
+            if angles_needed(machine.links, k, start):
+                leg[f"{end}_aimed"] = 1
+    return legs
+
+
+def _placed_links(machine: Machine, parts: Sequence[str]) -> PlacedLinks:
+    links, length = machine.links_kept(parts), machine.mechanism.characteristic_length
+    memory = np.zeros((4, 3)), np.zeros((2, 3))
+    if links is None:
+        none = np.zeros((0, 4), np.int64), np.zeros((0, 7)), np.zeros((0, 5)), np.zeros((0, 4, 3))
+        pairs = np.zeros((0, 2), np.int64)
+        return PlacedLinks(*none, pairs, pairs, np.zeros(1), np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), *memory)
+    sizes, places = (np.array([solid[k] for solid in links.solids], float) for k in (0, 1))
+    sizes[:, 1:] /= length
+    places[:, 0] /= length
+    places[sizes[:, KIND] == CAPSULE, 1] /= length
+    motions = [(each.on, each.kind, each.leg, each.place) for each in links.motions]
+    numbers = [(each.sense, *each.axis, *np.asarray(each.point) / length) for each in links.motions]
+    bodies = np.array([solid.bodies for solid in links.solids], np.int64)
+    pairs = np.array([pair[:2] for pair in links.pairs], np.int64)
+    return PlacedLinks(
+        np.array(motions, np.int64).reshape(-1, 4),
+        np.array(numbers, float).reshape(-1, 7),
+        sizes[:, :5],
+        places,
+        bodies,
+        pairs,
+        np.array([links.clearance / length]),
+        np.zeros((2 + len(motions), 4, 4)),
+        np.zeros_like(places),
+        *memory,
+    )
+
+
+def _shared(own: LegEvaluation, with_: Completion) -> LegEvaluation:
+    """A leg evaluation in the memory of another: no two are needed at once."""
+    return own._replace(frames=with_.frames, values=with_.values, lines=with_.lines)
+
+
+def _newton_scratch(model: Model, reaching: Reaching) -> NewtonScratch:
+    own = new_newton_scratch(reaching.near, not model.mechanism.end_effector_is_joint)
+    return own._replace(leg_eval=_shared(own.leg_eval, reaching.scratch))
+
+
+def _rating(machine: Machine, reaching: Reaching) -> Rating:
+    table, width, n_a = reaching.far, 6 + machine.n_redundant, len(machine.driven)
+    leg_eval, rows = _shared(new_leg_evaluation(table), reaching.scratch), int(table.task[0]["rows"])
+    return Rating(
+        table, leg_eval, np.zeros((rows, width)), np.zeros(rows, np.int64), np.zeros((n_a, width)), np.zeros((6, 6))
+    )
+
+
+def _series(path: JointPath) -> Series:
+    n, mechanism = len(path.coordinates), path.mechanism
+    size = mechanism.characteristic_length
+    return Series(
+        path._table,
+        np.array(mechanism.reference_point, float),
+        path.home,
+        np.where(path.is_angle, 1.0, size),
+        np.array([size]),
+        np.zeros(n),
+        np.zeros((4, 4)),
+        np.zeros((6, n)),
+        np.zeros((4, 4)),
+        np.zeros((n, n + 1)),
+        np.zeros(3 if mechanism.end_effector_is_joint else 6),
+    )
+
+
+def _projecting(model: Model, reaching: Reaching) -> Projecting:
+    tables = tables_of(model, Options())
+    legs, n_a = len(model.legs.legs), len(model.legs.driven)
+    scratch = new_answer_scratch(tables)
+    completion, nothing, search = reaching.scratch, _emptied(scratch.newton), scratch.nearest.search
+    search = search._replace(leg_eval=_shared(search.leg_eval, completion))
+    asked = np.zeros(1, QUESTION)
+    for name, value in ASKED.items():
+        asked[name] = value
+    return Projecting(
+        tables,
+        scratch._replace(
+            completion=completion, resting=completion, newton=nothing, nearest=scratch.nearest._replace(search=search)
+        ),
+        Question(asked),
+        Start(np.zeros((1, 4, 4)), np.zeros((1, legs)), np.zeros((1, n_a))),
+        np.zeros((1, 4, 4)),
+        new_solutions(1, legs, n_a),
+    )
+
+
+def _emptied(value: Any) -> Any:
+    """A NamedTuple without the numbers of its arrays: memory that is not needed."""
+    if isinstance(value, tuple):
+        return type(value)(*map(_emptied, value))
+    return value[:0]

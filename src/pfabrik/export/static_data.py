@@ -1,0 +1,128 @@
+"""NamedTuples of arrays as static data of C."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from .wording import literal
+
+PER_LINE = 120
+"""Most characters of a line of numbers."""
+
+MOST = 2**31 - 1
+"""Largest integer on a controller."""
+
+NUMBERS_PER_LINE = 6
+"""Most numbers of a record in a line."""
+
+
+class StaticData:
+    """Static data of a file: tables are constants, all other arrays memory of calls.
+
+    Parameters
+    ----------
+    program : the translated program.
+    text : the translated program: arrays that it does not read are left out.
+    size : bytes of a real number.
+    """
+
+    def __init__(self, program: Any, text: str, size: int) -> None:
+        self._program, self._text, self._size = program, text, size
+        self.n_constant = self.n_memory = 0  # bytes
+        self._arrays: dict[int, tuple[str, Any]] = {}  # by identity, with the array, so that it stays alive
+        self.lines = ["static double pfk_nothing[1]; /* where there are no numbers */"]
+
+    def constants(self, name: str, value: Any) -> None:
+        """Write the arrays of a NamedTuple as constants."""
+        for path, array in _arrays(name, value):
+            self._put(path, array, is_constant=True)
+
+    def variable(self, name: str, value: tuple[Any, ...]) -> None:
+        """Write a NamedTuple; its arrays that are no constants are memory."""
+        for path, array in _arrays(name, value):
+            self._put(path, array, is_constant=False)
+        kind = self._program.spell.value(self._program.type_of(value))
+        self.lines.append(f"static const {kind} pfk_{name} = {self._made(value)};")
+
+    def _is_read(self, path: str) -> bool:
+        field = path.rpartition(".")[2]
+        return re.search(rf"(?:->|\.){field}_?\b", self._text) is not None
+
+    def _put(self, path: str, array: Any, *, is_constant: bool) -> None:
+        if id(array) in self._arrays or not array.size or not self._is_read(path):
+            return
+        name = f"pfk_{path.replace('.', '_')}"
+        self._arrays[id(array)] = name, array
+        element, fields = self._element(array), [array.dtype[name] for name in array.dtype.names or ()] or [array.dtype]
+        size = array.size * sum(each.itemsize // 8 * (self._size if each.base.kind == "f" else 4) for each in fields)
+        self.n_constant, self.n_memory = self.n_constant + is_constant * size, self.n_memory + (not is_constant) * size
+        qualifier = "static const" if is_constant else "static"
+        is_zero = not is_constant and not any(np.any(array[field]) for field in array.dtype.names or [()])
+        declared = f"{qualifier} {element} {name}[{array.size}]"
+        self.lines.append(f"{declared};" if is_zero else f"{declared} = {{\n{_values(array)}\n}};")
+
+    def _element(self, array: Any) -> str:
+        return str(self._program.spell.value(self._program.type_of(array).element))
+
+    def _made(self, value: Any) -> str:
+        if isinstance(value, tuple):
+            return "{" + ", ".join(map(self._made, value)) + "}"
+        if not isinstance(value, np.ndarray):
+            return literal(value) if isinstance(value, float) else str(int(value))
+        sizes = ", ".join(map(str, value.shape))
+        known = self._arrays.get(id(value))
+        element = self._element(value)
+        return f"{{({element} *){'pfk_nothing' if known is None else known[0]}, {{{sizes}}}}}"
+
+
+def _arrays(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Arrays in a NamedTuple, with the names that lead there."""
+    if isinstance(value, np.ndarray):
+        yield path, value
+    for field, item in zip(getattr(value, "_fields", ()), value, strict=False):
+        yield from _arrays(f"{path}.{field}", item)
+
+
+def _values(array: Any) -> str:
+    if array.dtype.names:
+        return ",\n".join("    {\n" + "\n".join(_members(record)) + "\n    }" for record in array.ravel())
+    lines, line = [], "   "
+    for text in map(_number, array.ravel()):
+        if len(line) + len(text) + 2 > PER_LINE:
+            lines.append(line)
+            line = "   "
+        line += f" {text},"
+    return "\n".join([*lines, line.removesuffix(",")])
+
+
+def _members(record: Any) -> Iterator[str]:
+    """The members of a record in lines, each after a comment with their names."""
+    group: list[str] = []
+    for name in record.dtype.names:
+        is_long = bool(record.dtype[name].shape)
+        if group and (is_long or len(group) == NUMBERS_PER_LINE):
+            yield _labelled(group, record)
+            group = []
+        group.append(name)
+        if is_long:
+            yield _labelled(group, record)
+            group = []
+    if group:
+        yield _labelled(group, record)
+
+
+def _labelled(names: Sequence[str], record: Any) -> str:
+    return f"        /* {', '.join(names)} */ {', '.join(_number(record[name]) for name in names)},"
+
+
+def _number(value: Any) -> str:
+    if np.ndim(value):
+        return "{" + ", ".join(map(_number, np.ravel(value))) + "}"
+    if isinstance(value, (np.integer, int)):
+        return str(max(min(int(value), MOST), -MOST))
+    number = float(value)
+    return "INFINITY" if number == np.inf else "-INFINITY" if number == -np.inf else literal(number)

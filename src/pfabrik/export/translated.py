@@ -1,0 +1,195 @@
+"""The kernels of a machine's file, in C: translated for its tables, under a prefix of their own."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..kernels.clearance.link_records import NO_LINKS
+from ..kernels.controller.assembled import assemble
+from ..kernels.controller.joints import put_joints, walk
+from ..kernels.controller.projected import project_target
+from ..kernels.controller.rates import put_rates
+from ..kernels.controller.reached import measure, put_reached, put_turns, reach, rest
+from ..kernels.legs import records as K
+from ..kernels.platform.search_records import SETTINGS
+from ..kernels.platform.tables import MACHINE
+from ..to_c import Program
+from .controller_tables import ASKED, ControllerTables
+from .static_data import StaticData
+from .wording import Precision
+
+SINGLE = {
+    ("kernels.legs.answer", "CLOSED"): 1e-6,
+    ("kernels.legs.answer", "NEARLY_CLOSED"): 1e-5,
+    ("kernels.legs.answer", "DAMPING"): 1e-7,
+    ("kernels.legs.answer", "KEPT"): 1e-6,
+    ("kernels.legs.complete_poses", "NOT_A_ROTATION"): 2e-5,
+    ("kernels.legs.complete_poses", "ROUNDED"): 1e-7,
+    ("kernels.legs.endings", "LEAST_MARGIN"): 1e-3,
+    ("kernels.platform.forward", "ASSEMBLED"): 1e-6,
+    ("kernels.platform.forward", "NEARLY_ASSEMBLED"): 1e-5,
+    ("kernels.sqp", "CLOSED"): 3e-6,
+    ("kernels.sqp", "NEARLY_CLOSED"): 3e-5,
+    ("kernels.sqp", "FINE"): 1e-4,
+    ("kernels.sqp", "ROUNDING"): 1e-5,
+    ("kernels.sqp", "LAST"): 1e-9,
+    ("kernels.sqp", "NEXT"): 1e-10,
+    ("kernels.clearance.least_clearance", "TOUCHING"): 1e-5,
+    ("kernels.clearance.least_clearance", "LAST"): 1e-4,
+    ("kernels.clearance.hulls", "ROUNDING"): 1e-7,
+    ("kernels.controller.rates", "RANK"): 1e-5,
+    ("kernels.controller.joints", "FITTED"): 1e-6,
+    ("kernels.controller.joints", "NEARLY_FITTED"): 1e-5,
+}
+"""Constants of kernels in single precision: what was some hundred times the rounding of a double is so of a float."""
+
+TABLES = (K.LEG, K.COORDINATE, K.CONE, K.TASK, SETTINGS, MACHINE)
+"""Records whose integers are known of a machine."""
+
+NOT_CONSTANT = ("Starts",)
+"""NamedTuples whose arrays have other lengths where kernels make parts of them."""
+
+
+class Translated(NamedTuple):
+    """The kernels of a file, its static data, and their bytes with integers of four."""
+
+    kernels: str
+    data: str
+    constants: int
+    memory: int
+
+
+def translated(tables: ControllerTables, conditions: set[str], precision: Precision) -> Translated:
+    """The kernels that a file needs, and its static data."""
+    program = Program(precision, "intptr_t", _facts(tables), _everywhere(SINGLE) if precision == "float" else {})
+    matrix, row, number = np.zeros((0, 0)), np.zeros(0), 0
+    reaching, assembling = tables.reaching, tables.assembling
+    calls: list[tuple[str, Any, tuple[Any, ...]]] = [
+        ("IK", reach, (reaching, matrix, matrix, number)),
+        ("IK", put_reached, (reaching, matrix, row)),
+        ("RESTS", rest, (reaching, matrix)),
+        ("TURNS", put_turns, (reaching, row, row)),
+        ("CLEARANCE", measure, (reaching,)),
+        ("FK", assemble, (assembling, reaching, row, matrix)),
+        ("RATES", put_rates, (tables.rating, reaching, matrix, number, number)),
+        ("JOINTS", walk, (tables.series, row)),
+        ("TO_JOINTS", put_joints, (tables.series, assembling, reaching, row, row)),
+        ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number)),
+    ]
+    names = []
+    for condition, kernel, samples in calls:
+        if condition in conditions:
+            made = program.add(kernel, *samples)
+            assert made.name == kernel.__name__ and not made.allocates, made.name
+            names.append(made.name)
+    used = f"int {', '.join(names)};\n"
+    text = program.text(used).removesuffix(used)
+    data = _data(tables, program, text, precision)
+    lines = _prefixed("\n".join(data.lines), program)
+    return Translated(_own(_prefixed(text, program)), lines, data.n_constant, data.n_memory)
+
+
+def _everywhere(tolerances: dict[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+    """The same values for the constants where other modules of kernels import them."""
+    package = __package__.partition(".")[0]
+    kernels = {name: vars(module) for name, module in sys.modules.items() if name.startswith(f"{package}.kernels.")}
+    return {
+        (importer.partition(".")[2], name): value
+        for (module, name), value in tolerances.items()
+        for importer, members in kernels.items()
+        if members.get(name) is kernels[f"{package}.{module}"][name]
+    }
+
+
+def _facts(tables: ControllerTables) -> dict[tuple[str, str], set[int]]:
+    """Values of the integers in the tables, and lengths of arrays."""
+    facts: dict[tuple[str, str], set[int]] = {}
+    names = Program().records
+    for value in _parts(tables):
+        for field, item in zip(value._fields, value, strict=True):
+            if isinstance(item, np.ndarray) and type(value).__name__ not in NOT_CONSTANT:
+                facts.setdefault((type(value).__name__, field), set()).add(len(item))
+            if isinstance(item, np.ndarray) and item.dtype in TABLES:
+                for name in item.dtype.names:
+                    if item.dtype[name].base.kind == "i":
+                        values = facts.setdefault((names[item.dtype], name), set())
+                        values.update(np.ravel(item[name]).tolist())
+    if tables.projecting is not None:
+        asked = tables.projecting.question.asked
+        facts |= {(names[asked.dtype], name): {value} for name, value in ASKED.items()}
+    return facts
+
+
+def _parts(value: Any) -> Iterator[Any]:
+    """A NamedTuple and those in it."""
+    if isinstance(value, tuple):
+        yield value
+        for item in value:
+            yield from _parts(item)
+
+
+def _data(tables: ControllerTables, program: Program, text: str, precision: Precision) -> StaticData:
+    data = StaticData(program, text, 8 if precision == "double" else 4)
+    reaching, projecting = tables.reaching, tables.projecting
+    for name in ("near", "far", "whole_near", "whole_far", "home", "ways", "tilt"):
+        data.constants(f"reaching.{name}", getattr(reaching, name))
+    for name in ("motions", "numbers", "sizes", "home", "bodies", "pairs", "least"):
+        data.constants(f"reaching.links.{name}", getattr(reaching.links, name))
+    if tables.assembling is not None:
+        data.constants("assembling.stays", tables.assembling.stays)
+        data.constants("assembling.seeds", tables.assembling.seeds)
+    if tables.series is not None:
+        for name in ("motions", "end", "home", "units", "length"):
+            data.constants(f"series.{name}", getattr(tables.series, name))
+    if projecting is not None:
+        own = projecting.tables
+        data.constants("projecting.tables", own._replace(plan=own.plan._replace(links=NO_LINKS)))
+        for name in ("sizes", "home", "bodies", "pairs", "least"):
+            data.constants(f"projecting.tables.plan.links.{name}", getattr(own.plan.links, name))
+    for name, value in zip(tables._fields, tables, strict=True):
+        if value is not None:
+            data.variable(name, value)
+    return data
+
+
+OWN = """\
+#ifdef __cplusplus
+#define PFK_MADE(type) type
+#else
+#define PFK_MADE(type) (type)
+#endif
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-variable" /* what a machine does not need is left out */
+#pragma GCC diagnostic ignored "-Wunused-but-set-variable"
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+"""
+"""What the kernels of a machine need to be C++ too, and no warning."""
+
+
+def _own(text: str) -> str:
+    """Kernels as part of a file in C and C++."""
+    text = re.sub(r"(?m)^typedef \w+ pfk_real;\n", "", text)
+    text = re.sub(r"(?m)^ *(\w+) = \1;\n", "", text)
+    text = re.sub(r"/\* Memory of one call: .*?\n\}\n", "", text, flags=re.DOTALL)
+    text = re.sub(r"\((pfk_\w+)\)\{", r"PFK_MADE(\1){", text)
+    text = re.sub(r"(?m)^enum \{ (pfk_\w+) = (-?\w+) \};$", r"#define \1 \2", text)
+    return f"{OWN}{text}\n#if defined(__GNUC__)\n#pragma GCC diagnostic pop\n#endif\n"
+
+
+def _prefixed(text: str, program: Program) -> str:
+    """C text with the prefix pfk in the names that it declares."""
+    names = {*program.items, *re.findall(r"(?m)^#define (\w+)", text), "real", "integer", "arena", "checked"}
+    names -= {"take"} if "take" not in program.items else set()
+    pattern = re.compile(rf"\b({'|'.join(sorted(map(re.escape, names), key=len, reverse=True))})\b")
+    pieces = re.split(r"(/\*.*?\*/|^#include[^\n]*|^#error[^\n]*)", text, flags=re.DOTALL | re.MULTILINE)
+    pieces[::2] = [pattern.sub(r"pfk_\1", piece) for piece in pieces[::2]]
+    return re.sub(r"\b(INFINITY|NAN)\b", r"(pfk_real)\1", "".join(pieces))
