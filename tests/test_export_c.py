@@ -38,6 +38,9 @@ PRECISIONS = {"double": 1e-12, "float": 1e-5}
 ROUNDED = 1e-6
 """How far a pose is off in single precision after some ten roundings [L or rad]."""
 
+MATHEMATICS = {"sin", "cos", "sincos", "tan", "atan2", "acos", "hypot", "sqrt", "floor", "rint", "memset", "memcpy"}
+"""What an exported file may need of the C library; the last two compilers write of themselves."""
+
 REFUSED = {
     "nrpm": "poses leave joints A1, B1",
     "H4": "singular at home, where joints Q1, Q2",
@@ -345,7 +348,7 @@ def test_actuators_that_the_task_leaves_to_a_choice_are_not_exported(name: str, 
 @needs_compiler
 def test_a_self_test_fails_where_the_machine_is_another(tmp_path: Path) -> None:
     text = c_source(machine("stewart"))
-    place = text.index("/* base_end */ {") + len("/* base_end */ {")
+    place = text.index("/* base_end_point */ {") + len("/* base_end_point */ {")
     wrong = text[:place] + "1.0 + " + text[place:]
     run = subprocess.run([str(compiled(tmp_path, wrong, COMPILERS[0], driver=None))], capture_output=True, text=True)
     assert run.returncode == 1
@@ -400,14 +403,26 @@ def test_the_command_that_the_file_and_the_page_tell_runs_the_self_test(options:
 
 
 @needs_compiler
-def test_nothing_is_kept_between_calls_and_nothing_is_needed_but_mathematics(tmp_path: Path) -> None:
+def test_nothing_is_needed_but_mathematics_and_nothing_is_written_but_memory_of_calls(tmp_path: Path) -> None:
     (tmp_path / "exported.c").write_text(c_source(machine("servo_hexapod"), name="robot"))
     subprocess.run([COMPILERS[0], "-std=c99", "-O1", "-c", "exported.c"], cwd=tmp_path, check=True)
     listed = subprocess.run(["nm", "exported.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     symbols = [line.split()[-2:] for line in listed.splitlines()]
-    assert not [name for kind, name in symbols if kind in "bBdDC"]
-    assert {name for kind, name in symbols if kind == "U"} <= {"sin", "cos", "sincos", "atan2", "sqrt", "floor"}
-    assert all(name.startswith("robot_") for kind, name in symbols if kind == "T")
+    assert not [name for kind, name in symbols if kind in "BDC"]  # none that another file could see
+    assert {name for kind, name in symbols if kind == "U"} <= MATHEMATICS
+    assert all(name.startswith("robot_") for kind, name in symbols if kind in "Tbd")
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["stewart", "6-RRPS"])
+def test_no_answer_depends_on_the_calls_before(name: str, tmp_path: Path) -> None:
+    """The memory of calls is static: targets asked in another order have the same answers, bit by bit."""
+    known = truth(name, 300)
+    program, turned = compiled(tmp_path, c_source(machine(name)), COMPILERS[0]), slice(None, None, -1)
+    there = asked(program, machine(name), known)
+    back = asked(program, machine(name), Truth(*(each[turned] for each in known)))
+    for one, other in zip(there, back, strict=True):
+        np.testing.assert_array_equal(one, other[turned])
 
 
 def test_parts_that_are_not_asked_for_are_not_there() -> None:

@@ -6,9 +6,9 @@ check it, and what to use in place of it when your loop is in Python.
 
 # ## One file of C
 #
-# `export_c` writes C99 that needs nothing but the C library's mathematics. It allocates no memory and keeps nothing
-# between calls. `precision="float"` suits microcontrollers without double precision. Every name in the file begins with
-# `name`.
+# `export_c` writes C99 that needs nothing but the C library's mathematics. It allocates no memory, and no answer
+# depends on an earlier call. `precision="float"` suits microcontrollers without double precision. Every name in the
+# file begins with `name`.
 import shutil
 import subprocess
 from pathlib import Path
@@ -28,9 +28,10 @@ for line in Path("delta.c").read_text().splitlines():
 
 # ## Call it
 #
-# `delta_ik` takes a target and the last pose, and writes the actuators. It returns 0 when the target is reached. Any
-# other code names the limit or the leg that is in the way; then nothing has been written, and the loop stays where it
-# is.
+# `delta_ik_or_nearest` takes a target and the last pose, and writes the actuators. It returns 0 when the target is
+# reached. Out of reach it returns `DELTA_PROJECTED` with the nearest feasible pose, and names the limits that the pose
+# is at: the loop goes on, and comes back when the target does. It takes at most 40 steps here, and searches from the
+# last pose alone. (`delta_ik` writes nothing where the target is not reached, and names what is in the way.)
 Path("loop.c").write_text(r"""
 #define DELTA_DECLARATIONS_ONLY
 #include "delta.c"
@@ -38,17 +39,19 @@ Path("loop.c").write_text(r"""
 
 int main(void)
 {
-    const double heights[] = {-200, -210, -220, -400};
+    const double heights[] = {-200, -220, -400, -230};
     delta_pose pose, target;
     double motors[DELTA_ACTUATORS];
+    char holding[DELTA_LIMITS];
     delta_home(&pose);
     for (int k = 0; k < 4; k++) {
         delta_pose_rpy(20, 10, heights[k], 0, 0, 0, &target);
-        int code = delta_ik(&target, &pose, motors);
-        if (code == 0)
-            printf("z %4.0f: %.5f %.5f %.5f rad\n", heights[k], motors[0], motors[1], motors[2]);
-        else
-            printf("z %4.0f: %s\n", heights[k], delta_what(code));
+        int code = delta_ik_or_nearest(&target, &pose, motors, 40, 0, holding);
+        printf("z %4.0f: motors %.4f %.4f %.4f rad, ", heights[k], motors[0], motors[1], motors[2]);
+        printf("%s\n", delta_what(code));
+        for (int limit = 0; limit < DELTA_LIMITS && code == DELTA_PROJECTED; limit++)
+            if (holding[limit])
+                printf("        at z = %.1f, %s\n", pose.p[2], delta_what(limit + 1));
     }
     return 0;
 }
@@ -60,14 +63,10 @@ if cc:
     subprocess.run([cc, "-std=c99", "-O2", "loop.c", "delta.c", "-lm", "-o", "loop"], check=True)
     print(subprocess.run(["./loop"], capture_output=True, text=True, check=True).stdout)
 
-# The library gives the same motors:
-for height in (-200, -210, -220):
-    print(f"z {height}:", *(f"{value:.5f}" for value in pf.solve_ik(machine, [20, 10, height]).actuators), "rad")
-
-# For the last target the two differ in kind. C says what is in the way; `solve_ik` also finds the nearest pose that can
-# be reached, which takes a search.
-far = pf.solve_ik(machine, [20, 10, -400])
-print(f"{far.status.name}, {far.position_error:.2f} mm away, at z = {far.pose[2, 3]:.1f} mm")
+# The library gives the same motors, out of reach too:
+for height in (-200, -220, -400, -230):
+    found = pf.solve_ik(machine, [20, 10, height])
+    print(f"z {height}: motors", *(f"{value:.4f}" for value in found.actuators), f"rad, {found.status.name}")
 
 # ## Check it on your target
 #
