@@ -160,4 +160,4 @@ def test_slopes_are_compared_where_hinges_flip_and_where_axes_are_turned_over() 
     for name in ("closure.upu", "orthoglide"):
         for pose in poses_of(name):
             evaluated(table_of(name), pose, choices)
-    assert choices["evaluate_rod"] == choices["pivot_rows"] == {True, False}
+    assert choices["twist_side"] == choices["pivot_rows"] == {True, False}

@@ -35,7 +35,14 @@ def turned_back(T: Floats, v: Vec) -> Vec:
 @routine
 def angle_to(axis: Vec, u: Vec, w: Vec) -> float:
     """Angle from `u` to `w` about a unit vector, right-handed, in (-pi, pi]; components along it are ignored."""
-    return math.atan2(dot(axis, cross(u, w)), dot(u, w) - dot(axis, u) * dot(axis, w))
+    sine, cosine = parts_about(axis, u, w)
+    return math.atan2(sine, cosine)
+
+
+@routine
+def parts_about(axis: Vec, u: Vec, w: Vec) -> tuple[float, float]:
+    """Sine and cosine of the angle from `u` to `w` about a unit vector, times the lengths of their parts across it."""
+    return dot(axis, cross(u, w)), dot(u, w) - dot(axis, u) * dot(axis, w)
 
 
 @routine
@@ -80,13 +87,12 @@ def universal_angles(axes: Floats, u: Vec, w: Vec, side: float, angles: Floats) 
 
 @routine
 def aimed_axis(axes: Floats, u: Vec, w: Vec, side: float) -> Vec:
-    """The last of two crossed hinges that turn `u`, given at home, into `w`."""
+    """The last of two crossed hinges that turn `u`, given at home, into `w`, times a positive number."""
     a, b = (axes[0, 0], axes[0, 1], axes[0, 2]), (axes[1, 0], axes[1, 1], axes[1, 2])
     by_last, _, _, _ = aim(axes, u, w, side)
-    sine, cosine = dot(a, cross(by_last, w)), dot(by_last, w) - dot(a, by_last) * dot(a, w)
+    sine, cosine = parts_about(a, by_last, w)
     size = math.sqrt(sine * sine + cosine * cosine)
-    size = where(size > 0.0, size, 1.0)
-    return turned(b, a, cosine / size, sine / size)
+    return along(along(scale(cosine, b), sine, cross(a, b)), (size - cosine) * dot(a, b), a)
 
 
 @routine

@@ -18,7 +18,7 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, where, wrap
-from .endings import aimed_axis, angle_to, solve_angle, turned, turned_back, universal_angles
+from .endings import aimed_axis, angle_to, parts_about, solve_angle, turned, turned_back, universal_angles
 from .frames import ZERO, put_pose_slope
 from .records import (
     BASE_END,
@@ -120,10 +120,7 @@ def evaluate_rod(
     values[SLIDE] = length - rod["length"]
     base_side, platform_side = rod["base_end_side"], rod["platform_end_side"]
     if rod["twists"] == 1 and (rod["base_end"] == CROSS or rod["platform_end"] == CROSS):
-        base_mark = aimed_mark(rod["base_end"], rod["base_end_axes"], home, base_line, base_side)
-        platform_mark = aimed_mark(rod["platform_end"], rod["platform_end_axes"], home, platform_line, platform_side)
-        twist = twist_between(rod, proximal, frame, proximal_values, base_mark, platform_mark, u)
-        flip = where(abs(twist) > 0.5 * math.pi, -1.0, 1.0)
+        flip = twist_side(rod, proximal, frame, proximal_values, base_line, platform_line, u)
         if rod["platform_end"] == CROSS:
             platform_side *= flip
         else:
@@ -156,9 +153,23 @@ def ending_angles(ending: int, axes: Floats, home: Vec, line: Vec, side: float, 
 
 
 @routine
-def aimed_mark(ending: int, axes: Floats, home: Vec, line: Vec, side: float) -> Vec:
-    """The `twist_mark` of an ending that points its rod along a line."""
-    return (axes[0, 0], axes[0, 1], axes[0, 2]) if ending == HINGE else aimed_axis(axes, home, line, side)
+def twist_side(
+    rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, base_line: Vec, platform_line: Vec, u: Vec
+) -> float:
+    """1 if the twist of a rod with its hinges on home's sides is within a quarter turn of home's, else -1."""
+    home, base_axes, platform_axes = vec(rod["line"]), rod["base_end_axes"], rod["platform_end_axes"]
+    base_mark, platform_mark = (
+        vec(base_axes[0 if rod["base_end"] == HINGE else 1]),
+        vec(platform_axes[0 if rod["platform_end"] == HINGE else 1]),
+    )
+    home_sine, home_cosine = parts_about(home, base_mark, platform_mark)
+    if rod["base_end"] == CROSS:
+        base_mark = aimed_axis(base_axes, home, base_line, rod["base_end_side"])
+    if rod["platform_end"] == CROSS:
+        platform_mark = aimed_axis(platform_axes, home, platform_line, rod["platform_end_side"])
+    base_mark = turned_by_proximal(proximal, proximal_values, base_mark, 1.0)
+    sine, cosine = parts_about(u, base_mark, turn(frame, platform_mark))
+    return where(cosine * home_cosine + sine * home_sine < 0.0, -1.0, 1.0)
 
 
 @routine
@@ -171,20 +182,15 @@ def twist_mark(ending: int, axes: Floats, angles: Floats) -> Vec:
 
 
 @routine
-def twist_between(
-    rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, base_mark: Vec, platform_mark: Vec, u: Vec
-) -> float:
-    """Angle about a rod's line between the twist marks of its two endings, less that at home."""
-    base_end = turned_by_proximal(proximal, proximal_values, base_mark, 1.0)
-    return wrap(angle_to(u, base_end, turn(frame, platform_mark)) - rod["twist"], 0.0)
-
-
-@routine
 def twist_of(rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, values: Floats, u: Vec) -> float:
-    """The twist of a rod by the angles of its endings."""
-    base_mark = twist_mark(rod["base_end"], rod["base_end_axes"], values[BASE_END:SLIDE])
-    platform_mark = twist_mark(rod["platform_end"], rod["platform_end_axes"], values[PLATFORM_END:BASE_LINE])
-    return twist_between(rod, proximal, frame, proximal_values, base_mark, platform_mark, u)
+    """Angle about a rod's line between the twist marks of its two endings, less that at home."""
+    base_end = turned_by_proximal(
+        proximal, proximal_values, twist_mark(rod["base_end"], rod["base_end_axes"], values[BASE_END:SLIDE]), 1.0
+    )
+    platform_end = turn(
+        frame, twist_mark(rod["platform_end"], rod["platform_end_axes"], values[PLATFORM_END:BASE_LINE])
+    )
+    return wrap(angle_to(u, base_end, platform_end) - rod["twist"], 0.0)
 
 
 @routine
