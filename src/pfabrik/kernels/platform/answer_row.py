@@ -42,17 +42,33 @@ from .tables import (
 NEARLY = 1e-4
 """Distance below which a projection is close enough to its target to try to reach it exactly [L]."""
 
+FARTHEST_TURN = 1e9
+"""Largest angle that is counted in turns [rad]: the number of turns is then a number of 32 bits, too."""
+
+
+@routine
+def nearest_turn(driven: Record, value: float, near: float) -> tuple[float, bool]:
+    """The value of an actuator moved by whole turns to where it is nearest to another; itself if out of its range."""
+    turned = value
+    if abs(near - value) < FARTHEST_TURN:
+        turned = value + 2.0 * math.pi * round((near - value) / (2.0 * math.pi))
+    is_inside = turned >= driven["home"] + driven["lo"] and turned <= driven["home"] + driven["hi"]
+    return (turned, True) if is_inside and abs(near - turned) < FARTHEST_TURN else (value, False)
+
+
+@routine
+def turns_repeatedly(driven: Record) -> bool:
+    """True if an actuator may turn more than once."""
+    return bool(driven["turns"] == 1 and driven["hi"] - driven["lo"] > 2.0 * math.pi)
+
 
 @routine
 def count_turns(driven: Records, start_values: Floats, values: Floats) -> None:
     """Add whole turns to actuators that may turn more than once: nearest to the start's values (n_a,)."""
     for i in range(driven.shape[0]):
-        lo, hi, column = driven[i]["lo"], driven[i]["hi"], driven[i]["column"]
-        if driven[i]["turns"] == 1 and hi - lo > 2.0 * math.pi:
-            value = values[column]
-            nearest = value - 2.0 * math.pi * round((value - start_values[column]) / (2.0 * math.pi))
-            is_inside = nearest >= driven[i]["home"] + lo and nearest <= driven[i]["home"] + hi
-            values[column] = nearest if is_inside else value
+        column = driven[i]["column"]
+        if turns_repeatedly(driven[i]):
+            values[column], _ = nearest_turn(driven[i], values[column], start_values[column])
 
 
 @routine

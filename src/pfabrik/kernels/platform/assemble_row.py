@@ -18,7 +18,7 @@ from ..rows import (
     ROTATION_ERROR,
 )
 from ..vectors import copy_row
-from .answer_row import copy_solution, load_own, put_start
+from .answer_row import copy_solution, load_own, nearest_turn, put_start, turns_repeatedly
 from .forward import assemble_from_others, assemble_from_own, put_deviations, write_assembled
 from .nearest import nearest_of_row
 from .search_records import PoseSolutions, Starts
@@ -75,14 +75,11 @@ def find_values(
     if distance == math.inf:
         return False
     for i in range(driven.shape[0]):
-        column, lo, hi = driven[i]["column"], driven[i]["lo"], driven[i]["hi"]
+        column = driven[i]["column"]
         value = actuators[0, column]
-        if driven[i]["turns"] == 1 and hi - lo > 2.0 * math.pi:
-            turned = value + 2.0 * math.pi * round((values[0, column] - value) / (2.0 * math.pi))
-            if turned >= driven[i]["home"] + lo and turned <= driven[i]["home"] + hi:
-                value = turned
-            else:
-                is_inside = False
+        if turns_repeatedly(driven[i]):
+            value, is_there = nearest_turn(driven[i], value, values[0, column])
+            is_inside = is_inside and is_there
         actuators[0, column] = value
         worst = max(worst, abs(value - values[0, column]) / driven[i]["unit"])
     measures[0, POSITION_ERROR], measures[0, ROTATION_ERROR], measures[0, ACTUATOR_ERROR] = 0.0, 0.0, worst
