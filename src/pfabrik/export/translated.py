@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
+from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -185,11 +187,23 @@ def _own(text: str) -> str:
     return f"{OWN}{text}\n#if defined(__GNUC__)\n#pragma GCC diagnostic pop\n#endif\n"
 
 
+@cache
+def _around() -> frozenset[str]:
+    """Names of the functions around the kernels, without their prefix."""
+    text = resources.files(__package__).joinpath("controller.c").read_text(encoding="utf-8")
+    return frozenset(re.findall(r"(?m)^(?:static )?(?:inline )?(?:const )?\w+ \**pfk_(\w+)\(", text))
+
+
+def own_name(name: str) -> str:
+    """The name of a kernel in a file: another one where a function around the kernels has it."""
+    return f"pfk_kernel_{name}" if name in _around() else f"pfk_{name}"
+
+
 def _prefixed(text: str, program: Program) -> str:
     """C text with the prefix pfk in the names that it declares."""
     names = {*program.items, *re.findall(r"(?m)^#define (\w+)", text), "real", "integer", "arena", "checked"}
     names -= {"take"} if "take" not in program.items else set()
     pattern = re.compile(rf"\b({'|'.join(sorted(map(re.escape, names), key=len, reverse=True))})\b")
     pieces = re.split(r"(/\*.*?\*/|^#include[^\n]*|^#error[^\n]*)", text, flags=re.DOTALL | re.MULTILINE)
-    pieces[::2] = [pattern.sub(r"pfk_\1", piece) for piece in pieces[::2]]
+    pieces[::2] = [pattern.sub(lambda match: own_name(match[1]), piece) for piece in pieces[::2]]
     return re.sub(r"\b(INFINITY|NAN)\b", r"(pfk_real)\1", "".join(pieces))
