@@ -14,9 +14,9 @@ from PIL import Image
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
 from pfabrik.chains.serial_chain import is_chain
+from pfabrik.description.plane import plane_of
 from pfabrik.model import model_of
 from pfabrik.view.canvas import new_axes
-from pfabrik.view.plane import plane_of
 
 PAGE = Path(__file__).with_suffix(".md")
 PICTURES = PAGE.parent / "pictures"

@@ -3,41 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Literal, TypeAlias
 
 import numpy as np
 
 from .answers.solution import Solution
 from .arrays import Floats
 from .clearance.solid_meshes import SolidMesh, solids_of
-from .description.common_centre import arc, common_centre, is_around
+from .description.common_centre import arc, common_centre
 from .description.mechanism import Joint, Mechanism
-from .description.places import Places, joint_places, joints_on, middle
+from .description.places import Places, joint_places, middle
 from .errors import InvalidArgument
-
-Role: TypeAlias = Literal["base", "platform", "link"]
-
-SAME_ANGLE = 6
-"""Digits to which angles about a body's middle count [rad]: equal ones keep the order of the description."""
+from .parts import Part, Place, home_rail, parts_of
 
 ARC_STEPS = 12
 """Straight pieces that an arc is drawn with."""
 
 
 @dataclass(frozen=True)
-class BodyShape:
-    """A body through its joints.
+class Line:
+    """A part of a body where it is.
 
     Attributes
     ----------
-    corners : where its joints are, (k, 3) [length], in order.
-    outline : points (n, 3) [length] of a line between two corners, or around a face of three and more, back to the
-        first. Of a spherical linkage, arcs about its centre.
+    part : the rule that it is drawn by.
+    corners : its places, (k, 3) [length].
+    outline : points (n, 3) [length] of the line between two corners, or around a plate, back to the first. Of a
+        spherical linkage, an arc about its centre.
     """
 
-    body: str
-    role: Role
+    part: Part
     corners: Floats
     outline: Floats
 
@@ -58,35 +52,33 @@ class Skeleton:
     Attributes
     ----------
     rails : both ends of the travel of every prismatic joint on the base, (k, 2, 3) [length].
-    stem : from amid the joints that carry the reference point to it, (2, 3); None where the end effector is a joint.
     solids : the shapes of bodies that have one.
     """
 
     mechanism: Mechanism
-    parts: tuple[BodyShape, ...]
+    parts: tuple[Line, ...]
     marks: tuple[Mark, ...]
     rails: Floats
     reference: Floats
-    stem: Floats | None
     solids: tuple[SolidMesh, ...] = ()
 
     @property
     def points(self) -> Floats:
-        """Every point that is drawn, (n, 3) [length]."""
-        outlines = [part.outline for part in self.parts]
+        """Every point that is drawn, (n, 3) [length]; lines end at joints."""
+        outlines = [line.outline for line in self.parts if line.part.kind == "arc" or line.part.role == "base"]
         places = [mark.place for mark in self.marks]
         solids = [solid.vertices for solid in self.solids]
         return np.concatenate([places, *outlines, self.rails.reshape(-1, 3), [self.reference], *solids])
 
     @property
-    def is_held(self) -> bool:
-        """True if a limit is active."""
-        return any(mark.held_by for mark in self.marks)
+    def held(self) -> set[str]:
+        """The joints whose limits are active."""
+        return {mark.joint.name for mark in self.marks if mark.held_by}
 
     @property
     def lines(self) -> Floats:
         """Both ends of every line that is drawn, (k, 2, 3) [length]."""
-        edges = [np.stack([part.outline[:-1], part.outline[1:]], axis=1) for part in self.parts]
+        edges = [np.stack([line.outline[:-1], line.outline[1:]], axis=1) for line in self.parts]
         return np.concatenate([*edges, self.rails])
 
 
@@ -102,19 +94,16 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
     mechanism, solution = checked_shown(shown)
     reference = mechanism.home_pose[:3, 3] if solution is None else solution.pose[:3, 3]
     places = joint_places(mechanism, None if solution is None else solution.points, reference)
-    rails = {joint.name: rail for joint in mechanism.joints if (rail := rail_of(joint, places, shown)) is not None}
+    rails = [rail for joint in mechanism.joints if (rail := home_rail(mechanism, joint)) is not None]
     held: dict[str, list[str]] = {}
     for limit in () if solution is None else solution._limits[0]:
         held.setdefault(limit.joint, []).append(limit.bound)
-    ends = [places[name] for name in joints_on(mechanism, mechanism.end_effector)]
-    centre = common_centre(mechanism)
     return Skeleton(
         mechanism,
-        tuple(_shape(mechanism, body, places, rails, centre) for body in mechanism.bodies),
+        tuple(_line(mechanism, part, places, reference) for part in parts_of(mechanism) if part.kind in LINES),
         tuple(Mark(joint, places[joint.name], tuple(held.get(joint.name, ()))) for joint in mechanism.joints),
-        np.reshape(list(rails.values()), (-1, 2, 3)),
+        np.reshape(rails, (-1, 2, 3)),
         np.array(reference),
-        None if mechanism.end_effector_is_joint else np.array([middle(ends), reference]),
         solids_of(mechanism, solution) if mechanism.shapes else (),
     )
 
@@ -133,49 +122,27 @@ def checked_shown(shown: object) -> tuple[Mechanism, Solution | None]:
     return shown.mechanism, shown
 
 
-def rail_of(joint: Joint, places: Places, shown: Mechanism | Solution) -> Floats | None:
-    """Both ends (2, 3) of the travel of a prismatic joint on the base; None for any other, and without limits."""
-    mechanism = shown if isinstance(shown, Mechanism) else shown.mechanism
-    if joint.type != "prismatic" or joint.along or joint.range is None or mechanism.base not in joint.connects:
-        return None
-    bounds = np.array(joint.range, float)
-    if not np.isfinite(bounds).all():
-        return None
-    value = mechanism.home_coordinate(joint.name) if isinstance(shown, Mechanism) else shown.joints[joint.name]
-    outward = np.array(mechanism.home_axis(joint.name)) * (1.0 if joint.connects[0] == mechanism.base else -1.0)
-    return np.asarray(places[joint.name] + (bounds - value)[:, None] * outward)
+LINES = ("bar", "arc", "barrel", "plate")
+"""Parts that are drawn as lines, and as faces; joints have marks, and rails are drawn as such."""
 
 
-def around(points: list[Floats]) -> list[Floats]:
-    """Points in the order of their angles about their middle, in the plane that they span most of."""
-    offsets = np.array(points) - middle(points)
-    first, second = np.linalg.svd(offsets, full_matrices=False)[2][:2]
-    angles = np.arctan2(offsets @ second, offsets @ first)
-    return [points[index] for index in np.argsort(angles.round(SAME_ANGLE), kind="stable")]
+def _line(mechanism: Mechanism, part: Part, places: Places, reference: Floats) -> Line:
+    """A part between its places."""
+    corners = np.array([_place(end, places, reference) for end in part.ends])
+    outline = corners
+    if part.kind == "plate":
+        outline = np.vstack([corners, corners[:1]])
+    elif part.kind == "barrel":
+        along = corners[1] - corners[0]
+        corners = outline = corners[0] + np.array([[0.0], [part.length / (np.linalg.norm(along) or 1.0)]]) * along
+    elif part.kind == "arc":
+        centre = common_centre(mechanism)
+        assert centre is not None
+        outline = arc(corners[0], corners[1], centre, ARC_STEPS)
+    return Line(part, corners, outline)
 
 
-def _shape(
-    mechanism: Mechanism, body: str, places: Places, rails: dict[str, Floats], centre: Floats | None
-) -> BodyShape:
-    """A body between its joints; the base is held at the middle of its rails, so that it rests where they move."""
-    is_base = body == mechanism.base
-    names = joints_on(mechanism, body)
-    points = [rails[name].mean(axis=0) if is_base and name in rails else places[name] for name in names]
-    corners = np.array(around(points) if len(points) >= 3 else points)
-    turns = centre if centre is not None and is_around(mechanism, names, centre) else None
-    return BodyShape(body, _role(mechanism, body), corners, _outline(corners, turns))
-
-
-def _outline(corners: Floats, centre: Floats | None) -> Floats:
-    """Lines from corner to corner (k, 3), or arcs about a centre; back to the first where there are three and more."""
-    ends = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
-    if centre is None:
-        return ends
-    arcs = [arc(start, end, centre, ARC_STEPS) for start, end in pairwise(ends)]
-    return np.vstack([ends[:1], *[points[1:] for points in arcs]])
-
-
-def _role(mechanism: Mechanism, body: str) -> Role:
-    if body == mechanism.base:
-        return "base"
-    return "platform" if body == mechanism.end_effector else "link"
+def _place(end: Place, places: Places, reference: Floats) -> Floats:
+    if isinstance(end, np.ndarray):
+        return end
+    return middle([places[name] for name in end]) if end else reference

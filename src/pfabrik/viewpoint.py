@@ -16,7 +16,7 @@ AZIMUTHS = tuple(range(-175, 185, 13))
 CLOSE = 0.08
 """Distance on the screen from which on two joints are apart, as a share of the machine's largest extent."""
 
-AREA, TURN = 0.8, 0.25
+AREA, TURN = 0.8, 0.28
 """Weights of the share of a square that the machine covers, and of the angle from the usual direction [1/rad],
 against the mean share of `CLOSE` that joints are apart."""
 

@@ -14,6 +14,7 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
 from ..checks import require_ending, require_positive
+from ..description.plane import plane_of
 from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
@@ -23,7 +24,6 @@ from ..whole_files import whole_path
 from .canvas import canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD
 from .machine import draw_key, draw_machine
-from .plane import plane_of
 from .plot_track import checked_track, places_along
 from .save_picture import FILMS
 
@@ -125,7 +125,7 @@ class _Film:
         above, below = np.ravel(self.figure.subfigures(2, 1, height_ratios=(1, 11), squeeze=False))
         self._caption = above.text(0.02, 0.9, " ", fontsize=SMALL + 1.0, va="top")
         self._canvas = canvas_on(new_axes(below, plane), plane)
-        draw_key(self._canvas, next((each for each in skeletons if each.is_held), skeletons[0]))
+        draw_key(self._canvas, next((each for each in skeletons if each.held), skeletons[0]))
         everything = np.vstack([places_along(track), *(skeleton.points for skeleton in skeletons)])
         self._canvas.frame(everything, track.mechanism.length_unit)
         self._artists: list[Any] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,13 +11,13 @@ from ..answers.solution import Solution
 from ..checks import require_names
 from ..description.joint_types import JointType
 from ..description.mechanism import Mechanism
+from ..description.plane import plane_of
 from ..drawing import SMALL
-from ..skeleton import BodyShape, Mark, Skeleton, checked_shown, skeleton_of
+from ..skeleton import Line, Mark, Skeleton, checked_shown, skeleton_of
 from ..tolerances import TOLERANCES
 from .canvas import Canvas, canvas_on
 from .labels import place_names
-from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, PLATFORM, of_a_body
-from .plane import plane_of
+from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, of_a_body
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -37,6 +37,9 @@ PENS = (0.45, 1.5)
 
 SOLID_ALPHA, NEAREST_ALPHA = 0.06, 0.16
 """How opaque each of both sides of a thick link is, and of the two that are nearest to each other."""
+
+WIDTH = 2.0
+"""Width of the line of a usual bar [points]."""
 
 RAIL_DASHES = (0, (4, 2))
 
@@ -83,17 +86,14 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
 
 def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
     """Bodies, rails, reference point and joints, as artists that can be removed again."""
-    held = {body for mark in skeleton.marks if mark.held_by for body in mark.joint.connects}
     pen = pen_of(canvas, skeleton.mechanism)
-    artists: list[Artist] = [each for part in skeleton.parts for each in _body(canvas, part, part.body in held, pen)]
+    artists: list[Artist] = [each for line in skeleton.parts for each in _part(canvas, line, skeleton.held, pen)]
     for solid in skeleton.solids:
         colour = HELD if solid.is_stopped else LINK
         alpha = NEAREST_ALPHA if solid.is_nearest else SOLID_ALPHA
         artists.append(canvas.solid(solid.vertices[solid.faces], facecolor=colour, alpha=alpha, zorder=0))
     for rail in skeleton.rails:
         artists.append(canvas.line(rail, color=EDGE, linewidth=0.9, linestyle=RAIL_DASHES, zorder=1))
-    if skeleton.stem is not None:
-        artists.append(canvas.line(skeleton.stem, color=PLATFORM, linewidth=1.6 * pen, zorder=1))
     artists.append(canvas.line(skeleton.reference[None], marker="+", color=EDGE, markersize=9, zorder=4))
     return artists + _joints(canvas, skeleton.marks, pen)
 
@@ -115,17 +115,17 @@ def pen_of(canvas: Canvas, mechanism: Mechanism) -> float:
     return float(np.clip(min(side / USUAL_SIDE, between / MARKS_APART), *PENS))
 
 
-def _body(canvas: Canvas, part: BodyShape, is_held: bool, pen: float) -> list[Artist]:
-    """A body: base and end effector light and broad, links dark and narrow; links of a joint at its limit orange."""
-    is_link = part.role == "link"
-    colour = HELD if is_link and is_held else of_a_body(part.role)
-    width = pen * (1.6 if is_link or len(part.corners) > 2 else 4.0)
+def _part(canvas: Canvas, line: Line, held: Set[str], pen: float) -> list[Artist]:
+    """A part of a body: base and end effector light and broad, links dark and narrow; those of a joint at its limit
+    orange.
+    """
+    part = line.part
+    colour = HELD if held & set(part.joints) else of_a_body(part.role)
     artists: list[Artist] = []
-    if len(part.corners) >= 3:
-        alpha = 0.25 if is_link else 0.55
-        artists.append(canvas.face(part.outline[:-1], facecolor=colour, alpha=alpha, zorder=0))
-    if len(part.corners) >= 2:
-        artists.append(canvas.line(part.outline, color=colour, linewidth=width, solid_capstyle="round", zorder=1))
+    if part.kind == "plate":
+        artists.append(canvas.face(line.corners, facecolor=colour, alpha=0.55, zorder=0))
+    width = WIDTH * (0.8 if part.kind == "plate" else part.radius) * pen
+    artists.append(canvas.line(line.outline, color=colour, linewidth=width, solid_capstyle="round", zorder=1))
     return artists
 
 
@@ -180,7 +180,7 @@ def key_of(skeleton: Skeleton) -> list[Artist]:
 
     kinds = sorted({(mark.joint.type, bool(mark.joint.actuated)) for mark in skeleton.marks})
     looks = [(kind + ", actuated" * actuated, marker_style(kind, actuated, False)) for kind, actuated in kinds]
-    if skeleton.is_held:
+    if skeleton.held:
         looks.append(("at a limit", marker_style("fixed", False, True) | {"marker": "o", "facecolor": HELD}))
     return [
         Line2D(

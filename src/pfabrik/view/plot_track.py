@@ -13,6 +13,7 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats, Mask
 from ..checks import require_method
+from ..description.plane import plane_of
 from ..description.readouts import Readout, readouts
 from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument, counted
@@ -20,7 +21,6 @@ from ..skeleton import skeleton_of
 from .canvas import Canvas, canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE
 from .machine import draw_machine, key_of
-from .plane import plane_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

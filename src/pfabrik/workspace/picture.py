@@ -238,8 +238,7 @@ def draw_machine(axes: Any, region: Region) -> list[Floats]:
     if np.ptp(region.bounds, axis=0).max() < SMALLEST_WITH_MACHINE * np.ptp(skeleton.points, axis=0).max():
         return []
     columns = [POSITIONS.index(name) for name in region.names]
-    lines = [part.outline for part in skeleton.parts if len(part.outline) > 1] + list(skeleton.rails)
-    lines += [] if skeleton.stem is None else [skeleton.stem]
+    lines = [line.outline for line in skeleton.parts] + list(skeleton.rails)
     drawn = [line[:, columns] for line in lines]
     for line in drawn:
         axes.plot(*line.T, color=MACHINE, linewidth=1.1, solid_capstyle="round", zorder=2)

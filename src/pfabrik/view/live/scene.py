@@ -11,8 +11,9 @@ from ...answers.tracked import Track
 from ...arrays import Floats
 from ...clearance.solid_meshes import SolidMesh
 from ...description.mechanism import Mechanism
-from ...skeleton import BodyShape, Mark, Skeleton
-from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, PLATFORM, of_a_body, rgb
+from ...parts import Part
+from ...skeleton import Mark, Skeleton
+from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, of_a_body, rgb
 from .shapes import SHAPES, cylinder, fan, quaternion, upright_to
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
     from .border_patches import Patch
 
-RADIUS, LINK_RADIUS = 0.016, 0.010
-"""Of the edges of base and end effector, and of links [L]."""
+RADIUS = 0.0125
+"""Of a usual bar [L]."""
 
 PASSIVE, BASE = "#8f8f8f", "#9f9f9f"
 """Of joints that nobody drives, and of the base: darker than on paper, as light is added to them."""
@@ -55,15 +56,15 @@ class Scene:
         self._faces = [
             self._scene.add_mesh_simple(
                 f"{MACHINE}/bodies/{place}",
-                *fan(part.outline[:-1] / self._length),
-                color=_colour_of(part),
+                *fan(line.corners / self._length),
+                color=_colour_of(line.part),
                 opacity=0.45,
                 side="double",
                 cast_shadow=False,
                 receive_shadow=False,
             )
-            for place, part in enumerate(skeleton.parts)
-            if len(part.corners) >= 3
+            for place, line in enumerate(skeleton.parts)
+            if line.part.kind == "plate"
         ]
         self._solids = [
             self._scene.add_mesh_simple(
@@ -90,7 +91,7 @@ class Scene:
         positions, turns, scales, colours = self._cylinders(skeleton)
         self._lines.batched_positions, self._lines.batched_wxyzs = positions, turns
         self._lines.batched_scales, self._lines.batched_colors = scales, colours
-        corners = (part.outline[:-1] for part in skeleton.parts if len(part.corners) >= 3)
+        corners = (line.corners for line in skeleton.parts if line.part.kind == "plate")
         for face, face_corners in zip(self._faces, corners, strict=True):
             face.vertices = fan(face_corners / self._length)[0]
         for mesh, solid in zip(self._solids, skeleton.solids, strict=True):
@@ -161,16 +162,13 @@ class Scene:
 
     def _cylinders(self, skeleton: Skeleton) -> tuple[Any, Any, Any, Any]:
         """Every line as a cylinder: its middle, its turn from upright, radii and length, and its colour."""
-        held = {body for mark in skeleton.marks if mark.held_by for body in mark.joint.connects}
-        ends, radii, colours = [], [], []
-        for part in skeleton.parts:
-            colour = rgb(HELD) if part.role == "link" and part.body in held else _colour_of(part)
-            edges = np.stack([part.outline[:-1], part.outline[1:]], axis=1)
+        ends, radii, colours, held = [], [], [], skeleton.held
+        for line in skeleton.parts:
+            colour = rgb(HELD) if held & set(line.part.joints) else _colour_of(line.part)
+            edges = np.stack([line.outline[:-1], line.outline[1:]], axis=1)
             ends += list(edges)
-            radii += [LINK_RADIUS if part.role == "link" else RADIUS] * len(edges)
+            radii += [RADIUS * line.part.radius] * len(edges)
             colours += [colour] * len(edges)
-        if skeleton.stem is not None:
-            ends, radii, colours = [*ends, skeleton.stem], [*radii, LINK_RADIUS], [*colours, rgb(PLATFORM)]
         lines = np.reshape(ends, (-1, 2, 3)) / self._length
         along = lines[:, 1] - lines[:, 0]
         lengths = np.linalg.norm(along, axis=1)
@@ -192,7 +190,7 @@ class Scene:
                 self._labels[name] = self._scene.add_label(f"{MACHINE}/held/{name}", name, position=at)
 
 
-def _colour_of(part: BodyShape) -> tuple[int, int, int]:
+def _colour_of(part: Part) -> tuple[int, int, int]:
     return rgb(BASE if part.role == "base" else of_a_body(part.role))
 
 

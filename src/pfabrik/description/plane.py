@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from ..description.mechanism import Mechanism
-from ..description.sketch import seen_along
 from ..tolerances import TOLERANCES
+from .mechanism import Mechanism
+from .sketch import seen_along
 
 
 def plane_of(mechanism: Mechanism) -> Floats | None:
