@@ -15,7 +15,7 @@ export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 # Tests start many processes, and pytest rewrites every assertion: compiled files are kept, whatever the user's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo reproduce docs test test-processors test-tensors test-fast test-interpreted campaign check bench clean
+.PHONY: demo reproduce docs test test-processors test-tensors test-fast test-interpreted campaign check bench web clean
 
 demo: $(READY) $(MODULE)
 	@$(BIN)/pfabrik demo
@@ -62,6 +62,10 @@ check: $(STAMP)
 	$(BIN)/mypy --strict src paper tests/typing
 	$(BIN)/lint-imports
 	$(BIN)/python building/budget.py
+
+# The kernels of web pages, src/pfabrik/export/kernels.wasm, which is kept in the repository: needs clang and wasm-ld (lld).
+web: $(READY)
+	@$(BIN)/python building/compile_web.py
 
 bench: $(STAMP) $(MODULE)
 	@$(BIN)/python benchmarks/run.py

@@ -18,7 +18,7 @@ Apart       clearance (the least distance between links)
 Look into  search_log (every attempt behind an answer)
 Real machines   parameters, sensitivity, Measurements, calibrate
 Drive      actuation (a serial model's joints to motors, and back: torques, inertia, limits)
-See        plot, plot_track, plot_travel, animate; view (in the browser)
+See        plot, plot_track, plot_travel, animate; view (in the browser); export_web (a page to send)
 Structure  decompose, SubChain; errors
 Exchange   interop (MuJoCo and URDF, in and out)
 
@@ -72,6 +72,7 @@ _NAMES = {
     "description.legs": ("Leg",),
     "description.mechanism": ("Cone", "Joint", "Mechanism", "Shape"),
     "export.export_c": ("export_c",),
+    "export.export_web": ("export_web",),
     "export.ros2_control": ("export_ros2_control",),
     "export.tensors": ("export_jax", "export_numpy", "export_tensors", "export_torch"),
     "feasibility": ("Feasibility", "feasibility"),
@@ -149,6 +150,7 @@ if TYPE_CHECKING:
     from .description.legs import Leg as Leg
     from .description.mechanism import Cone as Cone, Joint as Joint, Mechanism as Mechanism, Shape as Shape
     from .export.export_c import export_c as export_c
+    from .export.export_web import export_web as export_web
     from .export.ros2_control import export_ros2_control as export_ros2_control
     from .export.tensors import (
         export_jax as export_jax,

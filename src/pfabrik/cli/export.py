@@ -19,6 +19,8 @@ NAMED = ("c", "c-float")
 """Formats whose names begin with one that can be chosen, and that take joints."""
 
 BACKENDS = ("torch", "jax", "numpy")
+FILES = (*BACKENDS, "web")
+"""Formats that are options with a file of their own."""
 
 
 def text_of(
@@ -42,6 +44,10 @@ def text_of(
         from ..export.klipper import klipper
 
         return klipper(mechanism)
+    if form == "web":
+        from ..export.export_web import web_page
+
+        return web_page(mechanism)
     if form in BACKENDS:
         from ..export.tensors import TASK, tensor_source
 
@@ -59,6 +65,7 @@ def text_of(
 @click.option("--torch", help="Write a file of PyTorch tensors, with gradients.", **OUTPUT)
 @click.option("--jax", help="The same in JAX.", **OUTPUT)
 @click.option("--numpy", help="The same in NumPy, without gradients.", **OUTPUT)
+@click.option("--web", help="Write a page, HTML, on which one drags the machine; it needs no network.", **OUTPUT)
 @click.option(
     "--ros2-control",
     "folder",
@@ -104,9 +111,9 @@ def export(
     linuxcnc  HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile
     klipper   [printer] and [stepper_*] of a delta printer
 
-    In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --ros2-control.
+    In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --web, --ros2-control.
     """
-    outputs = {backend: path for backend in BACKENDS if (path := files[backend]) is not None}
+    outputs = {form: path for form in FILES if (path := files[form]) is not None}
     if words and not (outputs or folder):
         form, words = words[0], words[1:]
         if form not in FORMATS:
@@ -117,7 +124,8 @@ def export(
     if words and not joints:
         raise click.UsageError(f"found {' '.join(words)}; expected one FORMAT, or names after --joints")
     if not outputs and folder is None:
-        raise click.UsageError(f"expected a FORMAT ({', '.join(FORMATS)}), --torch, --jax, --numpy or --ros2-control")
+        options = "--torch, --jax, --numpy, --web or --ros2-control"
+        raise click.UsageError(f"expected a FORMAT ({', '.join(FORMATS)}), {options}")
     joints = named_joints(joints, words)
     _check_settings(outputs, folder, name, joints)
     if parts and not outputs.keys() & {*NAMED}:
@@ -135,7 +143,7 @@ def export(
 
 
 def _option(form: str) -> str:
-    return f"--{form}" if form in BACKENDS else "-o"
+    return f"--{form}" if form in FILES else "-o"
 
 
 def _check_settings(outputs: dict[str, Path], folder: Path | None, name: str | None, joints: tuple[str, ...]) -> None:

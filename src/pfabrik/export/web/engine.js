@@ -1,0 +1,235 @@
+// The library's kernels, on the tables of one machine: an image of memory that Python wrote, where kernels open it.
+const BY_LEGS = 0, EXACTLY = 4;
+const PENDING = 9, UNSURE = 10;
+const SHORTEST_STEP = 1e-8, MOST_STEPS_OF_TRAVEL = 400, MOST_MODES = 24;
+const ALIKE = 0.999;
+
+async function unpacked(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const { readable, writable } = new DecompressionStream("gzip");
+  const writer = writable.getWriter();
+  writer.write(bytes).catch(() => {});
+  writer.close().catch(() => {});
+  return new Response(readable).arrayBuffer();
+}
+
+class Engine {
+  static async open(kernels, machine) {
+    const [code, image] = await Promise.all([unpacked(kernels), unpacked(machine.image.data)]);
+    const { instance } = await WebAssembly.instantiate(code, { env: Math });
+    return new Engine(instance.exports, machine, new Uint8Array(image));
+  }
+
+  constructor(kernels, machine, image) {
+    const { memory } = kernels;
+    Object.assign(this, { kernels, machine });
+    this.base = (kernels.free_memory() + 15) & ~15;
+    const missing = this.base + machine.image.size - memory.buffer.byteLength;
+    if (missing > 0) memory.grow(Math.ceil(missing / 65536));
+    new Uint8Array(memory.buffer).set(image, this.base);
+    const words = new Uint32Array(memory.buffer);
+    for (const place of machine.image.moved) words[(this.base + place) / 4] += this.base;
+    this.question = this.view("question.asked", Object.keys(machine.question).length, BigInt64Array);
+    this.status = this.view("answer.status", 1, BigInt64Array);
+    const { branches, actuators, columns } = machine;
+    const lengths = { poses: 16, sides: branches.length, q: branches.length, actuators: actuators.length, measures: 5 };
+    const fields = (record, names) => Object.fromEntries(names.map((name) => [name, this.view(`${record}.${name}`, lengths[name])]));
+    this.start = fields("start", ["poses", "sides", "actuators"]);
+    this.answer = fields("answer", Object.keys(lengths));
+    this.target = this.view("target.targets", 16);
+    this.values = this.view("values.values", actuators.length);
+    this.weights = this.view("weights.weights", machine.limits.length);
+    this.coordinates = this.view("read.coordinates", columns);
+    const home = fields("home", ["poses", "sides", "actuators"]);
+    this.home = { status: REACHED, pose: [...home.poses], branch: [...home.sides], actuators: [...home.actuators] };
+  }
+
+  at(name) {
+    return this.base + this.machine.image.places[name];
+  }
+
+  view(name, length, Kind = Float64Array) {
+    return new Kind(this.kernels.memory.buffer, this.at(name), length);
+  }
+
+  /** The status of a target: by some phases, from a start in its working mode, or from home in any. */
+  solve(target, start, { last = EXACTLY, keeps = start !== null, tables = "tables" } = {}) {
+    this.target.set(target);
+    this.prepare(start, last, keeps);
+    return this.call("answer_row", "target", tables);
+  }
+
+  prepare(start, last, keeps) {
+    const from = start ?? this.home;
+    this.start.poses.set(from.pose);
+    this.start.sides.set(from.branch);
+    this.start.actuators.set(from.actuators);
+    const asked = { first: BY_LEGS, last, has_start: start !== null, keeps_mode: keeps };
+    for (const [name, value] of Object.entries(asked)) this.question[this.machine.question[name]] = BigInt(value);
+  }
+
+  call(kernel, asked, tables = "tables") {
+    const places = [tables, "scratch", "start", asked, "question.asked", "answer"];
+    return this.kernels[kernel](...places.map((name) => this.at(name)));
+  }
+
+  /** The answer that a kernel has left in memory. */
+  read(status) {
+    const { poses, sides, q, actuators, measures } = this.answer;
+    const answer = { status, pose: [...poses], branch: [...sides], actuators: [...actuators], errors: [...measures] };
+    answer.proximal = [...q];
+    return answer;
+  }
+
+  ask(target, start = null) {
+    const found = this.solve(target, start);
+    if (found === PENDING) return this.failed(start ?? this.home);
+    const answer = this.read(found === UNSURE ? PROJECTED : found);
+    if (answer.status === PROJECTED && !answer.proximal.some(Number.isNaN)) answer.limits = this.holding();
+    return this.complete(answer);
+  }
+
+  /** Forward kinematics, in the assembly mode of a start. */
+  assemble(values, start = null) {
+    this.values.set(values);
+    this.prepare(start, EXACTLY, true);
+    const status = this.call("assemble_row", "values");
+    return status === PENDING ? this.failed(start ?? this.home) : this.complete(this.read(status));
+  }
+
+  failed(start) {
+    const answer = { ...start, status: FAILED, errors: [0, 0, 0, 0, 0], proximal: null, limits: [] };
+    return { ...this.complete(answer), actuators: null };
+  }
+
+  /** An answer with its joint coordinates, and the limits that it lies on. */
+  complete(answer) {
+    answer.q = this.coordinatesOf(answer);
+    if (!answer.limits?.length) answer.limits = this.active(answer.q);
+    return answer;
+  }
+
+  coordinatesOf({ pose, branch, proximal, actuators }) {
+    const { kernels, coordinates } = this;
+    this.answer.poses.set(pose);
+    this.answer.sides.set(branch);
+    this.answer.q.set(proximal ?? branch.map(() => NaN));
+    coordinates.fill(0);
+    const places = ["reading", "readingScratch", "&answer.poses", "&answer.sides", "&answer.q"];
+    const filled = ["&read.coordinates", "&read.no_rows", "&read.no_slopes"];
+    kernels.evaluate_poses(...[...places, ...filled].map((name) => this.at(name)));
+    this.machine.actuators.forEach(({ column, home }, k) => (coordinates[column] = actuators[k] - home));
+    return [...coordinates];
+  }
+
+  /** The limits that hold the answer in memory back, the largest multiplier first; like ones as they are described. */
+  holding() {
+    const places = ["tables", "scratch", "weighing", "&target.targets", "answer", "&weights.weights"];
+    this.kernels.weigh_limits(...places.map((name) => this.at(name)));
+    const { limits, holding, ranges } = this.machine;
+    const isRigid = (k) => k < 2 * ranges.length && !(ranges[k >> 1][1] < ranges[k >> 1][2]);
+    const held = limits.map((limit, k) => ({ ...limit, weight: this.weights[k], isRigid: isRigid(k) }));
+    const sorted = held.filter(({ weight }) => weight > holding).sort((a, b) => b.weight - a.weight);
+    let leader = Infinity;
+    for (const limit of sorted) {
+      if (!(limit.weight > ALIKE * leader)) leader = limit.weight;
+      limit.group = leader;
+    }
+    sorted.sort((a, b) => b.group - a.group || a.place - b.place);
+    return sorted.filter((limit) => !limit.isRigid);
+  }
+
+  /** The limits that joint coordinates lie on. */
+  active(q) {
+    const { ranges, limits, active } = this.machine;
+    const on = [];
+    ranges.forEach(([column, low, high, unit], k) => {
+      if (low < high && q[column] - low <= active * unit) on.push(limits[2 * k]);
+      else if (low < high && high - q[column] <= active * unit) on.push(limits[2 * k + 1]);
+    });
+    return on;
+  }
+
+  /** How far the end effector goes each way along and about each axis of the task, and what stops it. */
+  travel(from) {
+    const { task } = this.machine;
+    const axes = [...task.slides.map((axis) => ["along", axis]), ...task.turns.map((axis) => ["about", axis])];
+    return axes.flatMap(([kind, axis]) => [-1, 1].map((sign) => this.reach(from, kind, axis, sign)));
+  }
+
+  reach(from, kind, axis, sign) {
+    const { length } = this.machine;
+    const [scale, most] = kind === "along" ? [length, 4] : [1, 2 * Math.PI];
+    const vector = axisOf(this.machine.task, kind, axis, from.pose);
+    const at = (amount) => displaced(from.pose, kind, vector, sign * amount * scale);
+    let [amount, step, last] = [0, 1 / 32, from];
+    for (let n = 0; n < MOST_STEPS_OF_TRAVEL && amount < most && step > SHORTEST_STEP; n++) {
+      const next = Math.min(amount + step, most);
+      if (this.solve(at(next), last, { last: BY_LEGS }) === REACHED) [amount, last] = [next, this.read(REACHED)];
+      else step /= 4;
+    }
+    const isFree = amount >= most;
+    const limits = isFree ? [] : this.stopping(at(amount + 1e-3), last);
+    return { kind, axis, sign, distance: isFree ? Infinity : amount * scale, limits, pose: at(amount) };
+  }
+
+  /** The limits that a pose lies on, or else those that hold it back from a target just beyond. */
+  stopping(beyond, last) {
+    const limits = this.active(this.coordinatesOf(last));
+    if (limits.length) return limits;
+    const answer = this.ask(beyond, last);
+    return answer.status === PROJECTED ? answer.limits : [];
+  }
+
+  /** The working modes of a pose, and of the platform's other poses where the task leaves some of it open. */
+  modes(from) {
+    const places = this.machine.branches.flatMap((side, k) => (side ? [k] : []));
+    if (places.length > 6) return [];
+    const starts = [from, ...this.others()];
+    const modes = starts.flatMap((start) =>
+      Array.from({ length: 2 ** places.length }, (_, bits) => {
+        const branch = [...start.branch];
+        places.forEach((k, i) => (branch[k] = bits & (1 << i) ? -from.branch[k] : from.branch[k]));
+        return this.mode(from.pose, { ...start, branch, actuators: from.actuators });
+      }).filter(Boolean),
+    );
+    const isSame = (a, b) =>
+      a.branch.every((side, k) => Math.sign(side) === Math.sign(b.branch[k])) &&
+      a.pose.every((value, k) => Math.abs(value - b.pose[k]) < 1e-6 * this.machine.length);
+    const apart = modes.filter((mode, k) => !modes.slice(0, k).some((other) => isSame(mode, other)));
+    return apart.sort((a, b) => a.status - b.status).slice(0, MOST_MODES);
+  }
+
+  /** A pose on some sides of the legs, within limits or beyond; null where the legs do not meet. */
+  mode(pose, start) {
+    for (const [tables, status] of [["tables", REACHED], ["free", EXCEEDED]]) {
+      if (this.solve(pose, start, { last: BY_LEGS, keeps: false, tables }) === REACHED) {
+        return this.complete(this.read(status));
+      }
+    }
+    return null;
+  }
+
+  others() {
+    const { others, branches, length } = this.machine;
+    const [poses, sides] = [this.view("others.poses", 16 * others), this.view("others.sides", branches.length * others)];
+    return Array.from({ length: others }, (_, k) => ({
+      pose: withLengths([...poses.subarray(16 * k, 16 * (k + 1))], length),
+      branch: [...sides.subarray(branches.length * k, branches.length * (k + 1))],
+    }));
+  }
+
+  /** Which points of a grid along two axes legs reach at an answer's orientation, in its mode: 255 or 0 each. */
+  slice(from, [u, v], sides, count) {
+    const out = new Uint8Array(count * count);
+    this.solve(from.pose, from, { last: BY_LEGS });
+    const value = ([low, high], k) => low + ((high - low) * k) / (count - 1);
+    for (let j = 0; j < count; j++)
+      for (let i = 0; i < count; i++) {
+        this.target[4 * u + 3] = value(sides[0], i);
+        this.target[4 * v + 3] = value(sides[1], j);
+        if (this.call("answer_row", "target") === REACHED) out[j * count + i] = 255;
+      }
+    return out;
+  }
+}

@@ -1,0 +1,221 @@
+// The panel: status, what is asked for, actuators, travel and working modes.
+const $ = (selector) => document.querySelector(selector);
+function made(tag, properties = {}, ...inside) {
+  const element = Object.assign(document.createElement(tag), properties);
+  element.append(...inside);
+  return element;
+}
+const chip = (text, className = "") => made("span", { className: `chip ${className}`, textContent: text });
+const MOST_CHIPS = 5;
+
+/** Numbers as the panel shows them: small machines in metres are shown in millimetres. */
+class Wording {
+  constructor({ unit: name, length }) {
+    this.factor = name === "m" && length < 1 ? 1000 : 1;
+    this.unit = this.factor > 1 ? "mm" : name;
+    this.digits = this.unit === "m" ? 3 : 1;
+  }
+
+  length(value) {
+    return rounded(value * this.factor, this.digits);
+  }
+
+  value(value, isAngle) {
+    return isAngle ? `${rounded(value / DEGREE, 1)}°` : this.length(value);
+  }
+}
+const rounded = (value, digits) => (Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value).toFixed(digits).replace("-", "−");
+
+class Panel {
+  constructor(machine, session) {
+    Object.assign(this, { machine, session, wording: new Wording(machine) });
+    const { slides, turns } = machine.task;
+    this.addFields([...slides, ...turns.map((axis) => 3 + axis)]);
+    this.addActuators();
+    this.addTabs();
+    const units = [slides.length ? this.wording.unit : "", turns.length ? "degrees" : ""].filter(Boolean);
+    $("#units").textContent = units.join(", ");
+  }
+
+  addFields(places) {
+    const names = ["x", "y", "z", "roll", "pitch", "yaw"];
+    this.fields = places.map((k) => {
+      const step = k < 3 ? 10 ** (1 - this.wording.digits) : 1;
+      const input = made("input", { type: "number", step, ariaLabel: names[k] });
+      input.oninput = () => input.value !== "" && this.askFor(k, Number(input.value));
+      input.onblur = () => this.showFields();
+      $("#fields").append(made("label", {}, made("i", { className: "xyz"[k % 3], textContent: names[k] }), input));
+      return { k, input };
+    });
+  }
+
+  askFor(k, value) {
+    const { target } = this.session;
+    const [position, angles] = [originOf(target), anglesOf(target)];
+    if (k < 3) position[k] = value / this.wording.factor;
+    else angles[k - 3] = value;
+    this.session.ask(poseOf(position, angles));
+  }
+
+  addActuators() {
+    const { actuators, length } = this.machine;
+    $("#actuators").classList.toggle("wide", actuators.some(({ name }) => name.length > 8));
+    this.rows = actuators.map(({ name, isAngle, low, high, home }, k) => {
+      const span = isAngle ? Math.PI : length;
+      const [min, max] = [low ?? home - span, high ?? home + span];
+      const input = made("input", { type: "range", ariaLabel: name });
+      Object.assign(input, { min, max, step: (max - min) / 4000 });
+      input.oninput = () => this.drive(k, Number(input.value));
+      const ends = [low, high].map((end) => (end === null ? "free" : this.wording.value(end, isAngle)));
+      const text = made("output");
+      const wish = made("i", { className: "wish", hidden: true });
+      const slider = made("span", { className: "slider" }, input, wish);
+      const row = made("div", { className: "row", title: `${name}: ${ends.join(" to ")}` }, made("span", { textContent: name }), slider, text);
+      $("#actuators div").append(row);
+      return { row, input, text, wish, min, max };
+    });
+  }
+
+  drive(k, value) {
+    const { answer, wished } = this.session;
+    this.session.assemble((wished ?? answer.actuators).map((each, i) => (i === k ? value : (answer.actuators?.[i] ?? each))));
+  }
+
+  addTabs() {
+    const tabs = { pose: "Pose", actuators: "Actuators", travel: "Travel", modes: "Modes" };
+    const open = (name) => {
+      for (const each of Object.keys(tabs)) {
+        $(`#${each}`).classList.toggle("shown", each === name);
+        $(`#${each}-tab`).setAttribute("aria-selected", each === name);
+      }
+    };
+    for (const [name, textContent] of Object.entries(tabs)) {
+      const button = made("button", { id: `${name}-tab`, textContent, onclick: () => open(name) });
+      button.setAttribute("role", "tab");
+      button.setAttribute("aria-controls", name);
+      $("nav").append(button);
+    }
+    open("actuators");
+  }
+
+  show() {
+    this.showStatus();
+    this.showFields();
+    this.showActuators();
+  }
+
+  showStatus() {
+    const { answer, isFar } = this.session;
+    const words = {
+      [REACHED]: "Reached", [PROJECTED]: "Out of reach", [EXCEEDED]: "Beyond its limits", [FAILED]: "No feasible pose found",
+    };
+    $("#status").className = isFar ? "far" : "reached";
+    $("#status b").textContent = words[answer.status] ?? words[PROJECTED];
+    $("#status p").textContent = this.explanation();
+    const { limits } = answer;
+    const shown = limits.slice(0, limits.length > MOST_CHIPS ? MOST_CHIPS - 1 : MOST_CHIPS);
+    const chips = shown.map(({ joint, bound }) => chip(`${joint} ${bound}`, isFar ? "held" : ""));
+    if (limits.length > shown.length) chips.push(chip(`and ${limits.length - shown.length} more`));
+    $("#limits").replaceChildren(...chips);
+  }
+
+  explanation() {
+    const { answer, wished } = this.session;
+    const has = answer.limits.length > 0;
+    if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : "Every limit kept, all loops closed.";
+    if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";
+    if (answer.status === FAILED) return "The last feasible pose is shown.";
+    if (wished) return "These values do not fit together; this is the nearest that does.";
+    return `Nearest feasible pose, ${this.distance(answer)} short. ${has ? "Stopped by" : "Its links are stretched."}`;
+  }
+
+  distance({ errors: [position, rotation] }) {
+    const { slides, turns } = this.machine.task;
+    const parts = [];
+    if (slides.length && (position > 0 || !turns.length)) parts.push(`${this.wording.length(position)} ${this.wording.unit}`);
+    if (turns.length && (rotation > 1e-6 || !parts.length)) parts.push(`${rounded(rotation / DEGREE, 1)}°`);
+    return parts.join(" and ");
+  }
+
+  showFields() {
+    const { target } = this.session;
+    const values = [...originOf(target).map((value) => value * this.wording.factor), ...anglesOf(target)];
+    for (const { k, input } of this.fields) {
+      if (document.activeElement === input) continue;
+      const digits = k < 3 ? this.wording.digits : 1;
+      input.value = (Math.abs(values[k]) < 0.5 * 10 ** -digits ? 0 : values[k]).toFixed(digits);
+    }
+  }
+
+  showActuators() {
+    const { answer, wished } = this.session;
+    const limits = new Set(answer.limits.map(({ joint }) => joint));
+    this.rows.forEach(({ row, input, text, wish, min, max }, k) => {
+      const { isAngle, joint } = this.machine.actuators[k];
+      const value = answer.actuators ? answer.actuators[k] : NaN;
+      const isHeld = limits.has(joint);
+      const share = (at) => `${100 * clamp((at - min) / (max - min), 0, 1)}%`;
+      if (answer.actuators) input.value = value;
+      text.textContent = answer.actuators ? this.wording.value(value, isAngle) : "–";
+      row.classList.toggle("held", isHeld);
+      row.style.setProperty("--share", share(value));
+      wish.hidden = !wished || !(Math.abs(wished[k] - value) > 1e-3 * (max - min));
+      if (!wish.hidden) wish.style.setProperty("--share", share(wished[k]));
+      input.setAttribute("aria-valuetext", text.textContent + (isHeld ? ", at its limit" : ""));
+    });
+  }
+
+  showTravel(travel) {
+    const widest = (kind) =>
+      Math.max(...travel.filter((each) => each.kind === kind).map(({ distance }) => Math.min(distance, this.most(kind))), 1e-9);
+    const rows = travel.filter(({ sign }) => sign < 0).map((less, k) => {
+      const more = travel[2 * k + 1];
+      const isTurn = less.kind === "about";
+      const bar = made("span", { className: `bar ${"xyz"[less.axis]}` });
+      for (const each of [less, more]) {
+        const part = made("i", { className: each.sign < 0 ? "less" : "more" });
+        part.style.width = `${50 * clamp(each.distance / widest(each.kind), 0, 1)}%`;
+        bar.append(part);
+      }
+      const name = made("b", { className: "xyz"[less.axis], textContent: (isTurn ? "↻" : "") + "xyz"[less.axis] });
+      return made("div", { className: "travel" }, this.end(less), name, bar, this.end(more));
+    });
+    $("#travel div").replaceChildren(...rows);
+  }
+
+  most(kind) {
+    return kind === "about" ? Math.PI : 4 * this.machine.length;
+  }
+
+  /** A button that shows how far it is, and goes there. */
+  end({ kind, axis, sign, distance, limits, pose }) {
+    const isTurn = kind === "about";
+    const isZero = distance < 1e-6 * (isTurn ? 1 : this.machine.length);
+    const amount = isZero ? "0" : (sign < 0 ? "−" : "+") + this.wording.value(distance, isTurn);
+    const textContent = Number.isFinite(distance) ? amount : "free";
+    const names = limits.map(({ joint, bound }) => `${joint} ${bound}`).join(", ");
+    const cause = Number.isFinite(distance) ? `stopped by ${names || "stretched links"}` : "nothing stops it";
+    const title = `${isTurn ? "about" : "along"} ${sign < 0 ? "−" : "+"}${"xyz"[axis]}: ${textContent}, ${cause}`;
+    const button = made("button", { className: isZero ? "zero" : "", textContent, title, ariaLabel: title });
+    button.disabled = isZero || !Number.isFinite(distance);
+    button.onclick = () => this.session.ask(pose);
+    return button;
+  }
+
+  showModes(modes) {
+    const { answer } = this.session;
+    $("#modes").hidden = $("#modes-tab").hidden = modes.length < 2;
+    const isSame = (mode) =>
+      mode.branch.every((side, k) => Math.sign(side) === Math.sign(answer.branch[k])) &&
+      mode.pose.every((value, k) => Math.abs(value - answer.pose[k]) <= 1e-6 * this.machine.length);
+    const buttons = modes.map((mode, k) => {
+      const isBeyond = mode.status === EXCEEDED;
+      const title = isBeyond ? `Mode ${k + 1}, beyond limits` : `Mode ${k + 1}`;
+      const button = made("button", { className: isBeyond ? "chip beyond" : "chip", textContent: k + 1, title, ariaLabel: title });
+      button.setAttribute("aria-pressed", isSame(mode));
+      button.onclick = () => this.session.take(mode);
+      return button;
+    });
+    $("#modes div").replaceChildren(...buttons);
+  }
+}

@@ -1,0 +1,102 @@
+// What is asked for, the answer to it, the steps that can be undone, and the link that keeps them.
+const REACHED = 0, PROJECTED = 1, EXCEEDED = 2, FAILED = 3;
+const MOST_STEPS = 200;
+
+class Session {
+  constructor(machine, engine = null) {
+    Object.assign(this, { machine, engine, past: [], future: [], answer: null });
+  }
+
+  /** Ask for a pose: from the answer before, in its working mode; afresh where that has no configuration. */
+  ask(target, { isFresh = false } = {}) {
+    const start = !isFresh && this.answer?.actuators ? this.answer : null;
+    this.start = start;
+    let answer = this.timed(() => this.engine.ask(target, start));
+    if (start && !answer.actuators) answer = this.engine.ask(target, null);
+    this.settle({ target: [...target], answer, wished: null });
+  }
+
+  /** Ask for values of the actuators. */
+  assemble(values) {
+    const start = this.answer.actuators ? this.answer : null;
+    const answer = this.timed(() => this.engine.assemble(values, start));
+    this.settle({ target: [...answer.pose], answer, wished: [...values] });
+  }
+
+  /** Take an answer that was found already, such as one in another working mode. */
+  take(answer) {
+    this.settle({ target: [...answer.pose], answer, wished: null });
+  }
+
+  goHome() {
+    this.ask(this.machine.home, { isFresh: true });
+  }
+
+  timed(ask) {
+    const began = performance.now();
+    const answer = ask();
+    this.took = performance.now() - began;
+    return answer;
+  }
+
+  settle(state) {
+    Object.assign(this, state);
+    this.onChange?.();
+  }
+
+  get isFar() {
+    return this.answer.status !== REACHED;
+  }
+
+  /** Joints that an answer out of reach lights up. */
+  get held() {
+    return new Set(this.isFar ? this.answer.limits.map((limit) => limit.joint) : []);
+  }
+
+  /** Keep the present state as a step that can be undone. */
+  remember() {
+    const { target, answer, wished } = this;
+    if (this.present?.answer === answer) return;
+    if (this.present) this.past = [...this.past.slice(-MOST_STEPS), this.present];
+    this.present = { target, answer, wished };
+    this.future = [];
+  }
+
+  undo() {
+    this.remember();
+    this.step(this.past, this.future);
+  }
+
+  redo() {
+    this.step(this.future, this.past);
+  }
+
+  step(from, to) {
+    if (!from.length) return;
+    to.push(this.present);
+    this.present = from.pop();
+    this.settle(this.present);
+  }
+
+  /** The part of an address that keeps the target and the branches of the legs. */
+  get link() {
+    const compact = (value) => String(Math.abs(value) < 1e-9 ? 0 : +value.toPrecision(10));
+    const numbers = [...originOf(this.target), ...anglesOf(this.target)].map(compact);
+    const branches = this.answer.branch.filter((_, k) => this.machine.branches[k]).map((side) => (side < 0 ? "-" : "+"));
+    return `#p=${numbers.join(",")}${branches.length ? `&m=${branches.join("")}` : ""}`;
+  }
+
+  open(link) {
+    const parts = new URLSearchParams(link.replace(/^#/, "").replace(/\+/g, "%2B"));
+    const numbers = (parts.get("p") ?? "").split(",").map(Number);
+    if (numbers.length !== 6 || !numbers.every(Number.isFinite)) return this.goHome();
+    const signs = [...(parts.get("m") ?? "")];
+    const { branches } = this.machine;
+    this.answer = null;
+    if (signs.length && signs.length === branches.filter(Boolean).length) {
+      const branch = this.engine.home.branch.map((side, k) => (branches[k] ? signs.shift() + 1 : side));
+      this.answer = { ...this.engine.home, branch: branch.map(Number) };
+    }
+    return this.ask(poseOf(numbers.slice(0, 3), numbers.slice(3)));
+  }
+}

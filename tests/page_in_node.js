@@ -1,0 +1,42 @@
+// What a page answers, without a browser: `node page_in_node.js SCRIPT...`, the question on standard input.
+const fs = require("fs");
+
+const scripts = process.argv.slice(2).map((path) => fs.readFileSync(path, "utf-8"));
+const { kernels, machine, targets, path, values, link } = JSON.parse(fs.readFileSync(0, "utf-8"));
+
+const { Engine, Session } = new Function(`${scripts.join("\n")}; return { Engine, Session };`)();
+const named = (limits) => limits.map(({ joint, bound }) => `${joint} ${bound}`);
+const plain = ({ status, pose, actuators, limits }) => ({ status, pose, actuators, limits: named(limits) });
+
+async function main() {
+  const engine = await Engine.open(kernels, machine);
+  const home = engine.ask(machine.home);
+  let last = home;
+  const followed = path.map((target) => {
+    const answer = engine.ask(target, last);
+    last = answer.actuators ? answer : last;
+    return plain(answer);
+  });
+  const travel = engine.travel(home).map(({ distance, ...rest }) => ({ ...rest, distance: Number.isFinite(distance) ? distance : null }));
+  const session = new Session(machine, engine);
+  session.goHome();
+  session.remember();
+  session.open(link);
+  session.remember();
+  const steps = [[...session.answer.pose], session.link];
+  const kept = new Session(machine, engine);
+  kept.open(steps[1]);
+  session.undo();
+  const undone = [...session.answer.pose];
+  session.redo();
+  const answers = {
+    inverse: targets.map((target) => plain(engine.ask(target))),
+    followed,
+    forward: values.map((each) => plain(engine.assemble(each))),
+    travel,
+    modes: engine.modes(home).map(plain),
+    steps: { asked: steps[0], kept: kept.answer.pose, undone, redone: session.answer.pose },
+  };
+  fs.writeFileSync(1, JSON.stringify(answers));
+}
+main();

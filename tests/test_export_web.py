@@ -1,0 +1,204 @@
+"""A machine as one page: its answers are the library's, and it needs nothing but a browser."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import shutil
+import subprocess
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import pfabrik as pf
+from pfabrik.cli import main
+from pfabrik.errors import InvalidArgument
+from pfabrik.export.export_web import FOLDER, SCRIPTS, machine_data, web_page
+from pfabrik.export.memory_image import packed
+from pfabrik.model import model_of
+from pfabrik.rotations import from_rotvec
+
+NODE = shutil.which("node")
+needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js, which is not installed")
+
+N = 40
+NEAR = 1e-6
+"""Difference of poses that two searches may end at [L, or entries of rotations]: the sines of JavaScript differ in their
+last digits, which far poses at flat optima show a thousandfold."""
+
+LARGEST = 250_000
+"""Of a page [bytes]."""
+
+
+@lru_cache
+def exportable() -> tuple[str, ...]:
+    """Machines of the catalogue that pages answer for."""
+    names = []
+    for name in pf.catalog():
+        try:
+            web_page(pf.load(name))
+        except InvalidArgument:
+            continue
+        names.append(name)
+    return tuple(names)
+
+
+def targets_of(machine: pf.Mechanism, n: int, seed: int) -> Any:
+    """Poses about home, near and far, within the freedoms that the machine has."""
+    rng, task, length = np.random.default_rng(seed), model_of(machine).task, machine.characteristic_length
+    data = machine_data(model_of(machine))["task"]
+    targets = np.repeat(machine.home_pose[None], n, axis=0)
+    moves = np.isin(np.arange(3), data["slides"])
+    turns = np.isin(np.arange(3), data["turns"]) if task.rotations else np.zeros(3, bool)
+    targets[:, :3, 3] += rng.normal(size=(n, 3)) * moves * length * rng.choice([0.03, 0.1, 0.5], (n, 1))
+    rotations = from_rotvec(rng.normal(size=(n, 3)) * turns * rng.choice([0.03, 0.15, 0.5], (n, 1)))
+    targets[:, :3, :3] = rotations @ targets[:, :3, :3]
+    return targets
+
+
+@lru_cache
+def asked(name: str) -> tuple[Any, Any, Any]:
+    """Targets, a path and actuator values."""
+    machine = pf.load(name)
+    targets, path = targets_of(machine, N, 7), targets_of(machine, N // 2, 8)
+    lengths = [machine.characteristic_length if drive.kind == "length" else 1.0 for drive in machine.drives]
+    near = pf.solve_ik(machine, targets).actuators
+    values = near + 0.05 * np.random.default_rng(9).normal(size=near.shape) * lengths
+    return targets, path, values
+
+
+@lru_cache
+def answered(name: str) -> dict[str, Any]:
+    """What the page of a machine answers, in Node.js."""
+    targets, path, values = asked(name)
+    question = {
+        "kernels": packed((FOLDER / "kernels.wasm").read_bytes()),
+        "machine": machine_data(model_of(pf.load(name))),
+        "targets": targets.reshape(-1, 16).tolist(),
+        "path": path.reshape(-1, 16).tolist(),
+        "values": values.tolist(),
+        "link": link_to(path[0]),
+    }
+    scripts = [str(FOLDER / "web" / f"{each}.js") for each in SCRIPTS[: SCRIPTS.index("session") + 1]]
+    text = re.sub(r"\bInfinity\b", "1e999", json.dumps(question))
+    command = [str(NODE), str(Path(__file__).with_name("page_in_node.js")), *scripts]
+    ran = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    return dict(json.loads(ran.stdout))
+
+
+def link_to(pose: Any) -> str:
+    """The part of an address that asks for a pose."""
+    from scipy.spatial.transform import Rotation
+
+    angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz", degrees=True)
+    return "#p=" + ",".join(map(repr, [*pose[:3, 3].tolist(), *angles.tolist()]))
+
+
+def assert_same(machine: pf.Mechanism, answers: list[dict[str, Any]], expected: pf.Solution) -> None:
+    """Statuses equal, poses within `NEAR`."""
+    assert [answer["status"] for answer in answers] == np.atleast_1d(expected.status).astype(int).tolist()
+    poses = np.array([answer["pose"] for answer in answers]).reshape(-1, 4, 4)
+    scale = np.ones((4, 4))
+    scale[:3, 3] = machine.characteristic_length
+    assert (np.abs(poses - expected.pose) / scale).max() <= NEAR
+
+
+@needs_node
+@pytest.mark.parametrize("name", exportable())
+def test_a_page_answers_targets_as_the_library_does(name: str) -> None:
+    machine = pf.load(name)
+    assert_same(machine, answered(name)["inverse"], pf.solve_ik(machine, asked(name)[0]))
+
+
+@needs_node
+@pytest.mark.parametrize("name", exportable())
+def test_a_page_names_the_limits_that_the_library_names(name: str) -> None:
+    """All but links that are stretched out: of these it says that they are, and not at which joint."""
+    expected = pf.solve_ik(pf.load(name), asked(name)[0])
+    for answer, limits in zip(answered(name)["inverse"], expected.active_limits, strict=True):
+        if answer["status"] == pf.Status.PROJECTED:
+            named = [f"{limit.joint} {limit.bound}" for limit in limits if limit.bound != "stretched"]
+            assert answer["limits"] == named
+
+
+@needs_node
+@pytest.mark.parametrize("name", exportable())
+def test_a_page_assembles_actuators_as_the_library_does(name: str) -> None:
+    machine = pf.load(name)
+    assert_same(machine, answered(name)["forward"], pf.solve_fk(machine, asked(name)[2]))
+
+
+@needs_node
+@pytest.mark.parametrize("name", exportable())
+def test_a_drag_stays_in_the_mode_of_the_answer_before(name: str) -> None:
+    machine, last = pf.load(name), pf.solve_ik(pf.load(name), pf.load(name).home_pose)
+    for answer, target in zip(answered(name)["followed"], asked(name)[1], strict=True):
+        expected = pf.solve_ik(machine, target, start=last)
+        assert_same(machine, [answer], expected)
+        last = expected
+
+
+@needs_node
+@pytest.mark.parametrize("name", exportable())
+def test_a_page_travels_as_far_as_the_library(name: str) -> None:
+    machine = pf.load(name)
+    home = pf.solve_ik(machine, machine.home_pose)
+    for reach in answered(name)["travel"]:
+        axis = reach["sign"] * np.eye(3)[reach["axis"]]
+        expected = pf.travel(home, **{reach["kind"]: axis})[0].distance
+        found = np.inf if reach["distance"] is None else reach["distance"]
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6 * machine.characteristic_length)
+
+
+@needs_node
+@pytest.mark.parametrize("name", exportable())
+def test_a_link_keeps_the_pose_and_steps_are_undone(name: str) -> None:
+    machine, steps = pf.load(name), answered(name)["steps"]
+    scale = machine.characteristic_length
+    assert np.abs(np.subtract(steps["asked"], steps["kept"])).max() <= NEAR * max(scale, 1.0)
+    assert steps["redone"] == steps["asked"]
+    home = pf.solve_ik(machine, machine.home_pose).pose
+    assert np.abs(np.reshape(steps["undone"], (4, 4)) - home).max() <= NEAR * max(scale, 1.0)
+
+
+@pytest.mark.parametrize("name", exportable())
+def test_a_page_is_small_and_asks_for_nothing(name: str) -> None:
+    text = web_page(pf.load(name))
+    assert len(text.encode()) <= LARGEST
+    assert not re.search(r"https?://|\bfetch\(|XMLHttpRequest|\bimport\(|<link|@import|\bsrc=", text)
+
+
+def test_machines_without_closed_forms_are_refused_with_the_reason(tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match="closed forms") as refused:
+        pf.export_web(pf.load("panda"), tmp_path / "panda.html")
+    assert "sub-chain" in str(refused.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_writes_a_page(tmp_path: Path) -> None:
+    file = tmp_path / "machine.html"
+    written = CliRunner().invoke(main, ["export", "stewart", "--web", str(file)])
+    assert written.exit_code == 0
+    assert file.read_text(encoding="utf-8") == web_page(pf.load("stewart"))
+    refused = CliRunner().invoke(main, ["export", "panda", "--web", str(tmp_path / "panda.html")])
+    assert refused.exit_code == 2
+    assert "closed forms" in refused.stderr
+
+
+def test_a_name_cannot_end_the_script() -> None:
+    text = web_page(dataclasses.replace(pf.load("five_bar"), name="</script><b>5 bars & more"))
+    assert "</script><b>" not in text
+    assert "&lt;/script&gt;&lt;b&gt;5 bars &amp; more" in text
+
+
+def test_the_kernels_of_pages_are_those_of_today() -> None:
+    command = [sys.executable, "building/compile_web.py", "--check"]
+    ran = subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr

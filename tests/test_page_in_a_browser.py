@@ -1,0 +1,122 @@
+"""A page as a visitor meets it: in headless Chromium without a network, by mouse, finger and keys."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install '.[dev]'")
+
+CHROMIUM = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
+)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM, reason="needs Chromium, which is not installed (apt install chromium)"),
+]
+SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+SIZE = {"width": 900, "height": 500}
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+PATIENCE = 60_000  # milliseconds
+FOLLOWS = 0.5  # of a millimetre: a pixel is larger
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as started:
+        sandbox = ["--no-sandbox"] * (hasattr(os, "geteuid") and os.geteuid() == 0)
+        try:
+            chromium = started.chromium.launch(executable_path=CHROMIUM, args=[*SOFTWARE, *sandbox])
+        except playwright.Error as error:
+            pytest.skip(f"Chromium is there and does not start: {str(error).splitlines()[0]}")
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pages")
+    for name in ("stewart", "five_bar"):
+        pf.export_web(pf.load(name), folder / f"{name}.html")
+    return folder
+
+
+def opened(browser: Any, file: Path, link: str = "", **options: Any) -> tuple[Any, list[str]]:
+    """A page without a network, and its errors and what it asks for from elsewhere."""
+    context = browser.new_context(offline=True, **({"viewport": SIZE} | options))
+    page, faults = context.new_page(), list[str]()
+    page.set_default_timeout(PATIENCE)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("request", lambda request: faults.extend([request.url] * request.url.startswith(("http", "ws"))))
+    page.goto(file.as_uri() + link)
+    page.wait_for_function("window.page?.shown")
+    return page, faults
+
+
+def target(page: Any) -> Any:
+    return np.reshape(page.evaluate("page.session.target"), (4, 4))
+
+
+def centre(page: Any) -> list[float]:
+    """Where the handles are on the screen."""
+    found: list[float] = page.evaluate("page.scene.camera.look().onScreen(page.gizmo.centre)")
+    return found
+
+
+def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(browser: Any, folder: Path) -> None:
+    page, faults = opened(browser, folder / "stewart.html")
+    x, y = centre(page)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 40, y + 20)
+    assert np.subtract(centre(page), [x + 40, y + 20]) == pytest.approx(0.0, abs=FOLLOWS)
+    assert page.locator("#status b").inner_text() == "Reached"
+    page.mouse.move(x + 250, y - 100)
+    page.mouse.up()
+    assert page.locator("#status b").inner_text() == "Out of reach"
+    named = page.locator("#limits").inner_text().split()
+    assert named
+    assert named[0] in page.locator("#names").inner_text()
+    assert not faults
+
+
+def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, folder: Path) -> None:
+    page, _ = opened(browser, folder / "stewart.html", "#p=10,-20,200,5,0,10")
+    page.locator("canvas").press("ArrowRight")
+    page.wait_for_function("page.session.past.length === 1")
+    again, _ = opened(browser, folder / "stewart.html", page.evaluate("location.hash"))
+    assert target(again) == pytest.approx(target(page), abs=1e-6)
+    page.keyboard.press("Control+z")
+    assert target(page)[:3, 3] == pytest.approx([10.0, -20.0, 200.0], abs=1e-6)
+
+
+def test_a_slider_drives_an_actuator(browser: Any, folder: Path) -> None:
+    page, _ = opened(browser, folder / "five_bar.html")
+    slider = page.locator("#actuators input").first
+    slider.focus()
+    for _ in range(3):
+        slider.press("PageUp")
+    machine = pf.load("five_bar")
+    expected = pf.solve_fk(machine, page.evaluate("page.session.answer.actuators"))
+    assert np.reshape(page.evaluate("page.session.answer.pose"), (4, 4)) == pytest.approx(expected.pose, abs=1e-6)
+    assert page.evaluate("page.session.answer.actuators[0]") > machine.drives[0].home
+
+
+def test_a_finger_drags_on_a_phone(browser: Any, folder: Path) -> None:
+    page, faults = opened(browser, folder / "five_bar.html", **PHONE)
+    x, y = centre(page)
+    before, touch = target(page), page.context.new_cdp_session(page)
+    for kind, points in (("Start", [[x, y]]), ("Move", [[x + 30, y + 30]]), ("End", [])):
+        places = [{"x": a, "y": b} for a, b in points]
+        touch.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": places})
+    assert np.abs(target(page) - before).max() > 1.0
+    assert not page.evaluate("document.documentElement.scrollWidth > innerWidth")
+    assert not faults
