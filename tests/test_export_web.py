@@ -29,7 +29,7 @@ needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js, which is no
 
 N = 40
 NEAR = 1e-6
-"""Difference of poses that two searches may end at [L, or entries of rotations]: the sines of JavaScript differ in their
+"""Difference of poses that two searches may end at [L, or entries of rotations]: the sines of JavaScript differ in the
 last digits, which far poses at flat optima show a thousandfold."""
 
 LARGEST = 250_000

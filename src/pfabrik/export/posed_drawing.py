@@ -65,16 +65,14 @@ class _Drawing:
 
     def _motions(self, joint: Joint) -> list[list[Any]] | None:
         """Column, sign and screw of what moves a joint's second body; None where a coordinate is not known."""
+        if joint.is_rigid:
+            return []
         span = columns(self.mechanism)[joint.name]
-        if joint.type == "spherical" or (
-            not self.known.issuperset(range(span.start, span.stop)) and not joint.is_rigid
-        ):
+        its_columns = range(span.start, span.stop)
+        if joint.type == "spherical" or not self.known.issuperset(its_columns):
             return None
-        screws = [] if joint.is_rigid else joint_screws(self.mechanism, joint)
-        return [
-            [column, 1, screw[:3].tolist(), screw[3:].tolist()]
-            for column, screw in zip(range(span.start, span.stop), screws, strict=False)
-        ]
+        screws: list[list[float]] = joint_screws(self.mechanism, joint).tolist()
+        return [[column, 1, screw[:3], screw[3:]] for column, screw in zip(its_columns, screws, strict=True)]
 
     def _joint(self, joint: Joint) -> dict[str, Any]:
         """A point of a body, or amid others."""
