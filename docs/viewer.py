@@ -30,6 +30,9 @@ def main() -> None:
         take_viewer(chromium, FIGURES / "viewer.png")
         Image.open(FIGURES / "viewer.png").convert("RGB").quantize(COLOURS).save(FIGURES / "viewer.png", optimize=True)
         take_page(chromium, FIGURES / "page.png")
+        Image.open(FIGURES / "page.png").convert("RGB").quantize(256, kmeans=3).save(
+            FIGURES / "page.png", optimize=True
+        )
         chromium.close()
 
 
