@@ -1,5 +1,6 @@
 // The page: the panel, the picture, and what happens between them.
-const MORE_AFTER = 60, SLICE_CELLS = 112, FEW_FRAMES = 70;
+const MORE_AFTER = 60, FEW_FRAMES = 70;
+const MOST_CELLS = 112, LEAST_CELLS = 40, SLOW_SLICE = 50;
 
 class Page {
   constructor(machine) {
@@ -13,6 +14,8 @@ class Page {
     this.isCoarse = false;
     this.frames = 0;
     this.delay = MORE_AFTER;
+    this.cells = MOST_CELLS;
+    this.sliceTook = 0;
     this.addButtons();
   }
 
@@ -65,7 +68,8 @@ class Page {
   }
 
   showSlice() {
-    if (!this.view || !this.hasSlice) return;
+    if (!this.view || !this.hasSlice || this.hidesSlice) return;
+    if (this.gestures?.held && this.sliceTook > SLOW_SLICE) return;
     const { home, box, length, drawing } = this.machine;
     const [u, v, w] = drawing.sliceAxes;
     const { pose, branch } = this.session.answer;
@@ -77,7 +81,10 @@ class Page {
       const reach = 1.3 * Math.max(centre - box[0][k], box[1][k] - centre, 0.4 * length);
       return [centre - reach, centre + reach];
     });
-    this.view.setSlice(this.session.engine.slice(this.session.answer, [u, v], sides, SLICE_CELLS), SLICE_CELLS);
+    const began = performance.now();
+    this.view.setSlice(this.session.engine.slice(this.session.answer, [u, v], sides, this.cells), this.cells);
+    this.sliceTook = performance.now() - began;
+    if (this.sliceTook > 2 * SLOW_SLICE) this.cells = Math.max(LEAST_CELLS, this.cells >> 1);
     const axes = [u, v].map((k, i) => scaled(AXES[k], (sides[i][1] - sides[i][0]) / (2 * length)));
     const at = [0, 0, 0];
     [u, v].forEach((k, i) => (at[k] = (sides[i][0] + sides[i][1]) / (2 * length)));
@@ -133,6 +140,7 @@ class Page {
     $("#slice").onclick = ({ currentTarget }) => {
       this.hidesSlice = !this.hidesSlice;
       currentTarget.setAttribute("aria-pressed", !this.hidesSlice);
+      this.showSlice();
       this.redraw();
     };
     const dark = matchMedia("(prefers-color-scheme: dark)");
