@@ -445,7 +445,7 @@ static void pfk_put_factors(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_fac
         }
     }
     for (k = 0; k < own->rank && own->rank == PFK_ACTUATORS; ++k) { /* a triangle: put upside down it is t */
-        for (i = 0; i < PFK_ACTUATORS; ++i) {
+        for (i = 0; i < own->rank; ++i) {
             own->u[k][i] = i == own->rank - 1 - k ? 1.0 : 0.0;
             own->t[k][i] = left[own->rank - 1 - k][own->rank - 1 - i];
         }

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.controller.assembled import assemble
 from ..kernels.controller.joints import put_joints, walk
 from ..kernels.controller.projected import project_target
@@ -150,7 +149,10 @@ def _data(tables: ControllerTables, program: Program, text: str, precision: Prec
             data.constants(f"series.{name}", getattr(tables.series, name))
     if projecting is not None:
         own = projecting.tables
-        data.constants("projecting.tables", own._replace(plan=own.plan._replace(links=NO_LINKS)))
+        groups = ("projecting.tables", own), ("projecting.tables.plan", own.plan)
+        for place, group in groups:
+            for name in (each for each in group._fields if each not in ("plan", "links")):
+                data.constants(f"{place}.{name}", getattr(group, name))
         for name in ("sizes", "home", "bodies", "pairs", "least"):
             data.constants(f"projecting.tables.plan.links.{name}", getattr(own.plan.links, name))
     for name, value in zip(tables._fields, tables, strict=True):
