@@ -12,8 +12,8 @@ from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.clearance.solids import CAPSULE, KIND
 from ..kernels.controller.assembled import Assembling
-from ..kernels.controller.joints import Series
-from ..kernels.controller.placed_links import PlacedLinks
+from ..kernels.controller.joints_in_series import Series
+from ..kernels.controller.links_on_bodies import LinksOnBodies
 from ..kernels.controller.projected import Projecting
 from ..kernels.controller.rates import Rating
 from ..kernels.controller.reached import Reaching
@@ -78,7 +78,7 @@ def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | 
 
 def _reaching(machine: Machine, model: Model, parts: Sequence[str]) -> Reaching:
     table, n = kernel_table(model.legs), len(machine.legs)
-    links = _placed_links(machine, parts)
+    links = _links_on_bodies(machine, parts)
     if len(links.pairs):
         table = table._replace(legs=_aimed(machine, table.legs))
     if "limits" not in parts:
@@ -139,13 +139,13 @@ def _aimed(machine: Machine, legs: Records) -> Records:
     return legs
 
 
-def _placed_links(machine: Machine, parts: Sequence[str]) -> PlacedLinks:
+def _links_on_bodies(machine: Machine, parts: Sequence[str]) -> LinksOnBodies:
     links, length = machine.links_kept(parts), machine.mechanism.characteristic_length
     memory = np.zeros((4, 3)), np.zeros((2, 3))
     if links is None:
         none = np.zeros((0, 4), np.int64), np.zeros((0, 7)), np.zeros((0, 5)), np.zeros((0, 4, 3))
         pairs = np.zeros((0, 2), np.int64)
-        return PlacedLinks(*none, pairs, pairs, np.zeros(1), np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), *memory)
+        return LinksOnBodies(*none, pairs, pairs, np.zeros(1), np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), *memory)
     sizes, places = (np.array([solid[k] for solid in links.solids], float) for k in (0, 1))
     sizes[:, 1:] /= length
     places[:, 0] /= length
@@ -154,7 +154,7 @@ def _placed_links(machine: Machine, parts: Sequence[str]) -> PlacedLinks:
     numbers = [(each.sense, *each.axis, *np.asarray(each.point) / length) for each in links.motions]
     bodies = np.array([solid.bodies for solid in links.solids], np.int64)
     pairs = np.array([pair[:2] for pair in links.pairs], np.int64)
-    return PlacedLinks(
+    return LinksOnBodies(
         np.array(motions, np.int64).reshape(-1, 4),
         np.array(numbers, float).reshape(-1, 7),
         sizes[:, :5],

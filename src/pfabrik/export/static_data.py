@@ -31,7 +31,8 @@ class StaticData:
     """
 
     def __init__(self, program: Any, text: str, size: int) -> None:
-        self._program, self._text, self._size = program, text, size
+        self._program, self._size = program, size
+        self._fields = set(re.findall(r"(?:->|\.)(\w+)", text))
         self.n_constant = self.n_memory = 0  # bytes
         self._arrays: dict[int, tuple[str, Any]] = {}  # by identity, with the array, so that it stays alive
         self.lines = ["static double pfk_nothing[1]; /* where there are no numbers */"]
@@ -49,8 +50,7 @@ class StaticData:
         self.lines.append(f"static const {kind} pfk_{name} = {self._made(value)};")
 
     def _is_read(self, path: str) -> bool:
-        field = path.rpartition(".")[2]
-        return re.search(rf"(?:->|\.){field}_?\b", self._text) is not None
+        return all(f"{field}_" in self._fields or field in self._fields for field in path.split(".")[1:])
 
     def _put(self, path: str, array: Any, *, is_constant: bool) -> None:
         if id(array) in self._arrays or not array.size or not self._is_read(path):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..kernels.controller.assembled import assemble
-from ..kernels.controller.joints import put_joints, walk
+from ..kernels.controller.joints_in_series import put_joints, walk
 from ..kernels.controller.projected import project_target
 from ..kernels.controller.rates import put_rates
 from ..kernels.controller.reached import measure, put_reached, put_turns, reach, rest
@@ -44,8 +44,8 @@ SINGLE = {
     ("kernels.clearance.least_clearance", "LAST"): 1e-4,
     ("kernels.clearance.hulls", "ROUNDING"): 1e-7,
     ("kernels.controller.rates", "RANK"): 1e-5,
-    ("kernels.controller.joints", "FITTED"): 1e-6,
-    ("kernels.controller.joints", "NEARLY_FITTED"): 1e-5,
+    ("kernels.controller.joints_in_series", "FITTED"): 1e-6,
+    ("kernels.controller.joints_in_series", "NEARLY_FITTED"): 1e-5,
 }
 """Constants of kernels in single precision: what was some hundred times the rounding of a double is so of a float."""
 

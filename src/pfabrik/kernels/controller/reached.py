@@ -26,7 +26,7 @@ from ..platform.search_records import Starts
 from ..quaternions import difference
 from ..vectors import along, angle_between, copy_row, copy_table, dot, norm, scale, vec, wrap
 from .codes import LEG, NO_POSE, PAIR
-from .placed_links import PlacedLinks, nearest_pair
+from .links_on_bodies import LinksOnBodies, nearest_pair
 
 ATTEMPTS = 3
 """Ways to a target: at once, step by step from the start, and step by step from home; then, with implicit joints, so
@@ -49,7 +49,7 @@ class Reaching(NamedTuple):
     home: Starts  # one: home
     ways: Floats  # (n,): 1 if what the task leaves open follows in one way, at once; else ATTEMPTS or twice as many
     tilt: Floats  # (1 or 0, 3): the only axis about which the end effector tilts
-    links: PlacedLinks
+    links: LinksOnBodies
     scratch: Completion
     wanted: Floats  # (4, 4): the target [length]
     present: Floats  # (4, 4): where the platform is on the way there [length]
@@ -182,7 +182,7 @@ def beyond(own: Reaching, table: Table) -> int:
 
 
 @routine
-def too_near(links: PlacedLinks, table: Table, frames: Floats, values: Floats, lines: Floats, distance: Floats) -> int:
+def too_near(links: LinksOnBodies, table: Table, frames: Floats, values: Floats, lines: Floats, distance: Floats) -> int:
     """The code of the nearest pair of links if it is nearer than the clearance, else 0; fills its distance [L]."""
     pair = nearest_pair(links, table, frames, values, lines, distance)
     return 0 if distance[0] >= links.least[0] - KEPT else PAIR + pair + 1

@@ -25,7 +25,7 @@ SENSE, AXIS, POINT = 0, 1, 4
 """Columns of a motion's integers and numbers."""
 
 
-class PlacedLinks(NamedTuple):
+class LinksOnBodies(NamedTuple):
     """Links, the bodies that they are on, and the memory of a call; lengths in L, at home."""
 
     motions: Ints  # (m, 4): of each body after the platform: the body that it moves on, how, the leg, the coordinate
@@ -43,7 +43,7 @@ class PlacedLinks(NamedTuple):
 
 @routine
 def nearest_pair(
-    links: PlacedLinks, table: Table, frames: Floats, values: Floats, lines: Floats, distance: Floats
+    links: LinksOnBodies, table: Table, frames: Floats, values: Floats, lines: Floats, distance: Floats
 ) -> int:
     """Index of the nearest pair of links where legs are placed; fills its distance [L], negative if they overlap."""
     place_bodies(links, table, frames, values, lines)
@@ -70,7 +70,7 @@ def nearest_pair(
 
 
 @routine
-def place_bodies(links: PlacedLinks, table: Table, frames: Floats, values: Floats, lines: Floats) -> None:
+def place_bodies(links: LinksOnBodies, table: Table, frames: Floats, values: Floats, lines: Floats) -> None:
     """Fill the displacements of all bodies from home."""
     displaced, reference = links.displaced, vec(table.task[0]["reference"])
     for i in range(3):
