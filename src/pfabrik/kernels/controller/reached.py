@@ -182,7 +182,9 @@ def beyond(own: Reaching, table: Table) -> int:
 
 
 @routine
-def too_near(links: LinksOnBodies, table: Table, frames: Floats, values: Floats, lines: Floats, distance: Floats) -> int:
+def too_near(
+    links: LinksOnBodies, table: Table, frames: Floats, values: Floats, lines: Floats, distance: Floats
+) -> int:
     """The code of the nearest pair of links if it is nearer than the clearance, else 0; fills its distance [L]."""
     pair = nearest_pair(links, table, frames, values, lines, distance)
     return 0 if distance[0] >= links.least[0] - KEPT else PAIR + pair + 1
