@@ -12,8 +12,8 @@ from .clearance.solid_meshes import SolidMesh, solids_of
 from .description.common_centre import arc, common_centre
 from .description.mechanism import Joint, Mechanism
 from .description.places import Places, joint_places, middle
+from .drawn_parts import Part, Place, home_rail, parts_of
 from .errors import InvalidArgument
-from .parts import Part, Place, home_rail, parts_of
 
 ARC_STEPS = 12
 """Straight pieces that an arc is drawn with."""

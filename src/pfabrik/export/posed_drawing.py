@@ -14,9 +14,9 @@ from ..description.links import links_of
 from ..description.mechanism import Joint, Mechanism
 from ..description.places import joint_places, joints_on
 from ..description.plane import plane_of
+from ..drawn_parts import Part, Place, hangs, home_rail, parts_of, role_of, size_of
 from ..model import Model
 from ..motion.displacements import columns
-from ..parts import Part, Place, hangs, home_rail, parts_of, role_of, size_of
 
 THICKNESS = 0.0125
 """Radius of a usual bar, as a share of the machine's size."""

@@ -11,7 +11,7 @@ from ...answers.tracked import Track
 from ...arrays import Floats
 from ...clearance.solid_meshes import SolidMesh
 from ...description.mechanism import Mechanism
-from ...parts import Part
+from ...drawn_parts import Part
 from ...skeleton import Mark, Skeleton
 from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, of_a_body, rgb
 from .shapes import SHAPES, cylinder, fan, quaternion, upright_to
