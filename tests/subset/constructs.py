@@ -17,6 +17,8 @@ FIRST, SECOND, THIRD = range(3)
 WEIGHTS = (0.5, -2.0, 3.25)
 PLACES = (2, 0, 1)
 HUGE = 2**40
+MANY = 100000
+NEVER = False
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 ROWS, WIDTH = 3, 64
 
@@ -47,6 +49,7 @@ def arithmetic(x: Floats, n: Ints, out: Floats) -> None:
     out[12], out[13], out[14] = min(a, b, 0.25), max(i, j), min(1.0 * i, a)
     out[15], out[16], out[17] = int(1000.0 * a), round(10.0 * b), float(i)
     out[18], out[19], out[20] = +a, ~i, abs(j - i)
+    out[21] = MANY * MANY + i
 
 
 @routine
@@ -135,6 +138,9 @@ def order(x: Floats, out: Floats) -> None:
     while move_on(x) + x[0] < 30.0:
         out[10] += 1.0
     out[11] = max(move_on(x), x[0] + 0.5)
+    out[12] = 1.0 if move_on(x) > -99.0 and NEVER else 0.0
+    out[13] = 1.0 if move_on(x) > 1e9 or not NEVER else 0.0
+    out[15 + int(move_on(x)) * 0] = x[0]
 
 
 @inlined

@@ -172,3 +172,15 @@ def ended(x: Any) -> None:
 def truths(x: Any) -> None:
     """arithmetic with two truth values"""
     x[0] = (x[0] > 0.0) + (x[1] > 0.0)
+
+
+@routine
+def less_than_one(x: Any) -> None:
+    """a negative power of an integer"""
+    x[0] = 10**-3
+
+
+@routine
+def place_moved(x: Any) -> None:
+    """an index that is computed twice, and changes"""
+    x[int(x[0])] += move(x)

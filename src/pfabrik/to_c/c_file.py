@@ -15,7 +15,7 @@ from .types import INTEGER, REAL, Array, Spelling, Struct, Unsupported, type_of
 from .values import Value
 
 PRELUDE = Path(__file__).with_name("prelude.h")
-_SMALL = 2**31
+SMALL = 2**31
 
 
 class File:
@@ -65,7 +65,7 @@ class File:
         if t == REAL:
             return self.number(value)
         if t == INTEGER:
-            return str(int(value)) if abs(int(value)) < _SMALL else f"INT64_C({int(value)})"
+            return str(int(value)) if abs(int(value)) < SMALL else f"INT64_C({int(value)})"
         if isinstance(t, str):
             return "true" if value else "false"
         inner = ", ".join(self.literal(v, item) for v, item in zip(value, t.items, strict=True))
@@ -85,7 +85,7 @@ class File:
         if wanted not in self.items:
             self._constants[wanted] = value
             text = self.literal(value, t)
-            is_small = t == INTEGER and abs(value) < _SMALL
+            is_small = t == INTEGER and abs(value) < SMALL
             text = f"{wanted} = {text}"
             text = f"enum {{ {text} }};\n" if is_small else f"static const {self.spell.stored(t)}{text};\n"
             self.items[wanted] = text

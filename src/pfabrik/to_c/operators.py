@@ -6,6 +6,7 @@ import ast
 import operator
 from typing import Any
 
+from .c_file import SMALL
 from .expressions import Expressions
 from .naming import is_simple
 from .types import BOOL, INTEGER, NUMBERS, REAL, Struct, Tuple, join
@@ -115,7 +116,7 @@ class Operators(Expressions):
             raise self.fault(node, "`and` or `or` of what is not a truth value")
         if values[-1].is_constant and bool(values[-1].constant) is absorbing and not any(v.writes for v in values):
             return self.boolean(absorbing)
-        values = [v for v in values if not v.is_constant] or values[:1]
+        values = [v for v in values if not v.is_constant or bool(v.constant) is absorbing] or values[:1]
         if len(values) == 1:
             return values[0]
         sign, level = ("||", OR) if absorbing else ("&&", AND)
@@ -217,10 +218,14 @@ class Operators(Expressions):
             return self.power(a, b, node)
         if isinstance(op, (ast.FloorDiv, ast.Mod)) and t == REAL:
             raise self.fault(node, "// or % of a number that is no integer")
+        if isinstance(op, ast.Pow) and b.is_constant and b.constant < 0:
+            raise self.fault(node, "a negative power of an integer")
         a, b = self.cast(a, t, node), self.cast(b, t, node)
         constant = UNKNOWN
         if a.is_constant and b.is_constant and t == INTEGER and not isinstance(op, ast.Pow):
             constant = int(operate(a.constant, b.constant))
+            if abs(constant) >= SMALL:  # constants of C are narrower than integers
+                return Value(self.program.literal(constant, INTEGER), INTEGER, UNARY, constant)
         if (
             isinstance(op, (ast.FloorDiv, ast.Mod))
             and self.is_never_negative(node)

@@ -12,7 +12,7 @@ from .flow import is_range, names_in
 from .naming import c_name, comment, is_simple
 from .operators import OPERATORS
 from .types import BOOL, INTEGER, NOTHING, NUMBERS, REAL, Struct, Tuple, join
-from .values import CONDITION, ORDER, POSTFIX, UNARY, Value
+from .values import CONDITION, ORDER, POSTFIX, UNARY, Value, conflict
 
 WITH_BLOCKS = (ast.For, ast.While, ast.If)
 
@@ -183,7 +183,7 @@ class Statements(Calls):
         elif isinstance(target, ast.Subscript):
             n = len(self.lines)
             place = self.expression(target)
-            if (len(self.lines) > n and v.has_effect) or v.writes & place.reads:
+            if (len(self.lines) > n and v.has_effect) or conflict([v, place]):
                 kept = self.keep(v, n)  # Python computes the value first
                 v = kept
             self.store(place, v, s)
@@ -249,6 +249,9 @@ class Statements(Calls):
             self.writes |= lvalue.reads
         else:
             lvalue = place
+        inside = [n for n in ast.walk(load) if isinstance(n, (ast.Subscript, ast.Call)) and n is not load]
+        if lvalue.writes or (lvalue is not place and inside):
+            raise self.fault(s, "an index that is computed twice, and changes")
         sign, level, _ = OPERATORS[type(s.op)]
         if place.text == lvalue.text and level != POSTFIX and not isinstance(s.op, (ast.LShift, ast.RShift)):
             right = self.cast(right, made.type, s)

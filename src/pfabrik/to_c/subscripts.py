@@ -107,13 +107,16 @@ class Subscripts(Operators):
             v = self.rows(v, self.places(v, before, 0, node))
             if part.lower is None and part.upper is None:
                 return v
-            first = self.end(part.lower, node) if part.lower is not None else Value("0", INTEGER)
+            ends = [self.end(part.lower, node) if part.lower is not None else Value("0", INTEGER)]
             made = Array(v.type.element, v.type.ndim)
             v = self.cast(v, made, node) if v.type.width else v
             name, end = self.program.spell.value(made), ""
             if part.upper is not None:
-                end = f", {self.end(part.upper, node).text}"
-            return Value(f"{'part' if end else 'rest'}_{name}({v.text}, {first.text}{end})", made, **effects([v]))
+                ends.append(self.end(part.upper, node))
+                end = f", {ends[1].text}"
+            return Value(
+                f"{'part' if end else 'rest'}_{name}({v.text}, {ends[0].text}{end})", made, **effects([v, *ends])
+            )
         places: list[Value | ast.Slice] = []
         for k, i in enumerate(indices):
             places.append(i if isinstance(i, ast.Slice) else self.places(v, [i], k, node)[0])
