@@ -48,6 +48,7 @@ def arithmetic(x: Floats, n: Ints, out: Floats) -> None:
     out[9], out[10], out[11] = i & j | 5 ^ i, i >> 2, 1 << (j & 5)
     out[12], out[13], out[14] = min(a, b, 0.25), max(i, j), min(1.0 * i, a)
     out[15], out[16], out[17] = int(1000.0 * a), round(10.0 * b), float(i)
+    out[22] = i << 2
     out[18], out[19], out[20] = +a, ~i, abs(j - i)
     out[21] = MANY * MANY + i
 

@@ -184,3 +184,22 @@ def less_than_one(x: Any) -> None:
 def place_moved(x: Any) -> None:
     """an index that is computed twice, and changes"""
     x[int(x[0])] += move(x)
+
+
+@routine
+def moved_place(x: Any) -> None:
+    """an index that changes what it is an index of"""
+    x[0] = pair_of(x)[int(move(x) - move(x)) % 2]
+
+
+@routine
+def pair_of(x: Any) -> tuple[float, float]:
+    """"""
+    x[1] += 1.0
+    return x[0], x[1]
+
+
+@routine
+def in_nothing(x: Any) -> None:
+    """`in` of what is not a tuple"""
+    x[0] = 1.0 if x[0] in () else 0.0

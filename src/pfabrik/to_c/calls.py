@@ -127,7 +127,7 @@ class Calls(Subscripts):
         whole = " * ".join(f"{v.text}.n[{k}]" for k in range(v.type.ndim))
         lengths = [f"{whole} / ({known})" if s.is_constant and s.constant == -1 else s.text for s in sizes]
         t = Array(v.type.element, len(sizes))
-        return Value(f"({self.program.spell.value(t)}){{{v.text}.data, {{{', '.join(lengths)}}}}}", t)
+        return Value(f"({self.program.spell.value(t)}){{{v.text}.data, {{{', '.join(lengths)}}}}}", t, **effects(sizes))
 
     def of_math(self, name: str, values: list[Value], node: ast.AST) -> Value:
         """A call of a function of `math`."""

@@ -142,7 +142,7 @@ class Operators(Expressions):
     def member(self, node: ast.Compare) -> Value:
         """Whether a value is one of a tuple's."""
         is_in, among = isinstance(node.ops[0], ast.In), node.comparators[0]
-        if len(node.ops) > 1 or not isinstance(among, ast.Tuple):
+        if len(node.ops) > 1 or not isinstance(among, ast.Tuple) or not among.elts:
             raise self.fault(node, "`in` of what is not a tuple")
         left, *others = self.evaluate([node.left, *among.elts])
         left = left if is_simple(left.text) else self.keep(left)
@@ -237,8 +237,10 @@ class Operators(Expressions):
             return Value(f"{sign}({a.text}, {b.text})", t, POSTFIX, constant, **more)
         if isinstance(op, BITS):  # compilers ask for parentheses in them
             a_text, b_text = a.at(UNARY), b.at(UNARY)
-            if isinstance(op, ast.LShift) and a.is_constant:
+            if isinstance(op, ast.LShift) and a.is_constant and a.constant >= 0:
                 a_text = f"(integer){a_text}"
+            elif isinstance(op, ast.LShift):  # C shifts no negative number
+                return Value(f"{a.at(PRODUCT)} * ((integer)1 << {b_text})", t, PRODUCT, constant, **more)
         else:
             a_text, b_text = a.at(level), b.at(level + 1)
         return Value(f"{a_text} {sign} {b_text}", t, level, constant, **more)

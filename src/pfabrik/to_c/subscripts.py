@@ -47,7 +47,7 @@ class Subscripts(Operators):
 
     def places(self, v: Value, indices: list[ast.expr], first: int, node: ast.AST) -> list[Value]:
         """Indices as integers; a negative constant counts from the end."""
-        found = []
+        found, lines = [], len(self.lines)
         for k, place in enumerate(self.evaluate(indices)):
             if place.type == BOOL:
                 place = self.cast(place, INTEGER, node)
@@ -56,7 +56,7 @@ class Subscripts(Operators):
             if place.is_constant and place.constant < 0:
                 place = Value(f"{self.length(v, first + k).text} - {-place.constant}", INTEGER, SUM)
             found.append(place)
-        if conflict([v, *found]):
+        if conflict([v, *found]) or (v.writes and len(self.lines) > lines):
             raise self.fault(node, "an index that changes what it is an index of")
         return found
 
@@ -141,6 +141,7 @@ class Subscripts(Operators):
             v = Value(f"strided_{spell.value(whole)}({v.text})", loose, **effects([v]))
         v = self.keep(v)
         data, lengths, steps = [f"{v.text}.data"], [], []
+        ends = [i for i in indices if isinstance(i, Value)]
         for k in range(v.type.ndim):
             index = indices[k] if k < len(indices) else ast.Slice()
             if isinstance(index, Value):
@@ -150,15 +151,17 @@ class Subscripts(Operators):
             if index.lower is None and index.upper is None:
                 lengths.append(f"{v.text}.n[{k}]")
                 continue
-            first = f"place({self.end(index.lower, index).text}, {v.text}.n[{k}])" if index.lower is not None else "0"
+            limits = [self.end(part, index) if part is not None else None for part in (index.lower, index.upper)]
+            ends += [limit for limit in limits if limit is not None]
+            first = f"place({limits[0].text}, {v.text}.n[{k}])" if limits[0] is not None else "0"
             end = f"{v.text}.n[{k}]"
-            if index.upper is not None:
-                end = f"place({self.end(index.upper, index).text}, {end})"
+            if limits[1] is not None:
+                end = f"place({limits[1].text}, {end})"
             data.append(f"{first} * {v.text}.step[{k}]")
             lengths.append(f"max_i({end} - {first}, 0)")
         made = Array(v.type.element, len(lengths), is_contiguous=False)
         text = f"({spell.value(made)}){{{' + '.join(data)}, {{{', '.join(lengths)}}}, {{{', '.join(steps)}}}}}"
-        return Value(text, made)
+        return Value(text, made, **effects(ends))
 
     def field(self, owner: Value, key: ast.expr, node: ast.AST) -> Value:
         """A field of a record."""
@@ -175,7 +178,10 @@ class Subscripts(Operators):
 
     def chosen(self, v: Value, key: ast.expr, node: ast.AST) -> Value:
         """An item of a tuple by its place."""
+        lines = len(self.lines)
         index = self.expression(key)
+        if conflict([v, index]) or (v.has_effect and len(self.lines) > lines):
+            raise self.fault(node, "an index that changes what it is an index of")
         if index.is_constant:
             n = len(v.type.items)
             if not -n <= index.constant < n:
