@@ -202,4 +202,4 @@ def pair_of(x: Any) -> tuple[float, float]:
 @routine
 def in_nothing(x: Any) -> None:
     """`in` of what is not a tuple"""
-    x[0] = 1.0 if x[0] in () else 0.0
+    x[0] = 1.0 if x[0] in () else 0.0  # noqa: RUF060
