@@ -300,6 +300,7 @@ def test_arms_that_follow_in_more_than_one_way_do_so_in_home_s(tmp_path: Path) -
 
 
 @needs_compiler
+@pytest.mark.campaign
 @pytest.mark.parametrize("made", [closure.stretched_wrist, closure.five_bar_with_tool])
 def test_the_file_reaches_what_is_feasible_where_more_than_one_pose_closes(made: Any, tmp_path: Path) -> None:
     mechanism, random = made(), np.random.default_rng(0)

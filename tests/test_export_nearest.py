@@ -58,6 +58,10 @@ int main(void)
     return 0;
 }
 """
+QUICK = [("stewart", "double"), ("delta", "float"), ("five_bar", "double")]
+LONG = [("stewart", "float"), ("delta", "double"), ("five_bar", "float")]
+LONG += [(name, precision) for name in ("orthoglide", "rps") for precision in ("double", "float")]
+SLOW = [pytest.param(*each, marks=pytest.mark.campaign) for each in LONG]
 SANITIZED = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DCHECKED")
 
 
@@ -107,8 +111,7 @@ def known(name: str, n: int = 80) -> tuple[Array, pf.Solution]:
 
 
 @needs_compiler
-@pytest.mark.parametrize("precision", ["double", "float"])
-@pytest.mark.parametrize("name", ["stewart", "delta", "five_bar", "orthoglide", "rps"])
+@pytest.mark.parametrize(("name", "precision"), QUICK + SLOW)
 def test_what_is_out_of_reach_is_answered_as_the_library_does(name: str, precision: str, tmp_path: Path) -> None:
     targets, found = known(name)
     mechanism, told = machine(name), said(name, targets, tmp_path, precision)
@@ -160,8 +163,7 @@ def test_a_search_that_is_cut_short_says_so_and_ends_within_limits(tmp_path: Pat
 
 
 @needs_compiler
-@pytest.mark.parametrize("precision", ["double", "float"])
-@pytest.mark.parametrize("name", ["stewart", "delta"])
+@pytest.mark.parametrize(("name", "precision"), [QUICK[0], QUICK[1], *SLOW[:2]])
 def test_nothing_that_is_asked_breaks_it(name: str, precision: str, tmp_path: Path) -> None:
     """NaN, infinity, what is next to it and no rotations: a code, no pose written, or the nearest pose."""
     home, targets, are_poses = machine(name).home_pose, [], []
