@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "decisions" / "budget.md"
 ROW = re.compile(r"^\| (?P<what>[^|]+?) \| (?P<figure>[\d,]+) \|$", re.MULTILINE)
 
-CODE, OTHER_CODE = (".py",), (".c", ".h", ".cpp", ".hpp", ".in")
+CODE, OTHER_CODE = (".py",), (".c", ".h", ".cpp", ".hpp", ".in", ".js", ".html", ".css")
 PATTERNS = {
     'tests of `["kind"]` in src': r'\["kind"\]',
     "module constants in src": r"^[A-Z][A-Z0-9_, ]* *(:[^=]*)?= *-?[0-9]",
@@ -49,7 +49,7 @@ def measure() -> dict[str, int]:
     totals: Counter[str] = Counter()
     rooms: Counter[str] = Counter()
     for path, text in texts.items():
-        n_lines, kind = text.count("\n"), "Python" if path.suffix in CODE else "C and templates"
+        n_lines, kind = text.count("\n"), "Python" if path.suffix in CODE else "C, web and templates"
         totals[f"{path.parts[0]}, {kind}"] += n_lines
         rooms[f"{room_of(path)}, {kind}"] += n_lines
     figures = dict(sorted(totals.items()))
