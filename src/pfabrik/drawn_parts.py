@@ -61,7 +61,7 @@ class Part:
 
 
 def role_of(mechanism: Mechanism, body: str) -> Role:
-    """What a body is drawn as."""
+    """Shape in which a body is drawn."""
     if body == mechanism.base:
         return "base"
     return "platform" if body == mechanism.end_effector else "link"
@@ -137,7 +137,7 @@ def _body(mechanism: Mechanism, body: str, rails: dict[str, Floats]) -> list[Par
 
 
 def _corners(mechanism: Mechanism, names: list[str], rails: dict[str, Floats]) -> list[Floats]:
-    """Where a body is held at home: at its joints, or amid its rails; at their far ends where they are across it."""
+    """Points of a body at its joints, at home: joint centres, the middles of rails, or far ends of those across."""
     home = _home_places(mechanism)
     points = [rails[name].mean(axis=0) if name in rails else home[name] for name in names]
     normal = np.linalg.svd(np.array(points) - middle(points))[2][2]

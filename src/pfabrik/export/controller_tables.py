@@ -35,14 +35,14 @@ from .exported_links import angles_needed
 from .machine_data import Machine
 
 NEAR = 0.5
-"""How far implicit joints, which allow more poses, move at once [L or rad]."""
+"""Largest step of implicit joints on the way to a target [L or rad]: more than one pose may close."""
 
 ASKED = {"first": NEAREST, "last": EXACTLY, "has_start": 1, "keeps_mode": 1, "is_nearby": 0}
-"""What a controller asks where legs do not reach: seeds and steps are those of a call."""
+"""Question of a controller to `answer_row` out of reach; each call sets seeds and steps."""
 
 
 class ControllerTables(NamedTuple):
-    """What the parts of a file take; None of parts that it has not."""
+    """Tables that the parts of a file need; None for parts that are left out."""
 
     reaching: Reaching
     assembling: Assembling | None

@@ -67,6 +67,7 @@ class Flow:
         self.homes: dict[str, ast.stmt] = {}  # statement that a variable is declared at
         for name in self.local - self.arguments - self.perhaps_unset:
             self.homes[name] = self._home(name, function.body)
+        self.rising: set[str] = set()  # counters from a constant on, never negative
         self.counters = self._counters(function)
 
     def _home(self, name: str, block: Sequence[ast.stmt]) -> ast.stmt:
@@ -97,6 +98,10 @@ class Flow:
             nested = any(name in names_in(s, ast.Store) for loop in own for s in loop.body)
             if all(id(n) in inside for n in mentions) and stores == len(own) and not nested:
                 found.add(name)
+                ranges = [loop.iter.args for loop in own if isinstance(loop.iter, ast.Call)]
+                starts = [constant_of(limits[0], self.constants) if len(limits) > 1 else 0 for limits in ranges]
+                if all(len(limits) < 3 for limits in ranges) and all(s is not None and s >= 0 for s in starts):
+                    self.rising.add(name)
         return found - self.arguments
 
     # ---- which ways set what ----

@@ -92,9 +92,9 @@ class Function(Statements):
         head = f"{kind}{gives}{self.name}({', '.join(takes) or 'void'})"
         if len(head) > 118:
             head = f"{kind}{gives}{self.name}(\n" + textwrap.fill(f"{', '.join(takes)})", 116, **INDENTED)
-        told = comment(f"{ast.get_docstring(self.node) or ''}\n[{self.path}:{self.node.lineno}]")
+        described = comment(f"{ast.get_docstring(self.node) or ''}\n[{self.path}:{self.node.lineno}]")
         unused = [f"    (void){c_name(name)};" for name in self.parameters if not self._mentions(c_name(name))]
-        return f"{told}{head} {{\n" + "\n".join([*unused, *self.lines]) + "\n}\n"
+        return f"{described}{head} {{\n" + "\n".join([*unused, *self.lines]) + "\n}\n"
 
     def _mentions(self, name: str) -> bool:
         pattern = re.compile(rf"(?<![.>])\b{name}\b")

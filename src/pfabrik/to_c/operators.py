@@ -255,10 +255,7 @@ class Operators(Expressions):
     def is_never_negative(self, node: ast.AST) -> bool:
         """Whether what is divided counts a loop from a constant on."""
         left = node.left if isinstance(node, ast.BinOp) else node
-        return isinstance(left, ast.Name) and left.id in self.flow.counters and self.counts_up(left.id)
-
-    def counts_up(self, name: str) -> bool:
-        raise NotImplementedError
+        return isinstance(left, ast.Name) and left.id in self.flow.rising
 
 
 def is_number(v: Value, t: Any) -> bool:

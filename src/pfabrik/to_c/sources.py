@@ -36,7 +36,7 @@ def comments_of(path: str) -> dict[int, tuple[str, bool]]:
 
 
 def short_path(path: str) -> str:
-    """A path as it is told: from the package's folder on."""
+    """A path from the package's folder on, for comments and messages."""
     where = Path(path)
     return where.relative_to(PACKAGE).as_posix() if PACKAGE in where.parents else where.name
 

@@ -26,28 +26,28 @@ class Statements(Calls):
 
     def __init__(self) -> None:
         super().__init__()
-        self._last = 0  # line that is told
+        self._last = 0  # last line whose comments are written
         self._declared: set[str] = set()
 
     def block(self, statements: list[ast.stmt]) -> None:
         for s in statements:
-            self._tell(s)
+            self._write_notes(s)
             is_whole = isinstance(s, WITH_BLOCKS)
             if is_whole or isinstance(s, ast.AugAssign):
                 for name in self.flow.at_home(s):
                     self._declare(name)
             n = len(self.lines)
             getattr(self, f"do_{type(s).__name__}", self._unknown)(s)
-            told = self.comments.get(s.lineno if is_whole else s.end_lineno or s.lineno)
-            if told and not told[1] and not is_whole and len(self.lines) > n:
-                self.lines[-1] += f" {comment(told[0]).strip()}"
+            note = self.comments.get(s.lineno if is_whole else s.end_lineno or s.lineno)
+            if note and not note[1] and not is_whole and len(self.lines) > n:
+                self.lines[-1] += f" {comment(note[0]).strip()}"
 
-    def _tell(self, s: ast.stmt) -> None:
+    def _write_notes(self, s: ast.stmt) -> None:
         """The comments before a statement, and after the head of one with blocks."""
         for line in range(self._last + 1, s.lineno + 1):
-            told = self.comments.get(line)
-            if told and (told[1] or (line == s.lineno and isinstance(s, WITH_BLOCKS))):
-                self.emit(comment(told[0]).strip())
+            note = self.comments.get(line)
+            if note and (note[1] or (line == s.lineno and isinstance(s, WITH_BLOCKS))):
+                self.emit(comment(note[0]).strip())
         self._last = s.lineno if isinstance(s, WITH_BLOCKS) else s.end_lineno or s.lineno
 
     def _unknown(self, s: ast.stmt) -> None:
@@ -397,11 +397,6 @@ class Statements(Calls):
         self.emit("}")
         self.indent -= 1
         self.emit("}")
-
-    def counts_up(self, name: str) -> bool:
-        loops = [n for n in ast.walk(self.node) if isinstance(n, ast.For) and name in names_in(n.target)]
-        starts = [s.iter.args for s in loops if isinstance(s.iter, ast.Call)]
-        return all(len(a) == 1 or (len(a) == 2 and isinstance(a[0], ast.Constant) and a[0].value >= 0) for a in starts)  # type: ignore[operator]
 
 
 def is_choice(node: ast.expr, n: int) -> bool:

@@ -158,8 +158,8 @@ class Spelling:
         else:
             fields = [f"    {self.stored(item)}{c_name(f)};" for f, item in zip(t.cls._fields, t.items, strict=True)]
             name, doc = self._named(t.cls.__name__), t.cls.__doc__ or ""
-            told = "" if doc.startswith(f"{t.cls.__name__}(") else comment(doc)
-            self.declare(name, f"{told}typedef struct {{\n" + "\n".join(fields) + f"\n}} {name};\n")
+            described = "" if doc.startswith(f"{t.cls.__name__}(") else comment(doc)
+            self.declare(name, f"{described}typedef struct {{\n" + "\n".join(fields) + f"\n}} {name};\n")
         return name
 
     def _define_array(self, t: Array) -> str:
