@@ -28,7 +28,6 @@ from ..kernels.rows import (
 )
 from ..model import Model
 from ..options import Options
-from ..platform.answers import replaced
 from ..platform.legs_engine import LegsEngine
 from ..platform.links_of_legs import keeps_links
 from ..poses import are_poses
@@ -82,7 +81,7 @@ class ApartEngine(Engine):
         for part, part_options in self._by_hold(answers, rows, options):
             begin, part_targets = _starts_of(start, part), np.require(targets[part], requirements=["C", "W"])
             found = self._search.nearest(part_targets, begin, part_options, keep_mode=keep_mode, nearby=nearby)
-            answers = replaced(answers, part, self._checked(found))
+            answers = answers.with_rows(part, self._checked(found))
         return answers
 
     def _by_hold(self, answers: Configurations, rows: Rows, options: Options) -> list[tuple[Rows, Options]]:
@@ -107,7 +106,7 @@ class ApartEngine(Engine):
             is_new[self._too_near(others)] = False
             if is_new.any():
                 places = tried[reached[is_new]]
-                answers = replaced(answers, places, others.at(np.flatnonzero(is_new)))
+                answers = answers.with_rows(places, others.at(np.flatnonzero(is_new)))
                 is_left[np.isin(rows, places)] = False
             if not is_left[is_reached].any():
                 break
@@ -167,7 +166,7 @@ class ApartEngine(Engine):
         if not len(rows):
             return answers
         found = self._search.nearest_forward(values[rows], _starts_of(start, rows), tolerance)
-        return replaced(answers, rows, self._checked(found))
+        return answers.with_rows(rows, self._checked(found))
 
     def as_configurations(self, closing: Closing) -> Configurations:
         """As `Engine.as_configurations`; links that are too near count as limits that are exceeded."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from ..arrays import Floats, Mask
@@ -14,12 +12,11 @@ from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..kernels.rows import PENDING, REACHED, Rows
 from ..model import Model
 from ..options import Options
-from ..platform.answers import LegAnswers, answer_coordinates, start_coordinates_of
+from ..platform.answers import leg_answers
 from ..platform.legs_engine import LegsEngine
 from ..platform.reach import reach
 from .placed_links import PlacedLinks, bodies_of_links
 
-NOWHERE = np.zeros(0, np.intp)
 NO_NUMBERS, NO_COUNTERS = np.zeros((0, 0)), np.zeros((0, 0), np.int64)
 
 
@@ -39,15 +36,12 @@ def links_at_poses(
         return PlacedLinks(model.mechanism, Configurations(rows, NO_NUMBERS), dict), reached == REACHED
     rows = new_rows(model, len(poses))
     n_unsolved, end_sides = reach(model, poses, start, sides, False, rows)
-    starts = start_coordinates_of(model, start, sides)
-    coordinates = partial(answer_coordinates, model, rows, end_sides, None, starts, NOWHERE, None)
-    by_legs = LegAnswers(rows, coordinates, end_sides)
-    answers: Configurations = by_legs
+    answers: Configurations = leg_answers(model, rows, end_sides, None, start, sides)
     if n_unsolved:
         unsolved = np.flatnonzero(rows.status != REACHED)
         rows.status[unsolved] = PENDING
         others = LegsEngine(model).answer(poses[unsolved], start, Options(), keep_mode=True)
-        answers = by_legs.with_others(unsolved, others)
+        answers = answers.with_rows(unsolved, others)
     placed = PlacedLinks(model.mechanism, answers, lambda: LegsEngine(model).points(answers))
     return placed, np.asarray(answers.rows.status == REACHED)
 

@@ -115,6 +115,8 @@ class Configurations:
 
     def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
         """A copy with other configurations at some places."""
+        if len(places) == len(self):
+            return source
         rows, coordinates = take(self.rows, np.arange(len(self))), self.coordinates.copy()
         put(rows, places, source.rows)
         coordinates[places] = source.coordinates

@@ -53,32 +53,50 @@ class LegAnswers(Configurations):
         q_proximal = None if self.q_proximal is None else self.q_proximal[places]
         return LegAnswers(rows, lambda block: self.coordinates_at(places[block]), self.sides[places], q_proximal)
 
-    def with_others(self, places: NDArray[np.intp], others: Configurations) -> Configurations:
-        """A copy with the rows at some places replaced by others; coordinates are still computed on access."""
-        if not isinstance(others, LegAnswers):
-            return super().with_rows(places, others)
+    def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
+        """A copy with other configurations at some places; of legs' answers, coordinates are computed on access."""
+        if len(places) == len(self):
+            return source
+        if not isinstance(source, LegAnswers):
+            return super().with_rows(places, source)
         rows, sides = take(self.rows, np.arange(len(self))), self.sides.copy()
-        put(rows, places, others.rows)
-        sides[places] = others.sides
+        put(rows, places, source.rows)
+        sides[places] = source.sides
         q_proximal = np.full(sides.shape, np.nan) if self.q_proximal is None else self.q_proximal.copy()
-        q_proximal[places] = np.nan if others.q_proximal is None else others.q_proximal
+        q_proximal[places] = np.nan if source.q_proximal is None else source.q_proximal
         index = np.full(len(self), -1)
         index[places] = np.arange(len(places))
 
         def coordinates(block: Places) -> Floats:
             indices = np.arange(len(index))[block]
-            values, is_other = self.coordinates_at(indices), index[indices] >= 0
-            values[is_other] = others.coordinates_at(index[indices[is_other]])
+            is_other = index[indices] >= 0
+            others = source.coordinates_at(index[indices[is_other]])
+            values = np.empty((len(indices), others.shape[1]))
+            values[~is_other], values[is_other] = self.coordinates_at(indices[~is_other]), others
             return values
 
         return LegAnswers(rows, coordinates, sides, q_proximal)
 
 
-def replaced(answers: Configurations, rows: NDArray[np.intp], others: Configurations) -> Configurations:
-    """Answers with others in some rows."""
-    if len(rows) == len(answers):
-        return others
-    return answers.with_others(rows, others) if isinstance(answers, LegAnswers) else answers.with_rows(rows, others)
+def leg_answers(
+    model: Model,
+    rows: Rows,
+    sides: Floats,
+    q_proximal: Floats | None,
+    start: Configurations | None,
+    start_sides: Floats,
+) -> LegAnswers:
+    """Rows as answers, from a start, one or one for each, with the sides `start_sides`; None for home."""
+    start_coordinates = _coordinates_of(model, start, start_sides)
+
+    def coordinates(places: Places) -> Floats:
+        own_sides = sides if len(sides) == 1 else sides[places]
+        q = None if q_proximal is None else q_proximal[places]
+        return joint_coordinates(
+            model, rows.poses[places], rows.actuators[places], own_sides, start_coordinates(places), q
+        )
+
+    return LegAnswers(rows, coordinates, sides, q_proximal)
 
 
 def sides_at(model: Model, start: Configurations) -> Floats:
@@ -131,9 +149,7 @@ def columns_of_sides(model: Model) -> tuple[NDArray[np.intp], list[int]]:
     return two_sided, columns
 
 
-def start_coordinates_of(
-    model: Model, start: Configurations | None, sides: Floats
-) -> Callable[[Places], Floats | None]:
+def _coordinates_of(model: Model, start: Configurations | None, sides: Floats) -> Callable[[Places], Floats | None]:
     """A function that gives the joint coordinates of the starts at some places, or of the single start; None for home.
 
     Of a start whose coordinates are computed on access, only its pose and actuators are kept. Otherwise a chain of
@@ -151,42 +167,3 @@ def start_coordinates_of(
         return joint_coordinates(model, poses[rows], actuators[rows], sides if len(sides) == 1 else sides[rows], None)
 
     return coordinates_at
-
-
-def answer_coordinates(
-    model: Model,
-    rows: Rows,
-    sides: Floats,
-    q_proximal: Floats | None,
-    start_coordinates: Callable[[Places], Floats | None],
-    unsolved: NDArray[np.intp],
-    fallback: Configurations | None,
-    places: Places,
-) -> Floats:
-    """Joint coordinates (n, columns) of the answers at some places.
-
-    Parameters
-    ----------
-    unsolved : the rows that legs did not solve; their coordinates are those of `fallback`, row by row.
-    """
-    indices = np.arange(len(rows.status))[places]
-    fallback_index = np.full(len(rows.status), -1)
-    fallback_index[unsolved] = np.arange(len(unsolved))
-    by_legs = fallback_index[indices] < 0
-    leg_rows = indices[by_legs]
-    coordinates = joint_coordinates(
-        model,
-        rows.poses[leg_rows],
-        rows.actuators[leg_rows],
-        sides if len(sides) == 1 else sides[leg_rows],
-        start_coordinates(leg_rows),
-        None if q_proximal is None else q_proximal[leg_rows],
-    )
-    if fallback is None:
-        return coordinates
-    all_coordinates = np.empty((len(indices), coordinates.shape[1]))
-    all_coordinates[by_legs], all_coordinates[~by_legs] = (
-        coordinates,
-        fallback.coordinates[fallback_index[indices[~by_legs]]],
-    )
-    return all_coordinates

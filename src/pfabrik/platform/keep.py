@@ -11,7 +11,7 @@ from ..closure.configurations import Configurations
 from ..kernels.rows import HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..model import Model
 from ..poses import between
-from .answers import LegAnswers, sides_at
+from .answers import sides_at
 from .branch import same_branch
 
 Answer = Callable[[Floats, Configurations], Configurations]
@@ -30,8 +30,7 @@ def kept(
     for row in np.flatnonzero(has_left):
         place = np.array([row])
         begin, begin_sides = (start, sides) if len(start) == 1 else (start.at(place), sides[place])
-        led = _led(model, targets[place], begin, begin_sides, answer)
-        answers = answers.with_others(place, led) if isinstance(answers, LegAnswers) else answers.with_rows(place, led)
+        answers = answers.with_rows(place, _led(model, targets[place], begin, begin_sides, answer))
     return answers
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ from ..motion.outward import centres_at
 from ..options import Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
-from .answers import LegAnswers, answer_coordinates, replaced, sides_at, start_coordinates_of
+from .answers import LegAnswers, leg_answers, sides_at
 from .coordinates import joint_coordinates
 from .folds import home_answer, starts_beside, subsets
 from .forward import forward_kinematics, project_values
@@ -37,7 +36,7 @@ from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
 from .rows_one_by_one import Answers, answer_phases, request_from
-from .single import AssemblyOutputs, SingleAssembly, SingleTarget, new_scratch
+from .single import SingleAssembly, SingleTarget, new_scratch
 from .table import table_handle
 from .unreached import answer_unreached
 
@@ -78,89 +77,94 @@ class LegsEngine(Engine):
         Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
         `nearby` by a search around the start alone.
         """
-        answers = self._answer(targets, start, options, keep_mode=keep_mode, nearby=nearby)
+        answered = partial(self._by_stages, options=options, keep_mode=keep_mode)
+        answers = answered(targets, start, nearby=nearby)
         if not keep_mode or not self._table.has_sides:
             return answers
         status = answers.rows.status
         is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
         if isinstance(answers, LegAnswers) and answers.q_proximal is None and not is_missed:
             return answers
-        answers = self._kept(answers, targets, start, options)
+        answers = self._in_mode(answers, targets, start, answered)
         for is_folded, begin in starts_beside(self._model, start):
-            others = self._answer(targets, begin, options, keep_mode=True, nearby=nearby)
-            others = self._kept(others, targets, begin, options)
+            others = self._in_mode(answered(targets, begin, nearby=nearby), targets, begin, answered)
             better = np.flatnonzero(is_folded & self._is_nearer(others.rows, answers.rows, options))
             if len(better):
-                replaced = answers.with_others if isinstance(answers, LegAnswers) else answers.with_rows
-                answers = replaced(better, others.at(better))
+                answers = answers.with_rows(better, others.at(better))
         return answers
 
-    def _kept(
-        self, answers: Configurations, targets: Floats, start: Configurations | None, options: Options
-    ) -> Configurations:
-        """As `keep.kept`."""
-
-        if isinstance(answers, LegAnswers) and (answers.sides * self._sides_of(start) >= 0.0).all():
-            return answers
-
-        def answer(target: Floats, begin: Configurations) -> Configurations:
-            return self._answer(target, begin, options, keep_mode=True, nearby=True)
-
-        return kept(self._model, answers, targets, home_answer(self._model) if start is None else start, answer)
-
-    def _answer(
+    def _in_mode(
         self,
+        answers: Configurations,
         targets: Floats,
         start: Configurations | None,
-        options: Options,
-        *,
-        keep_mode: bool,
-        nearby: bool,
+        answered: Callable[..., Configurations],
     ) -> Configurations:
-        """As `answer`, from a start on a fold in one of the modes that meet there."""
+        """As `keep.kept`."""
+        if isinstance(answers, LegAnswers) and (answers.sides * self._sides_of(start) >= 0.0).all():
+            return answers
+        begin = home_answer(self._model) if start is None else start
+        return kept(self._model, answers, targets, begin, partial(answered, nearby=True))
+
+    def _by_stages(
+        self, targets: Floats, start: Configurations | None, *, options: Options, keep_mode: bool, nearby: bool
+    ) -> Configurations:
+        """Answer targets by closed forms; then what these leave, in other modes, by searches, in joint coordinates.
+
+        As `answer`, from a start on a fold in one of the modes that meet there.
+        """
+        model, start_sides = self._model, self._sides_of(start)
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
-        start_sides = self._sides_of(start)
-        rows = self._single.new_rows() if is_one else new_rows(self._model, len(targets))
-        end_sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
-        if is_one and self._reach_one(targets, start, end_sides, keep_mode, rows):
-            model = self._model
-            start_coordinates = start_coordinates_of(model, start, start_sides)
-            platform = rows.poses, rows.actuators, end_sides
-            return LegAnswers(
-                rows,
-                lambda places: joint_coordinates(model, *platform, start_coordinates(slice(None)))[places],
-                end_sides,
-            )
-        n_unsolved, sides = reach(self._model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
-        q_proximal, fallback = None, None
-        if n_unsolved and self._searches:
-            sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
-            q_proximal = np.full_like(sides, np.nan)
-            request = request_from(self._model, options, start, start_sides, keep_mode, nearby)
-            unreached = np.flatnonzero(rows.status != REACHED)
-            answer_unreached(request, targets, Answers(rows, q_proximal, sides), unreached)
-        is_pending = rows.status != REACHED
-        if q_proximal is not None:
-            is_pending = rows.status >= PENDING  # or UNSURE
-        unsolved = is_pending.nonzero()[0]
-        if len(unsolved):
-            fallback_start = start
-            if start is not None and len(start) not in (1, len(unsolved)):
-                fallback_start = start.at(unsolved)
-            fallback = self._joint_space.answer(targets[unsolved], fallback_start, options, keep_mode=keep_mode)
-            is_kept = self._kept_projections(take(rows, unsolved), fallback.rows, options)
-            rows.status[unsolved[is_kept]] = PROJECTED
-            unsolved = unsolved[~is_kept]
-            if is_kept.any():
-                fallback = fallback.at(np.flatnonzero(~is_kept))
-            if len(unsolved) == len(targets):
-                return self.rested(fallback, start)
-            put(rows, unsolved, fallback.rows)
-            sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides
-            sides[unsolved] = sides_at(self._model, fallback)
-            if q_proximal is not None:
-                q_proximal[unsolved] = np.nan
-        return self.rested(self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback), start)
+        rows, sides = self._single.new_rows() if is_one else new_rows(model, len(targets)), start_sides
+        if is_one:
+            sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
+            if self._reach_one(targets, start, sides, keep_mode, rows):
+                return leg_answers(model, rows, sides, None, start, start_sides)
+        n_unsolved, sides = reach(model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
+        if not n_unsolved:
+            return leg_answers(model, rows, sides, None, start, start_sides)
+        unsolved, q = np.flatnonzero(rows.status != REACHED), None
+        sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
+        if self._searches:
+            q = np.full_like(sides, np.nan)
+            request = request_from(model, options, start, start_sides, keep_mode, nearby)
+            answer_unreached(request, targets, Answers(rows, q, sides), unsolved)
+        else:
+            rows.status[unsolved] = PENDING
+
+        def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
+            return self._joint_space.answer(targets[rows], begin, options, keep_mode=keep_mode)
+
+        return self.rested(self._completed(rows, sides, q, start, by_joints, options), start)
+
+    def _completed(
+        self,
+        rows: Rows,
+        sides: Floats,
+        q: Floats | None,
+        start: Configurations | None,
+        by_joints: Callable[[NDArray[np.intp], Configurations | None], Configurations],
+        options: Options,
+    ) -> Configurations:
+        """Rows of legs as answers; those that are PENDING or UNSURE by joints.
+
+        An UNSURE projection stays where these neither reach its target nor come nearer.
+        """
+        unsolved, start_sides = np.flatnonzero(rows.status >= PENDING), self._sides_of(start)
+        if not len(unsolved):
+            return leg_answers(self._model, rows, sides, q, start, start_sides)
+        begin = start if start is None or len(start) in (1, len(unsolved)) else start.at(unsolved)
+        fallback = by_joints(unsolved, begin)
+        left = take(rows, unsolved)
+        is_kept = (left.status == UNSURE) & ~self._is_nearer(fallback.rows, left, options)
+        rows.status[unsolved[is_kept]] = PROJECTED
+        by_legs = leg_answers(self._model, rows, sides, q, start, start_sides)
+        if is_kept.any():
+            unsolved, fallback = unsolved[~is_kept], fallback.at(np.flatnonzero(~is_kept))
+        if not len(unsolved) or len(unsolved) == len(rows.status):
+            return fallback if len(unsolved) else by_legs
+        sides = sides_at(self._model, fallback)
+        return by_legs.with_rows(unsolved, LegAnswers(fallback.rows, fallback.coordinates, sides))
 
     def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
         """As `Engine.rested`: projections leave redundant joints where they have pulled them."""
@@ -172,12 +176,12 @@ class LegsEngine(Engine):
         old_sides = self._sides_of(old)
         sides = old_sides.copy()
         nearer = rest_redundant(self._model, start, self._sides_of(start), sides, rows).nonzero()[0]
-        others = self._answers(rows, sides, None, old, old_sides, nearer[:0], None)
-        return replaced(answers, projected[nearer], others.at(nearer))
+        others = leg_answers(self._model, rows, sides, None, old, old_sides)
+        return answers.with_rows(projected[nearer], others.at(nearer)) if len(nearer) else answers
 
     def in_other_modes(
         self, targets: Floats, start: Configurations | None
-    ) -> Iterator[tuple[NDArray[np.intp], LegAnswers]]:
+    ) -> Iterator[tuple[NDArray[np.intp], Configurations]]:
         """The answers of the closed forms to targets (n, 4, 4) in other working modes, those of few changed legs first.
 
         Yields the rows that are reached in a mode, and their answers.
@@ -194,8 +198,8 @@ class LegsEngine(Engine):
             reach_on_sides(table_handle(table), targets, start_poses, sides, rows)
             reached = np.flatnonzero(rows.status == REACHED)
             if len(reached):
-                answers = self._answers(rows, sides, None, start, start_sides, np.empty(0, np.intp), None)
-                yield reached, cast(LegAnswers, answers.at(reached))
+                answers = leg_answers(self._model, rows, sides, None, start, start_sides)
+                yield reached, answers.at(reached)
 
     def nearest(
         self,
@@ -215,14 +219,11 @@ class LegsEngine(Engine):
         answers = Answers(rows, np.empty(shape), np.empty(shape))
         request = request_from(self._model, options, start, start_sides, keep_mode, nearby)
         answer_phases(request, targets, answers, np.arange(len(targets)), NEAREST, NEAREST)
-        unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
-        if len(unsolved):
-            begin = start if start is None or len(start) == 1 else start.at(unsolved)
-            fallback = self._joint_space.nearest(targets[unsolved], begin, options, keep_mode=keep_mode, nearby=nearby)
-            if len(unsolved) == len(targets):
-                return fallback
-            put(rows, unsolved, fallback.rows)
-        return self._answers(rows, answers.sides, answers.q, start, start_sides, unsolved, fallback)
+
+        def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
+            return self._joint_space.nearest(targets[rows], begin, options, keep_mode=keep_mode, nearby=nearby)
+
+        return self._completed(rows, answers.sides, answers.q, start, by_joints, options)
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -234,10 +235,6 @@ class LegsEngine(Engine):
                 yield last
         if last is None or last.ending != "reached":
             yield from self._joint_space.attempts(target, start, options, keep_mode=keep_mode)
-
-    def _kept_projections(self, rows: Rows, fallback: Rows, options: Options) -> Mask:
-        """The UNSURE projections to keep: the fallback neither reaches their targets nor comes nearer."""
-        return np.asarray((rows.status == UNSURE) & ~self._is_nearer(fallback, rows, options))
 
     def _is_nearer(self, others: Rows, rows: Rows, options: Options) -> Mask:
         """True where others reach targets that rows do not, or come nearer and hold no less, (n,)."""
@@ -282,44 +279,18 @@ class LegsEngine(Engine):
             np.repeat(self._table.home_sides, len(answers), axis=0),
             np.full((len(answers), n_legs), np.nan),
         )
-        unsolved = np.array(
-            [i for i, answer in enumerate(answers) if not isinstance(answer, LegAnswers)], dtype=np.intp
-        )
         for i, answer in enumerate(answers):
-            row = slice(i, i + 1)
-            put(rows, row, answer.rows)
+            put(rows, slice(i, i + 1), answer.rows)
             if isinstance(answer, LegAnswers):
                 sides[i] = answer.sides
                 if answer.q_proximal is not None:
                     q_proximal[i] = answer.q_proximal
-        fallback = None
-        if len(unsolved):
-            fallback = Configurations(take(rows, unsolved), np.concatenate([answers[i].coordinates for i in unsolved]))
-        return self._answers(rows, sides, q_proximal, start, self._sides_of(start), unsolved, fallback)
-
-    def _answers(
-        self,
-        rows: Rows,
-        sides: Floats,
-        q_proximal: Floats | None,
-        start: Configurations | None,
-        start_sides: Floats,
-        unsolved: NDArray[np.intp],
-        fallback: Configurations | None,
-    ) -> LegAnswers:
-        """Rows as answers, from a start with the sides `start_sides`; the rows `unsolved` are those of the fallback."""
-        start_coordinates = start_coordinates_of(self._model, start, start_sides)
-        coordinates = partial(
-            answer_coordinates,
-            self._model,
-            rows,
-            sides,
-            q_proximal,
-            start_coordinates,
-            unsolved,
-            fallback,
-        )
-        return LegAnswers(rows, coordinates, sides, q_proximal)
+        joined = leg_answers(self._model, rows, sides, q_proximal, start, self._sides_of(start))
+        by_joints = np.array([i for i, answer in enumerate(answers) if not isinstance(answer, LegAnswers)], np.intp)
+        if not len(by_joints):
+            return joined
+        fallback = take(rows, by_joints), np.concatenate([answers[i].coordinates for i in by_joints])
+        return joined.with_rows(by_joints, LegAnswers(*fallback, sides[by_joints]))
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Continue to targets (n, 4, 4), each from its own start and in its working mode; PENDING where not reached.
@@ -386,7 +357,7 @@ class LegsEngine(Engine):
             rows, solution = outputs = self._single.new_rows(), self._single_forward.new_outputs()
             rows.actuators[:] = values
             if self._single_forward.assemble(self._forward_start(start, start_sides), rows, solution):
-                return self._single_answer(rows, solution, start, start_sides)
+                return leg_answers(self._model, rows, solution.sides, solution.q, start, start_sides)
         nearby = start is not None and keep_mode
         request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
         starts = self._forward_start(start, start_sides).record
@@ -396,26 +367,22 @@ class LegsEngine(Engine):
             begin = start if start is None or len(start) == 1 else start.at(projected)
             others = self._joint_space.forward(values[projected], begin, tolerance, keep_mode=False)
             rows.status[projected[others.rows.status == REACHED]] = PENDING
-        unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
-        if len(unsolved) == len(values):
-            return self._joint_space.forward(values, start, tolerance, keep_mode=keep_mode)
-        if len(unsolved):
-            block_start = start if start is None or len(start) == 1 else start.at(unsolved)
-            fallback = self._joint_space.forward(values[unsolved], block_start, tolerance, keep_mode=keep_mode)
-            put(rows, unsolved, fallback.rows)
-        return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
+
+        def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
+            return self._joint_space.forward(values[rows], begin, tolerance, keep_mode=keep_mode)
+
+        return self._completed(rows, sides, q_proximal, start, by_joints, request.options)
 
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
         start_sides = self._sides_of(start)
         request = request_from(self._model, Options(), start, start_sides, False, start is not None, tolerance)
+
+        def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
+            return self._joint_space.nearest_forward(values[rows], begin, tolerance)
+
         rows, q_proximal, sides = project_values(request, values)
-        unsolved, fallback = np.flatnonzero(rows.status == PENDING), None
-        if len(unsolved):
-            begin = start if start is None or len(start) == 1 else start.at(unsolved)
-            fallback = self._joint_space.nearest_forward(values[unsolved], begin, tolerance)
-            put(rows, unsolved, fallback.rows)
-        return self._answers(rows, sides, q_proximal, start, start_sides, unsolved, fallback)
+        return self._completed(rows, sides, q_proximal, start, by_joints, request.options)
 
     def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared:
         """As `Engine.prepared_forward`; with the call, its start and its scratch memory."""
@@ -434,20 +401,6 @@ class LegsEngine(Engine):
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""
         return self._table.home_sides if start is None else sides_at(self._model, start)
-
-    def _single_answer(
-        self, rows: Rows, solution: AssemblyOutputs, start: Configurations | None, start_sides: Floats
-    ) -> LegAnswers:
-        """One assembled row as an answer, from a start with the sides `start_sides`."""
-        model, q = self._model, solution.q
-        start_coordinates = start_coordinates_of(model, start, start_sides)
-        platform = rows.poses, rows.actuators, solution.sides
-        return LegAnswers(
-            rows,
-            lambda places: joint_coordinates(model, *platform, start_coordinates(slice(None)), q)[places],
-            solution.sides,
-            q,
-        )
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows

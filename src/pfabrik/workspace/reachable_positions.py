@@ -14,13 +14,12 @@ from ..apart.link_distances import clearance_excess
 from ..apart.placed_links import PlacedLinks
 from ..arrays import Floats, Mask
 from ..batch import take, take_each
-from ..closure.configurations import Places
 from ..closure.parasitic import has_other_assemblies
 from ..derived import derived
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import LIMIT_EXCESS, REACHED, RESIDUAL, Rows
 from ..model import Model
-from ..platform.answers import LegAnswers, sides_at
+from ..platform.answers import leg_answers, sides_at
 from ..platform.coordinates import joint_coordinates
 from ..platform.legs_engine import LegsEngine
 from ..platform.links_of_legs import keeps_links
@@ -89,11 +88,7 @@ def _placed_links(model: Model, solutions: PoseSolutions) -> PlacedLinks:
     """The links of solutions."""
     poses, actuators, sides, q = solutions.poses, solutions.actuators, solutions.sides, solutions.q
     rows = Rows(solutions.status, solutions.counters, poses, actuators, solutions.measures)
-
-    def coordinates(places: Places) -> Floats:
-        return joint_coordinates(model, poses[places], actuators[places], sides[places], None, q[places])
-
-    answers = LegAnswers(rows, coordinates, sides, q)
+    answers = leg_answers(model, rows, sides, q, None, sides)
     return PlacedLinks(model.mechanism, answers, lambda: LegsEngine(model).points(answers))
 
 
