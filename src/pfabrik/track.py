@@ -6,17 +6,18 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .answers.answer_fields import PoseRequest
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track, pace_of
-from .arrays import Floats
+from .arrays import Floats, Mask
 from .batch import put
 from .checks import require_callable
 from .closure.close import measure_configurations
 from .closure.configurations import Configurations
+from .closure.continuation import continued
 from .description.mechanism import Mechanism
 from .description.task import task_of
 from .engine import engine_of, inverse_engine_of
@@ -121,19 +122,16 @@ def _up_to_dead_point(
     mechanism: Mechanism, target: Floats, start: Configurations, sign: float, options: Options
 ) -> Configurations:
     """The last configuration with the start's sign of assembly on the straight way to a target (1, 4, 4)."""
-    engine, begin, kept, share, step = (
-        engine_of(mechanism),
-        start.rows.poses.copy(),
-        start.at(np.zeros(1, int)),
-        0.0,
-        0.5,
-    )
-    while step > LEAST_STEP:
-        there = engine.advance(between(begin, target, share + step), kept)
-        if there.rows.status[0] == REACHED and assembly_signs(mechanism, there.coordinates)[0] * sign >= 0.0:
-            kept, share = there, share + step
-        else:
-            step *= 0.5
+    engine, begin, kept = engine_of(mechanism), start.rows.poses.copy(), start.at(np.zeros(1, int))
+
+    def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
+        nonlocal kept
+        there = engine.advance(between(begin, target, shares), kept)
+        is_kept = (there.rows.status == REACHED) & (assembly_signs(mechanism, there.coordinates) * sign >= 0.0)
+        kept = there if is_kept[0] else kept
+        return np.asarray(is_kept)
+
+    continued(1, advance, LEAST_STEP)
     position, rotation = task_of(mechanism).errors(kept.rows.poses, target)
     kept.rows.measures[:, POSITION_ERROR], kept.rows.measures[:, ROTATION_ERROR] = position, rotation
     near = options.tolerance or TOLERANCES.position * mechanism.characteristic_length

@@ -8,7 +8,7 @@ from itertools import chain, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..batch import put, take
 from ..derived import derived
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
@@ -17,13 +17,10 @@ from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .close import CLOSED, Closing, close, platform_poses
 from .configurations import Configurations
+from .continuation import continued
 from .descend import MOST_STEPS, nearest_actuators
 from .effort import descents_within
 from .random_starts import same_random_starts
-
-SHORTEST_SHARE = 1.0 / 1024.0
-"""Shortest step of a continuation, as a share of the way. Where even that does not contract, a parallel singularity
-ends the assembly mode."""
 
 STARTS = 48
 """Random starts, if nothing else assembles and there is no start whose mode is to be kept."""
@@ -141,15 +138,15 @@ def _continue_to(closure: Closure, coordinates: Floats, poses: Floats, values: F
     Rows whose assembly mode a parallel singularity ends have the last configuration on the way, and infinite gaps.
     """
     begin, present = closure.actuators(coordinates), close(closure, coordinates, poses, max_iterations=0)
-    way, share = np.zeros(len(values)), np.full(len(values), 0.5)
-    while len(rows := np.flatnonzero((way < 1.0) & (share >= SHORTEST_SHARE))):
-        wanted = begin[rows] + (values - begin)[rows] * (way + share)[rows, None]
+
+    def advance(rows: NDArray[np.intp], shares: Floats) -> Mask:
+        wanted = begin[rows] + (values - begin)[rows] * shares[:, None]
         trial = _locked(closure, present.coordinates[rows], present.poses[rows], wanted, stays=True)
-        is_closed = trial.gap <= CLOSED
+        is_closed = np.asarray(trial.gap <= CLOSED)
         put(present, rows[is_closed], trial, is_closed)
-        way[rows] += np.where(is_closed, share[rows], 0.0)
-        share[rows] = np.where(is_closed, np.minimum(2.0 * share[rows], 1.0 - way[rows]), 0.5 * share[rows])
-    present.gaps[way < 1.0] = np.inf
+        return is_closed
+
+    present.gaps[continued(len(values), advance) < 1.0] = np.inf
     return present
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.configurations import Configurations
+from ..closure.continuation import continued
 from ..kernels.rows import HOLD, HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..model import Model
 from ..poses import between
@@ -16,9 +18,6 @@ from .branch import same_branch
 
 Answer = Callable[[Floats, Configurations], Configurations]
 """Answers one target (1, 4, 4) around a start, in its working mode."""
-
-FIRST_STEP, LAST_STEP = 1 / 8, 1 / 1024
-"""Shares of the way to a target: the first step, and the step below which a mode is taken to end."""
 
 
 def kept(
@@ -41,14 +40,16 @@ def _same_sides(model: Model, answers: Configurations, sides: Floats) -> Mask:
 
 def _led(model: Model, target: Floats, start: Configurations, sides: Floats, answer: Answer) -> Configurations:
     """The answer to one target as far as steps from the start lead to it, PROJECTED where they end before it."""
-    begin, last, done, step = start.rows.poses, answer(start.rows.poses, start), 0.0, FIRST_STEP
-    while done < 1.0 and step >= LAST_STEP:
-        trial = answer(between(begin, target, done + step), last)
-        if trial.rows.status[0] == REACHED and _same_sides(model, trial, sides)[0]:
-            last, done = trial, done + step
-        else:
-            step *= 0.5
-    if done < 1.0:
+    begin, last = start.rows.poses, answer(start.rows.poses, start)
+
+    def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
+        nonlocal last
+        trial = answer(between(begin, target, shares), last)
+        is_kept = (trial.rows.status == REACHED) & _same_sides(model, trial, sides)
+        last = trial if is_kept[0] else last
+        return np.asarray(is_kept)
+
+    if continued(1, advance)[0] < 1.0:
         measures = last.rows.measures
         measures[:, POSITION_ERROR], measures[:, ROTATION_ERROR] = model.task.errors(last.rows.poses, target)
         last.rows.status[:], last.rows.counters[:, HOLD] = PROJECTED, HOLD_NOTHING

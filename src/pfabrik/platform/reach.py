@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask, Records
 from ..batch import put, take
-from ..closure.assemble import SHORTEST_SHARE
 from ..closure.configurations import Configurations
+from ..closure.continuation import continued
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..kernels.platform.tables import BY_LEGS
@@ -79,19 +80,19 @@ def _lead(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats,
     """
     unsolved = np.flatnonzero(rows.status != REACHED)
     begin = np.broadcast_to(start_poses, targets.shape)[unsolved]
-    present, led_sides, led, way = begin.copy(), sides[unsolved], take(rows, unsolved), np.zeros(len(unsolved))
-    share = np.full(len(unsolved), 0.5)
-    while len(active := np.flatnonzero((way < 1.0) & (share >= SHORTEST_SHARE))):
-        wanted = between(begin[active], targets[unsolved[active]], (way + share)[active, None, None])
+    present, led_sides, led = begin.copy(), sides[unsolved], take(rows, unsolved)
+
+    def advance(active: NDArray[np.intp], shares: Floats) -> Mask:
+        wanted = between(begin[active], targets[unsolved[active]], shares[:, None, None])
         block, block_sides = take(led, active), led_sides[active]
         reach_on_sides(legs, wanted, present[active], block_sides, block)
-        is_reached = block.status == REACHED
+        is_reached = np.asarray(block.status == REACHED)
         reached = active[is_reached]
         put(led, reached, block, is_reached)
         present[reached], led_sides[reached] = block.poses[is_reached], block_sides[is_reached]
-        way[reached] += share[reached]
-        share[active] = np.where(is_reached, np.minimum(2.0 * share[active], 1.0 - way[active]), 0.5 * share[active])
-    solved = np.flatnonzero(way == 1.0)
+        return is_reached
+
+    solved = np.flatnonzero(continued(len(unsolved), advance) == 1.0)
     put(rows, unsolved[solved], led, solved)
     sides[unsolved[solved]] = led_sides[solved]
     return len(solved)
