@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import numpy as np
 
 from .answers.answer_fields import PoseRequest
@@ -14,7 +16,7 @@ from .closure.parasitic import has_parasitic_motion
 from .description.mechanism import Mechanism
 from .engine import engine_of, inverse_engine_of, knows_all_modes
 from .errors import InvalidArgument
-from .kernels.rows import HOLD_NOTHING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
+from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, PROJECTED, REACHED, Rows
 from .model import model_of
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
@@ -51,7 +53,9 @@ def solve_ik(
         raise InvalidArgument("target", f"{1 + len(misplaced)} arguments", expected)
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)
-    begin = start_of(mechanism, start, shape)
+    begin, before = start_of(mechanism, start, shape), start._request if isinstance(start, Solution) else None
+    if begin is not None and before is not None and _is_certified(begin, before, targets, options):
+        return Solution(mechanism, begin, shape, before)
     keep_mode = keeps_mode(options, begin)
     solutions = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keep_mode)
     status = solutions.rows.status
@@ -63,9 +67,9 @@ def solve_ik(
         solutions = _reach_missed(mechanism, solutions, targets, begin, options)
         if (solutions.rows.status == REACHED).all():
             return Solution(mechanism, solutions, shape)
-    request = PoseRequest(targets.copy(), options.hold, options.rotation_length)
-    if begin is not None and isinstance(start, Solution) and start._request is not None:
-        solutions = _prefer_start(mechanism, solutions, request, begin, start._request)
+    request = PoseRequest(targets.copy(), options)
+    if begin is not None and before is not None:
+        solutions = _prefer_start(mechanism, solutions, request, begin, before)
     return Solution(mechanism, solutions, shape, request)
 
 
@@ -91,6 +95,18 @@ def _reach_missed(
     return solutions
 
 
+def _is_certified(start: Configurations, request: PoseRequest, targets: Floats, options: Options) -> bool:
+    """True if the start is certified to be the nearest configuration to the same single target, by the same options."""
+    rows = start.rows
+    is_same = len(targets) == len(request.targets) == 1 and request.options == options
+    return (
+        is_same
+        and targets.tobytes() == request.targets.tobytes()
+        and rows.status[0] == PROJECTED
+        and rows.counters[0, HOLD] >= CERTAIN
+    )
+
+
 def _prefer_start(
     mechanism: Mechanism,
     solutions: Configurations,
@@ -102,22 +118,35 @@ def _prefer_start(
 
     A target that is asked for again, from its own answer, keeps this answer unless a nearer one is found.
     """
-    if (request.hold, request.rotation_length) != (start_request.hold, start_request.rotation_length):
+    options, others = request.options, start_request.options
+    if (options.hold, options.rotation_length) != (others.hold, others.rotation_length):
         return solutions
-    lever = request.rotation_length or mechanism.rotation_length
-    start_distances, distances = (
-        np.hypot(rows.measures[:, POSITION_ERROR], lever * rows.measures[:, ROTATION_ERROR])
-        for rows in (start.rows, solutions.rows)
+    is_same = np.logical_and.reduce(request.targets == start_request.targets, axis=(1, 2))
+    is_same &= (start.rows.status == PROJECTED) & (solutions.rows.status != REACHED)
+    lever, slack = (
+        options.rotation_length or mechanism.rotation_length,
+        TOLERANCES.position * mechanism.characteristic_length,
     )
-    is_same = (request.targets == start_request.targets).all(axis=(1, 2)) & (start.rows.status == PROJECTED)
-    is_same &= solutions.rows.status != REACHED
-    is_no_farther = start_distances <= distances + TOLERANCES.position * mechanism.characteristic_length
-    has_same_hold = start.rows.holds == solutions.rows.holds
-    rows = np.flatnonzero(is_same & np.where(has_same_hold, is_no_farther, solutions.rows.holds == HOLD_NOTHING))
-    if not len(rows):
+    rows = [
+        row
+        for row in is_same.nonzero()[0].tolist()
+        if _is_no_farther(start.rows, row if len(start) > 1 else 0, solutions.rows, row, lever, slack)
+    ]
+    if not rows:
         return solutions
-    start_rows = np.zeros(len(rows), np.intp) if len(start) == 1 else rows
-    return solutions.with_rows(rows, start.at(start_rows))
+    if len(rows) == len(start) == len(solutions):
+        return start
+    places = np.array(rows)
+    return solutions.with_rows(places, start.at(places if len(start) > 1 else 0 * places))
+
+
+def _is_no_farther(rows: Rows, row: int, others: Rows, other: int, lever: float, slack: float) -> bool:
+    """True if a projection holds more than another one, or as much at no greater distance [length]."""
+    held, other_held = int(rows.counters[row, HOLD]) % CERTAIN, int(others.counters[other, HOLD]) % CERTAIN
+    if held != other_held:
+        return other_held == HOLD_NOTHING
+    (d, angle), (e, other_angle) = rows.measures[row, :2].tolist(), others.measures[other, :2].tolist()
+    return hypot(d, lever * angle) <= hypot(e, lever * other_angle) + slack
 
 
 def keeps_mode(options: Options, start: object) -> bool:

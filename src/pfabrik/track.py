@@ -85,7 +85,7 @@ def track(
     if begin is not None:
         _continue_turns(mechanism, solutions.rows, begin.rows.actuators[0])
     refuse_invalid(poses, shape, solutions.rows.status, options)
-    request = PoseRequest(poses.copy(), options.hold, options.rotation_length)
+    request = PoseRequest(poses.copy(), options)
     return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
 
 

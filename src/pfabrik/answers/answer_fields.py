@@ -28,6 +28,7 @@ from ..kernels.rows import (
 )
 from ..model import model_of
 from ..motion.displacements import columns, home_coordinates
+from ..options import Options
 from .active_limits import (
     ActiveLimit,
     active_limits,
@@ -43,11 +44,10 @@ Held: TypeAlias = Literal["orientation", "position"] | None
 
 
 class PoseRequest(NamedTuple):
-    """Target poses (n, 4, 4) with the options that define their distance: `hold` and `rotation_length` of `Options`."""
+    """Target poses (n, 4, 4) with the options of the question."""
 
     targets: Floats
-    hold: str | None
-    rotation_length: float | None
+    options: Options
 
 
 _State: TypeAlias = tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None, Floats | None]
@@ -205,9 +205,9 @@ class Answer:
     def _holding(self, request: PoseRequest, projected: NDArray[np.intp]) -> list[tuple[ActiveLimit, ...]]:
         """The limits that block projected rows from their targets."""
         limits: dict[int, tuple[ActiveLimit, ...]] = {}
-        engine, holds = engine_of(self.mechanism), self._rows.holds[projected]
+        engine, holds, options = engine_of(self.mechanism), self._rows.holds[projected], request.options
         for projection in projection_modes(
-            model_of(self.mechanism).path_closure, request.hold, request.rotation_length
+            model_of(self.mechanism).path_closure, options.hold, options.rotation_length
         ):
             rows = projected[holds == projection.hold]
             if len(rows):

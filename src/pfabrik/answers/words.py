@@ -80,11 +80,12 @@ def given_up(answer: Answer) -> list[str]:
     request = answer._request
     if request is None or answer.held is not None:
         return []
-    preferred, *_ = projection_modes(model_of(answer.mechanism).path_closure, request.hold, request.rotation_length)
+    closure, options = model_of(answer.mechanism).path_closure, request.options
+    preferred, *_ = projection_modes(closure, options.hold, options.rotation_length)
     if preferred.hold == HOLD_NOTHING:
         return []
-    free_part = "position" if request.hold == "orientation" else "orientation"
-    return [f"no {free_part} was found that suits the {request.hold}: both give way"]
+    free_part = "position" if options.hold == "orientation" else "orientation"
+    return [f"no {free_part} was found that suits the {options.hold}: both give way"]
 
 
 def why_without_limits(answer: Answer) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -90,14 +89,16 @@ class Configurations:
     def __len__(self) -> int:
         return len(self.rows.status)
 
-    @cached_property
+    @property
     def coordinates(self) -> Floats:
-        return self._coordinates(slice(None)) if callable(self._coordinates) else self._coordinates
+        if callable(self._coordinates):
+            self._coordinates = self._coordinates(slice(None))
+        return self._coordinates
 
     def coordinates_at(self, places: NDArray[np.intp]) -> Floats:
         """The coordinates at some places; all are computed once parts have cost as much as the whole batch would."""
-        if not callable(self._coordinates) or "coordinates" in vars(self):
-            return self.coordinates[places]
+        if not callable(self._coordinates):
+            return self._coordinates[places]
         self._taken += len(places) + ROWS_A_CALL
         return self._coordinates(places) if self._taken < len(self) else self.coordinates[places]
 

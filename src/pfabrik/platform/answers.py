@@ -18,6 +18,9 @@ from ..kernels.rows import Rows
 from ..model import Model
 from .coordinates import joint_coordinates, read_coordinates
 
+MOST_LAYERS = 16
+"""Answers that may wait for the coordinates of those in whose place they are taken: all of them stay in memory."""
+
 
 class LegAnswers(Configurations):
     """Answers stored as platform poses; joint coordinates are computed on access.
@@ -38,6 +41,7 @@ class LegAnswers(Configurations):
     ) -> None:
         super().__init__(rows, coordinates)
         self._sides, self.q_proximal = sides, q_proximal
+        self._layers = 0
 
     def __reduce__(self) -> tuple[Any, ...]:
         return LegAnswers, (self.rows, self.coordinates, self._sides, self.q_proximal)
@@ -51,19 +55,25 @@ class LegAnswers(Configurations):
         """A copy of the configurations at some places."""
         rows = super().at(places).rows
         q_proximal = None if self.q_proximal is None else self.q_proximal[places]
-        return LegAnswers(rows, lambda block: self.coordinates_at(places[block]), self.sides[places], q_proximal)
+        answers = LegAnswers(rows, lambda block: self.coordinates_at(places[block]), self.sides[places], q_proximal)
+        answers._layers = self._layers
+        return answers
 
     def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
-        """A copy with other configurations at some places; of legs' answers, coordinates are computed on access."""
-        if len(places) == len(self):
-            return source
-        if not isinstance(source, LegAnswers):
+        """As of `Configurations`; of legs' answers, coordinates are computed on access.
+
+        But after every `MOST_LAYERS` answers taken from those before them.
+        """
+        if len(places) == len(self) or not isinstance(source, LegAnswers):
             return super().with_rows(places, source)
         rows, sides = take(self.rows, np.arange(len(self))), self.sides.copy()
         put(rows, places, source.rows)
         sides[places] = source.sides
         q_proximal = np.full(sides.shape, np.nan) if self.q_proximal is None else self.q_proximal.copy()
         q_proximal[places] = np.nan if source.q_proximal is None else source.q_proximal
+        layers = 1 + source._layers
+        if layers > MOST_LAYERS:
+            _, layers = source.coordinates, 1
         index = np.full(len(self), -1)
         index[places] = np.arange(len(places))
 
@@ -75,7 +85,9 @@ class LegAnswers(Configurations):
             values[~is_other], values[is_other] = self.coordinates_at(indices[~is_other]), others
             return values
 
-        return LegAnswers(rows, coordinates, sides, q_proximal)
+        answers = LegAnswers(rows, coordinates, sides, q_proximal)
+        answers._layers = layers
+        return answers
 
 
 def leg_answers(
