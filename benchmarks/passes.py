@@ -14,12 +14,12 @@ from pfabrik.closure.projection import projection_modes
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels.legs.answer import answer
-from pfabrik.kernels.reaching.accelerated import solve_by_half_spaces
-from pfabrik.kernels.reaching.solve import solve_by_passes
+from pfabrik.kernels.passes.accelerated import solve_by_half_spaces
+from pfabrik.kernels.passes.solve import solve_by_passes
 from pfabrik.model import model_of
+from pfabrik.passes.joint_positions import new_pass_results
+from pfabrik.passes.passes_engine import settings_of
 from pfabrik.platform.table import table_handle
-from pfabrik.reaching.joint_positions import new_pass_results
-from pfabrik.reaching.solve import settings_of
 from table import Row
 from timing import Solve, best_times, draw
 from yardstick import one_core
@@ -33,14 +33,14 @@ TURNED = 0.2
 
 def passes(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
     """Reachable targets, cold: kernels of either kind of passes, and whole answers, next to the default's."""
-    accelerated = replace(pf.Options.accelerated(), working_mode="any")
+    paper, accelerated = pf.passes.Options.paper(), replace(pf.passes.Options.accelerated(), working_mode="any")
     for name, label, size in MACHINES:
         mechanism = pf.load(name)
         drawn = draw(mechanism, rng, 4 * n, size, TURNED)
         targets = drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED][:n]
         count, what = len(targets), f"{label}, whole workspace, cold, one core"
-        solves = [kernel_call(mechanism, targets, options) for options in (accelerated, pf.Options.paper())]
-        solves += [partial(pf.solve_ik, mechanism, targets, options=options) for options in (accelerated, None)]
+        solves = [kernel_call(mechanism, targets, options) for options in (accelerated, paper)]
+        solves += [partial(pf.passes.solve, mechanism, targets, accelerated), partial(pf.solve_ik, mechanism, targets)]
         alone = legs_alone(mechanism, targets)
         with one_core():
             fast, plain, whole, default, *legs = best_times(runs, *solves, *([alone] if alone else []))
@@ -50,11 +50,11 @@ def passes(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
         yield Row(f"{what}, accelerated batch, all measured", count, whole / count, "default batch", default / count)
 
 
-def kernel_call(mechanism: pf.Mechanism, targets: Array, options: pf.Options) -> Solve:
+def kernel_call(mechanism: pf.Mechanism, targets: Array, options: pf.passes.Options) -> Solve:
     """One call of the kernel of passes for all targets, from home."""
     compiled, model = compile_plan(mechanism), model_of(mechanism)
     settings = settings_of(model, options, projection_modes(model.path_closure, options.hold, None)[0])
-    kernel = solve_by_half_spaces if options.passes == "accelerated" else solve_by_passes
+    kernel = solve_by_half_spaces if options.method == "accelerated" else solve_by_passes
     settings, results = settings._replace(max_rounds=0), new_pass_results(compiled, len(targets))
     return partial(kernel, compiled.plan, targets, compiled.home_seed, settings, results)
 

@@ -1,9 +1,11 @@
-"""How many rounds of the paper's projection pay: distance to targets out of reach, and time, by `Options.max_rounds`.
+"""How many rounds of the paper's projection pay: distance to targets out of reach, and time, by `max_rounds`.
 
 python benchmarks/rounds.py
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,10 +28,10 @@ def main() -> None:
     print("hold         max_rounds  mean distance  99 %    mean rotation [rad]  us a target")
     for hold in ("orientation", None):
         for rounds in ROUNDS:
-            options = pf.Options(hold=hold, projection="centroid", max_rounds=rounds)
+            options = replace(pf.passes.Options.centroid(), hold=hold, max_rounds=rounds)
             with one_core():
-                (seconds,) = best_times(3, lambda options=options: pf.solve_ik(mechanism, far, options=options))
-            solution = pf.solve_ik(mechanism, far, options=options)
+                (seconds,) = best_times(3, lambda options=options: pf.passes.solve(mechanism, far, options))
+            solution = pf.passes.solve(mechanism, far, options)
             distance = solution.position_error / mechanism.characteristic_length
             print(
                 f"{hold or 'nothing':<11}  {rounds:>10}  {distance.mean():>13.4f}  {np.quantile(distance, 0.99):.4f}"

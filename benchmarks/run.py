@@ -30,7 +30,7 @@ from viewer import viewer
 from workspaces import workspaces
 from yardstick import geometric, one_core
 
-CENTROID, NEAREST = pf.Options(projection="centroid"), pf.Options(projection="nearest")
+CENTROID, NEAREST = pf.passes.Options.centroid(), pf.Options()
 
 USE_EVERYTHING = """
 import time, numpy as np
@@ -142,7 +142,7 @@ def projections(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
     for name, what in (("five_bar", "5-bar"), ("nrpm", "NRPM"), ("servo_hexapod", "6-RUS"), ("delta", "delta")):
         mechanism = pf.load(name)
         drawn = draw(mechanism, rng, n // 5, 1.0, 0.5)
-        far = drawn[pf.solve_ik(mechanism, drawn, options=CENTROID).status == pf.Status.PROJECTED][: n // 10]
+        far = drawn[pf.passes.solve(mechanism, drawn, CENTROID).status == pf.Status.PROJECTED][: n // 10]
         near = np.tile(mechanism.home_pose, (len(far), 1, 1))
         held = ", hold orientation" if "rotation" in mechanism.task else ""
         yield from projected(f"{what}, batch, out of reach{held}", mechanism, far, near, "orientation", min(runs, 3))
@@ -152,12 +152,12 @@ def projected(
     what: str, mechanism: pf.Mechanism, far: Array, near: Array, hold: str | None, runs: int
 ) -> Iterator[Row]:
     """Targets out of reach projected in either way, and targets within reach."""
-    centroid, nearest = (replace(options, hold=hold) for options in (CENTROID, NEAREST))
+    centroid, nearest = replace(CENTROID, hold=hold), replace(NEAREST, hold=hold)
     with one_core():
         reached, by_centroid, exactly = best_times(
             runs,
             lambda: pf.solve_ik(mechanism, near),
-            lambda: pf.solve_ik(mechanism, far, options=centroid),
+            lambda: pf.passes.solve(mechanism, far, centroid),
             lambda: pf.solve_ik(mechanism, far, options=nearest),
         )
     n = len(far)

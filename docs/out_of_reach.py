@@ -46,9 +46,10 @@ def draw(axes: Axes, name: str, box: tuple[float, float, float, float], targets:
     axes.contourf(y, z, reached, levels=[0.5, 1.5], colors=["#e3ecf3"])
     axes.contour(y, z, reached, levels=[0.5], colors=["#7f9db5"], linewidths=1)
     wanted = in_the_section(*np.transpose(targets))
-    for projection, colour, mark in (("centroid", CENTROID, "s"), ("nearest", NEAREST, "o")):
-        answers = pf.solve_ik(mechanism, wanted, options=pf.Options(projection=projection))
-        places = answers.pose[:, :3, 3]
+    centroids = pf.passes.solve(mechanism, wanted, pf.passes.Options.centroid())
+    answers = ("centroid", centroids, CENTROID, "s"), ("nearest", pf.solve_ik(mechanism, wanted), NEAREST, "o")
+    for projection, solution, colour, mark in answers:
+        places = solution.pose[:, :3, 3]
         for target, place in zip(wanted, places, strict=True):
             axes.plot(*np.transpose([target, place])[1:], color=colour, linewidth=1)
         axes.plot(*places.T[1:], mark, color=colour, markersize=6 if mark == "s" else 4, label=projection)

@@ -149,10 +149,10 @@ def count(figure: Figure) -> None:
         ]
     )
     targets = drawn[pf.solve_ik(mechanism, drawn).status == pf.Status.REACHED]
-    options = {"the paper's passes": pf.Options.paper(), "half-spaces": pf.Options.accelerated()}
+    options = {"the paper's passes": pf.passes.Options.paper(), "half-spaces": pf.passes.Options.accelerated()}
     axes, edges = figure.subplots(), np.append(np.arange(1, 13), 101)
     for place, (label, each) in enumerate(options.items()):
-        answers = pf.solve_ik(mechanism, targets, options=replace(each, working_mode="any"))
+        answers = pf.passes.solve(mechanism, targets, replace(each, working_mode="any"))
         reached = answers.status == pf.Status.REACHED
         bars = np.append(np.histogram(answers.iterations[reached], edges)[0], np.sum(~reached)) / len(targets)
         text = f"{label}: {100 * np.mean(reached):.1f} % reached, {np.mean(answers.iterations[reached]):.2f} passes"

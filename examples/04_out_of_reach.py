@@ -9,7 +9,7 @@ target = pf.pose([0, 150, 120], rpy=np.radians([8, -5, 0]))
 
 # Of all poses that keep every limit, the nearest one that has the target's orientation; and, farther away, the paper's.
 nearest = pf.solve_ik(mechanism, target)
-centroid = pf.solve_ik(mechanism, target, options=pf.Options(projection="centroid"))
+centroid = pf.passes.solve(mechanism, target, pf.passes.Options.centroid())
 print(f"{nearest.status}, {nearest.held} held: {nearest.position_error:.2f} mm from the target")
 print(f"where the chains' ends agree: {centroid.position_error:.2f} mm and {centroid.rotation_error:.2f} rad")
 

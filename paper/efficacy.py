@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from pfabrik import Options, Solution, Status, solve_fk, track
+from pfabrik import Options, Solution, Status, solve_fk
 
 from .arrays import Floats
 from .checking import Feasibility, feasibility
-from .study import SETTINGS, Case, Extent, Tick
+from .study import SETTINGS, Case, Extent, Tick, follow
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ class Efficacy:
 def run(case: Case, extent: Extent, tick: Tick) -> Efficacy:
     """Follow the circle inside the workspace with every set of options."""
     targets = case.inside.poses(extent.steps)
-    runs = {name: follow(case, targets, options) for name, options in SETTINGS.items()}
+    runs = {name: go_around(case, targets, options) for name, options in SETTINGS.items()}
     tick()
     return Efficacy(case, targets, runs)
 
 
-def follow(case: Case, targets: Floats, options: Options) -> Followed:
+def go_around(case: Case, targets: Floats, options: Options) -> Followed:
     """Inverse kinematics along a path, then forward kinematics of every step from the step before."""
-    solution = track(case.mechanism, targets, options=options)
+    solution = follow(case.mechanism, targets, options)
     start = solve_fk(case.mechanism, solution[:1].actuators)
     rest = solve_fk(case.mechanism, solution[1:].actuators, start=solution[:-1])
     poses = np.concatenate([start.pose, rest.pose])

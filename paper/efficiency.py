@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from pfabrik import Mechanism, Solution, Solver, Status, pose, solve_ik
+from pfabrik import Mechanism, Solution, Solver, Status, passes, pose
 
 from . import geometric
 from .arrays import Floats, Mask
 from .checking import Feasibility, feasibility
 from .efficacy import rms
-from .study import SETTINGS, Case, Extent, Tick
+from .study import SETTINGS, Case, Extent, Tick, solve
 from .timing import median_times, one_core
 
 DRAWN_AT_ONCE = 4096
@@ -94,8 +94,8 @@ def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
     closed = geometric.solve_ik(mechanism, targets)
     answers = {}
     for name, options in ANY_MODE.items():
-        cold = solve_ik(mechanism, targets, options=options)
-        warm = solve_ik(mechanism, targets[1:], start=cold[:-1], options=options)
+        cold = solve(mechanism, targets, options)
+        warm = solve(mechanism, targets[1:], options, cold[:-1])
         answers[name, "cold"] = Answered(cold, feasibility(cold))
         answers[name, "warm"] = Answered(warm, feasibility(warm))
     tick()
@@ -155,17 +155,19 @@ def timed(
 ) -> dict[tuple[str, str, str], float]:
     """Median time of one target [s], on one core, each way by turns.
 
-    "batch": its share of one call for all targets, many times over. "call": a call of its own from Python, of a
-    prepared `Solver`. "single": a call of its own from compiled code, of the geometric approach alone.
+    "batch": its share of one call for all targets, many times over. "call": a call of its own from Python, by
+    default of a prepared `Solver`. "single": a call of its own from compiled code, of the geometric approach alone.
     """
     calls: dict[tuple[str, str, str], Callable[[], object]] = {}
     many, after = np.tile(targets, (COPIES, 1, 1)), np.tile(targets[1:], (COPIES, 1, 1))
     first = np.tile(np.arange(len(targets) - 1), COPIES)
     for name, options in ANY_MODE.items():
         before = answers[name, "cold"].solution[first]
-        calls[name, "cold", "batch"] = partial(solve_ik, mechanism, many, options=options)
-        calls[name, "warm", "batch"] = partial(solve_ik, mechanism, after, start=before, options=options)
-        calls[name, "cold", "call"] = partial(ask_one_by_one, Solver(mechanism, options=options).ik, targets)
+        calls[name, "cold", "batch"] = partial(solve, mechanism, many, options)
+        calls[name, "warm", "batch"] = partial(solve, mechanism, after, options, before)
+        is_default = not isinstance(options, passes.Options)
+        one = Solver(mechanism, options=options).ik if is_default else partial(solve, mechanism, options=options)
+        calls[name, "cold", "call"] = partial(ask_one_by_one, one, targets)
     closed = partial(geometric.solve_ik, mechanism)
     calls["geometric", "cold", "batch"] = partial(closed, many)
     calls["geometric", "warm", "batch"] = partial(closed, after, start=closed(targets[first]))
@@ -192,9 +194,9 @@ def time_a_pass(mechanism: Mechanism, targets: Floats, repeats: int) -> float:
     longer a batch takes whose chains may make K of them than one whose chains stop after the first, where none comes
     near enough to stop before, over the passes that were made more.
     """
-    endless = replace(ANY_MODE["paper"], tolerance=NEVER, rotation_tolerance=NEVER, max_rounds=1)
-    few, most = replace(endless, max_iterations=1), replace(endless, max_iterations=ANY_MODE["paper"].max_iterations)
-    calls = {options: partial(solve_ik, mechanism, targets, options=options) for options in (few, most)}
+    most = replace(passes.Options.paper(), working_mode="any", tolerance=NEVER, rotation_tolerance=NEVER, max_rounds=1)
+    few = replace(most, max_iterations=1)
+    calls = {options: partial(passes.solve, mechanism, targets, options) for options in (few, most)}
     made = {options: int(np.sum(call().iterations)) for options, call in calls.items()}
     with one_core():
         seconds = median_times(calls, repeats)

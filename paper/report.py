@@ -54,8 +54,9 @@ def report(findings: Findings) -> str:
     parts = [
         "# The paper's experiments, run again",
         "Written by `python -m paper`. *Paper*: as printed in P-FABRIK; it does not print the dimensions of its "
-        "machines, ours have others. *Paper's E*: `Options.paper()`, the passes of P-FABRIK alone with E = 0.01 mm. "
-        "*Accelerated*: `Options.accelerated()`, passes with exact meetings and half-spaces, which are not the "
+        "machines, ours have others. *Paper's E*: `passes.Options.paper()`, the passes of P-FABRIK alone with "
+        "E = 0.01 mm. "
+        "*Accelerated*: `passes.Options.accelerated()`, passes with exact meetings and half-spaces, which are not the "
         "paper's, to 1e-9 L. *Default*: `Options()`, which for legs that have closed forms takes these and makes no "
         "passes.",
         "## What must hold",
@@ -67,10 +68,10 @@ def report(findings: Findings) -> str:
         "forward and backward, of all chains: by how much longer a batch takes that makes a hundred, over a hundred. "
         "*Single*: the passes that a target takes, without what a call sets up, next to the geometric approach for a "
         "target alone, in a compiled loop. *Of a batch*: the share of one call, which also works out joint coordinates "
-        "and measures loops and limits; with the paper's E this takes longer than the passes. *One call*: of a "
-        "prepared `Solver`.",
+        "and measures loops and limits; with the paper's E this takes longer than the passes. *One call*: by "
+        "default of a prepared `Solver`.",
         "Out of reach: the distance from the target over that of the nearest feasible pose of the same orientation, "
-        "which the exact projection (`projection='nearest'`) finds, or a general optimiser, whichever comes nearer.",
+        "which the exact projection (the default) finds, or a general optimiser, whichever comes nearer.",
         "The CSV files have every number: jumps of the actuators, those with twice as many steps too, and all times.",
         "![errors](efficacy.png)",
         "![cost](efficiency.png)",

@@ -7,14 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from pfabrik import Mechanism, Status, Track, Workspace, solve_ik, track, workspace
+from pfabrik import Mechanism, Status, Track, Workspace, passes, solve_ik, workspace
 
 from .arrays import Floats, Mask
 from .checking import Feasibility, feasibility
 from .closest import Comparison, compare
-from .study import CENTROID, NEAREST, SETTINGS, Case, Extent, Tick
+from .study import Case, Extent, Tick
 from .timing import clock, one_core
 from .tolerances import ROTATION
+
+CENTROID = passes.Options.centroid()
+"""The paper's projection, finished exactly."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +87,10 @@ def run(case: Case, extent: Extent, tick: Tick) -> Robustness:
     """Follow the circle that leaves the workspace."""
     mechanism = case.mechanism
     targets = case.leaving.poses(extent.steps)
-    solution = track(mechanism, targets, options=CENTROID)
-    finer = track(mechanism, case.leaving.poses(2 * extent.steps - 1), options=CENTROID)
-    exact = solve_ik(mechanism, targets, options=NEAREST)
-    accelerated = solve_ik(mechanism, targets, options=SETTINGS["accelerated"])
+    solution = passes.track(mechanism, targets, CENTROID)
+    finer = passes.track(mechanism, case.leaving.poses(2 * extent.steps - 1), CENTROID)
+    exact = solve_ik(mechanism, targets)
+    accelerated = passes.solve(mechanism, targets, passes.Options.accelerated())
     compared = compare(targets, solution, exact, accelerated, extent.searches, tick)
     return Robustness(
         case=case,
@@ -137,7 +140,7 @@ def step_times(mechanism: Mechanism, targets: Floats, solution: Track, repeats: 
         for row in taken:
             for i, seed in enumerate(seeds):
                 start = clock()
-                track(mechanism, targets[i : i + 1], start=seed, options=CENTROID)
+                passes.track(mechanism, targets[i : i + 1], CENTROID, start=seed)
                 row[i] = clock() - start
     return np.asarray(np.median(taken, axis=0))
 

@@ -11,21 +11,29 @@ from typing import Any
 
 import numpy as np
 
-from pfabrik import Mechanism, Options, load, pose
+from pfabrik import Mechanism, Options, Solution, Track, load, passes, pose, solve_ik, track
 
 from .arrays import Floats
 
 Tick = Callable[[], None]
 
-CENTROID = Options(projection="centroid")
-"""The paper's projection, finished exactly."""
-
-NEAREST = Options(projection="nearest")
-"""The exact projection, which the paper's is compared with."""
-
-SETTINGS = {"paper": Options.paper(), "accelerated": Options.accelerated(), "default": Options()}
+SETTINGS = {"paper": passes.Options.paper(), "accelerated": passes.Options.accelerated(), "default": Options()}
 """The paper's passes, with its E and its projection; passes with exact meetings and half-spaces, which are not its own;
 and what the library does unless told otherwise: where legs have closed forms it takes them, and no passes at all."""
+
+
+def solve(mechanism: Mechanism, targets: Floats, options: Options, start: Solution | None = None) -> Solution:
+    """Answers by passes, or by default, as the options say."""
+    if isinstance(options, passes.Options):
+        return passes.solve(mechanism, targets, options, start=start)
+    return solve_ik(mechanism, targets, start=start, options=options)
+
+
+def follow(mechanism: Mechanism, targets: Floats, options: Options) -> Track:
+    """Answers along a path, by passes or by default."""
+    if isinstance(options, passes.Options):
+        return passes.track(mechanism, targets, options)
+    return track(mechanism, targets, options=options)
 
 
 @dataclass(frozen=True)

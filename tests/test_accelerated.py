@@ -17,7 +17,7 @@ from pfabrik import Mechanism, Options, Status
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
-ACCELERATED = replace(Options.accelerated(), working_mode="any")
+ACCELERATED = replace(pf.passes.Options.accelerated(), working_mode="any")
 TWO_PARTS = ("five_bar", "stewart", "servo_hexapod", "reachy_mini", "hexaglide", "rrr", "prr", "rpr")
 ON_TRUNKS: dict[str, Callable[[], Mechanism]] = {"nrpm": lambda: pf.load("nrpm"), **ARMS, **TRUNKS}
 ON_TRUNKS.pop("pivoted")
@@ -45,7 +45,7 @@ def targets_about(mechanism: Mechanism, size: float, turn: float, n: int = N) ->
 
 def assert_reached_exactly(mechanism: Mechanism, targets: np.ndarray) -> pf.Solution:
     """All targets are reached, loops closed and limits kept, judged from the description alone."""
-    answers = pf.solve_ik(mechanism, targets, options=ACCELERATED)
+    answers = pf.passes.solve(mechanism, targets, ACCELERATED)
     np.testing.assert_array_equal(answers.status, Status.REACHED)
     assert gap_of_joints(mechanism, answers).max() <= 1e-9
     assert excess_of_joints(mechanism, answers).max() <= 1e-9
@@ -84,7 +84,7 @@ def test_the_arms_of_the_paper_take_less_than_two_passes_over_a_whole_workspace(
     answers = assert_reached_exactly(mechanism, reachable)
     assert len(reachable) > 400
     assert np.mean(answers.iterations) <= 1.9
-    warm = pf.solve_ik(mechanism, reachable[1:], start=answers[:-1], options=ACCELERATED)
+    warm = pf.passes.solve(mechanism, reachable[1:], ACCELERATED, start=answers[:-1])
     np.testing.assert_array_equal(warm.status, Status.REACHED)
 
 
@@ -102,7 +102,7 @@ def test_the_arms_of_the_paper_take_less_than_two_passes_over_a_whole_workspace(
 def test_targets_out_of_reach_end_near_the_nearest_pose(name: str, size: float, farther: float) -> None:
     mechanism = pf.load(name)
     targets = targets_about(mechanism, size, 0.2, N if not INTERPRETED else 4)
-    answers = pf.solve_ik(mechanism, targets, options=ACCELERATED)
+    answers = pf.passes.solve(mechanism, targets, ACCELERATED)
     nearest = pf.solve_ik(mechanism, targets, options=Options(working_mode="any"))
     held = (nearest.status == Status.PROJECTED) & (nearest.rotation_error <= 1e-6) & (answers.rotation_error <= 1e-6)
     held &= nearest.position_error > 0.02 * mechanism.characteristic_length
@@ -118,14 +118,8 @@ def test_targets_out_of_reach_end_near_the_nearest_pose(name: str, size: float, 
 def test_a_leg_that_keeps_its_side_is_not_flipped() -> None:
     mechanism = pf.load("rrr")
     targets = targets_about(mechanism, 0.5, 0.4)
-    kept = replace(Options.accelerated(), working_mode="keep")
-    answers = pf.solve_ik(mechanism, targets, options=kept)
+    answers = pf.passes.solve(mechanism, targets, replace(ACCELERATED, working_mode="keep"))
     default = pf.solve_ik(mechanism, targets, options=Options(working_mode="keep"))
     np.testing.assert_array_equal(answers.status == Status.REACHED, default.status == Status.REACHED)
     reached = answers.status == Status.REACHED
     np.testing.assert_allclose(answers.actuators[reached], default.actuators[reached], atol=1e-7)
-
-
-def test_unknown_passes_are_refused_by_name() -> None:
-    with pytest.raises(pf.errors.InvalidArgument, match=r"options\.passes"):
-        Options(passes="fast")  # type: ignore[arg-type]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pytest
@@ -202,24 +202,27 @@ def loop(mechanism: pf.Mechanism, steps: int) -> np.ndarray:
     return poses
 
 
-@pytest.mark.parametrize("projection", ["nearest", "centroid"])
+FOLLOW = {"nearest": pf.track, "centroid": partial(pf.passes.track, options=pf.passes.Options.centroid())}
+
+
+@pytest.mark.parametrize("projection", FOLLOW)
 @pytest.mark.parametrize("name", ["nrpm", "rails"])
 def test_half_the_steps_along_a_path_are_half_as_long_reached_or_not(name: str, projection: str) -> None:
     """Or 0.71 times, where limits fold as a square root does; leaps that a track tells of are no steps of arms."""
     mechanism, largest = machine(name), []
     for steps in (60, 120):
-        track = pf.track(mechanism, loop(mechanism, steps), options=Options(projection=projection))
+        track = FOLLOW[projection](mechanism, loop(mechanism, steps))
         changes = np.abs(np.diff(track.actuators, axis=0)) / actuator_units(mechanism)
         largest.append(changes[~np.asarray(track.jumps)[1:]].max())
     assert 0.2 <= np.mean(track.status == pf.Status.PROJECTED) <= 0.8
     assert largest[1] <= 0.8 * largest[0]
 
 
-@pytest.mark.parametrize("projection", ["nearest", "centroid"])
+@pytest.mark.parametrize("projection", FOLLOW)
 @pytest.mark.parametrize("name", NAMES)
 def test_no_answer_has_its_arms_farther_than_the_same_pose_asked_for(name: str, projection: str) -> None:
     mechanism = machine(name)
-    track = pf.track(mechanism, loop(mechanism, 60), options=Options(projection=projection))
+    track = FOLLOW[projection](mechanism, loop(mechanism, 60))
     rows = np.flatnonzero(~np.asarray(track.jumps)[1:]) + 1
     start = pf.configuration(mechanism, track.q[rows - 1])
     again = pf.solve_ik(mechanism, track.pose[rows], start=start, options=Options(working_mode="keep"))

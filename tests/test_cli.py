@@ -476,14 +476,6 @@ def test_what_was_to_be_held_and_is_not_is_said(run: Callable[..., Result]) -> N
     assert run("ik", "five_bar", "--position", 0, 0, 300).stdout.count("give way") == 0
 
 
-def test_the_nearest_pose_is_no_farther_than_the_centroid(run: Callable[..., Result]) -> None:
-    line = ["ik", "stewart", "--position", 60, 30, 260, "--json"]
-    nearest, centroid = (json.loads(run(*line, "--projection", way).stdout) for way in ("nearest", "centroid"))
-    assert nearest == json.loads(run(*line).stdout)
-    assert nearest["position_error"] < centroid["position_error"]
-    assert centroid["rotation_error"] <= 1e-9
-
-
 def test_margins_are_listed_the_nearest_limit_first(run: Callable[..., Result]) -> None:
     result = run("ik", "stewart", *BEYOND_REACH, "--margins")
     table = result.stdout.split("\n\n")[-1].splitlines()
@@ -1227,7 +1219,6 @@ def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> 
         (["ik", "stewart", "--position", "0", "0", "-inf"], "finite"),
         (["ik", "stewart", *WITHIN_REACH, "--rpy", "0", "nan", "0"], "finite"),
         (["ik", "stewart", *WITHIN_REACH, "--hold", "both"], "orientation"),
-        (["ik", "stewart", *WITHIN_REACH, "--projection", "best"], "centroid"),
         (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
         (["ik", "stewart", *WITHIN_REACH, "--all", "--force", "0", "0", "1"], "--force and --moment are of one answer"),
         (["ik", "stewart", *WITHIN_REACH, "--force", "0", "0", "nan"], "numbers that are not finite"),

@@ -152,8 +152,8 @@ def test_no_question_hands_a_kernel_what_it_refuses(name: str) -> None:
         pf.solve_ik(mechanism, targets, start=seed),
         pf.solve_ik(mechanism, targets[::-1], start=seed[::-1]),
         pf.solve_ik(mechanism, targets, start=seed[0]),
-        pf.solve_ik(mechanism, far, options=pf.Options(hold=None, max_rounds=3, tolerance=1)),
-        pf.solve_ik(mechanism, far, options=pf.Options.paper()),
+        pf.solve_ik(mechanism, far, options=pf.Options(hold=None, tolerance=1)),
+        pf.passes.solve(mechanism, far, pf.passes.Options.paper()),
         pf.track(mechanism, targets, start=seed[1], on_progress=lambda done, total: None),
     ):
         assert answer.active_limits is not None

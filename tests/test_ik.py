@@ -160,7 +160,7 @@ def test_an_orientation_that_no_position_suits_gives_way() -> None:
 def test_the_papers_settings_end_within_its_tolerance_with_the_loops_closed(name: str) -> None:
     mechanism = pf.load(name)
     targets = oracles.inside_targets(mechanism, np.random.default_rng(8), 10 if INTERPRETED else 200, least=0.05)
-    answer = pf.solve_ik(mechanism, targets, options=pf.Options.paper())
+    answer = pf.passes.solve(mechanism, targets)
     assert_feasible(mechanism, answer)
     assert (answer.position_error <= 1e-2).mean() > 0.95
     assert np.median(answer.iterations) <= 100
@@ -197,9 +197,9 @@ def test_a_mechanism_that_positions_cannot_express_is_solved_by_the_closure_engi
     np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("projection", ["nearest", "centroid"])
-def test_a_joint_end_effector_has_no_orientation_to_hold(projection: Any) -> None:
-    answer = pf.solve_ik(pf.load("five_bar"), (0, 60, 300), options=pf.Options(projection=projection))
+@pytest.mark.parametrize("solve", [pf.solve_ik, pf.passes.solve])
+def test_a_joint_end_effector_has_no_orientation_to_hold(solve: Any) -> None:
+    answer = solve(pf.load("five_bar"), (0, 60, 300))
     assert answer.status is pf.Status.PROJECTED
     assert answer.held is None
     assert isinstance(answer.active_limits, tuple)

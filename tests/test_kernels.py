@@ -20,9 +20,9 @@ from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, quaternions, vectors
 from pfabrik.kernels.legs import complete_poses
-from pfabrik.kernels.reaching import half_spaces, moving_frames, restrict, solve
-from pfabrik.kernels.reaching import passes as reach
-from pfabrik.kernels.reaching import plan as P
+from pfabrik.kernels.passes import half_spaces, moving_frames, restrict, solve
+from pfabrik.kernels.passes import passes as reach
+from pfabrik.kernels.passes import plan as P
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

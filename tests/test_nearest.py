@@ -161,7 +161,7 @@ def test_what_a_rotation_counts_is_for_the_caller_to_say(share: float) -> None:
 @pytest.mark.parametrize(("name", "hold"), CASES)
 def test_the_centroid_is_never_nearer(name: str, hold: str | None) -> None:
     mechanism, targets, answers = projections(name, hold, few(name))
-    centred = pf.solve_ik(mechanism, targets, options=Options(hold=hold, projection="centroid"))
+    centred = pf.passes.solve(mechanism, targets, replace(pf.passes.Options.centroid(), hold=hold))
     check_feasible(mechanism, targets, centred)
     alike = np.equal(centred.held, answers.held)
     ours, theirs = distances(mechanism, answers)[alike], distances(mechanism, centred)[alike]

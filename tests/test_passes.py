@@ -1,4 +1,4 @@
-"""The paper's method, as `Options.paper()` and `projection="centroid"` give it: as honest as all else."""
+"""The paper's method, plain and accelerated, and its projection: as honest as all else."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ import pfabrik as pf
 from checks import INTERPRETED, excess_of_joints, gap_of_joints
 from machines import MACHINES
 from machines.trunks import TRUNKS
-from pfabrik import Mechanism, Options, Status
+from pfabrik import Mechanism, Status
+from pfabrik.passes import Options
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -24,10 +25,10 @@ EVERY: dict[str, Callable[[], Mechanism]] = {
     **TRUNKS,
 }
 WAYS = {
-    "paper": Options(tolerance=1e-2, max_rounds=50, exact=False, projection="centroid"),
-    "centroid": Options(projection="centroid"),
-    "nothing held": Options(projection="centroid", hold=None),
-    "position held": Options(projection="centroid", hold="position"),
+    "paper": Options(tolerance=1e-2, max_rounds=50),
+    "centroid": Options.centroid(),
+    "nothing held": replace(Options.centroid(), hold=None),
+    "position held": replace(Options.centroid(), hold="position"),
 }
 if not INTERPRETED:  # where a target out of reach takes seconds
     WAYS |= {
@@ -59,7 +60,7 @@ def any_targets(machine: Mechanism, n: int) -> np.ndarray:
 def test_limits_are_kept_and_loops_closed_for_any_target(name: str, way: str) -> None:
     machine, options = made(name), WAYS[way]
     targets = any_targets(machine, 4 if INTERPRETED else 8)
-    answer = pf.solve_ik(machine, targets, options=options)
+    answer = pf.passes.solve(machine, targets, options)
     assert np.isin(answer.status, (Status.REACHED, Status.PROJECTED)).all()
     assert gap_of_joints(machine, answer).max() <= 1e-9
     assert excess_of_joints(machine, answer).max() <= 1e-9
@@ -74,9 +75,9 @@ def test_a_path_keeps_its_working_mode_and_goes_on_from_answer_to_answer(name: s
     way = np.sin(np.linspace(0.0, np.pi, 9 if INTERPRETED else 21))
     targets = np.repeat(machine.home_pose[None], len(way), axis=0)
     targets[:, 0, 3] += 1.2 * way * machine.characteristic_length
-    ways = (Options.paper(), Options(projection="centroid"), Options.accelerated())
+    ways = (Options.paper(), Options.centroid(), Options.accelerated())
     for options in ways[:2] if INTERPRETED else ways:
-        found = pf.track(machine, targets, options=options)
+        found = pf.passes.track(machine, targets, options)
         assert (found.status == Status.PROJECTED).any()
         np.testing.assert_allclose(found.actuators[-1], found.actuators[0], atol=0.02 * machine.characteristic_length)
 
@@ -89,6 +90,6 @@ def test_arms_are_told_of_every_limit_of_their_struts_and_move_for_those_that_as
     targets[:, :3, 3] += rng.uniform(-0.8, 0.8, (150, 3)) * mechanism.characteristic_length
     targets[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.26, 0.26, (150, 3))).as_matrix()
     targets = targets[pf.solve_ik(mechanism, targets).status == Status.REACHED]
-    answers = pf.solve_ik(mechanism, targets, options=Options.paper())
+    answers = pf.passes.solve(mechanism, targets)
     assert len(targets) >= 25
     assert np.mean(answers.status == Status.REACHED) >= 0.92

@@ -148,7 +148,7 @@ def test_home_just_off_its_bound_is_reached() -> None:
 def test_a_coarse_tolerance_opens_no_loop() -> None:
     machine = arm_on_a_rail()
     targets = np.random.default_rng(2).uniform(-900, 900, (40, 3))
-    answer = pf.solve_ik(machine, targets, options=Options(exact=False, tolerance=1e3))
+    answer = pf.passes.solve(machine, targets, pf.passes.Options(tolerance=1e3))
     assert np.max(answer.residual) <= 1e-9 * machine.characteristic_length
     assert (answer.status <= Status.PROJECTED).all()
 

@@ -13,7 +13,7 @@ import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.decomposition.plan import compile_plan
-from pfabrik.reaching.joint_positions import joint_points, new_pass_results
+from pfabrik.passes.joint_positions import joint_points, new_pass_results
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
 

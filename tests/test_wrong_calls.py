@@ -78,8 +78,11 @@ TABLE: list[Case] = [
     (partial(pf.Solver, "delta"), "mechanism: found str"),
     (partial(pf.solve_ik, STEWART, HOME, options={"hold": None}), "options"),
     *((partial(Options, **wrong), "options") for wrong in (
-      {"hold": "nothing"}, {"tolerance": -1}, {"max_iterations": 0}, {"projection": "best"}, {"exact": "no"},
-      {"tolerance": True}, {"max_iterations": True}, {"rotation_tolerance": None})),
+      {"hold": "nothing"}, {"tolerance": -1}, {"tolerance": True}, {"rotation_tolerance": None})),
+    *((partial(pf.passes.Options, **wrong), "options") for wrong in (
+      {"hold": "nothing"}, {"method": "fast"}, {"max_iterations": 0}, {"max_rounds": True})),
+    (partial(pf.solve_ik, STEWART, HOME, options=pf.passes.Options()), "options: found PassOptions; expected Options"),
+    (partial(pf.passes.solve, STEWART, HOME, Options()), "options: found Options; expected PassOptions"),
     # modes
     *((partial(pf.working_modes, FIVE_BAR, (0, 0, 180), **{name: wrong}), f"{name}: found .* a whole number, at least")
       for name in ("most", "most_starts") for wrong in (-1, 2.5, True, "many", None)),

@@ -4,16 +4,17 @@ For readers of the P-FABRIK paper. You learn how to ask for the method as it was
 from those of the default, and on which targets.
 """
 
-# `Options.paper()` is the method with the paper's constants: up to K = 100 passes over all chains, a tolerance E = 0.01
-# mm, and a target that is moved to where the chains' ends agree until all of them reach it. The default solves legs in
-# closed form where one exists, and finds the nearest feasible pose by optimisation where a target is out of reach.
+# `pf.passes.solve` answers by the method with the paper's constants: up to K = 100 passes over all chains, a tolerance
+# E = 0.01 mm, and a target that is moved to where the chains' ends agree until all of them reach it. The default,
+# `pf.solve_ik`, solves legs in closed form where one exists, and finds the nearest feasible pose by optimisation where
+# a target is out of reach.
 import matplotlib.pyplot as plt
 import numpy as np
 
 import pfabrik as pf
 
-paper = pf.Options.paper()
-print(paper)
+print(pf.passes.Options.paper())
+methods = {"paper": pf.passes.solve, "default": pf.solve_ik}
 machines = {name: pf.load(name) for name in ("five_bar", "stewart")}
 
 # ## Targets within reach
@@ -33,8 +34,8 @@ def reachable(machine: pf.Mechanism, count: int) -> np.ndarray:
 
 for name, machine in machines.items():
     targets = reachable(machine, 200)
-    for label, options in (("paper", paper), ("default", None)):
-        answers = pf.solve_ik(machine, targets, options=options)
+    for label, solve in methods.items():
+        answers = solve(machine, targets)
         reached = np.mean(answers.status == pf.Status.REACHED)
         print(
             f"{name:8}  {label:7}  reached {reached:4.0%}, passes {np.mean(answers.iterations):.1f}, "
@@ -49,8 +50,8 @@ for name, machine in machines.items():
 # agree; the default's is the nearest.
 away = {"five_bar": [0, 40, 300], "stewart": pf.pose([60, 20, 290], rpy=[0, 10, 0], degrees=True)}
 for name, machine in machines.items():
-    for label, options in (("paper", paper), ("default", None)):
-        each = pf.solve_ik(machine, away[name], options=options)
+    for label, solve in methods.items():
+        each = solve(machine, away[name])
         print(f"{name:8}  {label:7}  {each.status.name}, {each.position_error:.2f} mm away")
 
 # One target proves nothing. So take 100 of them at random, and compare distances: 1 means as near as the default.
@@ -59,7 +60,7 @@ for name, machine in machines.items():
     offsets = random.normal(size=(100, 3)) * ([0, 1, 1] if name == "five_bar" else 1)
     offsets *= 1.5 * machine.characteristic_length / np.linalg.norm(offsets, axis=1, keepdims=True)
     targets = machine.home_pose[:3, 3] + offsets
-    by_paper, nearest = pf.solve_ik(machine, targets, options=paper), pf.solve_ik(machine, targets)
+    by_paper, nearest = pf.passes.solve(machine, targets), pf.solve_ik(machine, targets)
     is_out = (nearest.status == pf.Status.PROJECTED) & (by_paper.status == pf.Status.PROJECTED)
     ratio = (by_paper.position_error / nearest.position_error)[is_out]
     print(f"{name}: {is_out.sum()} of {len(targets)} out of reach for both; paper's distance / nearest:")
@@ -67,7 +68,7 @@ for name, machine in machines.items():
 
 # For the 5-bar, in its plane: grey lines lead from where the default ends to where the paper's method does.
 away = [0, 40, 0] + np.column_stack([np.zeros(40), np.linspace(-200, 120, 40), np.full(40, 280)])
-both = [pf.solve_ik(machines["five_bar"], away, options=options).pose[:, 1:3, 3].T for options in (None, paper)]
+both = [solve(machines["five_bar"], away).pose[:, 1:3, 3].T for solve in (pf.solve_ik, pf.passes.solve)]
 figure, axes = plt.subplots(figsize=(6.5, 2.8), layout="constrained")
 axes.plot(away[:, 1], away[:, 2], ".", label="target")
 axes.plot(*both[0], ".", label="default: nearest")
@@ -79,6 +80,6 @@ figure.savefig("answers.png", dpi=110)
 
 # ## Which one to use
 #
-# The default, unless you want to study or compare with the paper. `Options(projection="centroid")` combines the
-# default's accuracy with the paper's projection. Times are not shown here, as they differ from computer to computer:
+# The default, unless you want to study or compare with the paper. `Options.centroid()` combines the default's
+# accuracy with the paper's projection. Times are not shown here, as they differ from computer to computer:
 # `make reproduce` runs all experiments of the paper and measures them ([reproduction](../reproduction.md)).

@@ -21,6 +21,7 @@ Drive      actuation (a serial model's joints to motors, and back: torques, iner
 See        plot, plot_track, plot_travel, animate; view (in the browser); export_web (a page to send)
 Structure  decompose, SubChain; errors
 Exchange   interop (MuJoCo and URDF, in and out)
+Paper      passes (P-FABRIK's passes, plain or with half-spaces)
 
 Lengths are in the mechanism's own unit, angles in radians; a pose is a 4x4 matrix from platform to base coordinates;
 batch axes come first.
@@ -109,12 +110,12 @@ _NAMES = {
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 # Modules that are themselves public.
-_MODULES = ("errors", "interop")
+_MODULES = ("errors", "interop", "passes")
 
 __all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
-    from . import errors as errors, interop as interop
+    from . import errors as errors, interop as interop, passes as passes
     from .actuation.actuation import Actuation as Actuation, actuation as actuation
     from .answers.differential import (
         Mobility as Mobility,

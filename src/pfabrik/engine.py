@@ -6,16 +6,13 @@ from .apart.apart_engine import ApartEngine
 from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .closure.closure_engine import ClosureEngine
-from .closure.engine_contract import Engine, InverseEngine
-from .decomposition.decompose import positions_express
+from .closure.engine_contract import Engine
 from .derived import derived
 from .description.mechanism import Mechanism
 from .model import Model, model_of
-from .options import USUAL, Options
 from .platform.legs_engine import LegsEngine
 from .platform.seeds import seeds_of_other_assemblies
 from .platform.tip_engine import TipEngine, measured, read_at_tip
-from .reaching.solve import ReachingEngine
 
 
 def engine_of(mechanism: Mechanism) -> Engine:
@@ -24,16 +21,6 @@ def engine_of(mechanism: Mechanism) -> Engine:
     Of a mechanism without loops these are solved in time linear in the number of joints.
     """
     return _engine(model_of(mechanism))
-
-
-def inverse_engine_of(mechanism: Mechanism, options: Options = USUAL) -> InverseEngine:
-    """The engine that solves for targets.
-
-    The paper's passes and its projection work on joint positions. They are used if the options ask for them and joint
-    positions express all chains and the whole task.
-    """
-    nearest = options.exact and options.projection == "nearest"
-    return engine_of(mechanism) if nearest or not positions_express(mechanism) else _reaching(model_of(mechanism))
 
 
 def knows_all_modes(mechanism: Mechanism) -> bool:
@@ -70,14 +57,6 @@ def _completing(model: Model) -> Engine:
     if model.has_legs:
         return LegsEngine(model)
     return ChainEngine(model) if is_chain(model) else ClosureEngine(model)
-
-
-@derived
-def _reaching(model: Model) -> InverseEngine:
-    if model.mechanism.clearance is None:
-        return ReachingEngine(model, _usual(model))
-    free = _without_clearance(model)
-    return ApartEngine(model, _usual(free), ReachingEngine(free, _usual(free)))
 
 
 def _without_clearance(model: Model) -> Model:

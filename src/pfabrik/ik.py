@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import hypot
 
 import numpy as np
@@ -12,10 +13,10 @@ from .answers.start_configuration import Start, start_of
 from .arrays import Floats
 from .closure.closure_engine import close_on_targets, to_answers
 from .closure.configurations import Configurations
+from .closure.engine_contract import InverseEngine
 from .closure.parasitic import has_parasitic_motion
 from .description.mechanism import Mechanism
-from .engine import engine_of, inverse_engine_of, knows_all_modes
-from .errors import InvalidArgument
+from .engine import engine_of, knows_all_modes
 from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, PROJECTED, REACHED, Rows
 from .model import model_of
 from .options import Options, checked_options
@@ -24,11 +25,7 @@ from .tolerances import TOLERANCES
 
 
 def solve_ik(
-    mechanism: Mechanism,
-    target: Target,
-    *misplaced: object,
-    start: Start | None = None,
-    options: Options | None = None,
+    mechanism: Mechanism, target: Target, *, start: Start | None = None, options: Options | None = None
 ) -> Solution:
     """Actuator values that put the end effector on a target, or as near as possible, with every limit kept.
 
@@ -48,16 +45,24 @@ def solve_ik(
     ------
     InvalidArgument : a target or start of the wrong shape, or (unless marked) rows that are no poses.
     """
-    if misplaced:
-        expected = "one target, such as [x, y, z], and the rest by name: solve_ik(m, target, start=..., options=...)"
-        raise InvalidArgument("target", f"{1 + len(misplaced)} arguments", expected)
     options = checked_options(options)
+    return solve_by(engine_of, mechanism, target, start, options)
+
+
+def solve_by(
+    choose_engine: Callable[[Mechanism], InverseEngine],
+    mechanism: Mechanism,
+    target: Target,
+    start: Start | None,
+    options: Options,
+) -> Solution:
+    """As `solve_ik`, by the engine that is chosen."""
     targets, shape = as_targets(mechanism, target)
     begin, before = start_of(mechanism, start, shape), start._request if isinstance(start, Solution) else None
     if begin is not None and before is not None and _is_certified(begin, before, targets, options):
         return Solution(mechanism, begin, shape, before)
     keep_mode = keeps_mode(options, begin)
-    solutions = inverse_engine_of(mechanism, options).answer(targets, begin, options, keep_mode=keep_mode)
+    solutions = choose_engine(mechanism).answer(targets, begin, options, keep_mode=keep_mode)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()

@@ -10,7 +10,7 @@ from .answers.start_configuration import Start, start_of
 from .closure.attempts import Attempt
 from .description.mechanism import Mechanism
 from .description.mechanism_html import card
-from .engine import inverse_engine_of
+from .engine import engine_of
 from .errors import InvalidArgument
 from .feasibility import feasibility
 from .ik import keeps_mode, solve_ik
@@ -105,9 +105,7 @@ def search_log(
         raise InvalidArgument("target", f"{len(targets)} targets", "a single one")
     solution = solve_ik(mechanism, targets[0], start=start, options=options)
     begin = start_of(mechanism, start, ())
-    attempts = tuple(
-        inverse_engine_of(mechanism, options).attempts(targets, begin, options, keep_mode=keeps_mode(options, begin))
-    )
+    attempts = tuple(engine_of(mechanism).attempts(targets, begin, options, keep_mode=keeps_mode(options, begin)))
     return SearchLog(solution, attempts, _blocked_by(mechanism, targets[0], start))
 
 

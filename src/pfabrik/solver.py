@@ -14,7 +14,7 @@ from .answers.status import Status
 from .arrays import Floats
 from .closure.configurations import new_rows
 from .description.mechanism import Mechanism, checked_mechanism
-from .engine import engine_of, inverse_engine_of
+from .engine import engine_of
 from .errors import InvalidArgument
 from .first_answers import prepare
 from .fk import Actuators, solve_fk
@@ -59,10 +59,10 @@ class Solver:
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
         self._start, begin = start, start_of(mechanism, start, ())
         prepare(mechanism)
-        inverse, keep_mode = inverse_engine_of(mechanism, self.options), keeps_mode(self.options, start)
+        engine, keep_mode = engine_of(mechanism), keeps_mode(self.options, start)
         self._rows, self._target = new_rows(model_of(mechanism), 1), np.eye(4)[None]
-        self._prepared = inverse.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
-        self._prepared_forward = engine_of(mechanism).prepared_forward(begin, self._rows)
+        self._prepared = engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
+        self._prepared_forward = engine.prepared_forward(begin, self._rows)
         self._reach, self._assemble = (call and call[0] for call in (self._prepared, self._prepared_forward))
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
         self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])

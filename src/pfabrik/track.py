@@ -18,9 +18,10 @@ from .checks import require_callable
 from .closure.close import measure_configurations
 from .closure.configurations import Configurations
 from .closure.continuation import continued
+from .closure.engine_contract import InverseEngine, OnProgress
 from .description.mechanism import Mechanism
 from .description.task import task_of
-from .engine import engine_of, inverse_engine_of
+from .engine import engine_of
 from .errors import InvalidArgument
 from .kernels.rows import POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from .model import model_of
@@ -73,20 +74,38 @@ def track(
     """
     options = checked_options(options)
     require_callable("on_progress", on_progress)
+    poses = as_path(mechanism, targets, options)
+    pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
+    solutions, request = follow_by(engine_of(mechanism), mechanism, poses, start, options, on_progress)
+    return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
+
+
+def as_path(mechanism: Mechanism, targets: Target, options: Options) -> Floats:
+    """The targets of a path, (n, 4, 4); InvalidArgument for others, and for options that change the working mode."""
     poses, shape = as_targets(mechanism, targets)
     if len(shape) != 1:
         raise InvalidArgument("targets", f"batch shape {shape}", "a path: shape (n, 4, 4) or (n, 3)")
     if options.working_mode == "any":
         raise InvalidArgument("options.working_mode", "'any'", "'keep' or None: a machine cannot change it on its way")
-    pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
+    return poses
+
+
+def follow_by(
+    engine: InverseEngine,
+    mechanism: Mechanism,
+    poses: Floats,
+    start: Start | None,
+    options: Options,
+    on_progress: OnProgress | None,
+) -> tuple[Configurations, PoseRequest]:
+    """Solve for a path (n, 4, 4) as `track` does, by an engine; and what was asked."""
     begin = start_of(mechanism, start, ())
-    solutions = inverse_engine_of(mechanism, options).follow(poses, begin, options, on_progress)
+    solutions = engine.follow(poses, begin, options, on_progress)
     solutions = _kept_assembly(mechanism, poses, begin, solutions, options)
     if begin is not None:
         _continue_turns(mechanism, solutions.rows, begin.rows.actuators[0])
-    refuse_invalid(poses, shape, solutions.rows.status, options)
-    request = PoseRequest(poses.copy(), options)
-    return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
+    refuse_invalid(poses, poses.shape[:1], solutions.rows.status, options)
+    return solutions, PoseRequest(poses.copy(), options)
 
 
 def _kept_assembly(

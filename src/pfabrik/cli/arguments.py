@@ -150,7 +150,7 @@ def named_joints(option: tuple[str, ...], words: tuple[str, ...]) -> tuple[str, 
 
 
 def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--hold`` and ``--projection``, which the command gets as `options` for the solver."""
+    """Add ``--hold``, which the command gets as `options` for the solver."""
 
     @click.option(
         "--hold",
@@ -159,22 +159,9 @@ def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
         show_default=True,
         help="What an answer to a target out of reach keeps exactly, if any pose does.",
     )
-    @click.option(
-        "--projection",
-        type=click.Choice(["nearest", "centroid"]),
-        default="nearest",
-        show_default=True,
-        help="Which answer that is: the nearest, or where the chains' ends agree.",
-    )
     @functools.wraps(command)
-    def with_options(
-        *,
-        hold: Literal["orientation", "position", "none"],
-        projection: Literal["nearest", "centroid"],
-        **parameters: Any,
-    ) -> Any:
-        options = pf.Options(hold=None if hold == "none" else hold, projection=projection)
-        return command(options=options, **parameters)
+    def with_options(*, hold: Literal["orientation", "position", "none"], **parameters: Any) -> Any:
+        return command(options=pf.Options(hold=None if hold == "none" else hold), **parameters)
 
     return with_options
 
@@ -186,8 +173,6 @@ def note_left_out(given: Iterable[str], mechanism: pf.Mechanism) -> None:
 
 
 def note_unused_projection(reason: str) -> None:
-    """Note that ``--hold`` or ``--projection`` is given where nothing is projected."""
-    context = click.get_current_context()
-    for name in ("hold", "projection"):
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            note(f"--{name} has no effect with {reason}: nothing is projected")
+    """Note that ``--hold`` is given where nothing is projected."""
+    if click.get_current_context().get_parameter_source("hold") is ParameterSource.COMMANDLINE:
+        note(f"--hold has no effect with {reason}: nothing is projected")

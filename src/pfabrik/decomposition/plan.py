@@ -1,4 +1,4 @@
-"""Sub-chains as arrays for the kernels of `reaching`, with the names that go with them."""
+"""Sub-chains as arrays for the kernels of `passes`, with the names that go with them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..derived import derived
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
-from ..kernels.reaching import plan as P
+from ..kernels.passes import plan as P
 from .decompose import beyond_positions, decompose, express_on
 from .positions import BranchForm, express_trunk
 
@@ -25,7 +25,7 @@ class JointPoint:
     node: int
     shift: float
     axis: Floats
-    carrier: int  # the body that the axis turns with: as of `kernels.reaching.plan`, or -1 for the platform
+    carrier: int  # the body that the axis turns with: as of `kernels.passes.plan`, or -1 for the platform
 
 
 @dataclass(frozen=True)

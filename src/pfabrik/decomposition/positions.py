@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Floats, Record, Records
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
-from ..kernels.reaching import plan as P
+from ..kernels.passes import plan as P
 from ..tolerances import TOLERANCES
 from .joint_nodes import JointNode, NotExpressible, joint_nodes_along
 
@@ -34,7 +34,7 @@ class BranchForm:
     ----------
     joints : names of the joints at each node; several where they act as one.
     shifts : from each node to the centre of its joints, along the axis of its hinge, (nodes,) [length].
-    nodes, record, cones : as of `kernels.reaching.plan`; a node that is stored has the place 0.
+    nodes, record, cones : as of `kernels.passes.plan`; a node that is stored has the place 0.
     determined : joints whose value follows from the nodes.
     """
 

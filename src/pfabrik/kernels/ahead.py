@@ -21,15 +21,15 @@ from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.margin_blocks import margins_in_blocks
+from .passes import plan as P
+from .passes.accelerated import solve_by_half_spaces
+from .passes.move_trunks import move_trunks
+from .passes.solve import solve_by_passes
 from .platform.answer_rows import answer_rows
 from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
 from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
-from .reaching import plan as P
-from .reaching.accelerated import solve_by_half_spaces
-from .reaching.move_trunks import move_trunks
-from .reaching.solve import solve_by_passes
 from .replay import replay
 from .timing import fastest, second_derivatives
 from .walk_path import walk_path

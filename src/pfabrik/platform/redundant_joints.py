@@ -15,10 +15,10 @@ from ..decomposition.plan import compile_trunks
 from ..derived import derived
 from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.legs import records as K
+from ..kernels.passes import plan as P
 from ..kernels.platform import redundant_sets as R
 from ..kernels.platform.nearest import NO_STARTS
 from ..kernels.platform.search_records import SETTINGS, Along, MultistartPlan
-from ..kernels.reaching import plan as P
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..tolerances import TOLERANCES
@@ -95,7 +95,7 @@ def step_redundant_joints(
     all_trunks = _trunks(model)
     if not all_trunks:
         return places[:0], start_poses
-    from ..kernels.reaching.move_trunks import move_trunks
+    from ..kernels.passes.move_trunks import move_trunks
 
     targets, margin = np.ascontiguousarray(targets[places]), TOLERANCES.inside * model.length
     for trunks in all_trunks:

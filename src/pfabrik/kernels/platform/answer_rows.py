@@ -7,7 +7,7 @@ from numpy import zeros
 from ...arrays import Floats, Ints
 from .._jit import opener, search
 from ..legs.open_table import SAMPLE
-from ..reaching import plan as P
+from ..passes import plan as P
 from ..rows import PROJECTED
 from .answer_row import answer_row
 from .assemble_row import assemble_row

@@ -10,10 +10,10 @@ import numpy as np
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..legs.records import Table
-from ..reaching.half_spaces import Asks, new_asks
-from ..reaching.move_trunks import move_trunk
-from ..reaching.plan import Configuration, Plan, Settings
-from ..reaching.solve import new_configuration
+from ..passes.half_spaces import Asks, new_asks
+from ..passes.move_trunks import move_trunk
+from ..passes.plan import Configuration, Plan, Settings
+from ..passes.solve import new_configuration
 from ..vectors import copy_table, sub, turn
 from .nearest import NearestScratch, nearest_of_row, new_nearest_scratch
 from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
@@ -30,7 +30,7 @@ MOVING = np.dtype(
 
 
 class MovedTrunks(NamedTuple):
-    """Free redundant joints as the trunks of chains in joint positions, as of `reaching.plan`."""
+    """Free redundant joints as the trunks of chains in joint positions, as of `passes.plan`."""
 
     nodes: Records
     branches: Records

@@ -21,17 +21,19 @@ from ..closure.engine_contract import Engine, InverseEngine
 from ..closure.projection import ProjectionMode, held_parts, projection_modes
 from ..decomposition.plan import compile_plan
 from ..derived import derived
+from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import LOCKED
 from ..kernels.legs.records import REDUNDANT
-from ..kernels.reaching import plan as P
+from ..kernels.passes import plan as P
 from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
-from ..model import Model
+from ..model import Model, model_of
 from ..options import Options
 from ..platform.answers import sides_at
 from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of
+from .pass_options import PassOptions
 
 NEAR = 1e-3
 """Tolerance of the passes [L] if exact answers follow: loops are closed from there."""
@@ -42,41 +44,40 @@ STEPS = 8
 ROWS_A_BLOCK = 64
 
 
-class ReachingEngine(InverseEngine):
+class PassesEngine(InverseEngine):
     """The paper's method, for mechanisms whose chains can be expressed by joint positions.
 
     Passes bring the ends of chains to the target, or else move the target; from there the loops are closed exactly.
-    With `Options.exact`, targets that another engine reaches are answered by that engine. It also answers targets for
-    which the passes end in no feasible configuration.
+    The usual engine answers targets for which that ends in no feasible configuration, and by the "centroid" method
+    those within reach.
     """
 
-    def __init__(self, model: Model, exact: Engine) -> None:
-        self._model, self.mechanism, self._exact = model, model.mechanism, exact
-        self._compiled, self._held = compile_plan(model.mechanism), holding(model.mechanism)
+    def __init__(self, mechanism: Mechanism, usual: Engine, options: PassOptions) -> None:
+        self.mechanism, self._usual, self._options = mechanism, usual, options
+        self._model = model_of(mechanism if mechanism.clearance is None else mechanism.with_clearance(None))
+        self._compiled, self._held = compile_plan(mechanism), holding(mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose."""
         is_valid = are_poses(targets)
-        if options.exact:
-            solutions = self._exact.answer(targets, start, options, keep_mode=keep_mode)
-            missed = np.flatnonzero(is_valid & (solutions.rows.status != REACHED))
-            if not len(missed):
-                return solutions
-            solutions = Configurations(solutions.rows, solutions.coordinates)
+        targets, start = targets[is_valid], _at(start, np.flatnonzero(is_valid))
+        if self._options.method != "centroid":
+            solutions = self._by_passes(made_exact(targets), start, keep_mode)
+            failed = np.flatnonzero(solutions.rows.status == FAILED)
+            if len(failed):
+                usual = self._usual.answer(targets[failed], _at(start, failed), options, keep_mode=keep_mode)
+                solutions.put(failed, usual, np.ones(len(failed), bool))
+            return solutions.scatter(is_valid)
+        solutions = self._usual.answer(targets, start, options, keep_mode=keep_mode)
+        missed = np.flatnonzero(solutions.rows.status != REACHED)
+        if len(missed):
             starts = _at(start, missed)
-            projected = self._by_passes(made_exact(targets[missed]), starts, options, keep_mode)
-            projected = self._exact.rested(projected, starts)
+            projected = self._usual.rested(self._by_passes(made_exact(targets[missed]), starts, keep_mode), starts)
             is_feasible = projected.rows.status != FAILED
+            solutions = Configurations(solutions.rows, solutions.coordinates)
             solutions.put(missed[is_feasible], projected, is_feasible)
-            return solutions
-        starts = _at(start, np.flatnonzero(is_valid))
-        solutions = self._by_passes(made_exact(targets[is_valid]), starts, options, keep_mode)
-        failed = np.flatnonzero(solutions.rows.status == FAILED)
-        if len(failed):
-            fallback = self._exact.answer(targets[is_valid][failed], _at(starts, failed), options, keep_mode=keep_mode)
-            solutions.put(failed, fallback, np.ones(len(failed), bool))
         return solutions.scatter(is_valid)
 
     def follow(
@@ -97,14 +98,11 @@ class ReachingEngine(InverseEngine):
             coordinates[i] = previous.coordinates[0]
         return Configurations(take(rows, is_valid), coordinates[is_valid]).scatter(is_valid)
 
-    def _by_passes(
-        self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool
-    ) -> Configurations:
+    def _by_passes(self, targets: Floats, start: Configurations | None, keep_mode: bool) -> Configurations:
         """Solve for poses by passes; FAILED where infeasible, or where the working mode is to be kept and is not."""
         begin = start_coordinates(self._model, start)
         begin = np.repeat(begin, len(targets), axis=0) if len(begin) == 1 else begin
-        projection = projection_modes(self._model.path_closure, options.hold, options.rotation_length)[0]
-        solutions = self._solve_from(targets, begin, options, projection, keep_mode)
+        solutions = self._solve_from(targets, begin, keep_mode)
         if keep_mode:
             has_left_mode = (self._sides(solutions) * self._sides(start) < 0.0).any(axis=1)
             solutions.rows.status[has_left_mode] = FAILED
@@ -119,18 +117,16 @@ class ReachingEngine(InverseEngine):
         sides = home if configurations is None else sides_at(self._model, configurations)
         return np.where(has_side, sides, 0.0)
 
-    def _solve_from(
-        self, targets: Floats, begin: Floats, options: Options, projection: ProjectionMode, keep_mode: bool
-    ) -> Configurations:
-        """Solve for poses by passes from joint coordinates (n, columns); FAILED where the loops do not close."""
-        closure = self._model.path_closure
+    def _solve_from(self, targets: Floats, begin: Floats, keep_mode: bool) -> Configurations:
+        """Solve for poses by passes from joint coordinates (n, columns); FAILED where that ends in none feasible."""
+        closure, options = self._model.path_closure, self._options
+        projection = projection_modes(closure, options.hold, options.rotation_length)[0]
         settings = settings_of(self._model, options, projection)._replace(keep_sides=int(keep_mode))
         clipped = clip_targets(self.mechanism, targets)
-        if options.exact and not self._is_struts:
-            placed, results = self._move_to_fit(clipped, begin, settings, options)
+        if options.method == "centroid" and not self._is_struts:
+            placed, results = self._move_to_fit(clipped, begin, settings)
         else:
-            pass_settings = settings._replace(max_iterations=1) if options.exact else settings
-            results = self._run(clipped, begin, pass_settings, options)
+            results = self._run(clipped, begin, settings)
             placed = place(closure, self._compiled, begin, results)
         margin = TOLERANCES.inside
         closed = close(closure, placed.coordinates, placed.poses, platform=projection.held, limits=True, margin=margin)
@@ -144,11 +140,11 @@ class ReachingEngine(InverseEngine):
         solutions = to_answers(self._model, closed, targets, holds, options)
         solutions.rows.counters[:, ITERATIONS] = results.iterations
         solutions.rows.counters[:, ROUNDS] = results.rounds
+        if self.mechanism.clearance is not None:
+            solutions.rows.status[~self._usual.as_configurations(closed).is_within_limits] = FAILED
         return solutions
 
-    def _move_to_fit(
-        self, targets: Floats, begin: Floats, settings: P.Settings, options: Options
-    ) -> tuple[Closing, P.PassResults]:
+    def _move_to_fit(self, targets: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.PassResults]:
         """Move the platform round by round to where all chains reach it, each chain fitted by least squares.
 
         This replaces passes, which can get stuck at the ranges of joints. The remaining gap of a chain is at its end.
@@ -161,7 +157,7 @@ class ReachingEngine(InverseEngine):
         for _ in range(settings.max_rounds):
             start, poses = placed.coordinates[unsolved], placed.poses[unsolved]
             fitted = close(closure, start, poses, platform=self._held, limits=True, max_iterations=STEPS)
-            revised = self._run(fitted.poses.copy(), fitted.coordinates, once, options)
+            revised = self._run(fitted.poses.copy(), fitted.coordinates, once)
             if not self.mechanism.end_effector_is_joint:
                 fitted.poses[:] = revised.poses
             fitted.poses[:, :3, 3] = revised.poses[:, :3, 3]
@@ -182,9 +178,9 @@ class ReachingEngine(InverseEngine):
         branches = self._compiled.plan.branches
         return bool((branches["last"] - branches["first"] <= 1).all() and (branches["carrier"] == 0).all())
 
-    def _run(self, targets: Floats, begin: Floats, settings: P.Settings, options: Options) -> P.PassResults:
+    def _run(self, targets: Floats, begin: Floats, settings: P.Settings) -> P.PassResults:
         """Run the kernel on all rows, on all cores; rotations of targets of a joint end effector are overwritten."""
-        solve = _kernel(is_accelerated(options))
+        solve = _kernel(self._options.method == "accelerated")
         if self.mechanism.end_effector_is_joint:  # a point has no orientation; that of home is used
             targets[:, :3, :3] = np.eye(3)
         seeds = positions_of(self.mechanism, self._compiled, begin)
@@ -197,18 +193,13 @@ class ReachingEngine(InverseEngine):
         return results
 
 
-def is_accelerated(options: Options) -> bool:
-    """True if passes are those with exact meetings and half-spaces."""
-    return not options.exact and options.passes == "accelerated"
-
-
 def _kernel(accelerated: bool) -> Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.PassResults], None]:
     """The kernel of the passes asked for; kernels are loaded where they are needed."""
     if accelerated:
-        from ..kernels.reaching.accelerated import solve_by_half_spaces
+        from ..kernels.passes.accelerated import solve_by_half_spaces
 
         return solve_by_half_spaces
-    from ..kernels.reaching.solve import solve_by_passes
+    from ..kernels.passes.solve import solve_by_passes
 
     return solve_by_passes
 
@@ -219,14 +210,15 @@ def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configuration
 
 
 @derived
-def settings_of(model: Model, options: Options, projection: ProjectionMode) -> P.Settings:
-    """Options as the kernel reads them; passes end sooner if exact steps follow."""
+def settings_of(model: Model, options: PassOptions, projection: ProjectionMode) -> P.Settings:
+    """Options as the kernel reads them; one pass a round, that ends sooner, if exact steps follow."""
     length, free = model.length, [weight != LOCKED and weight > 0.0 for weight in projection.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)
     turning = max((weight for weight in projection.weights[3:] if weight != LOCKED), default=0.0)
+    is_finished = options.method == "centroid"
     return P.Settings(
-        enough=max(tolerance, NEAR * length) if options.exact else tolerance,
-        max_iterations=int(options.max_iterations),
+        enough=max(tolerance, NEAR * length) if is_finished else tolerance,
+        max_iterations=1 if is_finished else int(options.max_iterations),
         max_rounds=int(options.max_rounds),
         free=P.TRANSLATES * any(free[:3]) + P.TURNS * any(free[3:]),
         keep_sides=0,

@@ -13,7 +13,7 @@ from ..decomposition.plan import CompiledPlan, compile_plan
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..description.task import Weights
-from ..kernels.reaching import plan as P
+from ..kernels.passes import plan as P
 from ..motion.closure import Closure
 from ..motion.displacements import columns, displacements
 from ..rotations import from_rotvec

@@ -1,0 +1,13 @@
+"""P-FABRIK, the paper's method: forward and backward passes on joint positions, and its projection of what they miss.
+
+answer = pf.passes.solve(m, target)                                  # the paper's text, K = 100 and E = 1e-2
+answer = pf.passes.solve(m, target, pf.passes.Options.accelerated())  # exact meetings and half-spaces
+track = pf.passes.track(m, targets)                                  # each target from the answer before it
+
+Whatever `solve_ik` and `track` ask for needs none of it.
+"""
+
+from .pass_options import PassOptions as Options
+from .solve import solve, track
+
+__all__ = ["Options", "solve", "track"]

@@ -1,0 +1,61 @@
+"""Inverse kinematics and paths by the paper's method."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from ..answers.solution import Solution
+from ..answers.start_configuration import Start
+from ..answers.tracked import Track, pace_of
+from ..closure.engine_contract import InverseEngine
+from ..decomposition.decompose import positions_express
+from ..derived import derived
+from ..description.mechanism import Mechanism
+from ..engine import engine_of
+from ..ik import solve_by
+from ..model import Model, model_of
+from ..options import options_or
+from ..targets import Target
+from ..track import as_path, follow_by
+from .pass_options import PassOptions
+from .passes_engine import PassesEngine
+
+
+def solve(
+    mechanism: Mechanism, target: Target, options: PassOptions | None = None, *, start: Start | None = None
+) -> Solution:
+    """Answers as of `solve_ik`, by passes; its own where joint positions do not express the mechanism (`decompose`).
+
+    Parameters
+    ----------
+    target, start : as of `solve_ik`.
+    options : default `Options.paper()`.
+    """
+    options = options_or(PAPER, options)
+    return solve_by(lambda each: _engine(model_of(each), options), mechanism, target, start, options)
+
+
+def track(
+    mechanism: Mechanism, targets: Target, options: PassOptions | None = None, *, start: Start | None = None
+) -> Track:
+    """A path as of `pfabrik.track`, by passes.
+
+    Parameters
+    ----------
+    targets, start : as of `pfabrik.track`.
+    options : default `Options.paper()`.
+    """
+    options = options_or(PAPER, options)
+    poses = as_path(mechanism, targets, options)
+    solutions, request = follow_by(_engine(model_of(mechanism), options), mechanism, poses, start, options, None)
+    again = partial(track, mechanism, options=options)
+    return Track(mechanism, solutions, request, again, pace_of(mechanism, len(poses), None, None, None))
+
+
+@derived
+def _engine(model: Model, options: PassOptions) -> InverseEngine:
+    usual = engine_of(model.mechanism)
+    return PassesEngine(model.mechanism, usual, options) if positions_express(model.mechanism) else usual
+
+
+PAPER = PassOptions.paper()
