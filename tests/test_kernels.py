@@ -71,25 +71,26 @@ def pass_once(plan, b, now, forward):
         reach.reach_backward(plan, b, now)
 
 
-def asks_of(plan, b, now, settings, column, free, goal):
-    asks = half_spaces.new_asks(plan)
-    asks.goal[:] = goal
-    half_spaces.open_asks(asks, half_spaces.PLATFORM + plan.trunk_joints.shape[0], column, free)
-    gap = half_spaces.ask_for_branch(plan, b, now, settings, asks)
-    k = asks.frame[0]
-    return gap, asks.problem.G[:k, :-1].copy(), asks.problem.h[:k].copy(), asks.equal[:k].copy()
+def half_spaces_of(plan, b, now, settings, column, window):
+    spaces = half_spaces.new_half_spaces(plan)
+    programme = spaces.programme[0]
+    programme["window"], programme["trunk_scale"], programme["lever"] = window, 1.0, settings.lever
+    half_spaces.begin_programme(spaces, half_spaces.PLATFORM + plan.trunk_joints.shape[0], column, settings.free)
+    half_spaces.add_branch(plan, b, now, settings, spaces)
+    k = programme["n_rows"]
+    return spaces.problem.G[:k, :-1].copy(), spaces.problem.h[:k].copy()
 
 
-def least_step(plan, rows, h, equal):
-    asks = half_spaces.new_asks(plan)
+def least_step(plan, rows, h, equations=()):
+    spaces = half_spaces.new_half_spaces(plan)
     k, n = rows.shape
-    half_spaces.open_asks(asks, n, 0, 0)
+    half_spaces.begin_programme(spaces, n, 0, 0)
     for i in range(k):
         for j in range(n):
-            asks.problem.G[i, j] = rows[i, j]
-        half_spaces.close_row(asks, h[i], equal[i])
-    half_spaces.least_step(asks)
-    return asks.x[:n].copy()
+            spaces.problem.G[i, j] = rows[i, j]
+        half_spaces.keep_row(spaces, h[i], i in equations)
+    half_spaces.least_step(spaces)
+    return spaces.x[:n].copy()
 
 
 def place_ends(plan, now):
@@ -493,7 +494,6 @@ def test_half_spaces_are_the_slopes_of_what_limits_are_exceeded_by(name: str) ->
     plan, rng, step = compiled.plan, np.random.default_rng(17), 1e-6
     length, column, lever = plan.length, half_spaces.PLATFORM, 0.7 * plan.length
     settings = P.Settings(1e-9 * length, 10, 0, P.TRANSLATES + P.TURNS, 0, lever)
-    goal = np.array([0.0, 1e9 * length, 1.0, lever])
     now = at_home(compiled)
     disturb(compiled, now, rng, 0.1)
     pose, trunks = now.pose.copy(), now.trunks.copy()
@@ -505,8 +505,7 @@ def test_half_spaces_are_the_slopes_of_what_limits_are_exceeded_by(name: str) ->
         slides = plan.trunk_joints["kind"] == P.SLIDE
         now.trunks[:] = trunks + x[6:] * np.where(slides, length, 1.0)
         move_carriers(plan, now)
-        _, rows, h, _ = asks_of(plan, b, now, settings, column, settings.free, goal)
-        return rows, h
+        return half_spaces_of(plan, b, now, settings, column, 1e9 * length)
 
     for b in range(min(len(plan.branches), 3)):
         n = column + len(plan.trunk_joints)
@@ -523,23 +522,23 @@ def test_the_least_step_is_that_of_a_general_optimiser() -> None:
     plan, rng = compile_plan(TRUNKS["trunk with struts"]()).plan, np.random.default_rng(18)
     for _ in range(20):
         rows, inside = rng.normal(size=(7, 4)), rng.normal(size=4)
-        equal = np.array([1, 0, 0, 0, 0, 0, 0])
-        h = -rows @ inside - np.where(equal, 0.0, rng.uniform(0, 1, 7))
+        h = -rows @ inside - np.where(np.arange(7) == 2, 0.0, rng.uniform(0, 1, 7))
         found = minimize(
             lambda x: x @ x,
             inside,
             constraints=[
-                {"type": "ineq", "fun": lambda x, rows=rows, h=h: -(rows[1:] @ x + h[1:])},
-                {"type": "eq", "fun": lambda x, rows=rows, h=h: rows[:1] @ x + h[:1]},
+                {"type": "ineq", "fun": lambda x, rows=rows, h=h: -(np.delete(rows, 2, 0) @ x + np.delete(h, 2))},
+                {"type": "eq", "fun": lambda x, rows=rows, h=h: rows[2:3] @ x + h[2:3]},
             ],
             method="SLSQP",
             options={"ftol": 1e-14, "maxiter": 200},
         )
-        np.testing.assert_allclose(least_step(plan, rows, h, equal), found.x, atol=1e-4)
+        twice = np.concatenate([rows, rows[2:3]]), np.append(h, h[2]), (2, 7)  # one equation implies the other
+        np.testing.assert_allclose(least_step(plan, *twice), found.x, atol=1e-4)
 
 
 def test_half_spaces_that_contradict_are_missed_alike() -> None:
     plan = compile_plan(TRUNKS["trunk with struts"]()).plan
     rows, h = np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([0.3, 0.5])  # x <= -0.3, x >= 0.5
-    x = least_step(plan, rows, h, np.zeros(2, int))
+    x = least_step(plan, rows, h)
     np.testing.assert_allclose(x, [0.1, 0.0], atol=1e-6)

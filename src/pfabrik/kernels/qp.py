@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ._jit import routine
+from ._jit import allocator, routine
 
 # Violation up to which a limit counts as kept; violation that may remain when no more limit can be made active; share
-# of a gradient's square, orthogonal to the active gradients, below which it counts as dependent on them.
-KEPT, ROUNDED, DEPENDENT = 1e-14, 1e-9, 1e-12
+# of a gradient's square, orthogonal to the active gradients, below which it counts as dependent on them, and that below
+# which an equation counts as following from others.
+KEPT, ROUNDED, DEPENDENT, IMPLIED = 1e-14, 1e-9, 1e-12, 1e-6
 
 
 class QP(NamedTuple):
@@ -36,6 +37,7 @@ class QP(NamedTuple):
     active: Ints  # (n,): indices of the active limits
 
 
+@allocator
 def new_qp(n: int, k: int) -> QP:
     """Allocate a programme of up to n unknowns and k limits."""
     return QP(
@@ -87,11 +89,11 @@ def apply_inverse(L: Floats, n: int, b: Floats, x: Floats) -> None:
 
 
 @routine
-def worst_violated(p: QP, n: int, k: int) -> tuple[int, float]:
-    """The limit violated most, or -1; and its violation."""
+def worst_violated(p: QP, n: int, first: int, k: int) -> tuple[int, float]:
+    """The limit violated most, of those from the first on, or -1; and its violation."""
     worst, most = -1, KEPT
     G, x = p.G, p.x
-    for c in range(k):
+    for c in range(first, k):
         value = p.h[c]
         for i in range(n):
             value += G[c, i] * x[i]
@@ -154,13 +156,16 @@ def drop(p: QP, n: int, m: int, a: int) -> None:
 
 
 @routine
-def take_up(p: QP, n: int, m: int, c: int, violation: float) -> int:
-    """Make limit `c` active; the number of active limits, or -1 if it contradicts the others."""
+def take_up(p: QP, n: int, kept: int, m: int, c: int, violation: float) -> int:
+    """Make limit `c` active; the number of active limits, or -1 if it contradicts the others.
+
+    The first `kept` active ones are equations, which are never dropped.
+    """
     multiplier = 0.0
     for _change in range(4 * n + 4):
         rate = divide(p, n, m, c)
         leaving, limit = -1, math.inf
-        for a in range(m):
+        for a in range(kept, m):
             if p.share[a] > 0.0 and p.multipliers[p.active[a]] < limit * p.share[a]:
                 leaving, limit = a, p.multipliers[p.active[a]] / p.share[a]
         full = violation / rate if rate > 0.0 else math.inf
@@ -184,19 +189,49 @@ def take_up(p: QP, n: int, m: int, c: int, violation: float) -> int:
 
 
 @routine
+def keep_equations(p: QP, n: int, equations: int) -> int:
+    """Move x to the nearest point where the first rows are equations, and make active those that others do not imply.
+
+    Returns how many are active.
+    """
+    m = 0
+    for c in range(equations):
+        if m == n:
+            break
+        full_rate, rate = put_pull(p, n, m, c)
+        if rate > IMPLIED * full_rate:
+            off = p.h[c]
+            for i in range(n):
+                off += p.G[c, i] * p.x[i]
+            divide(p, n, m, c)
+            for i in range(n):
+                p.x[i] -= off / rate * p.step[i]
+            p.active[m] = c
+            m += 1
+    return m
+
+
+@routine
 def solve_qp(p: QP, n: int, k: int) -> bool:
     """Solve a programme with factorised H; False if no x keeps all limits."""
+    return solve_with_equations(p, n, 0, k)
+
+
+@routine
+def solve_with_equations(p: QP, n: int, equations: int, k: int) -> bool:
+    """As `solve_qp`, with G x + h = 0 for the first rows; those that contradict the ones before are left out."""
     for c in range(k):
         p.multipliers[c] = 0.0
     apply_inverse(p.factor, n, p.g, p.x)
     for i in range(n):
         p.x[i] = -p.x[i]
-    m = 0
+    kept = keep_equations(p, n, equations)
+    m = kept
     for _round in range(4 * (n + k)):
-        c, violation = worst_violated(p, n, k)
+        c, violation = worst_violated(p, n, equations, k)
         if c < 0:
             return True
-        m = -1 if p.multipliers[c] > 0.0 else take_up(p, n, m, c, violation)
+        m = -1 if p.multipliers[c] > 0.0 else take_up(p, n, kept, m, c, violation)
         if m < 0:
             return violation <= ROUNDED
     return False

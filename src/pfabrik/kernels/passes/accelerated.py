@@ -1,6 +1,6 @@
 """The kernel of P-FABRIK with exact meetings and half-spaces.
 
-A pass of a chain whose trunk carries several branches: every branch asks for half-spaces, the trunk takes the least
+A pass of a chain whose trunk carries several branches: every branch adds half-spaces, the trunk takes the least
 step that answers all of them, and the branches reach outward again. Where targets are not reached, the target itself is
 the trunk of all chains: it takes the least step, from where it is pulled back towards what was asked for.
 """
@@ -15,7 +15,16 @@ from ..legs.complete_poses import orthonormalise, turn_pose
 from ..quaternions import difference
 from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
 from .fit import turn_to_fit
-from .half_spaces import PLATFORM, Asks, ask_for_branch, ask_for_ranges, dot_of, least_step, new_asks, open_asks
+from .half_spaces import (
+    PLATFORM,
+    HalfSpaces,
+    add_branch,
+    add_ranges,
+    begin_programme,
+    dot_of,
+    least_step,
+    new_half_spaces,
+)
 from .meet import reach_end
 from .moving_frames import move_carriers
 from .plan import SLIDE, TRANSLATES, TURN, TURNS, Configuration, PassResults, Plan, Seeds, Settings
@@ -49,29 +58,37 @@ CLOSING = 12
 
 
 @routine
-def ask_for_chain(plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks) -> float:
+def add_chain(plan: Plan, c: int, config: Configuration, settings: Settings, spaces: HalfSpaces) -> float:
     """Add what the branches of a chain ask for, and the ranges of its trunk; the largest excess."""
     gap, trunk = 0.0, plan.chains[c]["trunk"]
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-        gap = max(gap, ask_for_branch(plan, b, config, settings, asks))
+        gap = max(gap, add_branch(plan, b, config, settings, spaces))
     if trunk >= 0:
-        ask_for_ranges(plan, plan.trunks[trunk]["first"], plan.trunks[trunk]["last"], config, asks)
+        add_ranges(plan, plan.trunks[trunk]["first"], plan.trunks[trunk]["last"], config, spaces)
     return gap
 
 
 @routine
-def move_trunk(plan: Plan, trunk: int, config: Configuration, asks: Asks, share: float) -> None:
+def move_trunk(plan: Plan, trunk: int, config: Configuration, spaces: HalfSpaces, share: float) -> None:
     """Move the joints of a trunk by a share of the step, within their ranges; carriers do not follow yet."""
+    programme = spaces.programme[0]
     for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
         joint = plan.trunk_joints[j]
         unit = plan.length if joint["kind"] == SLIDE else 1.0
-        value = config.trunks[j] + share * unit * asks.goal[2] * asks.x[asks.frame[2] + j]
+        value = config.trunks[j] + share * unit * programme["trunk_scale"] * spaces.x[programme["trunk_column"] + j]
         config.trunks[j] = min(max(value, joint["lo"]), joint["hi"])
 
 
 @routine
 def reach_from_start(
-    plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks, margin: float, patience: int, near: bool
+    plan: Plan,
+    c: int,
+    config: Configuration,
+    settings: Settings,
+    spaces: HalfSpaces,
+    margin: float,
+    patience: int,
+    near: bool,
 ) -> tuple[float, int]:
     """Passes of a chain from where its trunk is; the largest excess that is left, and how many.
 
@@ -84,38 +101,37 @@ def reach_from_start(
     """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    best, stalled, nearest = math.inf, 0, math.inf
-    copy_row(config.trunks, asks.start)
+    best, stalled, nearest, programme = math.inf, 0, math.inf, spaces.programme[0]
+    copy_row(config.trunks, spaces.start)
     for n in range(PASSES + 1):
         for j in range(first, last):
             unit = plan.length if plan.trunk_joints[j]["kind"] == SLIDE else 1.0
-            asks.x[j - first] = (asks.start[j] - config.trunks[j]) / unit if near else 0.0
-        far = math.sqrt(dot_of(asks.x, asks.x, last - first))
-        asks.goal[0] = margin
-        asks.goal[1] = max(margin, far * plan.length)
-        asks.goal[2] = 1.0
-        open_asks(asks, last - first, -first, 0)
-        gap = ask_for_chain(plan, c, config, settings, asks)
+            spaces.x[j - first] = (spaces.start[j] - config.trunks[j]) / unit if near else 0.0
+        far = math.sqrt(dot_of(spaces.x, spaces.x, last - first))
+        programme["margin"], programme["window"] = margin, max(margin, far * plan.length)
+        programme["trunk_scale"] = 1.0
+        begin_programme(spaces, last - first, -first, 0)
+        gap = add_chain(plan, c, config, settings, spaces)
         stalled = 0 if gap < TAKEN_OFF * best else stalled + 1
         best = min(best, gap)
         reaches = gap <= 0.5 * settings.enough
         if (reaches and (far == 0.0 or far >= nearest)) or stalled == patience or n == PASSES:
             break
         if reaches:
-            copy_row(config.trunks, asks.trunks)
+            copy_row(config.trunks, spaces.trunks)
             nearest = far
         else:
             for i in range(last - first):
-                asks.x[i] = 0.0
-        least_step(asks)
-        size = math.sqrt(dot_of(asks.x, asks.x, last - first))
+                spaces.x[i] = 0.0
+        least_step(spaces)
+        size = math.sqrt(dot_of(spaces.x, spaces.x, last - first))
         if reaches and size <= CAME_BACK * far:
             break
-        move_trunk(plan, trunk, config, asks, min(1.0, LONGEST / max(size, 1e-300)))
+        move_trunk(plan, trunk, config, spaces, min(1.0, LONGEST / max(size, 1e-300)))
         move_carriers(plan, config)
         margin *= SHRINK
     if nearest < math.inf:
-        copy_row(asks.trunks, config.trunks)
+        copy_row(spaces.trunks, config.trunks)
         move_carriers(plan, config)
         gap = best
     return gap, n
@@ -136,11 +152,13 @@ def start_trunk(plan: Plan, trunk: int, config: Configuration, start: int, insid
 
 
 @routine
-def reach_with_trunk(plan: Plan, c: int, config: Configuration, settings: Settings, asks: Asks) -> tuple[float, int]:
+def reach_with_trunk(
+    plan: Plan, c: int, config: Configuration, settings: Settings, spaces: HalfSpaces
+) -> tuple[float, int]:
     """Passes of a chain with a trunk, from other starts too where one is caught; the excess left, and how many."""
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    gap, passes = reach_from_start(plan, c, config, settings, asks, MARGINS[0] * plan.length, HASTY, False)
+    gap, passes = reach_from_start(plan, c, config, settings, spaces, MARGINS[0] * plan.length, HASTY, False)
     corners = 1 << min(last - first, VARIED)
     for start in range(len(INSIDE) * corners):
         if gap <= 0.5 * settings.enough:
@@ -148,7 +166,7 @@ def reach_with_trunk(plan: Plan, c: int, config: Configuration, settings: Settin
         start_trunk(plan, trunk, config, start, INSIDE[start // corners])
         tour = start // corners
         patience = HASTY if tour == 0 else PATIENT
-        gap, more = reach_from_start(plan, c, config, settings, asks, MARGINS[tour] * plan.length, patience, False)
+        gap, more = reach_from_start(plan, c, config, settings, spaces, MARGINS[tour] * plan.length, patience, False)
         passes += more
     return gap, max(passes, 1)
 
@@ -164,12 +182,12 @@ def reach_ends(plan: Plan, config: Configuration, settings: Settings) -> tuple[f
 
 
 @routine
-def reach_pose(plan: Plan, config: Configuration, settings: Settings, asks: Asks) -> tuple[float, int]:
+def reach_pose(plan: Plan, config: Configuration, settings: Settings, spaces: HalfSpaces) -> tuple[float, int]:
     """Passes of all chains towards the present pose; the largest gap of an end, and the most passes of a chain."""
     passes = 1
     for c in range(plan.chains.shape[0]):
         if plan.chains[c]["trunk"] >= 0:
-            gap, more = reach_with_trunk(plan, c, config, settings, asks)
+            gap, more = reach_with_trunk(plan, c, config, settings, spaces)
             passes = max(passes, more)
             if gap > settings.enough:
                 return gap, passes
@@ -179,11 +197,11 @@ def reach_pose(plan: Plan, config: Configuration, settings: Settings, asks: Asks
 
 @routine
 def pull_back(
-    config: Configuration, target: Floats, settings: Settings, asks: Asks, pull: float, length: float
+    config: Configuration, target: Floats, settings: Settings, spaces: HalfSpaces, pull: float, length: float
 ) -> float:
     """Set x to the target's way back to what was asked for; the distance [length]."""
-    x, far = asks.x, 0.0
-    for i in range(asks.frame[1]):
+    x, far = spaces.x, 0.0
+    for i in range(spaces.programme[0]["n_unknowns"]):
         x[i] = 0.0
     if settings.free & TRANSLATES:
         for i in range(3):
@@ -200,53 +218,53 @@ def pull_back(
 
 
 @routine
-def move_all(plan: Plan, config: Configuration, settings: Settings, asks: Asks, share: float) -> None:
+def move_all(plan: Plan, config: Configuration, settings: Settings, spaces: HalfSpaces, share: float) -> None:
     """Move the target and all trunks by a share of the step."""
     if settings.free & TURNS:
-        turn_pose(config.pose, scale(share * plan.length / settings.lever, vec(asks.x[3:6])))
+        turn_pose(config.pose, scale(share * plan.length / settings.lever, vec(spaces.x[3:6])))
         orthonormalise(config.pose)
     if settings.free & TRANSLATES:
         for i in range(3):
-            config.pose[i, 3] += share * plan.length * asks.x[i]
+            config.pose[i, 3] += share * plan.length * spaces.x[i]
     for trunk in range(plan.trunks.shape[0]):
-        move_trunk(plan, trunk, config, asks, share)
+        move_trunk(plan, trunk, config, spaces, share)
     move_carriers(plan, config)
 
 
 @routine
-def settle(plan: Plan, config: Configuration, target: Floats, settings: Settings, asks: Asks) -> tuple[float, int]:
+def settle(
+    plan: Plan, config: Configuration, target: Floats, settings: Settings, spaces: HalfSpaces
+) -> tuple[float, int]:
     """Move the target, and all trunks, to where all chains reach it, as near as it can be; the gap and the rounds.
 
     From where they are: every round pulls the target back and answers what branches ask for; once steps are small, the
     last rounds only answer.
     """
-    pull, closing, n = PULL, 0, PLATFORM + plan.trunk_joints.shape[0]
+    pull, closing, n, programme = PULL, 0, PLATFORM + plan.trunk_joints.shape[0], spaces.programme[0]
     for b in range(plan.branches.shape[0]):
-        put(asks.normals[b], (0.0, 0.0, 0.0))
+        put(spaces.normals[b], (0.0, 0.0, 0.0))
     last_step, least, since, rounds = (0.0, 0.0, 0.0), math.inf, 0, 0
     while rounds < settings.max_rounds and closing < CLOSING:
         rounds += 1
-        asks.goal[0] = 0.0
-        asks.goal[1] = WINDOW * plan.length
-        asks.goal[2] = CHEAP
-        asks.goal[3] = settings.lever
-        open_asks(asks, n, PLATFORM, settings.free)
+        programme["margin"], programme["window"] = 0.0, WINDOW * plan.length
+        programme["trunk_scale"], programme["lever"] = CHEAP, settings.lever
+        begin_programme(spaces, n, PLATFORM, settings.free)
         gap = 0.0
         for c in range(plan.chains.shape[0]):
-            gap = max(gap, ask_for_chain(plan, c, config, settings, asks))
+            gap = max(gap, add_chain(plan, c, config, settings, spaces))
         if closing > 0 and gap <= 0.5 * settings.enough:
             break
         since = 0 if gap < TAKEN_OFF * least else since + 1
         least = min(least, gap)
         if gap > LOST * plan.length and since > LOST_ROUNDS:
             break
-        far = pull_back(config, target, settings, asks, 0.0 if closing > 0 else pull, plan.length)
-        least_step(asks)
-        size, step = math.sqrt(dot_of(asks.x, asks.x, PLATFORM)), vec(asks.x)
+        far = pull_back(config, target, settings, spaces, 0.0 if closing > 0 else pull, plan.length)
+        least_step(spaces)
+        size, step = math.sqrt(dot_of(spaces.x, spaces.x, PLATFORM)), vec(spaces.x)
         if dot(step, last_step) < -0.25 * dot(last_step, last_step):
             pull *= WEAKER
         last_step = step
-        move_all(plan, config, settings, asks, min(1.0, LONGEST_OF_ALL / max(size, 1e-300)))
+        move_all(plan, config, settings, spaces, min(1.0, LONGEST_OF_ALL / max(size, 1e-300)))
         if closing > 0 or size <= SETTLED * far or rounds >= PULLED:
             closing += 1
     gap, _passes = reach_ends(plan, config, settings)
@@ -254,38 +272,40 @@ def settle(plan: Plan, config: Configuration, target: Floats, settings: Settings
 
 
 @routine
-def distance_from(config: Configuration, target: Floats, settings: Settings, asks: Asks, length: float) -> float:
+def distance_from(
+    config: Configuration, target: Floats, settings: Settings, spaces: HalfSpaces, length: float
+) -> float:
     """Distance of the pose from what was asked for [L], turns as they count beside it."""
-    return pull_back(config, target, settings, asks, 0.0, length)
+    return pull_back(config, target, settings, spaces, 0.0, length)
 
 
 @routine
 def project_target(
-    plan: Plan, config: Configuration, target: Floats, seeds: Seeds, row: int, settings: Settings, asks: Asks
+    plan: Plan, config: Configuration, target: Floats, seeds: Seeds, row: int, settings: Settings, spaces: HalfSpaces
 ) -> tuple[float, int, int]:
     """Move a target that is not reached to a nearest pose that is; the largest gap, passes and rounds.
 
     From the target itself; where a trunk moves, or that settles nowhere, from the seed too, and the nearer counts. If
     neither settles, ends agree on their centroid, as in the paper.
     """
-    gap, passes = reach_pose(plan, config, settings, asks)
+    gap, passes = reach_pose(plan, config, settings, spaces)
     if gap <= settings.enough or settings.max_rounds == 0:
         return gap, passes, 0
     load_seed(plan, seeds, row, config)
     copy_table(target, config.pose)
-    gap, rounds = settle(plan, config, target, settings, asks)
+    gap, rounds = settle(plan, config, target, settings, spaces)
     if gap > settings.enough or plan.trunks.shape[0] > 0:
-        far = distance_from(config, target, settings, asks, plan.length) if gap <= settings.enough else math.inf
-        copy_table(config.pose, asks.pose)
-        copy_row(config.trunks, asks.trunks)
+        far = distance_from(config, target, settings, spaces, plan.length) if gap <= settings.enough else math.inf
+        copy_table(config.pose, spaces.pose)
+        copy_row(config.trunks, spaces.trunks)
         load_seed(plan, seeds, row, config)
         start_at_target(config, target, settings)
-        other_gap, more = settle(plan, config, target, settings, asks)
+        other_gap, more = settle(plan, config, target, settings, spaces)
         rounds += more
-        other = distance_from(config, target, settings, asks, plan.length)
+        other = distance_from(config, target, settings, spaces, plan.length)
         if far <= other or other_gap > settings.enough:
-            copy_table(asks.pose, config.pose)
-            copy_row(asks.trunks, config.trunks)
+            copy_table(spaces.pose, config.pose)
+            copy_row(spaces.trunks, config.trunks)
             move_carriers(plan, config)
             other_gap, _passes = reach_ends(plan, config, settings)
         gap = other_gap
@@ -313,11 +333,11 @@ def start_at_target(config: Configuration, target: Floats, settings: Settings) -
 @search
 def solve_by_half_spaces(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, results: PassResults) -> None:
     """Run passes with exact meetings and half-spaces towards every target, and move targets that are not reached."""
-    config, asks = new_configuration(plan), new_asks(plan)
+    config, spaces = new_configuration(plan), new_half_spaces(plan)
     for i in range(targets.shape[0]):
         load_seed(plan, seeds, i, config)
         copy_table(targets[i], config.pose)
-        gap, iterations, rounds = project_target(plan, config, targets[i], seeds, i, settings, asks)
+        gap, iterations, rounds = project_target(plan, config, targets[i], seeds, i, settings, spaces)
         write_row(plan, i, config, results)
         results.gaps[i] = gap
         results.iterations[i] = iterations

@@ -30,7 +30,7 @@ def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
             for j in range(n + 1):
                 system[i, j] = 0.0
         for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-            if config.asks[b] == 0:
+            if config.is_unmet[b] == 0:
                 continue
             present = move(config.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
             miss = sub(vec(wishes[b]), present)

@@ -6,7 +6,7 @@ from ...arrays import Floats
 from .._jit import routine, search
 from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import PATIENT, reach_from_start
-from .half_spaces import Asks, new_asks
+from .half_spaces import HalfSpaces, new_half_spaces
 from .moving_frames import move_carriers
 from .plan import Configuration, Plan, Settings
 from .solve import new_configuration
@@ -23,18 +23,24 @@ def stand_as_at_home(plan: Plan, config: Configuration) -> None:
 
 @routine
 def move_trunk(
-    plan: Plan, target: Floats, trunks: Floats, settings: Settings, margin: float, config: Configuration, asks: Asks
+    plan: Plan,
+    target: Floats,
+    trunks: Floats,
+    settings: Settings,
+    margin: float,
+    config: Configuration,
+    spaces: HalfSpaces,
 ) -> None:
     """Move the trunks of one configuration, (n_trunk_joints,), as `move_trunks` does."""
     copy_table(target, config.pose)
     copy_row(trunks, config.trunks)
     move_carriers(plan, config)
     stand_as_at_home(plan, config)
-    for k in range(asks.normals.shape[0]):
-        for j in range(asks.normals.shape[1]):
-            asks.normals[k, j] = 0.0
+    for k in range(spaces.normals.shape[0]):
+        for j in range(spaces.normals.shape[1]):
+            spaces.normals[k, j] = 0.0
     for c in range(plan.chains.shape[0]):
-        reach_from_start(plan, c, config, settings, asks, margin, PATIENT, True)
+        reach_from_start(plan, c, config, settings, spaces, margin, PATIENT, True)
     copy_row(config.trunks, trunks)
 
 
@@ -48,6 +54,6 @@ def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings,
     ----------
     margin : how far inside limits steps aim [length].
     """
-    config, asks = new_configuration(plan), new_asks(plan)
+    config, spaces = new_configuration(plan), new_half_spaces(plan)
     for i in range(targets.shape[0]):
-        move_trunk(plan, targets[i], trunks[i], settings, margin, config, asks)
+        move_trunk(plan, targets[i], trunks[i], settings, margin, config, spaces)

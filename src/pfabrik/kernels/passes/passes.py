@@ -78,7 +78,7 @@ def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
         reach_forward(plan, b, config)
         wish = vec(config.nodes[first])
         put(config.wishes[b], wish)
-        config.asks[b] = 1 if norm(sub(wish, present)) > CONTENT * plan.length else 0
+        config.is_unmet[b] = 1 if norm(sub(wish, present)) > CONTENT * plan.length else 0
     if chain["trunk"] >= 0:
         fit_trunk(plan, c, config)
     return pass_outward(plan, c, config)

@@ -92,7 +92,7 @@ class Configuration(NamedTuple):
     carriers: Floats  # (n_trunks + 1, 3, 4); the first is the base
     screws: Floats  # (n_trunk_joints, 2, 3): present point and axis
     wishes: Floats  # (n_branches, 3): where each branch wants its first node, after a forward pass
-    asks: Ints  # (n_branches,): 1 if that is elsewhere than it is
+    is_unmet: Ints  # (n_branches,): 1 if that is elsewhere than it is
     system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..legs.records import Table
-from ..passes.half_spaces import Asks, new_asks
+from ..passes.half_spaces import HalfSpaces, new_half_spaces
 from ..passes.move_trunks import move_trunk
 from ..passes.plan import Configuration, Plan, Settings
 from ..passes.solve import new_configuration
@@ -68,7 +68,7 @@ class TrunkScratch(NamedTuple):
     """Scratch memory of one thread, for trunks."""
 
     config: Configuration
-    asks: Asks
+    half_spaces: HalfSpaces
     pose: Floats  # (4, 4) [length]
     values: Floats  # (n_trunk_joints,)
 
@@ -104,7 +104,7 @@ def new_sets_scratch(sets: RedundantSets) -> SetsScratch:
 
 def _new_trunk_scratch(trunks: MovedTrunks) -> TrunkScratch:
     plan = Plan(*trunks[:6], 1.0)
-    return TrunkScratch(new_configuration(plan), new_asks(plan), np.zeros((4, 4)), np.zeros(len(trunks.legs)))
+    return TrunkScratch(new_configuration(plan), new_half_spaces(plan), np.zeros((4, 4)), np.zeros(len(trunks.legs)))
 
 
 def _new_set_scratch(part: RedundantSet) -> SetScratch:
@@ -151,7 +151,7 @@ def step_trunks(trunks: MovedTrunks, scratch: TrunkScratch, home: Floats, target
         values[i] = sides[trunks.legs[i]] * trunks.units[i]
     plan = Plan(trunks.nodes, trunks.branches, trunks.chains, trunks.cones, trunks.trunks, trunks.trunk_joints, length)
     settings = Settings(enough, moving["iterations"], 0, 0, 0, length)
-    move_trunk(plan, pose, values, settings, enough, scratch.config, scratch.asks)
+    move_trunk(plan, pose, values, settings, enough, scratch.config, scratch.half_spaces)
     for i in range(values.shape[0]):
         sides[trunks.legs[i]] = values[i] / trunks.units[i]
 
