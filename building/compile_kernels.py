@@ -38,7 +38,7 @@ FLAGS = ["-std=c99", "-O3", "-fvisibility=hidden", "-ffp-contract=off", "-fno-ma
 
 CHECKS = ["-DCHECKED", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
-ALONE = {"platform.nearest_pose": "nearest", "closure.close": "close", "closure.first_order": "first_order"}
+ALONE = {"platform.nearest_pose": "nearest", "closure.close": "close", "closure.rates": "rates"}
 """Kernels whose C is a file of its own, by the file's name; else it has all of a folder."""
 
 UNABLE = 3

@@ -15,7 +15,7 @@ from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.words import DEAD_POINT, NO_FREEDOM, STRETCHED, has_freedom, short_names
 from .arrays import Floats, Mask
-from .closure.first_order import are_stretched
+from .closure.first_order import are_stretched, is_at_dead_point
 from .description.mechanism import Mechanism
 from .description.mechanism_html import card
 from .description.task import task_of
@@ -24,7 +24,7 @@ from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
 from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, task_remark
-from .motion.singularities import assembly_signs, is_at_dead_point
+from .motion.singularities import assembly_signs
 from .motion.tilt_axis import tilt_axis
 from .poses import as_floats
 from .rotations import from_rotvec
@@ -224,7 +224,7 @@ def _cause(end: Solution, is_at_limit: bool, velocity: Floats, turn: Floats) -> 
         return "" if is_able else task_remark(mechanism)
     if is_at_limit:
         return ""
-    if is_at_dead_point(mechanism, q):
+    if is_at_dead_point(model_of(mechanism), q):
         return DEAD_POINT
     is_stretched = are_stretched(model_of(mechanism), q)[0] or has_freedom(mechanism, q, end.pose, velocity, turn)
     return STRETCHED if is_stretched else NO_FREEDOM

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..arrays import Floats
 from ..closure.assemble import is_over_determined
+from ..closure.first_order import is_at_dead_point
 from ..description.joint_types import KINDS
 from ..description.readouts import readouts
 from ..description.task import task_of
 from ..model import model_of
 from ..motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
-from ..motion.singularities import is_at_dead_point
 from ..motion.tilt_axis import tilt_axis
 from ..rotations import to_rotvec
 from ..tolerances import TOLERANCES
@@ -95,7 +95,7 @@ def why_without_limits(answer: Answer) -> str:
         return CONTRADICTORY if is_over_determined(model_of(mechanism).closure) else MODE_ENDS
     if has_dependent_coordinates(mechanism):
         return task_remark(mechanism)
-    if is_at_dead_point(mechanism, answer._coordinates):
+    if is_at_dead_point(model_of(mechanism), answer._coordinates):
         return DEAD_POINT
     pose, target = answer.pose, request.targets[0]
     offset, turn = (target - pose)[:3, 3], to_rotvec(target[:3, :3] @ pose[:3, :3].T)

@@ -139,7 +139,7 @@ class Fit:
             if not missing.any():
                 self._start = copy(solution._configurations)  # a copy has its coordinates, which are of this geometry
             changes = self.parameters.slopes(values)
-            first = GeometrySlopes(mechanism, q - home_coordinates(mechanism), changes)
+            first = GeometrySlopes(mechanism, q - home_coordinates(mechanism), changes, self.parameters.like)
             moved = self.measurements.actuators[:, :, None] * self.parameters.factors.T
             twists, rates = first.at_held_actuators(moved)
             require_closed(first.opened, self.parameters)

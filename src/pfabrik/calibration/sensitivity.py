@@ -8,25 +8,17 @@ import numpy as np
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, shaped
+from ..closure.first_order import JointRates
 from ..description.geometry import Geometry
 from ..description.graph import tree_of
-from ..description.home_mobility import body_twist, column_joints, column_moves, loop_conditions
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..errors import InvalidArgument, UnsupportedMechanism
-from ..motion.displacements import (
-    displacements,
-    end_effector_pose,
-    geometry_screws,
-    home_coordinates,
-    rate_units,
-    screws,
-)
+from ..model import model_of
+from ..motion.displacements import displacements, end_effector_pose, geometry_screws, home_coordinates, rate_units
+from ..motion.joint_rates import graph_of
+from ..motion.singularities import task_twists
 from ..tolerances import TOLERANCES
 from .parameters import Parameters
-
-SQUARE_ENOUGH = 1e8
-"""Condition number up to which loop conditions, as many as passive coordinates, are solved as they are."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +58,8 @@ def sensitivity(solution: Solution, parameters: Parameters) -> Sensitivity:
     q = np.reshape(solution.q, (-1, len(mechanism.coordinate_names)))
     if not np.isfinite(q).all():
         raise InvalidArgument("solution", "a row that is INVALID", "configurations")
-    first = GeometrySlopes(parameters.like, q - home_coordinates(mechanism), parameters.slopes(parameters.values))
+    slopes = parameters.slopes(parameters.values)
+    first = GeometrySlopes(parameters.like, q - home_coordinates(mechanism), slopes, parameters.like)
     pose, _ = first.at_held_actuators()
     require_closed(first.opened, parameters)
     twists = 3 if mechanism.end_effector_is_joint else 6
@@ -103,30 +96,25 @@ class GeometrySlopes:
     ----------
     q : coordinates as deviations from home, (n, c) [rad or length].
     slopes : derivatives of the geometry by p parameters.
+    like : the machine from which this one was changed, by little.
     """
 
-    def __init__(self, mechanism: Mechanism, q: Floats, slopes: Geometry) -> None:
-        self.mechanism, self.length = mechanism, mechanism.characteristic_length
-        owners, tree = column_joints(mechanism), tree_of(mechanism)
-        moves = column_moves(mechanism)
-        body = mechanism.end_effector_body
-        present = screws(mechanism, q)
+    def __init__(self, mechanism: Mechanism, q: Floats, slopes: Geometry, like: Mechanism) -> None:
+        self.mechanism, self.q, self.length = mechanism, q, mechanism.characteristic_length
+        self.rates, self.units = JointRates(model_of(mechanism), q, model_of(like)), rate_units(mechanism)
+        self.drives, body = self.rates.actuated, mechanism.end_effector_body
         weights = np.concatenate([np.nan_to_num(slopes.points), slopes.axes[:, :, 0], slopes.axes[:, :, 1]], axis=2)
         units = np.eye(9)[:, None] * np.ones((len(mechanism.joints), 1))
         changes = geometry_screws(mechanism, q, units[..., :3], units[..., 3:].reshape(9, -1, 2, 3))
-        self.units = rate_units(mechanism)
-        self.drives = [drive.column for drive in mechanism.drives]
+        ways = np.concatenate([graph_of(mechanism).of_joints, tree_of(mechanism).paths[body][None]])
+        sums = _at(_summed(changes, weights, ways), end_effector_pose(mechanism, q)[:, :3, 3] / self.length)
+        n, _, _, p = sums.shape
+        self.openings, self.twist_changes = sums[:, :-1].reshape(n, -1, p), sums[:, -1]
+        rotations = displacements(mechanism, q)[body][:, :3, :3]
+        self.twist_changes[:, :3] += np.einsum("nab,pb->nap", rotations, slopes.reference_point) / self.length
         self.zeros = slopes.home[:, self.drives] / self.units[self.drives]
         """Changes of the drives' zeros, (p, n_a) [rad or L]."""
-        self.loops = loop_conditions(tree.loops[:, owners] * moves, present)
-        self.openings = _summed(changes, weights, tree.loops)
-        here = end_effector_pose(mechanism, q)[:, :3, 3] / self.length
-        self.twist = _at(body_twist(tree.paths[body][owners] * moves, present), here)
-        rotations = displacements(mechanism, q)[body][:, :3, :3]
-        self.twist_changes = _at(_summed(changes, weights, tree.paths[body][None]), here)
-        self.twist_changes[:, :3] += np.einsum("nab,pb->nap", rotations, slopes.reference_point) / self.length
-        self.rotations = rotations
-        self.opened = np.zeros(len(self.zeros))
+        self.opened = np.zeros(p)
         """How far loops are from closing per unit of a parameter, (p,) [L or rad]; 0 until it is computed."""
 
     def at_held_actuators(self, moved: Floats | None = None) -> tuple[Floats, Floats]:
@@ -136,43 +124,24 @@ class GeometrySlopes:
         ----------
         moved : how far parameters move actuators that read the same, (n, n_a, p) [rad or length]; by default not.
         """
-        n, _, columns = self.loops.shape
-        rates = np.zeros((n, columns, len(self.zeros)))
-        rates[:, self.drives] = -self.zeros.T
-        if moved is not None:
-            rates[:, self.drives] += moved / self.units[self.drives, None]
-        passive = np.setdiff1d(np.arange(columns), self.drives)
-        wanted = -(self.openings + self.loops[:, :, self.drives] @ rates[:, self.drives])
-        rates[:, passive] = solved(self.loops[:, :, passive], wanted)
-        left = self.loops[:, :, passive] @ rates[:, passive] - wanted
-        self.opened = np.abs(left).max(axis=(0, 1), initial=0.0)
-        twists = self.twist @ rates + self.twist_changes
+        wanted = -self.zeros.T + (0.0 if moved is None else moved / self.units[self.drives, None])
+        rates = self.rates.geometry(self.openings, wanted)
+        left = self.rates.conditions @ rates + self.openings, rates[:, self.drives] - wanted
+        self.opened = np.abs(np.concatenate(left, axis=1)).max(axis=(0, 1), initial=0.0)
+        twists = self.rates.twists @ rates + self.twist_changes
         twists[:, :3] *= self.length
-        return twists, rates * self.units[:, None]
+        return twists, graph_of(self.mechanism).rates.T @ rates * self.units[:, None]
 
     def at_held_pose(self) -> Floats:
         """Rates of the actuators (n, n_a, p) per unit of every parameter, with the task's coordinates held."""
-        held = self._task_rows()
-        rows = np.concatenate([self.loops, held @ self.twist], axis=1)
-        wanted = np.concatenate([self.openings, held @ self.twist_changes], axis=1)
-        rates = -np.linalg.pinv(rows, TOLERANCES.rank) @ wanted
-        return np.asarray((rates[:, self.drives] + self.zeros.T) * self.units[self.drives, None])
-
-    def _task_rows(self) -> Floats:
-        """Rows (n, k, 6) that pick the coordinates of the task from twists."""
-        task = task_of(self.mechanism)
-        position = np.zeros((len(self.twist), sum(task.axes), 6))
-        position[:, :, :3] = np.eye(3)[list(task.axes)]
-        if task.rotations == 0:
-            return position
-        axes = np.swapaxes(self.rotations, 1, 2) if task.rotations == 2 else np.eye(3)
-        turns = np.zeros((len(self.twist), task.rotations, 6))
-        turns[:, :, 3:] = np.broadcast_to(axes, (len(self.twist), 3, 3))[:, list(task.turns)]
-        return np.concatenate([position, turns], axis=1)
+        least, held = self.rates.geometry(self.openings), np.swapaxes(task_twists(self.mechanism, self.q), 1, 2)
+        left = held @ (self.rates.twists @ least + self.twist_changes)
+        moved = self.rates.motions @ np.linalg.pinv(held @ self.rates.twists @ self.rates.motions, TOLERANCES.rank)
+        return np.asarray(((least - moved @ left)[:, self.drives] + self.zeros.T) * self.units[self.drives, None])
 
 
 def _summed(screws: Floats, weights: Floats, passes: Floats) -> Floats:
-    """Sums of the joints' screws along ways, (n, 6 ways, p).
+    """Sums of the joints' screws along ways, (n, ways, 6, p).
 
     Parameters
     ----------
@@ -184,24 +153,10 @@ def _summed(screws: Floats, weights: Floats, passes: Floats) -> Floats:
     along = passes[:, None, :, None] * weights  # (ways, p, joints, 9)
     flat = np.moveaxis(screws, -1, 1).reshape(n, 6, joints * numbers)  # one by one: a BLAS takes no threads for these
     sums = (flat @ along.reshape(ways * p, joints * numbers).T).reshape(n, 6, ways, p)
-    return np.asarray(np.swapaxes(sums, 1, 2).reshape(n, 6 * ways, p))
+    return np.asarray(np.swapaxes(sums, 1, 2))
 
 
 def _at(twists: Floats, points: Floats) -> Floats:
-    """Twists (n, 6, k) as [velocity at points (n, 3); angular velocity], from [angular; velocity at the origin]."""
-    angular, velocity = twists[:, :3], twists[:, 3:]
-    return np.concatenate([velocity + np.cross(angular, points[:, :, None], axis=1), angular], axis=1)
-
-
-def solved(matrices: Floats, wanted: Floats) -> Floats:
-    """The least rates (n, c, p) that come nearest to what is wanted of conditions, (n, r, c) and (n, r, p)."""
-    if matrices.shape[1] == matrices.shape[2] and matrices.shape[1]:
-        try:
-            inverses = np.linalg.inv(matrices)
-        except np.linalg.LinAlgError:
-            inverses = None
-        if inverses is not None and np.isfinite(inverses).all():
-            sizes = np.linalg.norm(inverses, axis=(1, 2)) * np.linalg.norm(matrices, axis=(1, 2))
-            if sizes.max(initial=0.0) < SQUARE_ENOUGH:
-                return np.asarray(inverses @ wanted)
-    return np.asarray(np.linalg.pinv(matrices, TOLERANCES.rank) @ wanted)
+    """Twists (n, k, 6, p) as [velocity at points (n, 3); angular velocity], from [angular; velocity at the origin]."""
+    angular, velocity = twists[:, :, :3], twists[:, :, 3:]
+    return np.concatenate([velocity + np.cross(angular, points[:, None, :, None], axis=2), angular], axis=2)

@@ -1,7 +1,8 @@
-"""Jacobians and singularities of configurations of closed loops, compiled."""
+"""Configurations of closed loops to first order: Jacobians, singularities, and joint rates by whatever moves them."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,18 +10,19 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..batch import take
 from ..derived import derived
-from ..kernels.closure.loops import FirstOrder, FirstOrderPlan
+from ..description.home_mobility import body_twist, loop_conditions
+from ..kernels.closure.loops import CONSTRAINT, JACOBIANS, JOINTS, MEASURES, Rates, RatesPlan
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..motion.displacements import rate_units
 from ..motion.joint_rates import actuated_columns, graph_of
 from ..motion.mobility import generic_of
-from ..motion.singularities import KINDS, Singularity, measures, singularity_of
+from ..motion.singularities import Singularity, loop_basis, singularity_of
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
-    from ..kernels.closure.first_order import FirstOrderScratch
+    from ..kernels.closure.first_order import RatesScratch
 
 ROWS_A_BLOCK = 64
 
@@ -28,26 +30,18 @@ ROWS_A_BLOCK = 64
 def forward_map(model: Model, q: Floats) -> Floats:
     """Twists per actuator rate at coordinates q, (n, c): (n, 6, n_a) or (n, 3, n_a); NaN where q is."""
     twists, actuators = units_of(model)
-    return np.asarray(twists[:, None] * _first_order(model, q, whole=False).forward / actuators)
+    return np.asarray(twists[:, None] * rates(model, q, JACOBIANS).forward / actuators)
 
 
 def inverse_map(model: Model, q: Floats) -> Floats:
     """Actuator rates per twist at coordinates q, (n, c): (n, n_a, 6) or (n, n_a, 3); NaN where q is."""
     twists, actuators = units_of(model)
-    return np.asarray(actuators[:, None] * _first_order(model, q, whole=False).inverse / twists)
+    return np.asarray(actuators[:, None] * rates(model, q, JACOBIANS).inverse / twists)
 
 
 def singularities(model: Model, q: Floats) -> Singularity:
-    """Measures of how near coordinates q, (n, c), are to singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples.
-
-    In a singularity, or next to one, what is lost and gained takes all singular vectors: NumPy finds them there.
-    """
-    found = _first_order(model, q, whole=True)
-    near = np.flatnonzero(found.measures.min(axis=1) < TOLERANCES.singular)
-    if len(near):
-        exactly = measures(model.mechanism, q[near])
-        found.measures[near] = np.stack([getattr(exactly, kind) for kind in KINDS], axis=1)
-        found.lost[near], found.gained[near] = exactly.lost, exactly.gained
+    """How near coordinates q, (n, c), are to singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples."""
+    found = rates(model, q, MEASURES)
     return singularity_of(found.measures, found.lost, found.gained)
 
 
@@ -57,54 +51,143 @@ def are_stretched(model: Model, q: Floats) -> Mask:
     return np.asarray(np.minimum(found.serial, found.passive) < TOLERANCES.stretched)
 
 
-def _first_order(model: Model, q: Floats, *, whole: bool) -> FirstOrder:
-    """Jacobians and measures at coordinates q, (n, c), lengths in L; `whole`: the constraint measure too."""
-    from ..kernels.closure.first_order import first_order
+def is_at_dead_point(model: Model, q: Floats) -> bool:
+    """True if a linkage with one freedom is at a dead point of its drive or a change point at coordinates q (1, c)."""
+    if not len(loop_basis(model.mechanism)[0]):
+        return False
+    near = singularities(model, q)
+    return bool(np.minimum(near.parallel, near.constraint)[0] < TOLERANCES.stretched)
 
-    closure, plan = model.closure, _plan(model, whole)
-    n, coordinates = len(q), q * closure.scale
-    twists, actuators = plan.twists, len(plan.actuated)
-    found = FirstOrder(
-        np.empty((n, twists, actuators)),
-        np.empty((n, actuators, twists)),
-        np.empty((n, 4)),
-        np.empty((n, twists)),
-        np.empty((n, twists)),
-    )
-    scratch = _scratch(model, whole)
+
+class JointRates:
+    """What joints do at configurations, to first order, where actuators move, the geometry changes, or loads act.
+
+    By orthonormal joint rates, lengths in L; twists are [velocity of the reference point; angular velocity], and
+    wrenches [force times L; moment about the reference point].
+
+    Parameters
+    ----------
+    q : coordinates as deviations from home, (n, c) [rad or length].
+    like : a machine of almost the same geometry, whose mobility is known.
+
+    Attributes
+    ----------
+    screws : of joint rates, (n, c, 6).
+    by_actuators : joint rates per rate of each actuator, (n, c, n_a).
+    is_singular : True in constraint singularities, in which the rest means nothing, (n,).
+    """
+
+    def __init__(self, model: Model, q: Floats, like: Model | None = None) -> None:
+        mechanism = model.mechanism
+        self._graph, self._found = graph_of(mechanism), rates(model, q, JOINTS, like)
+        self.actuated, counts = actuated_columns(mechanism), generic_of((like or model).mechanism).mobility
+        self._most = counts.platform + counts.internal
+        self.screws, self.by_actuators, self.motions = self._found.screws, self._found.joints, self._found.motions
+        self.is_singular = np.asarray(self._found.measures[:, CONSTRAINT] < TOLERANCES.singular)
+
+    @cached_property
+    def twists(self) -> Floats:
+        """Of the end effector, (n, 6, c)."""
+        return body_twist(self._graph.path, self.screws)
+
+    @cached_property
+    def conditions(self) -> Floats:
+        """What loops ask to vanish, (n, 6 loops, c)."""
+        return loop_conditions(self._graph.orthonormal, self.screws)
+
+    def geometry(self, openings: Floats, actuators: Floats | None = None) -> Floats:
+        """Joint rates (n, c, p) that close loops which a geometry opens, (n, 6 loops, p): the least.
+
+        Parameters
+        ----------
+        actuators : their rates, if they are given, (n, n_a, p) or (n_a, p).
+        """
+        rates = -self._found.closing @ openings
+        if actuators is not None:
+            rates += self.by_actuators @ (actuators - rates[:, self.actuated])
+        return np.asarray(rates)
+
+    def wrench(self, work: Floats) -> tuple[Floats, Floats]:
+        """The least forces of actuators (n, n_a, k) against loads that do work (n, c, k), and wrenches in the loops."""
+        actuators = -np.swapaxes(self.by_actuators, -1, -2) @ work
+        work = work.copy()
+        work[:, self.actuated] += actuators
+        return np.asarray(actuators), np.asarray(-np.swapaxes(self._found.closing, -1, -2) @ work)
+
+    @cached_property
+    def open(self) -> Floats:
+        """Wrenches in the loops that no joint notices, (n, 6 loops, 6 loops): a projection."""
+        return np.asarray(np.eye(self.conditions.shape[1]) - self.conditions @ self._found.closing)
+
+    @cached_property
+    def pairs(self) -> Floats:
+        """Motions that show, (n, c, d): twists and actuator rates are orthonormal together; zero for what is lost."""
+        shown, is_shown = self.motions[..., : self._most], self._is_shown[:, None, : self._most]
+        return np.divide(shown, self._found.sizes[:, None, : self._most], out=np.zeros(shown.shape), where=is_shown)
+
+    @cached_property
+    def unseen(self) -> Floats:
+        """Motions (n, c, k) that neither end effector nor actuators show; zero for the others."""
+        return np.where(self._is_shown[:, None], 0.0, self.motions)
+
+    @cached_property
+    def _is_shown(self) -> Mask:
+        sizes = self._found.sizes
+        return np.asarray((sizes > TOLERANCES.singular) & (np.arange(sizes.shape[1]) < self._most))
+
+
+def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> Rates:
+    """What is asked of coordinates q, (n, c), lengths in L; NaN where q is.
+
+    Parameters
+    ----------
+    asks : JACOBIANS, MEASURES or JOINTS.
+    like : see `JointRates`.
+    """
+    from ..kernels.closure.first_order import rates
+
+    plan, scratch = _prepared(model, asks) if like is None else _made(model, asks, like)
+    closure, (n, c), (r, _), n_a = model.closure, q.shape, plan.directions.shape, len(plan.actuated)
+    coordinates = q * closure.scale
+    of_pose = (r, n_a), (n_a, r), (4,), (r,), (r,)
+    of_joints = (c, 6), (c, c - plan.rank), (c - plan.rank,), (c, n_a), (c, 6 * len(plan.loops))
+    rows = [n if asks < JOINTS or place == CONSTRAINT else 0 for place in range(len(of_pose))]
+    rows += [n if asks == JOINTS else 0] * len(of_joints)
+    shapes = zip(rows, of_pose + of_joints, strict=True)
+    found = Rates(*(np.full((k, *shape), np.nan) for k, shape in shapes))
 
     def run(block: slice) -> None:
-        own = take(found, block)
-        first_order(closure.machine.address, scratch.address, plan, coordinates[block], own)
+        rates(closure.machine.address, scratch.address, plan, coordinates[block], take(found, block))
 
     in_blocks(run, n, ROWS_A_BLOCK)
     return found
 
 
 @derived
-def _scratch(model: Model, whole: bool) -> Scratch[FirstOrderScratch]:
-    from ..kernels.closure.first_order import new_first_order_scratch
-
-    return Scratch(new_first_order_scratch, model.closure.loops, _plan(model, whole))
+def _prepared(model: Model, asks: int) -> tuple[RatesPlan, Scratch[RatesScratch]]:
+    return _made(model, asks, model)
 
 
-@derived
-def _plan(model: Model, whole: bool) -> FirstOrderPlan:
-    mechanism = model.mechanism
-    graph, generic = graph_of(mechanism), generic_of(mechanism)
-    counts = generic.mobility
-    return FirstOrderPlan(
+def _made(model: Model, asks: int, like: Model) -> tuple[RatesPlan, Scratch[RatesScratch]]:
+    """What the kernel takes."""
+    from ..kernels.closure.first_order import new_rates_scratch
+
+    mechanism, generic = model.mechanism, generic_of(like.mechanism)
+    graph, counts = graph_of(mechanism), generic.mobility
+    plan = RatesPlan(
         loops=np.ascontiguousarray(graph.orthonormal),
         way=np.array(graph.path, float),
         rates=np.array(graph.rates),
         actuated=np.array(actuated_columns(mechanism), np.int64),
+        directions=np.ascontiguousarray(generic.directions),
         rank=generic.rank,
         shown=counts.platform + counts.internal,
         freedoms=counts.platform,
-        twists=3 if mechanism.end_effector_is_joint else 6,
-        least=TOLERANCES.rank,
-        asks_constraint=int(whole),
+        least=TOLERANCES.singular if asks == JOINTS else TOLERANCES.rank,
+        singular=TOLERANCES.singular,
+        asks=asks,
     )
+    return plan, Scratch(new_rates_scratch, model.closure.loops, plan)
 
 
 @derived

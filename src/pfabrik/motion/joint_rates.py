@@ -32,12 +32,14 @@ class CycleBasis:
     ----------
     path : of the end effector's body, (c,).
     fundamental, orthonormal : the loops of the tree, and orthonormal combinations that depend on no tree, (loops, c).
+    of_joints : these combinations by joint, (loops, joints).
     rates : orthonormal rates of every joint, (c, c).
     """
 
     path: Floats
     fundamental: Floats
     orthonormal: Floats
+    of_joints: Floats
     rates: Floats
 
 
@@ -48,7 +50,7 @@ def graph_of(mechanism: Structure) -> CycleBasis:
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
     moves = column_moves(mechanism)
     loops, rates = tree.loops[:, owners] * moves, moves[:, None] * orthonormal_rates(mechanism)
-    return CycleBasis(path * moves, loops, orthonormal[:, owners] * moves, rates)
+    return CycleBasis(path * moves, loops, orthonormal[:, owners] * moves, orthonormal, rates)
 
 
 def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:

@@ -160,7 +160,7 @@ def _half_spaces(solution: Solution, maps: Maps, bounds: Floats) -> tuple[Floats
         ends = np.concatenate([-bounds[:, 0], bounds[:, 1]])
         return np.concatenate([normals, -normals], axis=1), np.tile(ends, (len(normals), 1))
     q = np.where(maps.is_valid[:, None], solution._coordinates, 0.0)
-    pairs, units, length = pairs_of(mechanism, q), actuator_units(mechanism), mechanism.characteristic_length
+    pairs, units = pairs_of(mechanism, q), actuator_units(mechanism)
     if n_facets(len(bounds), pairs.rates.shape[2]) > MOST_FACETS:
         raise UnsupportedMechanism(mechanism.name, [f"{len(bounds)} actuators"], "given a polytope of what it holds")
     blocks = []
@@ -169,8 +169,9 @@ def _half_spaces(solution: Solution, maps: Maps, bounds: Floats) -> tuple[Floats
         normals, ends = sum_of_segments(-pairs.rates[block], bounds * units[:, None])
         shown = normals @ np.swapaxes(pairs.twists[block], -1, -2)
         shown[np.linalg.norm(shown, axis=-1) <= TOLERANCES.rank] = 0.0
-        angular = np.zeros_like(shown[..., :3]) if mechanism.end_effector_is_joint else shown[..., :3]
-        blocks.append((np.concatenate([shown[..., 3:] * length, angular], axis=-1), ends))
+        whole = np.zeros((*shown.shape[:2], 6))
+        whole[..., : shown.shape[2]] = shown * twist_units(mechanism)
+        blocks.append((whole, ends))
     return np.concatenate([normals for normals, _ in blocks]), np.concatenate([ends for _, ends in blocks])
 
 

@@ -10,7 +10,7 @@ h_k = s_k . K_j. It has a solution x where N'(h + t) = 0 for the motions N that 
 principle of virtual power, from which the actuators' forces follow. x is determined but for the null space of C', which
 is that of the overconstraints.
 
-Lengths are in L, and wrenches are [moment about the present reference point; force times L].
+Lengths are in L, and wrenches are [force times L; moment about the present reference point].
 """
 
 from __future__ import annotations
@@ -20,15 +20,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..description.graph import tree_of
-from ..description.home_mobility import body_twist, column_joints, loop_conditions
+from ..closure.first_order import JointRates
+from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
-from ..motion.displacements import screws
-from ..motion.joint_rates import actuated_columns, at_reference, graph_of
-from ..motion.mobility import generic_of
+from ..model import model_of
+from ..motion.joint_rates import graph_of
 from ..tolerances import TOLERANCES
 
-ROWS_A_BLOCK = 128
+ROWS_A_BLOCK = 512
 """Rows whose matrices are in memory at once."""
 
 
@@ -42,7 +41,7 @@ class Balance(NamedTuple):
     is_idle : True where it works on a motion that neither end effector nor actuators show, (n, k).
     wrenches : what joints transmit from their first body to their second, (n, joints, 6, k); where it is not determined
         by equilibrium, the least.
-    open : what of these equilibrium leaves open, orthonormal, (n, joints, 6, z).
+    open : what of these equilibrium leaves open, (n, joints, 6, z).
     is_singular : True where the loops are in a constraint singularity, in which `wrenches` mean nothing, (n,).
     """
 
@@ -59,25 +58,12 @@ class Pairs(NamedTuple):
 
     Attributes
     ----------
-    twists, rates : of the end effector (n, 6, d), [angular; linear], and of the actuators (n, n_a, d): orthonormal
-        together. Zero for a motion that nothing shows at a configuration.
-    of_joints : rates of all orthonormal joint coordinates, (n, c, d).
-    unseen : motions that nothing shows, (n, c, m); zero for the others.
+    twists, rates : of the end effector (n, r, d), and of the actuators (n, n_a, d): orthonormal together. Zero for a
+        motion that nothing shows at a configuration.
     """
 
     twists: Floats
     rates: Floats
-    of_joints: Floats
-    unseen: Floats
-
-
-class _Loops(NamedTuple):
-    """Loop conditions C (n, 6 loops, c) by orthonormal joint rates, and their singular vectors and values."""
-
-    screws: Floats
-    left: Floats
-    values: Floats
-    right: Floats
 
 
 def balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
@@ -91,78 +77,32 @@ def balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
 
 def pairs_of(mechanism: Mechanism, q: Floats) -> Pairs:
     """The motions at coordinates q, (n, c)."""
-    blocks = [
-        _pairs(mechanism, _loops(mechanism, q[start : start + ROWS_A_BLOCK]))
-        for start in range(0, max(len(q), 1), ROWS_A_BLOCK)
-    ]
-    return Pairs(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
+    first, rows = JointRates(model_of(mechanism), q), 3 if mechanism.end_effector_is_joint else 6
+    return Pairs(first.twists[:, :rows] @ first.pairs, first.pairs[:, first.actuated])
 
 
 def _balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
-    loops, owners = _loops(mechanism, q), column_joints(mechanism)
-    pairs, rank = _pairs(mechanism, loops), generic_of(mechanism).rank
-    work = np.einsum("nci,ncik->nck", loops.screws, carried[:, owners])
-    actuators, left = _least_forces(pairs, work)
+    first, owners = JointRates(model_of(mechanism), q), column_joints(mechanism)
+    actuators, by_loop = first.wrench(np.einsum("nci,ncik->nck", first.screws, carried[:, owners]))
+    wrenches = -(carried + _of_joints(mechanism, by_loop))
+    undone = -np.einsum("nci,ncik->nck", first.screws, wrenches[:, owners])
+    undone[:, first.actuated] += actuators
     sizes = TOLERANCES.alignment * np.abs(carried).max(axis=(1, 2), initial=0.0)
-    unseen = np.abs(np.swapaxes(pairs.unseen, -1, -2) @ work).max(axis=1, initial=0.0)
-    columns = actuated_columns(mechanism)
-    work[:, columns] += actuators
-    kept = loops.right[:, :rank] @ work / np.where(loops.values[:, :rank] > 0.0, loops.values[:, :rank], 1.0)[..., None]
-    joints = np.linalg.qr(tree_of(mechanism).loops.T)[0].T
-    by_loop = -(loops.left[..., :rank] @ kept)
-    wrenches = -(carried + _of_joints(joints, by_loop))
+    held, idle = (np.abs(np.swapaxes(motions, -1, -2) @ undone) for motions in (first.pairs, first.unseen))
     return Balance(
         actuators=actuators,
-        is_held=left <= sizes,
-        is_idle=unseen > sizes,
+        is_held=held.max(axis=1, initial=0.0) <= sizes,
+        is_idle=idle.max(axis=1, initial=0.0) > sizes,
         wrenches=wrenches,
-        open=_of_joints(joints, loops.left[..., rank:]),
-        is_singular=loops.values[:, :rank].min(axis=1, initial=1.0) < TOLERANCES.singular,
+        open=_of_joints(mechanism, first.open),
+        is_singular=first.is_singular,
     )
 
 
-def _of_joints(joints: Floats, by_loop: Floats) -> Floats:
+def _of_joints(mechanism: Mechanism, by_loop: Floats) -> Floats:
     """Wrenches (n, joints, 6, k) from those of loops, (n, 6 loops, k)."""
-    n, _, k = by_loop.shape
+    joints, (n, _, k) = graph_of(mechanism).of_joints, by_loop.shape
     return np.asarray(np.einsum("lj,nlik->njik", joints, by_loop.reshape(n, len(joints), 6, k)))
-
-
-def _loops(mechanism: Mechanism, q: Floats) -> _Loops:
-    graph = graph_of(mechanism)
-    present = graph.rates @ at_reference(mechanism, q, screws(mechanism, q))
-    conditions = loop_conditions(graph.orthonormal, present)
-    if 0 in conditions.shape[1:]:
-        n, rows, columns = conditions.shape
-        full = np.broadcast_to(np.eye(columns), (n, columns, columns))
-        return _Loops(present, np.zeros((n, rows, rows)), np.zeros((n, 0)), full)
-    return _Loops(present, *np.linalg.svd(conditions))
-
-
-def _pairs(mechanism: Mechanism, loops: _Loops) -> Pairs:
-    generic = generic_of(mechanism)
-    counts, columns = generic.mobility, actuated_columns(mechanism)
-    motions = np.swapaxes(loops.right[:, generic.rank :], -1, -2)
-    twist = body_twist(graph_of(mechanism).path, loops.screws)
-    shown_rows = twist[:, 3:] if mechanism.end_effector_is_joint else twist
-    seen = np.concatenate([shown_rows @ motions, motions[:, columns]], axis=1)
-    _, sizes, right = np.linalg.svd(seen)
-    shown = counts.platform + counts.internal
-    sizes = np.concatenate([sizes, np.zeros((len(seen), max(0, motions.shape[-1] - sizes.shape[1])))], axis=1)
-    is_shown = (sizes > TOLERANCES.singular) & (np.arange(sizes.shape[1]) < shown)
-    turned = motions @ np.swapaxes(right, -1, -2)
-    of_joints = np.divide(turned, sizes[:, None], out=np.zeros_like(turned), where=is_shown[:, None])[..., :shown]
-    unseen = np.where(is_shown[:, None], 0.0, turned)
-    return Pairs(twist @ of_joints, of_joints[:, columns], of_joints, unseen)
-
-
-def _least_forces(pairs: Pairs, work: Floats) -> tuple[Floats, Floats]:
-    """The least actuator forces (n, n_a, k) against work (n, c, k), and the largest work that is left, (n, k)."""
-    against = np.swapaxes(pairs.of_joints, -1, -2) @ work
-    left, sines, right = np.linalg.svd(pairs.rates, full_matrices=False)
-    inverse = np.divide(1.0, sines, out=np.zeros_like(sines), where=sines > TOLERANCES.singular)
-    forces = -(left @ (inverse[..., None] * (right @ against)))
-    undone = against + np.swapaxes(pairs.rates, -1, -2) @ forces
-    return np.asarray(forces), np.abs(undone).max(axis=1, initial=0.0)
 
 
 def about_centres(mechanism: Mechanism, wrenches: Floats, centres: Floats, reference: Floats) -> Floats:
@@ -177,6 +117,6 @@ def about_centres(mechanism: Mechanism, wrenches: Floats, centres: Floats, refer
     for place, joint in enumerate(mechanism.joints):
         if joint.at is None:
             points[:, place] = centres[:, names.index(joint.along[0])] if joint.along else reference
-    forces = wrenches[:, :, 3:] / mechanism.characteristic_length
+    forces = wrenches[:, :, :3] / mechanism.characteristic_length
     arms = (points - reference[:, None])[..., None]
-    return np.concatenate([forces, wrenches[:, :, :3] - np.cross(arms, forces, axis=2)], axis=2)
+    return np.concatenate([forces, wrenches[:, :, 3:] - np.cross(arms, forces, axis=2)], axis=2)

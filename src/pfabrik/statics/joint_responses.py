@@ -50,16 +50,14 @@ def responses_of(solution: Solution, maps: Maps, purpose: str) -> Responses:
         raise UnsupportedMechanism(mechanism.name, [reason], purpose)
     places = np.flatnonzero(maps.is_valid)
     q, length = solution._configurations.coordinates_at(places), mechanism.characteristic_length
-    units = np.zeros((6, 6))
-    units[:3, 3:], units[3:, :3] = np.eye(3), np.eye(3) * length
-    wrenches = units[:, : maps.forward.shape[1]]
+    wrenches = np.diag(np.repeat([length, 1.0], 3))[:, : maps.forward.shape[1]]
     path = tree_of(mechanism).paths[mechanism.end_effector_body]
     found = balance(mechanism, q, np.broadcast_to(path[:, None, None] * wrenches, (len(q), len(path), *wrenches.shape)))
     centres, rods = placed(mechanism, q)[1], rods_of(mechanism)
     return Responses(
         places,
-        found.wrenches[:, :, 3:] / length,
-        found.open[:, :, 3:],
+        found.wrenches[:, :, :3] / length,
+        found.open[:, :, :3],
         tensions(rods, found.wrenches, centres) / length,
         np.abs(tensions(rods, found.open, centres)).max(axis=-1, initial=0.0),
         found.is_singular,

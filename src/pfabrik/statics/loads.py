@@ -76,7 +76,7 @@ def asked_of(solution: Solution, wrench: ArrayLike | None, at: ArrayLike | None)
 def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoads, gravity: Floats) -> Floats:
     """What each joint carries of loads, by the way of the tree to the base, (n, joints, 6).
 
-    As moment about the present reference point, and force times L: what rates of `screws` do work with.
+    As force times L, and moment about the present reference point: what screws of `JointRates` do work with.
 
     Parameters
     ----------
@@ -149,5 +149,5 @@ def _finite(name: str, value: Any, expected: str) -> Floats:
 
 
 def _scaled(wrenches: Floats, length: float) -> Floats:
-    """Wrenches (n, 6) as moment and force times L."""
-    return np.concatenate([wrenches[:, 3:], wrenches[:, :3] * length], axis=1)
+    """Wrenches (n, 6) with forces times L."""
+    return np.asarray(wrenches * np.repeat([length, 1.0], 3))

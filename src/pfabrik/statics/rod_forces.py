@@ -49,9 +49,9 @@ def tensions(rods: Rods, wrenches: Floats, centres: Floats) -> Floats:
 
     Parameters
     ----------
-    wrenches : what joints transmit from their first body to their second, [moment; force], (n, joints, 6, k).
+    wrenches : what joints transmit from their first body to their second, [force; moment], (n, joints, 6, k).
     centres : of joints, (n, joints, 3) [length].
     """
     along = centres[:, rods.ends] - centres[:, rods.starts]
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    return np.asarray(np.einsum("nri,nrik,r->nrk", along, wrenches[:, rods.ends, 3:], rods.signs))
+    return np.asarray(np.einsum("nri,nrik,r->nrk", along, wrenches[:, rods.ends, :3], rods.signs))

@@ -153,14 +153,10 @@ def _side_by_side(solution: Solution, maps: Maps, values: Floats) -> tuple[Float
     """
     mechanism = solution.mechanism
     pairs = pairs_of(mechanism, np.where(maps.is_valid[:, None], solution._coordinates, 0.0))
-    order = [3, 4, 5, 0, 1, 2][: maps.forward.shape[1]]
-    twists, springs = (
-        pairs.twists[:, order],
-        np.broadcast_to(values * actuator_units(mechanism) ** 2, pairs.rates.shape[:2]),
-    )
+    twists, springs = pairs.twists, np.broadcast_to(values * actuator_units(mechanism) ** 2, pairs.rates.shape[:2])
     inner = np.swapaxes(pairs.rates, -1, -2) @ (springs[..., None] * pairs.rates)
     sizes, vectors = np.linalg.eigh(inner)
-    is_lost = np.abs(pairs.of_joints).max(axis=1, initial=0.0) == 0.0  # at a serial singularity: rigid
+    is_lost = np.abs(np.concatenate(pairs, axis=1)).max(axis=1, initial=0.0) == 0.0  # at a serial singularity: rigid
     is_loose = np.asarray((sizes <= TOLERANCES.rank * sizes[:, -1:]).sum(axis=1) > is_lost.sum(axis=1))
     softness = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > TOLERANCES.rank * sizes[:, -1:])
     shown = twists @ vectors

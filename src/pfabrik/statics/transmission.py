@@ -8,13 +8,14 @@ import numpy as np
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
+from ..closure.first_order import JointRates
 from ..description.mechanism import Mechanism
+from ..model import model_of
 from ..motion.displacements import columns, rate_units
 from ..motion.joint_rates import graph_of
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .first_order_maps import Maps, maps_of
-from .joint_balance import pairs_of
 from .reasons import Reasons, has_reason, in_shape
 
 
@@ -96,11 +97,9 @@ def _of_joint(solution: Solution, maps: Maps, joint: str) -> Floats:
     """Rates of a joint's coordinates per actuator rate, (n, own, n_a)."""
     mechanism = solution.mechanism
     q, column = np.where(maps.is_valid[:, None], solution._coordinates, 0.0), columns(mechanism)[joint]
-    pairs, units = pairs_of(mechanism, q), rate_units(mechanism)
-    of_joints = graph_of(mechanism).rates.T[column] @ pairs.of_joints
-    rates = of_joints @ np.linalg.pinv(pairs.rates, rcond=TOLERANCES.singular)
-    actuators = units[[drive.column for drive in mechanism.drives]]
-    return np.asarray(rates * units[column][:, None] / actuators)
+    first, units = JointRates(model_of(mechanism), q), rate_units(mechanism)
+    rates = graph_of(mechanism).rates.T[column] @ first.by_actuators
+    return np.asarray(rates * units[column][:, None] / units[first.actuated])
 
 
 def _ranks(mechanism: Mechanism) -> tuple[int, int]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
-from ..answers.differential import singularity
+from ..answers.differential import forward_jacobian, singularity
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
@@ -215,7 +215,8 @@ def _along(track: Track) -> SingularityTrack:
 
 
 def _of(answers: Solution) -> tuple[Singularity, Floats]:
-    return singularity(answers), parallel_signs(answers.mechanism, answers._coordinates)
+    signs = parallel_signs(answers.mechanism, answers._coordinates, forward_jacobian(answers))
+    return singularity(answers), signs
 
 
 def _signed(measures: Singularity, signs: Floats) -> Floats:

@@ -87,33 +87,42 @@ class Closed(NamedTuple):
     iterations: Ints  # (n,)
 
 
-# Columns of FirstOrder.measures.
+# Columns of Rates.measures.
 SERIAL, PARALLEL, CONSTRAINT, PASSIVE = 0, 1, 2, 3
 
+# What is asked for: Jacobians alone, with all measures, or joint rates.
+JACOBIANS, MEASURES, JOINTS = 0, 1, 2
 
-class FirstOrderPlan(NamedTuple):
+
+class RatesPlan(NamedTuple):
     """What is asked of a mechanism, and what holds of it in general."""
 
     loops: Floats  # (loops, columns): orthonormal combinations of the loops
     way: Floats  # (columns,): how the way to the end effector passes each joint
     rates: Floats  # (columns, columns): orthonormal rates of every joint
     actuated: Ints  # (n_a,): columns of the actuators
+    directions: Floats  # (twists, k): orthonormal twists that the end effector ever has
     rank: int  # of the loops' conditions
     shown: int  # motions that show at the end effector or the actuators
     freedoms: int  # of the end effector
-    twists: int  # rows of a twist: 6, or 3
     least: float  # singular value up to which a direction counts as lost
-    asks_constraint: int  # 1: the singular value of the conditions is asked for
+    singular: float  # measure below which a configuration is singular
+    asks: int  # JACOBIANS, MEASURES or JOINTS
 
 
-class FirstOrder(NamedTuple):
-    """What is told, row by row; lengths in L."""
+class Rates(NamedTuple):
+    """What holds at n configurations, by orthonormal joint rates; lengths in L. No rows of what is not asked for."""
 
     forward: Floats  # (n, twists, n_a)
     inverse: Floats  # (n, n_a, twists)
-    measures: Floats  # (n, 4): see above
+    measures: Floats  # (n, 4)
     lost: Floats  # (n, twists): not yet unit vectors
     gained: Floats
+    screws: Floats  # (n, columns, 6): velocity of the reference point, angular velocity
+    motions: Floats  # (n, columns, motions): orthonormal, those that show most first
+    sizes: Floats  # (n, motions): how much each shows at end effector and actuators
+    joints: Floats  # (n, columns, n_a): rates per actuator rate
+    closing: Floats  # (n, columns, conditions): the least rates that open loops
 
 
 class PoseObjective(NamedTuple):

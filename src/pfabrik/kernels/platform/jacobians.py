@@ -14,14 +14,10 @@ import numpy as np
 
 from ...arrays import Floats
 from .._jit import opener, routine, search
-from ..closure.first_order import size_of, triangularise
+from ..closure.first_order import REGULAR, orthogonalise, triangularise
 
 # Slope up to which a constraint follows from others [L or rad].
 IMPLIED = 1e-9
-# Size of a slope below which it may be that of a singular configuration, the inverse of the largest [L or rad].
-REGULAR = 1e-3
-# Share of a row that has to be left of it beside others, for it to be orthogonal to them at once.
-ENOUGH = 0.5
 
 
 class JacobianTables(NamedTuple):
@@ -71,7 +67,7 @@ def jacobians(scratch_address: int, slopes: Floats, is_forward: int, found: Floa
                 table[twists + i, j] = slopes[row, i, j]
         to, first = (0, twists) if is_forward == 1 else (twists, 0)
         is_told = abs(total) < math.inf and put_pairs(rows, table, pairs)
-        if not is_told or (is_forward == 1 and not orthogonalise(pairs, first)):
+        if not is_told or (is_forward == 1 and not orthogonalise(pairs, first, width)):
             found[row, 0, 0] = math.nan
             left += 1
             continue
@@ -103,31 +99,4 @@ def put_pairs(rows: int, table: Floats, pairs: Floats) -> bool:
             pairs[k, i] = table[rows + i, rank + k]
             if not abs(pairs[k, i]) < 1.0 / REGULAR:
                 return False
-    return True
-
-
-@routine
-def orthogonalise(pairs: Floats, first: int) -> bool:
-    """Make the columns of all rows from `first` on orthonormal, by Gram and Schmidt; the others go along.
-
-    False where next to nothing is left of one.
-    """
-    n, width = pairs.shape
-    for k in range(n):
-        size = size_of(pairs, k, first, width)
-        for _ in range(2):  # what is left of a row after much of it was taken is not orthogonal yet
-            before = size
-            for j in range(k):
-                share = 0.0
-                for i in range(first, width):
-                    share += pairs[j, i] * pairs[k, i]
-                for i in range(width):
-                    pairs[k, i] -= share * pairs[j, i]
-            size = size_of(pairs, k, first, width)
-            if size > ENOUGH * before:
-                break
-        if not size > REGULAR:
-            return False
-        for i in range(width):
-            pairs[k, i] /= size
     return True
