@@ -16,7 +16,7 @@ from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..motion.displacements import rate_units
-from ..motion.joint_rates import actuated_columns, graph_of
+from ..motion.joint_rates import actuated_columns, graph_of, present_screws
 from ..motion.mobility import generic_of
 from ..motion.singularities import Singularity, loop_basis, singularity_of
 from ..tolerances import TOLERANCES
@@ -84,6 +84,9 @@ class JointRates:
         self._most = counts.platform + counts.internal
         self.screws, self.by_actuators, self.motions = self._found.screws, self._found.joints, self._found.motions
         self.is_singular = np.asarray(self._found.measures[:, CONSTRAINT] < TOLERANCES.singular)
+        idle = model.closure.idle
+        if idle.any():  # on no path, as a tool's hinge: what it carries works on it
+            self.screws[:, idle] = present_screws(mechanism, q)[:, idle][..., [3, 4, 5, 0, 1, 2]]
 
     @cached_property
     def twists(self) -> Floats:
@@ -116,8 +119,9 @@ class JointRates:
 
     @cached_property
     def open(self) -> Floats:
-        """Wrenches in the loops that no joint notices, (n, 6 loops, 6 loops): a projection."""
-        return np.asarray(np.eye(self.conditions.shape[1]) - self.conditions @ self._found.closing)
+        """Wrenches in the loops that no joint notices, (n, 6 loops, 6 loops): a projection; 0 in singularities."""
+        left = np.eye(self.conditions.shape[1]) - self.conditions @ self._found.closing
+        return np.where(self.is_singular[:, None, None], 0.0, left)
 
     @cached_property
     def pairs(self) -> Floats:

@@ -24,8 +24,8 @@ from ..description.graph import tree_of
 from ..description.home_mobility import loop_conditions, unclear_conditions
 from ..description.joints import Joint
 from ..description.structure import Structure
-from ..motion.displacements import columns, displacements, joint_displacements, loop_errors, screws
-from ..motion.joint_rates import at_reference, graph_of, moved
+from ..motion.displacements import columns, displacements, joint_displacements
+from ..motion.joint_rates import at_reference, graph_of, loop_errors_here, loop_slopes, moved
 from ..rotations import from_rotvec
 from .digits import Rounding
 
@@ -71,7 +71,7 @@ def nearest_moving(structure: Structure, roundings: Sequence[Rounding]) -> tuple
     if displacements is None:
         return None
     moving = _displaced(structure, displacements)
-    is_open = np.abs(_errors(moving, _walked(moving, rank, np.random.default_rng(1)))).max() > OPEN
+    is_open = np.abs(loop_errors_here(moving, _walked(moving, rank, np.random.default_rng(1)))).max() > OPEN
     if is_open or len(unclear_conditions(moving)) >= len(unclear_conditions(structure)):
         return None
     return moving.joints
@@ -82,19 +82,8 @@ def _count(structure: Structure) -> int:
 
 
 def _rank(structure: Structure, q: Floats, threshold: float) -> int:
-    values = np.linalg.svd(_slopes(structure, q), compute_uv=False)
+    values = np.linalg.svd(loop_slopes(structure, q), compute_uv=False)
     return int(np.count_nonzero(values > threshold, axis=1).max())
-
-
-def _errors(structure: Structure, q: Floats) -> Floats:
-    """Loop errors e, (n, 6 loops)."""
-    return at_reference(structure, q, loop_errors(structure, q)).reshape(len(q), -1)
-
-
-def _slopes(structure: Structure, q: Floats) -> Floats:
-    """Slopes J of the loop errors by joint rates, (n, 6 loops, c)."""
-    graph = graph_of(structure)
-    return loop_conditions(graph.fundamental, graph.rates @ at_reference(structure, q, screws(structure, q)))
 
 
 def _displacement_slopes(structure: Structure, q: Floats) -> Floats:
@@ -131,11 +120,11 @@ def _walked(structure: Structure, rank: int, rng: np.random.Generator) -> Floats
     """Configurations (n, c) some steps from home along motions that are free up to rounding, and closed up to it."""
     q = np.zeros((SAMPLES, _count(structure)))
     for _ in range(STEPS):
-        right = np.linalg.svd(_slopes(structure, q))[2][:, rank:]
+        right = np.linalg.svd(loop_slopes(structure, q))[2][:, rank:]
         step = np.einsum("nki,nk->ni", right, rng.standard_normal(right.shape[:2]))
         q = moved(structure, q, STEP * step / np.abs(step).max(axis=1, keepdims=True))
         for _ in range(NEWTON_STEPS):
-            step = _joint_steps(_slopes(structure, q), _errors(structure, q), rank)[1]
+            step = _joint_steps(loop_slopes(structure, q), loop_errors_here(structure, q), rank)[1]
             q = moved(structure, q, step)
             if np.abs(step).max() <= CLOSED:
                 break
@@ -153,7 +142,7 @@ def _displacements(structure: Structure, q: Floats, units: Floats, rank: int) ->
     """Displacements of the joints (j, 6) with which the loops close in configurations near to given ones (n, c)."""
     displaced, trial = np.zeros_like(units), structure
     for _ in range(NEWTON_STEPS):
-        errors, slopes = _errors(trial, q), _slopes(trial, q)
+        errors, slopes = loop_errors_here(trial, q), loop_slopes(trial, q)
         if np.abs(errors).max() <= CLOSED:
             break
         by_joints = _displacement_slopes(trial, q) * units.ravel()

@@ -16,7 +16,7 @@ from ..description.graph import tree_of
 from ..description.home_mobility import body_twist, column_joints, column_moves, loop_conditions, orthonormal_rates
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
-from .displacements import end_effector_pose, screws, stepped
+from .displacements import end_effector_pose, loop_errors, screws, stepped
 
 
 def actuated_columns(mechanism: Mechanism) -> list[int]:
@@ -55,12 +55,26 @@ def graph_of(mechanism: Structure) -> CycleBasis:
 
 def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
     """Loop conditions (n, 6 loops, c) and twist of the end effector (n, r, c), per orthonormal joint rate."""
-    graph = graph_of(mechanism)
-    present = graph.rates @ at_reference(mechanism, q, screws(mechanism, q))
+    graph, present = graph_of(mechanism), present_screws(mechanism, q)
     twist = body_twist(graph.path, present)
     velocity, angular = twist[:, 3:], twist[:, :3]
     rows = [velocity] if mechanism.end_effector_is_joint else [velocity, angular]
     return loop_conditions(graph.orthonormal, present), np.concatenate(rows, axis=1)
+
+
+def present_screws(mechanism: Structure, q: Floats) -> Floats:
+    """Screws of orthonormal joint rates, (n, c, 6): angular velocity, velocity of the present reference point."""
+    return np.asarray(graph_of(mechanism).rates @ at_reference(mechanism, q, screws(mechanism, q)))
+
+
+def loop_slopes(mechanism: Structure, q: Floats) -> Floats:
+    """Slopes of the loops' errors by orthonormal joint rates, (n, 6 loops, c)."""
+    return loop_conditions(graph_of(mechanism).fundamental, present_screws(mechanism, q))
+
+
+def loop_errors_here(mechanism: Structure, q: Floats) -> Floats:
+    """The loops' errors at the present reference point, (n, 6 loops) [rad, L]."""
+    return at_reference(mechanism, q, loop_errors(mechanism, q)).reshape(len(q), -1)
 
 
 def at_reference(mechanism: Structure, q: Floats, origin_screws: Floats) -> Floats:

@@ -6,11 +6,11 @@ import numpy as np
 
 from ..arrays import Floats
 from ..derived import derived
-from ..description.home_mobility import column_joints, loop_conditions
+from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..tolerances import TOLERANCES
-from .displacements import gaps, loop_errors, screws
-from .joint_rates import actuated_columns, at_reference, first_order, graph_of, moved, right_singular
+from .displacements import gaps
+from .joint_rates import actuated_columns, first_order, loop_errors_here, loop_slopes, moved, right_singular
 
 SAMPLES, STEPS, STEP = 8, 3, 0.1
 """Number of walks from home to generic configurations, steps of each, and largest joint motion of a step [rad or L]."""
@@ -38,12 +38,10 @@ def _closed(mechanism: Mechanism, q: Floats) -> Floats:
 
     Directions in which the loops hardly resist are not corrected, so that a walk may start in a singularity.
     """
-    graph = graph_of(mechanism)
     for _ in range(NEWTON_STEPS):
         open_by = gaps(mechanism, q) / mechanism.characteristic_length
-        conditions = loop_conditions(graph.fundamental, graph.rates @ at_reference(mechanism, q, screws(mechanism, q)))
-        errors = at_reference(mechanism, q, loop_errors(mechanism, q)).reshape(len(q), -1)
-        step = np.einsum("nij,nj->ni", np.linalg.pinv(conditions, TOLERANCES.alignment), -errors)
+        inverses = np.linalg.pinv(loop_slopes(mechanism, q), TOLERANCES.alignment)
+        step = np.einsum("nij,nj->ni", inverses, -loop_errors_here(mechanism, q))
         q = moved(mechanism, q, step)
         if (open_by <= TOLERANCES.position).all():
             break

@@ -89,7 +89,7 @@ class Forces:
         """
         rods, (centres, _) = rods_of(self._mechanism), self._places
         pulls = tensions(rods, self._balance.wrenches, centres)[..., 0] / self._mechanism.characteristic_length
-        open_pulls = np.abs(tensions(rods, self._balance.open, centres)).max(axis=-1, initial=0.0)
+        open_pulls = np.linalg.norm(tensions(rods, self._balance.open, centres), axis=-1)
         pulls = np.where((open_pulls > TOLERANCES.alignment) | self._is_unknown[:, None], np.nan, pulls)
         return FrozenMapping({name: self._shaped(pulls[:, place]) for place, name in enumerate(rods.names)})
 
@@ -132,7 +132,7 @@ class Forces:
         """True where a component of a reaction is not determined, (n, joints, 6)."""
         left = about_centres(self._mechanism, self._balance.open, *self._places)
         units = np.repeat([1.0, self._mechanism.characteristic_length], 3) / self._mechanism.characteristic_length
-        return np.asarray(np.abs(left / units[:, None]).max(axis=-1, initial=0.0) > TOLERANCES.alignment)
+        return np.asarray(np.linalg.norm(left / units[:, None], axis=-1) > TOLERANCES.alignment)
 
 
 def forces(

@@ -59,6 +59,6 @@ def responses_of(solution: Solution, maps: Maps, purpose: str) -> Responses:
         found.wrenches[:, :, :3] / length,
         found.open[:, :, :3],
         tensions(rods, found.wrenches, centres) / length,
-        np.abs(tensions(rods, found.open, centres)).max(axis=-1, initial=0.0),
+        np.linalg.norm(tensions(rods, found.open, centres), axis=-1),
         found.is_singular,
     )

@@ -150,7 +150,7 @@ def put_joint_rates(plan: RatesPlan, scratch: RatesScratch, seen: int, row: int,
         put_resisted(plan, scratch, seen)
         rotate_apart(resisted, 0, m, sizes)
         found.measures[row, CONSTRAINT] = sizes[plan.rank - 1]
-    put_map(resisted, 0, m + seen, plan.rank, 0.0, sizes, found.closing[row])
+    put_map(resisted, 0, m + seen, plan.rank, plan.least, sizes, found.closing[row])
 
 
 @routine
