@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -120,7 +120,10 @@ class JointRates:
     @cached_property
     def open(self) -> Floats:
         """Wrenches in the loops that no joint notices, (n, 6 loops, 6 loops): a projection; 0 in singularities."""
-        left = np.eye(self.conditions.shape[1]) - self.conditions @ self._found.closing
+        m = self.conditions.shape[1]
+        if self.motions.shape[2] == len(self._graph.path) - m:
+            return np.zeros((len(self.screws), m, 0))
+        left = np.eye(m) - self.conditions @ self._found.closing
         return np.where(self.is_singular[:, None, None], 0.0, left)
 
     @cached_property
@@ -150,39 +153,42 @@ def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> Rate
     """
     from ..kernels.closure.first_order import rates
 
-    plan, scratch = _prepared(model, asks) if like is None else _made(model, asks, like)
-    closure, (n, c), (r, _), n_a = model.closure, q.shape, plan.directions.shape, len(plan.actuated)
+    own = _prepared(model, asks) if like is None else _made(model, asks, like)
+    closure, n = model.closure, len(q)
     coordinates = q * closure.scale
-    of_pose = (r, n_a), (n_a, r), (4,), (r,), (r,)
-    of_joints = (c, 6), (c, c - plan.rank), (c - plan.rank,), (c, n_a), (c, 6 * len(plan.loops))
-    rows = [n if asks < JOINTS or place == CONSTRAINT else 0 for place in range(len(of_pose))]
-    rows += [n if asks == JOINTS else 0] * len(of_joints)
-    shapes = zip(rows, of_pose + of_joints, strict=True)
-    found = Rates(*(np.full((k, *shape), np.nan) for k, shape in shapes))
+    found = Rates(*(none if shape is None else np.full((n, *shape), np.nan) for shape, none in own.results))
 
     def run(block: slice) -> None:
-        rates(closure.machine.address, scratch.address, plan, coordinates[block], take(found, block))
+        part = found if n <= ROWS_A_BLOCK else take(found, block)
+        rates(closure.machine.address, own.scratch.address, own.plan, coordinates[block], part)
 
     in_blocks(run, n, ROWS_A_BLOCK)
     return found
 
 
+class _Prepared(NamedTuple):
+    """What the kernel takes; shapes of what is asked for, row by row, and arrays without rows for all else."""
+
+    plan: RatesPlan
+    scratch: Scratch[RatesScratch]
+    results: list[tuple[tuple[int, ...] | None, Floats]]
+
+
 @derived
-def _prepared(model: Model, asks: int) -> tuple[RatesPlan, Scratch[RatesScratch]]:
+def _prepared(model: Model, asks: int) -> _Prepared:
     return _made(model, asks, model)
 
 
-def _made(model: Model, asks: int, like: Model) -> tuple[RatesPlan, Scratch[RatesScratch]]:
-    """What the kernel takes."""
+def _made(model: Model, asks: int, like: Model) -> _Prepared:
     from ..kernels.closure.first_order import new_rates_scratch
 
     mechanism, generic = model.mechanism, generic_of(like.mechanism)
-    graph, counts = graph_of(mechanism), generic.mobility
+    graph, counts, actuated = graph_of(mechanism), generic.mobility, actuated_columns(mechanism)
     plan = RatesPlan(
         loops=np.ascontiguousarray(graph.orthonormal),
         way=np.array(graph.path, float),
         rates=np.array(graph.rates),
-        actuated=np.array(actuated_columns(mechanism), np.int64),
+        actuated=np.array(actuated, np.int64),
         directions=np.ascontiguousarray(generic.directions),
         rank=generic.rank,
         shown=counts.platform + counts.internal,
@@ -191,7 +197,13 @@ def _made(model: Model, asks: int, like: Model) -> tuple[RatesPlan, Scratch[Rate
         singular=TOLERANCES.singular,
         asks=asks,
     )
-    return plan, Scratch(new_rates_scratch, model.closure.loops, plan)
+    r, c, n_a = len(plan.directions), len(plan.way), len(actuated)
+    of_pose = {"forward": (r, n_a), "inverse": (n_a, r), "measures": (4,), "lost": (r,), "gained": (r,)}
+    of_joints = {"screws": (c, 6), "motions": (c, c - plan.rank), "sizes": (c - plan.rank,), "joints": (c, n_a)}
+    of_joints |= {"closing": (c, 6 * len(plan.loops)), "measures": (4,)}
+    asked, shapes = of_joints if asks == JOINTS else of_pose, of_pose | of_joints
+    results = [(asked.get(name), np.empty((0, *shapes[name]))) for name in Rates._fields]
+    return _Prepared(plan, Scratch(new_rates_scratch, model.closure.loops, plan), results)
 
 
 @derived

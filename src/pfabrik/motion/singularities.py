@@ -132,7 +132,7 @@ def assembly_signs(mechanism: Mechanism, q: Floats) -> Floats:
     basis, passive = loop_basis(mechanism)
     if not len(basis) or not len(q):
         return np.zeros(len(q))
-    invalid = np.isnan(q).any(axis=1)
+    invalid = np.asarray(np.isnan(q).any(axis=1))
     closure, _ = first_order(mechanism, np.where(invalid[:, None], 0.0, q))
     return np.asarray(np.where(invalid, 0.0, np.sign(np.linalg.det(basis @ closure[:, :, passive]))))
 

@@ -71,9 +71,8 @@ def new_rates_scratch(loops: Loops, plan: RatesPlan) -> RatesScratch:
     return RatesScratch(new_state(loops), new_equations(loops, LAYOUT), *(np.zeros(shape) for shape in shapes))
 
 
-PLAN = RatesPlan(
-    *(np.zeros((0,) * k) for k in (2, 1, 2)), np.zeros(0, np.int64), np.zeros((0, 0)), 0, 0, 0, 0.0, 0.0, 0
-)
+NONE = np.zeros((0, 0))
+PLAN = RatesPlan(NONE, np.zeros(0), NONE, np.zeros(0, np.int64), NONE, 0, 0, 0, 0.0, 0.0, 0)
 """A plan of the types that kernels are compiled for."""
 
 open_scratch = opener(new_rates_scratch(LOOPS, PLAN))
