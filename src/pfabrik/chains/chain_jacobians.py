@@ -9,7 +9,7 @@ from ..derived import derived
 from ..kernels.closure.loops import BALL
 from ..model import Model
 from ..tolerances import TOLERANCES
-from .run_chains import run_screws
+from .run_chains import posed
 from .serial_chain import chain_of, is_chain
 
 
@@ -28,7 +28,9 @@ def forward_of_chain(model: Model, q: Floats) -> Floats:
     places, freedoms = driven
     n_twists, n_actuators = 3 if model.mechanism.end_effector_is_joint else 6, len(model.closure.actuated)
     forward = np.zeros((len(q), n_twists, n_actuators))
-    screws = run_screws(model, q * model.closure.scale)[:, freedoms, :n_twists]
+    screws = np.zeros((len(q), len(chain_of(model).lo), 6))
+    posed(model, q * model.closure.scale, screws)
+    screws = screws[:, freedoms, :n_twists]
     screws[..., :3] *= model.length
     screws *= model.closure.scale[model.closure.actuated[places], None]
     forward[:, :, places] = np.swapaxes(screws, 1, 2)

@@ -11,7 +11,7 @@ from ..derived import derived
 from ..kernels.chains.chain_records import SEEDS
 from ..kernels.closure.loops import BALL, SLIDE
 from ..model import Model
-from .run_chains import run_walk
+from .run_chains import NO_SCREWS, posed
 from .serial_chain import chain_of
 
 WAVES = 4
@@ -64,7 +64,7 @@ def chain_seeds(model: Model) -> ChainSeeds:
         seed[chain.columns[~is_ball]] = values[~is_ball]
         for k in np.flatnonzero(is_ball):
             seed[chain.columns[k] : chain.columns[k] + 3] = bend[:, k]
-    return ChainSeeds(coordinates, run_walk(model, coordinates).poses)
+    return ChainSeeds(coordinates, posed(model, coordinates, NO_SCREWS)[0])
 
 
 def _own_frame(axes: Floats) -> Floats:

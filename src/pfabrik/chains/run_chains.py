@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Floats
+from ..closure.close import Closing, in_lengths
 from ..derived import derived
-from ..kernels.chains.chain_records import ChainAim, ChainAnswers
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
@@ -21,59 +20,47 @@ if TYPE_CHECKING:
 ROWS_A_BLOCK = 16
 """Rows of one call of a kernel: a row takes microseconds to milliseconds."""
 
-
-def new_answers(coordinates: Floats) -> ChainAnswers:
-    """Allocate the answers of as many dimensionless starts, (n, columns), which are copied."""
-    n = len(coordinates)
-    poses = np.zeros((n, 4, 4))
-    poses[:, 3, 3] = 1.0
-    return ChainAnswers(coordinates.copy(), poses, np.zeros(n), np.zeros(n), np.zeros(n, np.int64))
-
-
 NO_SCREWS = np.zeros((0, 0, 6))
 
 
-def run_walk(model: Model, coordinates: Floats) -> ChainAnswers:
-    """Poses of the end effector and limits at dimensionless coordinates (n, columns), which are not changed."""
-    return _walk(model, coordinates, NO_SCREWS)
+def walk(model: Model, coordinates: Floats) -> Closing:
+    """Configurations at joint coordinates (n, columns), as results of closing loops, of which there are none."""
+    poses, excess = posed(model, coordinates * model.closure.scale, NO_SCREWS)
+    gaps, excesses, misses = np.zeros((3, len(coordinates), len(model.path_closure.loops.groups) - 1))
+    excesses[:] = excess[:, None]
+    return Closing(
+        coordinates, in_lengths(poses, model.length), gaps, excesses, misses, np.zeros(len(coordinates), int)
+    )
 
 
-def run_screws(model: Model, coordinates: Floats) -> Floats:
-    """Twists of the end effector per unit rate of each freedom, (n, freedoms, 6) [L], at dimensionless coordinates."""
-    screws = np.zeros((len(coordinates), len(chain_of(model).lo), 6))
-    _walk(model, coordinates, screws)
-    return screws
+def posed(model: Model, coordinates: Floats, screws: Floats) -> tuple[Floats, Floats]:
+    """End effectors (n, 4, 4) [L] and largest excesses over a limit (n,) at dimensionless coordinates (n, columns).
 
-
-def _walk(model: Model, coordinates: Floats, screws: Floats) -> ChainAnswers:
-    """Walk chains at dimensionless coordinates (n, columns), and fill the screws unless there are no rows of these."""
+    Parameters
+    ----------
+    screws : filled with the twists of the end effector per unit rate of each freedom, (n, freedoms, 6), or `NO_SCREWS`.
+    """
     from ..kernels.chains.answer_chains import walk_chains
 
-    answers, handle, scratch = new_answers(coordinates), chain_handle(model), scratch_of_chain(model)
-
-    def run(block: slice) -> None:
-        own = ChainAnswers._make(array[block] for array in answers)
-        walk_chains(handle.address, scratch.address, own, screws[block])
-
-    in_blocks(run, len(coordinates), 4 * ROWS_A_BLOCK)
-    return answers
-
-
-def run_chains(model: Model, kernel: Callable[..., int], aim: ChainAim, answers: ChainAnswers) -> int:
-    """Run a kernel on the rows of answers, in place; the sum of what it returns."""
+    poses, excesses = np.empty((len(coordinates), 4, 4)), np.empty(len(coordinates))
     handle, scratch = chain_handle(model), scratch_of_chain(model)
 
-    def run(block: slice) -> int:
-        own = aim._replace(pose=aim.pose._replace(targets=aim.pose.targets[block]))
-        return kernel(handle.address, scratch.address, own, ChainAnswers._make(array[block] for array in answers))
+    def run(block: slice) -> None:
+        part = coordinates[block], poses[block], excesses[block], screws[block]
+        walk_chains(handle.address, scratch.address, *part)
 
-    n = len(answers.steps)
-    return sum(in_blocks(run, n, n if aim.follows else ROWS_A_BLOCK))
+    in_blocks(run, len(coordinates), 4 * ROWS_A_BLOCK)
+    return poses, excesses
 
 
 @derived
 def scratch_of_chain(model: Model) -> Scratch[ChainScratch]:
     """Scratch memory of the kernels, for each thread its own."""
+    return Scratch(new_scratch, model, 0)
+
+
+def new_scratch(model: Model, attempts: int) -> ChainScratch:
+    """Allocate scratch memory, with room to note so many attempts."""
     from ..kernels.chains.chain_state import new_chain_scratch
 
-    return Scratch(new_chain_scratch, chain_of(model))
+    return new_chain_scratch(chain_of(model), len(model.closure.scale), attempts)

@@ -9,7 +9,6 @@ import numpy as np
 from ..arrays import Floats
 from ..derived import derived
 from ..description.paths import independent_paths
-from ..description.task import norms
 from ..kernels.chains.chain_records import SerialChain
 from ..kernels.closure.loops import BALL, SLIDE, Loops
 from ..kernels.handle import Handle
@@ -82,14 +81,8 @@ def serial_chain(model: Model) -> SerialChain | None:
     )
 
 
-def length_beyond(model: Model, targets: Floats) -> Floats:
-    """By how much targets (n, 4, 4) are farther away than the chain is long when it is stretched out, (n,) [L]."""
-    away = np.where(model.task.axes, targets[:, :3, 3] / model.length - chain_of(model).offsets[0], 0.0)
-    return np.asarray(norms(away) - _stretched_length(model) * (1.0 + TOLERANCES.position) - TOLERANCES.position)
-
-
 @derived
-def _stretched_length(model: Model) -> float:
+def stretched_length(model: Model) -> float:
     """Length of a chain that is stretched out, slides too [L]."""
     chain = chain_of(model)
     slides = chain.freedoms[chain.kinds == SLIDE]

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from .certify.prove import prove
-from .chains.answer_chains import nearest_in_chains, reach_in_chains, walk_chains
-from .chains.chain_records import ChainAim, ChainAnswers
+from .chains.answer_chains import answer_chains, walk_chains
 from .clearance.capsules import capsule_clearance, place_ends
 from .clearance.least_clearance import least_clearance
 from .closure.close import close
@@ -67,7 +66,6 @@ _PASSES = (
 )
 
 _POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i f f i"))
-_CHAINS = ChainAim(_POSE_OBJECTIVE, *_values("F2 F3 i i i f f")), ChainAnswers(*_values("f2 f3 f1 f1 i1"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, tuple(_values("i F3 F3 F2 i1 f3 f2 f2"))),
@@ -85,9 +83,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i F2 i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),
-    (walk_chains, (*_values("i i"), _CHAINS[1], *_values("f3"))),
-    (reach_in_chains, (*_values("i i"), *_CHAINS)),
-    (nearest_in_chains, (*_values("i i"), *_CHAINS)),
+    (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
+    (answer_chains, tuple(_values("i i i F3 F2 f2 i1 i2 f3 f2 f2"))),
     (measure_home, tuple(_values("f1 i f1 i1"))),
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),

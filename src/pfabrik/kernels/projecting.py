@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Record
+from ..arrays import Floats, Record, Records
 from ._jit import routine
 from .closure.loops import LOCKED
 from .rows import HOLD_ORIENTATION
@@ -39,6 +39,16 @@ EFFORT = np.dtype(
     ]
 )
 """What searches have cost, and may."""
+
+ATTEMPT = np.dtype(
+    [
+        ("phase", "i8"),  # 0: to reach the target; else the objective, from 1 on
+        ("start", "i8"),  # number of the seed; -1: the start
+        ("steps", "i8"),
+        ("distance", "f8"),  # of its end from the target, or from what is held [L]; infinite without one
+    ]
+)
+"""One search in a log of all."""
 
 UNBOUNDED = 2**62
 """More steps than are ever taken."""
@@ -85,6 +95,16 @@ def count_effort(steps: int, effort: Record) -> None:
     """Count a search."""
     effort["steps"] += steps
     effort["searches"] += 1
+
+
+@routine
+def note_attempt(phase: int, start: int, steps: int, distance: float, effort: Record, log: Records) -> None:
+    """Count a search whose steps are counted already, and note it in a log as long as that has room."""
+    place = effort["searches"]
+    effort["searches"] += 1
+    if place < len(log):
+        attempt = log[place]
+        attempt["phase"], attempt["start"], attempt["steps"], attempt["distance"] = phase, start, steps, distance
 
 
 @routine

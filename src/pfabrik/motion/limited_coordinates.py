@@ -59,7 +59,7 @@ def ranges_of(mechanism: Mechanism) -> Ranges:
 
 def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
     """Shift the angles of ranged joints about one axis by full turns into their ranges, if possible, in place."""
-    places, low, high = _ranged_angles(mechanism)
+    places, low, high = ranged_angles(mechanism)
     values = coordinates[:, places]
     outside = (values < low) | (values > high)
     if outside.any():
@@ -68,7 +68,7 @@ def within_turns(mechanism: Mechanism, coordinates: Floats) -> None:
 
 
 @derived
-def _ranged_angles(mechanism: Mechanism) -> tuple[NDArray[np.intp], Floats, Floats]:
+def ranged_angles(mechanism: Mechanism) -> tuple[NDArray[np.intp], Floats, Floats]:
     """Columns of ranged angles about one axis, and the bounds of their deviations, widened by the limit tolerance."""
     ranges = ranges_of(mechanism)
     chosen = [

@@ -1,248 +1,222 @@
-"""Kernels of serial chains: targets reached, or the nearest configurations, each from the start and from seeds."""
+"""Kernels of serial chains: targets answered, and configurations posed."""
 
 from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints, Record
 from .._jit import routine, search
-from ..closure.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
+from ..closure.loops import SIGHT
+from ..legs.complete_poses import is_pose, orthonormalise
+from ..platform.answer_row import errors
+from ..rows import (
+    FAILED,
+    HOLD,
+    HOLD_NOTHING,
+    HOLD_ORIENTATION,
+    HOLD_POSITION,
+    ITERATIONS,
+    LIMIT_EXCESS,
+    PENDING,
+    POSITION_ERROR,
+    PROJECTED,
+    REACHED,
+    ROTATION_ERROR,
+)
 from ..vectors import copy_row, copy_table
-from .chain_records import ChainAim, ChainAnswers, SerialChain
-from .chain_state import ChainScratch, ChainState, open_chain, open_chain_scratch
-from .descend_chain import descend_chain, pull
-from .reach_target import reach_target
+from .chain_records import ChainTables
+from .chain_state import ChainScratch, open_chain, open_chain_scratch, open_question, open_tables
+from .search_chain import project, reach
 from .walk_chain import copy_chain_state, excess_of, load_chain, store_chain, walk_chain
 
-STEPS = 30
-"""Most steps of an attempt to reach a target; those that converge need ten."""
-
-DESCENT_STEPS = 200
-"""Most steps of a descent, those that are not taken included; most need a dozen."""
-
-NEARER = 0.25
-"""The start goes before a seed that is not nearer than this share of its squared distance."""
-
-NEARLY = 1e4
-"""Ratio to the least objective up to which a descent's end may become the nearest by way of a target farther out."""
-
-PULLS = 12
-"""Most times that an answer is sought by way of a target farther out."""
-
-SAME = 2e-7
-"""Relative difference of objectives that count as equal."""
+LARGEST_NUMBER = 1.7976931348623157e308
+"""Upper bound of position errors: finite, however far the target."""
 
 
 @search
-def reach_in_chains(machine: int, scratch_address: int, aim: ChainAim, answers: ChainAnswers) -> int:
-    """Reach targets, from each row's start and the seeds nearest to its target; return the number of rows missed.
-
-    A row that is missed gets the configuration with the least error. With `aim.follows` each row starts from the result
-    of the one before, and the number of rows is returned up to the first that is missed.
-
-    Parameters
-    ----------
-    machine, scratch_address : addresses of a `SerialChain` and of its `ChainScratch`.
-    """
-    chain, s = open_chain(machine), open_chain_scratch(scratch_address)
-    n_missed = 0
-    for row in range(len(answers.steps)):
-        target, least, steps = aim.pose.targets[row], math.inf, 0
-        limit = order_seeds(chain, row, aim, answers, s)
-        is_tried = False
-        for k in range(aim.tries + 1):
-            seed = nearest_seed(s, len(aim.seeds) if k < aim.tries or is_tried else 0)
-            if not is_tried and (seed < 0 or s.distances[seed] > limit):
-                load_chain(chain, answers.coordinates[row], True, s.state)
-                is_tried = True
-            elif seed < 0:
-                break
-            else:
-                load_chain(chain, aim.seeds[seed], True, s.state)
-                s.distances[seed] = math.inf
-            error, n_steps = reach_target(chain, target, aim.pose, s.state, s, aim.closeness, STEPS)
-            steps += n_steps
-            if error < least:
-                least = error
-                keep_nearest(s)
-            if error <= aim.is_held:
-                break
-        write_answer(chain, row, least, steps, s, answers)
-        is_missed = least > aim.is_held
-        if aim.follows == 1 and is_missed:
-            return row
-        if aim.follows == 1 and row + 1 < len(answers.steps):
-            copy_row(answers.coordinates[row], answers.coordinates[row + 1])
-        n_missed += 1 if is_missed else 0
-    return len(answers.steps) if aim.follows == 1 else n_missed
-
-
-@search
-def nearest_in_chains(machine: int, scratch_address: int, aim: ChainAim, answers: ChainAnswers) -> int:
-    """Find the nearest configurations to targets, from each row's start and from seeds; return how many have none.
+def answer_chains(
+    tables_address: int,
+    scratch_address: int,
+    question_address: int,
+    targets: Floats,
+    starts: Floats,
+    coordinates: Floats,
+    status: Ints,
+    counters: Ints,
+    poses: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Answer targets (n, 4, 4) [length]: reached, or brought nearest; FAILED or PENDING where that finds nothing.
 
     Parameters
     ----------
-    machine, scratch_address : addresses of a `SerialChain` and of its `ChainScratch`.
+    tables_address, scratch_address, question_address : of `ChainTables`, of `ChainScratch`, and of a QUESTION.
+    starts : joint coordinates, deviations from home, one row for each target or one for all [length or rad].
+    coordinates : of the answers, (n, columns) [length or rad].
+    status, counters, poses, actuators, measures : as in `Rows`.
+
+    Returns
+    -------
+    The number of rows that are not REACHED. If each starts from the one before, rows after the first such are left out.
     """
-    chain, s = open_chain(machine), open_chain_scratch(scratch_address)
-    n_missed = 0
-    for row in range(len(answers.steps)):
-        target, least, agreements, steps = aim.pose.targets[row], math.inf, 0, 0
-        load_chain(chain, answers.coordinates[row], True, s.state)
-        walk_chain(chain, s.state, s)
-        keep_nearest(s)
-        order_seeds(chain, row, aim, answers, s)
-        for k in range(aim.tries + 1):
-            if k == 0:
-                load_chain(chain, answers.coordinates[row], True, s.state)
-            else:
-                seed = nearest_seed(s, len(aim.seeds)) if k % 2 == 1 else next_seed(s, k // 2, len(aim.seeds))
-                if seed < 0:
-                    break
-                load_chain(chain, aim.seeds[seed], True, s.state)
-                s.distances[seed] = math.inf
-            value = descend_chain(chain, target, aim.pose, s, aim.closeness, DESCENT_STEPS)
-            if value < NEARLY * least:
-                value = pull_nearer(chain, target, aim, value, s)
-            steps += 1
-            if value < (1.0 - SAME) * least:
-                least, agreements = value, 1
-                walk_chain(chain, s.state, s)
-                keep_nearest(s)
-            elif value <= (1.0 + SAME) * least:
-                agreements += 1
-            if agreements >= aim.agreements or least <= 0.5 * aim.closeness * aim.closeness:
+    tables, s, question = (
+        open_tables(tables_address),
+        open_chain_scratch(scratch_address),
+        open_question(question_address).asked[0],
+    )
+    n_missed, follows = 0, question["follows"] == 1
+    for row in range(targets.shape[0]):
+        if follows and row > 0:
+            copy_row(coordinates[row - 1], coordinates[row])
+        else:
+            copy_row(starts[row if starts.shape[0] > 1 else 0], coordinates[row])
+        has_start = question["has_start"] == 1 or (follows and row > 0)
+        status[row] = answer_chain(
+            tables,
+            s,
+            question,
+            has_start,
+            targets[row],
+            coordinates[row],
+            counters[row],
+            poses[row],
+            actuators[row],
+            measures[row],
+        )
+        if status[row] != REACHED:
+            n_missed += 1
+            if follows:
                 break
-        n_missed += 1 if least == math.inf else 0
-        write_answer(chain, row, math.sqrt(2.0 * least), steps, s, answers)
     return n_missed
 
 
 @routine
-def pull_nearer(chain: SerialChain, target: Floats, aim: ChainAim, value: float, s: ChainScratch) -> float:
-    """Bring the configuration `s.state`, of a given objective, nearer by way of targets farther out; the objective."""
-    for _ in range(PULLS):
-        if value <= 0.5 * aim.closeness * aim.closeness or not pull(chain, target, aim.pose, value, s):
-            break
-        copy_chain_state(s.state, s.unpulled)
-        descend_chain(chain, s.pulled, aim.pose, s, aim.closeness, DESCENT_STEPS)
-        nearer = descend_chain(chain, target, aim.pose, s, aim.closeness, DESCENT_STEPS)
-        if not nearer < (1.0 - SAME) * value:
-            copy_chain_state(s.unpulled, s.state)
-            break
-        value = nearer
-    return value
-
-
-@search
-def walk_chains(machine: int, scratch_address: int, answers: ChainAnswers, screws: Floats) -> None:
-    """Pose the end effectors of configurations, and measure their limits; coordinates are kept as they are.
-
-    Parameters
-    ----------
-    machine, scratch_address : addresses of a `SerialChain` and of its `ChainScratch`.
-    screws : output, of all freedoms, (n, freedoms, 6), or without rows.
-    """
-    chain, s = open_chain(machine), open_chain_scratch(scratch_address)
-    for row in range(len(answers.steps)):
-        load_chain(chain, answers.coordinates[row], False, s.state)
-        walk_chain(chain, s.state, s)
-        write_pose(row, s.X, answers.poses)
-        answers.excesses[row] = excess_of(chain, s.state, s)
-        if len(screws) > 0:
-            copy_table(s.screws, screws[row])
+def answer_chain(
+    tables: ChainTables,
+    s: ChainScratch,
+    question: Record,
+    has_start: bool,
+    asked: Floats,
+    coordinates: Floats,
+    counters: Ints,
+    pose: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Answer one target from joint coordinates, which become the answer's; the status."""
+    chain, columns, effort = tables.chain, tables.columns, s.effort[0]
+    if not is_pose(asked):
+        return PENDING
+    effort["steps"], effort["searches"], effort["most"] = 0, 0, question["effort"]
+    for j in range(coordinates.shape[0]):
+        s.coordinates[j] = coordinates[j] * columns[j]["moves"] * columns[j]["scale"]
+    is_clipped = read_target(tables.machine[0], asked, s)
+    load_chain(chain, s.coordinates, True, s.start)
+    walk_chain(chain, s.start, s)
+    copy_table(s.X, s.start_X)
+    error, hold = reach(tables, question, s), HOLD_NOTHING
+    if is_clipped or error > tables.machine[0]["met"]:
+        copy_chain_state(s.start if question["keeps_mode"] == 1 else s.nearest, s.own)
+        distance, hold = project(tables, question["keeps_mode"] == 1, has_start, s)
+        if distance == math.inf:
+            return FAILED
+    return write_answer(tables, hold, s, coordinates, counters, pose, actuators, measures)
 
 
 @routine
-def write_pose(row: int, X: Floats, poses: Floats) -> None:
-    """Write the pose of the end effector."""
+def read_target(machine: Record, asked: Floats, s: ChainScratch) -> bool:
+    """Fill the target in both units; True if it is so far away that it was moved towards home."""
+    copy_table(asked, s.pose)
+    orthonormalise(s.pose)
+    copy_table(s.pose, s.target)
+    far, largest, scale = SIGHT * machine["length"], 0.0, 1.0 / machine["length"]
     for i in range(3):
-        for j in range(4):
-            poses[row, i, j] = X[i, j]
-
-
-@routine
-def keep_nearest(s: ChainScratch) -> None:
-    """Keep the present configuration, which was walked, as the nearest."""
-    copy_chain_state(s.state, s.nearest)
-    copy_table(s.X, s.nearest_X)
+        largest = max(largest, abs(asked[i, 3] - machine["home"][i]))
+    for i in range(3):
+        if largest > far:
+            s.target[i, 3] = machine["home"][i] + (asked[i, 3] - machine["home"][i]) * (far / largest)
+        s.target[i, 3] *= scale
+    return largest > far
 
 
 @routine
 def write_answer(
-    chain: SerialChain, row: int, distance: float, steps: int, s: ChainScratch, answers: ChainAnswers
+    tables: ChainTables,
+    hold: int,
+    s: ChainScratch,
+    coordinates: Floats,
+    counters: Ints,
+    pose: Floats,
+    actuators: Floats,
+    measures: Floats,
+) -> int:
+    """Write the nearest configuration; the status."""
+    machine, columns, driven = tables.machine[0], tables.columns, tables.driven
+    store_chain(tables.chain, s.nearest, s.coordinates)
+    for j in range(coordinates.shape[0]):
+        coordinates[j] = within_turns(columns[j], s.coordinates[j] / columns[j]["scale"])
+    for i in range(driven.shape[0]):
+        actuators[i] = coordinates[driven[i]] + tables.home[i]
+    write_pose(s.nearest_X, machine["length"], pose)
+    excess = excess_of(tables.chain, s.nearest, s)
+    position, rotation = errors(machine, s.pose, pose, s.gradient.turn)
+    if hold == HOLD_ORIENTATION and rotation > machine["held"]:
+        hold = HOLD_NOTHING
+    if hold == HOLD_POSITION and position > machine["held"]:
+        hold = HOLD_NOTHING
+    position = min(position * machine["length"], LARGEST_NUMBER)
+    if machine["turns"] == 0:
+        for i in range(3):
+            for j in range(3):
+                pose[i, j] = 1.0 if i == j else 0.0
+    for k in range(counters.shape[0]):
+        counters[k] = 0
+    for k in range(measures.shape[0]):
+        measures[k] = 0.0
+    counters[ITERATIONS], counters[HOLD] = s.effort[0]["steps"], hold
+    measures[POSITION_ERROR], measures[ROTATION_ERROR], measures[LIMIT_EXCESS] = position, rotation, max(excess, 0.0)
+    if excess > machine["limit"]:
+        return FAILED
+    return REACHED if position <= machine["position"] and rotation <= machine["rotation"] else PROJECTED
+
+
+@routine
+def within_turns(column: Record, value: float) -> float:
+    """An angle shifted by whole turns into its range, if possible."""
+    if value < column["low"] or value > column["high"]:
+        shifted = value - 2.0 * math.pi * math.floor((value - column["low"]) / (2.0 * math.pi))
+        return shifted if shifted <= column["high"] else value
+    return value
+
+
+@routine
+def write_pose(X: Floats, length: float, pose: Floats) -> None:
+    """Write a pose (4, 4) [length] from one (3, 4) [L]."""
+    for i in range(3):
+        pose[3, i] = 0.0
+        for j in range(4):
+            pose[i, j] = X[i, j] * length if j == 3 else X[i, j]
+    pose[3, 3] = 1.0
+
+
+@search
+def walk_chains(
+    machine: int, scratch_address: int, coordinates: Floats, poses: Floats, excesses: Floats, screws: Floats
 ) -> None:
-    """Write the nearest configuration of a row."""
-    write_pose(row, s.nearest_X, answers.poses)
-    store_chain(chain, s.nearest, answers.coordinates[row])
-    answers.excesses[row] = excess_of(chain, s.nearest, s)
-    answers.distances[row] = distance
-    answers.steps[row] = steps
+    """Pose the end effectors of configurations (n, columns), dimensionless, and measure their limits.
 
-
-@routine
-def order_seeds(chain: SerialChain, row: int, aim: ChainAim, answers: ChainAnswers, s: ChainScratch) -> float:
-    """Write the squared distances of all seeds from a target; the one below which a seed goes before the start."""
-    target, near = aim.pose.targets[row], math.inf
-    if aim.tries > 0:
-        for k in range(len(aim.seeds)):
-            s.distances[k] = squared_distance(aim.pose, target, aim.seed_poses[k])
-        load_chain(chain, answers.coordinates[row], True, s.state)
-        if row == 0 or not are_same(s.state, s.start):
-            walk_chain(chain, s.state, s)
-            copy_chain_state(s.state, s.start)
-            copy_table(s.X, s.start_X)
-        near = NEARER * squared_distance(aim.pose, target, s.start_X)
-    return near
-
-
-@routine
-def are_same(one: ChainState, other: ChainState) -> bool:
-    """True if two configurations are equal, as the starts of most batches are."""
-    for j in range(len(one.q)):
-        if one.q[j] != other.q[j]:
-            return False
-    for k in range(len(one.balls)):
-        for i in range(4):
-            if one.balls[k, i] != other.balls[k, i]:
-                return False
-    return True
-
-
-@routine
-def nearest_seed(s: ChainScratch, n: int) -> int:
-    """The seed that is nearest and not yet tried; -1 if there is none."""
-    seed, least = -1, math.inf
-    for k in range(n):
-        if s.distances[k] < least:
-            seed, least = k, s.distances[k]
-    return seed
-
-
-@routine
-def next_seed(s: ChainScratch, k: int, n: int) -> int:
-    """The first seed from the k-th on that is not yet tried; -1 if there is none."""
-    for seed in range(k, n):
-        if s.distances[seed] < math.inf:
-            return seed
-    return -1
-
-
-@routine
-def squared_distance(objective: PoseObjective, target: Floats, X: Floats) -> float:
-    """Squared distance of two poses in the components of the objective: lengths in L, rotations by their chords."""
-    total, w = 0.0, objective.platform
-    for i in range(3):
-        weight = 1.0 if w[i] == LOCKED else w[i]
-        total += weight * (X[i, 3] - target[i, 3]) ** 2
-    turning = w[5] if objective.frame == HALF_WAY else w[3]
-    if turning == 0.0 or objective.frame == HALF_WAY:
-        return total
-    weight = 1.0 if turning == LOCKED else turning
-    for i in range(3):
-        for j in range(3):
-            if j == 2 or objective.frame != TARGET_AXES:
-                share = 1.0 if objective.frame == TARGET_AXES else 0.5
-                total += share * weight * (X[i, j] - target[i, j]) ** 2
-    return total
+    Parameters
+    ----------
+    machine, scratch_address : addresses of a `SerialChain` and of its `ChainScratch`.
+    poses, excesses : output, (n, 4, 4) [L], and the largest excess over a limit, (n,) [L or rad].
+    screws : output, of all freedoms, (n, freedoms, 6), or without rows.
+    """
+    chain, s = open_chain(machine), open_chain_scratch(scratch_address)
+    for row in range(coordinates.shape[0]):
+        load_chain(chain, coordinates[row], False, s.state)
+        walk_chain(chain, s.state, s)
+        write_pose(s.X, 1.0, poses[row])
+        excesses[row] = excess_of(chain, s.state, s)
+        if len(screws) > 0:
+            copy_table(s.screws, screws[row])

@@ -1,4 +1,4 @@
-"""A serial chain of unit motions from the base to the end effector, what kernels are asked of it, and their answers.
+"""A serial chain of unit motions from the base to the end effector, and what kernels are asked of it.
 
 Lengths are in units of L; coordinates are deviations from home. A degree of freedom is one turn or one slide; a ball
 joint has three.
@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints
-from ..closure.loops import PoseObjective
+import numpy as np
+
+from ...arrays import Floats, Ints, Records
 
 SEEDS = 512
 """Most feasible configurations that are kept as starts: the nearest of them is near enough for most targets."""
@@ -34,24 +35,67 @@ class SerialChain(NamedTuple):
     cone_angles: Floats  # (cones,): half angles
 
 
-class ChainAim(NamedTuple):
-    """What is asked of all rows; lengths in L."""
+MACHINE = np.dtype(
+    [
+        ("length", "f8"),  # L
+        ("axes", "i8", 3),  # what the task sets of a pose, as of `description.task.Task`
+        ("rotations", "i8"),
+        ("frame", "i8"),
+        ("turns", "i8"),  # 1: the end effector is a body; 0: a point
+        ("home", "f8", 3),  # position at home [length]
+        ("longest", "f8"),  # of the chain stretched out, slides too, with what counts as reached [L]
+        ("is_short", "i8"),  # 1: limits leave many local minima
+        ("tries", "i8"),  # most seeds that a target is reached from
+        ("descents", "i8"),  # most seeds that a search for the nearest starts from
+        ("agreements", "i8"),  # of its ends, that end it
+        ("position", "f8"),  # tolerances of what counts as reached [length], [rad]
+        ("rotation", "f8"),
+        ("limit", "f8"),  # excess up to which a limit is kept [L or rad]
+        ("met", "f8"),  # error up to which a search has met what is held [L or rad]
+        ("held", "f8"),  # most that an answer may miss of the part that it holds [L or rad]
+    ]
+)
+"""What is known of a machine beside its chain, and what counts as an answer."""
 
-    pose: PoseObjective  # weights, and targets (n, 4, 4)
-    seeds: Floats  # (seeds, columns): feasible configurations
-    seed_poses: Floats  # (seeds, 4, 4)
-    follows: int  # 1: each row starts from the result of the one before
-    tries: int  # most seeds to start from, beside the start
-    agreements: int  # descents that must end at the least distance before the others are left out
-    closeness: float  # error of held components that ends a search [L or rad]
-    is_held: float  # error up to which they are met
+COLUMN = np.dtype(
+    [
+        (
+            "scale",
+            "f8",
+        ),  # makes the coordinate dimensionless; it starts at this, times `moves`, times that of the start
+        ("moves", "f8"),  # 1; 0: it is locked
+        ("low", "f8"),  # range into which whole turns bring it [rad]; infinite where there is none
+        ("high", "f8"),
+    ]
+)
+"""A coordinate of a joint, beside the chain too."""
+
+QUESTION = np.dtype(
+    [
+        ("has_start", "i8"),  # 1: the start was given, 0: it is home
+        ("keeps_mode", "i8"),  # 1: answers are in the working mode of the start
+        ("follows", "i8"),  # 1: each row starts from the answer to the one before, up to one that is not reached
+        ("effort", "i8"),  # steps of all searches for a row after which no further one begins
+    ]
+)
+"""What is asked of all rows."""
 
 
-class ChainAnswers(NamedTuple):
-    """Starts and results, row by row."""
+class Question(NamedTuple):
+    """What is asked of targets."""
 
-    coordinates: Floats  # (n, columns), dimensionless: of the start, then of the result
-    poses: Floats  # (n, 4, 4) [L]
-    excesses: Floats  # (n,): largest excess over a limit [L or rad]
-    distances: Floats  # (n,): error of what is held, or distance from the target [L]; infinite without a result
-    steps: Ints  # (n,)
+    asked: Records  # (1,): QUESTION
+
+
+class ChainTables(NamedTuple):
+    """All that is needed to answer targets."""
+
+    machine: Records  # (1,): MACHINE
+    chain: SerialChain
+    columns: Records  # (columns,): COLUMN
+    driven: Ints  # (n_a,): columns of the actuators
+    home: Floats  # (n_a,): their values at home [length or rad]
+    weights: Floats  # (1 + projections, 6): that hold all that counts, then of the projections tried in turn
+    holds: Ints  # (1 + projections,): what these hold; the last one holds nothing
+    seeds: Floats  # (seeds, columns): feasible configurations, dimensionless
+    seed_poses: Floats  # (seeds, 4, 4) [L]

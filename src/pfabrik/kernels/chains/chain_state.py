@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, Records
 from .._jit import opener
 from ..closure.loops import BALL
 from ..closure.pose_objective import PoseGradient
-from .chain_records import SEEDS, SerialChain
+from ..projecting import ATTEMPT, EFFORT, TALLY
+from .chain_records import COLUMN, MACHINE, QUESTION, SEEDS, ChainTables, Question, SerialChain
 
 
 class ChainState(NamedTuple):
@@ -32,11 +33,21 @@ class ChainScratch(NamedTuple):
     saved: ChainState
     unpulled: ChainState
     nearest: ChainState
-    start: ChainState  # of the last row that was walked
+    start: ChainState
+    own: ChainState  # where the searches for the nearest start first
+    held: ChainState  # the nearest that holds a part of the target
     X: Floats  # (3, 4): pose of the end effector
     start_X: Floats  # (3, 4)
     nearest_X: Floats  # (3, 4)
+    held_X: Floats  # (3, 4)
+    target: Floats  # (4, 4) [L]: no farther away than SIGHT
+    between: Floats  # (4, 4): a target on the way there
     pulled: Floats  # (4, 4): a target farther out
+    pose: Floats  # (4, 4) [length]: the target as it is asked for, exactly orthonormal
+    coordinates: Floats  # (columns,), dimensionless
+    effort: Records  # (1,): EFFORT
+    tally: Records  # (1,): TALLY
+    log: Records  # (n,): ATTEMPT; most have no rows
     screws: Floats  # (n, 6)
     centres: Floats  # (n, 3): a point on the axis of each freedom
     least: Floats  # (n,): bounds of the step of each freedom
@@ -60,7 +71,7 @@ class ChainScratch(NamedTuple):
     rests: Floats  # (n, 7): right-hand sides: of the gradient, then of the held components
     sides: Floats  # (7, 6): sums of these
     shifts: Floats  # (7, 6): twists of the freedoms further in
-    distances: Floats  # (SEEDS,): of the seeds from a target
+    distances: Floats  # (SEEDS,): of the seeds from a target; infinite for those that were tried
     responses: Floats  # (n, 7): step, or slope of a fixed freedom; then its changes per unit of each multiplier
 
 
@@ -70,8 +81,8 @@ def new_chain_state(chain: SerialChain) -> ChainState:
     return ChainState(np.zeros(len(chain.lo)), np.zeros((len(chain.kinds) if has_balls else 0, 4)))
 
 
-def new_chain_scratch(chain: SerialChain) -> ChainScratch:
-    """Allocate the memory of one thread."""
+def new_chain_scratch(chain: SerialChain, columns: int, attempts: int) -> ChainScratch:
+    """Allocate the memory of one thread, with room to note so many attempts."""
     n = len(chain.lo)
     return ChainScratch(
         state=new_chain_state(chain),
@@ -80,10 +91,20 @@ def new_chain_scratch(chain: SerialChain) -> ChainScratch:
         unpulled=new_chain_state(chain),
         nearest=new_chain_state(chain),
         start=new_chain_state(chain),
+        own=new_chain_state(chain),
+        held=new_chain_state(chain),
         X=np.zeros((3, 4)),
         start_X=np.zeros((3, 4)),
         nearest_X=np.zeros((3, 4)),
+        held_X=np.zeros((3, 4)),
+        target=np.zeros((4, 4)),
+        between=np.zeros((4, 4)),
         pulled=np.zeros((4, 4)),
+        pose=np.zeros((4, 4)),
+        coordinates=np.zeros(columns),
+        effort=np.zeros(1, EFFORT),
+        tally=np.zeros(1, TALLY),
+        log=np.zeros(attempts, ATTEMPT),
         screws=np.zeros((n, 6)),
         centres=np.zeros((n, 3)),
         least=np.zeros(n),
@@ -117,5 +138,18 @@ _TYPES = "i1 f2 f2 i1 i1 f1 f1 f1 f1 f1 i1 f2 f2 f1"
 CHAIN = SerialChain._make(np.zeros((2,) * int(each[1]), f"{each[0]}8") for each in _TYPES.split())
 """A chain of the types that kernels are compiled for."""
 
-open_chain, open_chain_scratch = opener(CHAIN), opener(new_chain_scratch(CHAIN))
-"""Functions that open the `SerialChain` and the `ChainScratch` at the address of a `Handle`."""
+TABLES = ChainTables(
+    np.zeros(1, MACHINE),
+    CHAIN,
+    np.zeros(1, COLUMN),
+    np.zeros(1, np.int64),
+    np.zeros(1),
+    np.zeros((2, 6)),
+    np.zeros(2, np.int64),
+    np.zeros((1, 1)),
+    np.zeros((1, 4, 4)),
+)
+
+open_chain, open_chain_scratch = opener(CHAIN), opener(new_chain_scratch(CHAIN, 1, 0))
+open_tables, open_question = opener(TABLES), opener(Question(np.zeros(1, QUESTION)))
+"""Functions that open the arguments of kernels at the addresses of their handles."""

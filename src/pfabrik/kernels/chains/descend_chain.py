@@ -8,8 +8,10 @@ from ...arrays import Floats, Ints
 from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient
+from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
-from ..quaternions import difference, exponential, rotate_by
+from ..quaternions import difference
+from ..vectors import copy_table, norm, vec
 from .chain_records import SerialChain
 from .chain_state import ChainScratch
 from .curvature import fill_curvature, model_change, plan_newton_step
@@ -62,6 +64,7 @@ def descend_chain(
     estimate_multipliers(chain, held, s)
     damping, predicted, is_kept = FIRST_DAMPING, math.inf, True
     for _ in range(most_steps):
+        s.effort[0]["steps"] += 1
         if value <= NOTHING or abs(predicted) <= CONVERGED * value or damping > MOST_DAMPING:
             break
         if not is_kept:
@@ -130,37 +133,27 @@ def keep_none(s: ChainScratch) -> None:
 
 
 @routine
-def pull(chain: SerialChain, target: Floats, objective: PoseObjective, value: float, s: ChainScratch) -> bool:
+def pull(chain: SerialChain, target: Floats, objective: PoseObjective, distance: float, s: ChainScratch) -> bool:
     """Write to `s.pulled` a target farther out than a near one, in the direction of the error; False if it is not near.
 
     Where the workspace ends next to a target, its pull is as weak as the distance, and bends of many joints change it
     only to second order. The farther target has the same nearest configuration, and pulls.
     """
     X, turn, pulled = s.X, s.gradient.turn, s.pulled
-    distance = math.sqrt(2.0 * value)
     if not 0.0 < distance < PULL:
         return False
-    for i in range(4):
-        for j in range(4):
-            pulled[i, j] = target[i, j]
-    share, angle = PULL / distance, 0.0
-    is_turned = objective.frame == BASE_AXES and 0.0 < objective.platform[3] < LOCKED
+    copy_table(target, pulled)
+    share, is_turned = PULL / distance, objective.frame == BASE_AXES and 0.0 < objective.platform[3] < LOCKED
     if is_turned:
         difference(target, X, turn[3:])
-        angle = math.sqrt(turn[3] ** 2 + turn[4] ** 2 + turn[5] ** 2)
-        share = min(share, PULLED_TURN / max(angle, 1e-300))
+        share = min(share, PULLED_TURN / max(norm(vec(turn[3:])), 1e-300))
     for i in range(3):
         if 0.0 < objective.platform[i] < LOCKED:
             pulled[i, 3] = X[i, 3] + share * (target[i, 3] - X[i, 3])
-    if is_turned and angle > 0.0:
-        w, x, y, z = exponential(-share * turn[3], -share * turn[4], -share * turn[5])
-        for i in range(3):  # the transpose of what turns: (R^T exp(-v))^T = exp(v) R
-            for j in range(3):
-                pulled[i, j] = X[j, i]
-        rotate_by(pulled, w, x, y, z)
-        for i in range(3):
-            for j in range(i):
-                pulled[i, j], pulled[j, i] = pulled[j, i], pulled[i, j]
+        for j in range(3 if is_turned else 0):
+            pulled[i, j] = X[i, j]
+    if is_turned:
+        turn_pose(pulled, (share * turn[3], share * turn[4], share * turn[5]))
     return True
 
 

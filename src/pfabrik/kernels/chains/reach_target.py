@@ -54,8 +54,8 @@ def reach_target(
     s: ChainScratch,
     closeness: float,
     most_steps: int,
-) -> tuple[float, int]:
-    """Move a configuration until the held components are met, or no step brings them nearer; error and steps.
+) -> float:
+    """Move a configuration until the held components are met, or no step brings them nearer; the error.
 
     The best configuration is left in `state`, with its pose, screws and errors in the scratch memory.
     """
@@ -64,6 +64,7 @@ def reach_target(
     damping, idle, steps = 1e-3, 0, 0
     while steps < most_steps and largest(errors, held) > closeness and idle < PATIENCE:
         steps += 1
+        s.effort[0]["steps"] += 1
         plan_least_step(chain, s, held, damping * min(1.0, value))
         copy_chain_state(state, s.saved)
         move_chain(chain, state, s)
@@ -77,7 +78,7 @@ def reach_target(
         copy_chain_state(s.saved, state)
         measure_pose(chain, target, objective, state, s)
         damping = max(10.0 * damping, 1e-4)
-    return largest(errors, held), steps
+    return largest(errors, held)
 
 
 @routine

@@ -1,0 +1,103 @@
+"""All that kernels need to answer targets of a chain: the machine, options and the question."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..closure.projection import projection_modes
+from ..derived import derived
+from ..description.home_mobility import column_moves
+from ..kernels.chains.chain_records import COLUMN, MACHINE, QUESTION, ChainTables, Question
+from ..kernels.handle import Handle
+from ..kernels.projecting import UNBOUNDED
+from ..kernels.rows import HOLD_NOTHING
+from ..model import Model
+from ..motion.limited_coordinates import ranged_angles
+from ..options import Options
+from ..tolerances import TOLERANCES
+from .chain_seeds import chain_seeds
+from .serial_chain import chain_of, stretched_length
+
+MET = 1e-10
+"""Error up to which what is held is met [L or rad]: a tenth of what counts as reached."""
+
+FEW = 12
+"""Most joints of a chain that has few: with narrow limits these have the most local minima."""
+
+TRIES_OF_FEW, TRIES = 40, 8
+"""Seeds from which a target is tried, in chains of few joints and in longer ones."""
+
+DESCENTS_OF_FEW, DESCENTS = 60, 15
+"""Seeds from which descents to the nearest start, likewise."""
+
+AGREEMENTS_OF_FEW, AGREEMENTS = 10, 4
+"""Descents that must end at the least distance before the others are left out, likewise."""
+
+
+@lru_cache(maxsize=16)
+def question_of(has_start: bool, keeps_mode: bool, *, follows: bool = False) -> Handle[Question]:
+    """What is asked of all rows."""
+    asked = np.zeros(1, QUESTION)
+    asked[0] = has_start, keeps_mode, follows, UNBOUNDED
+    return Handle(Question(asked))
+
+
+def tables_of(model: Model, options: Options) -> Handle[ChainTables]:
+    """All that kernels need of a chain, with options."""
+    return _tables(model, options.hold, options.rotation_length, options.tolerance, options.rotation_tolerance)
+
+
+@derived
+def _tables(
+    model: Model,
+    hold: str | None,
+    rotation_length: float | None,
+    tolerance: float | None,
+    rotation_tolerance: float,
+) -> Handle[ChainTables]:
+    closure, mechanism, task, length = model.closure, model.mechanism, model.task, model.length
+    projections, seeds = projection_modes(model.path_closure, hold, rotation_length), chain_seeds(model)
+    machine, columns = np.zeros(1, MACHINE), np.zeros(len(closure.scale), COLUMN)
+    is_short = len(chain_of(model).kinds) <= FEW
+    fields = {
+        "length": length,
+        "axes": task.axes,
+        "rotations": task.rotations,
+        "frame": task.frame,
+        "turns": not mechanism.end_effector_is_joint,
+        "home": mechanism.home_pose[:3, 3],
+        "longest": stretched_length(model) * (1.0 + TOLERANCES.position) + TOLERANCES.position,
+        "is_short": is_short,
+        "tries": TRIES_OF_FEW if is_short else TRIES,
+        "descents": DESCENTS_OF_FEW if is_short else DESCENTS,
+        "agreements": AGREEMENTS_OF_FEW if is_short else AGREEMENTS,
+        "position": tolerance or TOLERANCES.position * length,
+        "rotation": rotation_tolerance,
+        "limit": TOLERANCES.limit,
+        "held": TOLERANCES.held,
+        "met": MET,
+    }
+    for name, value in fields.items():
+        machine[name] = value
+    columns["scale"], columns["moves"], columns["low"], columns["high"] = (
+        closure.scale,
+        column_moves(mechanism),
+        -np.inf,
+        np.inf,
+    )
+    places, low, high = ranged_angles(mechanism)
+    columns["low"][places], columns["high"][places] = low, high
+    return Handle(
+        ChainTables(
+            machine,
+            chain_of(model),
+            columns,
+            closure.actuated,
+            closure.home,
+            np.array([task.held, *(projection.weights for projection in projections)], float),
+            np.array([HOLD_NOTHING, *(projection.hold for projection in projections)], np.int64),
+            *seeds,
+        )
+    )

@@ -1,0 +1,297 @@
+"""Searches of a serial chain: a target reached, or the nearest configuration, each from a start and from seeds."""
+
+from __future__ import annotations
+
+import math
+
+from ...arrays import Floats, Record
+from .._jit import routine
+from ..closure.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
+from ..legs.complete_poses import turn_pose
+from ..platform.answer_row import errors
+from ..projecting import (
+    brings_nearer,
+    clear_tally,
+    count_ending,
+    is_agreed,
+    is_spent,
+    is_too_far,
+    note_attempt,
+)
+from ..quaternions import difference
+from ..rows import HOLD_NOTHING
+from ..vectors import copy_table
+from .chain_records import ChainTables, SerialChain
+from .chain_state import ChainScratch
+from .descend_chain import descend_chain, pull
+from .reach_target import reach_target
+from .walk_chain import copy_chain_state, load_chain, walk_chain
+
+CLOSENESS = 1e-12
+"""Error of held components that ends a search [L or rad]."""
+
+STEPS = 30
+"""Most steps of an attempt to reach a target; those that converge need ten."""
+
+DESCENT_STEPS = 200
+"""Most steps of a descent, those that are not taken included; most need a dozen."""
+
+NEARER = 0.25
+"""The start goes before a seed that is not nearer than this share of its squared distance."""
+
+CONTINUATION_STEPS, LONGEST_STEP = 8, 0.25
+"""Steps on the way to a target in the working mode of the start, and the longest single one that keeps it: a longer one
+may jump over a singularity [L or rad]."""
+
+PULLED_FROM, PULLS = 100.0, 12
+"""Ratio to the least distance up to which a descent's end may become the nearest by way of a target farther out, and
+most times that this is done."""
+
+SAME = 1e-7
+"""Relative difference of distances that count as equal."""
+
+NEARLY, DESCENTS_NEARBY = 1e-2, 120
+"""Distance below which a target out of reach of a short chain is tried from more seeds [L], and how many these are."""
+
+
+@routine
+def objective_of(tables: ChainTables, aim: int) -> PoseObjective:
+    """The objective with the weights of one aim."""
+    return PoseObjective(tables.seed_poses, tables.weights[aim], tables.machine[0]["frame"], 0.0, 0.0, 0)
+
+
+@routine
+def keep_nearest(s: ChainScratch) -> None:
+    """Keep the present configuration, which was walked, as the nearest."""
+    copy_chain_state(s.state, s.nearest)
+    copy_table(s.X, s.nearest_X)
+
+
+@routine
+def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
+    """Reach the target, left in `s.nearest`, or the configuration with the least error [L or rad], which is returned.
+
+    From the start, and in any mode from the seeds nearest to the target; in the mode of the start, where the target is
+    farther than one step, by way of others between.
+    """
+    if question["keeps_mode"] == 0:
+        return reach_in_any_mode(tables, s)
+    chain, objective = tables.chain, objective_of(tables, 0)
+    copy_chain_state(s.start, s.state)
+    least = reach_from(tables, objective, -1, s)
+    keep_nearest(s)
+    position, rotation = distances(tables, s.start_X, s)
+    is_near = least <= tables.machine[0]["met"] and math.hypot(position, rotation) <= LONGEST_STEP
+    if is_near or is_beyond(tables, s):
+        return least
+    error = math.inf
+    copy_chain_state(s.start, s.state)
+    for step in range(1, CONTINUATION_STEPS + 1):
+        put_between(step / CONTINUATION_STEPS, s)
+        error = reach_target(chain, s.between, objective, s.state, s, CLOSENESS, STEPS)
+    if error <= tables.machine[0]["met"]:
+        keep_nearest(s)
+    return min(error, least)
+
+
+@routine
+def reach_from(tables: ChainTables, objective: PoseObjective, seed: int, s: ChainScratch) -> float:
+    """Reach the target from `s.state`, and note the attempt; the error."""
+    before = s.effort[0]["steps"]
+    error = reach_target(tables.chain, s.target, objective, s.state, s, CLOSENESS, STEPS)
+    note_attempt(0, seed, s.effort[0]["steps"] - before, error, s.effort[0], s.log)
+    return error
+
+
+@routine
+def reach_in_any_mode(tables: ChainTables, s: ChainScratch) -> float:
+    """`reach` from the start and from the seeds nearest to the target."""
+    objective, least = objective_of(tables, 0), math.inf
+    tries = 0 if is_beyond(tables, s) else tables.machine[0]["tries"]
+    n_seeds = len(tables.seeds) if tries > 0 else 0
+    limit, is_tried = 0.0, False
+    if tries > 0:
+        put_distances(tables, objective, s)
+        limit = NEARER * squared_distance(objective, s.target, s.start_X)
+    for k in range(tries + 1):
+        seed = nearest_seed(s, n_seeds if k < tries or is_tried else 0)
+        if not is_tried and (seed < 0 or s.distances[seed] > limit):
+            copy_chain_state(s.start, s.state)
+            is_tried, seed = True, -1
+        elif seed < 0:
+            break
+        else:
+            load_seed(tables, seed, s)
+        error = reach_from(tables, objective, seed, s)
+        if error < least:
+            least = error
+            keep_nearest(s)
+        if error <= tables.machine[0]["met"] or is_spent(s.effort[0]):
+            break
+    return least
+
+
+@routine
+def is_beyond(tables: ChainTables, s: ChainScratch) -> bool:
+    """True if the target is farther away than the chain is long when it is stretched out."""
+    machine, away = tables.machine[0], 0.0
+    for i in range(3):
+        away = math.hypot(away, s.target[i, 3] - tables.chain.offsets[0, i] if machine["axes"][i] == 1 else 0.0)
+    return away > machine["longest"]
+
+
+@routine
+def put_between(share: float, s: ChainScratch) -> None:
+    """Fill the pose a share of the way from the start to the target: a straight line, and the shortest turn."""
+    between, turn, X = s.between, s.gradient.turn, s.start_X
+    difference(s.target, X, turn)
+    for i in range(3):
+        for j in range(4):
+            between[i, j] = X[i, 3] + share * (s.target[i, 3] - X[i, 3]) if j == 3 else X[i, j]
+    turn_pose(between, (share * turn[0], share * turn[1], share * turn[2]))
+
+
+@routine
+def distances(tables: ChainTables, X: Floats, s: ChainScratch) -> tuple[float, float]:
+    """Distance [L] and angle [rad] of a pose from the target, in what the task sets."""
+    position, rotation = errors(tables.machine[0], s.target, X, s.gradient.turn)
+    return position * tables.machine[0]["length"], rotation
+
+
+@routine
+def project(tables: ChainTables, keeps_mode: bool, has_start: bool, s: ChainScratch) -> tuple[float, int]:
+    """Find the nearest configuration, left in `s.nearest`, from `s.own` and seeds; its distance [L] and what it holds.
+
+    Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
+    target than a start that was given, nothing is held.
+    """
+    last, weights, distance, hold = len(tables.holds) - 1, tables.weights, math.inf, HOLD_NOTHING
+    seeds = 0 if keeps_mode else tables.machine[0]["descents"]
+    for aim in range(1, last + 1):
+        if distance == math.inf:
+            distance, hold = search_for(tables, aim, seeds, s), tables.holds[aim]
+    if has_start and last > 1 and hold == tables.holds[1]:
+        position, rotation = distances(tables, s.start_X, s)
+        if is_too_far(distance, weights[1], hold, position, rotation):
+            copy_chain_state(s.nearest, s.held)
+            copy_table(s.nearest_X, s.held_X)
+            released = search_for(tables, last, 0, s)
+            if brings_nearer(released, weights[last], position, rotation):
+                return released, HOLD_NOTHING
+            copy_chain_state(s.held, s.nearest)
+            copy_table(s.held_X, s.nearest_X)
+    return distance, hold
+
+
+@routine
+def search_for(tables: ChainTables, aim: int, n_seeds: int, s: ChainScratch) -> float:
+    """Find the nearest configuration by one objective, left in `s.nearest`; its distance [L], or infinity."""
+    objective, machine, tally = objective_of(tables, aim), tables.machine[0], s.tally[0]
+    copy_chain_state(s.own, s.state)
+    walk_chain(tables.chain, s.state, s)
+    keep_nearest(s)
+    clear_tally(tally)
+    descend_from_all(tables, objective, aim, n_seeds, machine["agreements"], s)
+    least = tally["least"]
+    if n_seeds > 0 and machine["is_short"] == 1 and least > machine["met"] and least < NEARLY:
+        copy_chain_state(s.nearest, s.own)
+        descend_from_all(tables, objective, aim, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
+    return tally["least"]
+
+
+@routine
+def descend_from_all(
+    tables: ChainTables, objective: PoseObjective, aim: int, n_seeds: int, agreements: int, s: ChainScratch
+) -> None:
+    """Descend from `s.own`, then from so many seeds, until enough ends agree; the nearest stays in `s.nearest`."""
+    tally, effort = s.tally[0], s.effort[0]
+    if n_seeds > 0:
+        put_distances(tables, objective, s)
+    for k in range(n_seeds + 1):
+        seed = -1
+        if k > 0:
+            seed = nearest_seed(s, len(tables.seeds)) if k % 2 == 1 else next_seed(s, k // 2, len(tables.seeds))
+            if seed < 0:
+                break
+            load_seed(tables, seed, s)
+        else:
+            copy_chain_state(s.own, s.state)
+        before = effort["steps"]
+        value = descend_chain(tables.chain, s.target, objective, s, CLOSENESS, DESCENT_STEPS)
+        distance = pull_nearer(tables.chain, objective, math.sqrt(2.0 * value), s)
+        note_attempt(aim, seed, effort["steps"] - before, distance, effort, s.log)
+        if distance < math.inf and count_ending(distance, tally):
+            walk_chain(tables.chain, s.state, s)
+            keep_nearest(s)
+        if is_agreed(tally, agreements) or tally["least"] <= CLOSENESS or is_spent(effort):
+            break
+
+
+@routine
+def pull_nearer(chain: SerialChain, objective: PoseObjective, distance: float, s: ChainScratch) -> float:
+    """Bring the configuration `s.state`, at a distance [L], nearer by way of targets farther out; the distance."""
+    if not distance < PULLED_FROM * s.tally[0]["least"]:
+        return distance
+    for _ in range(PULLS):
+        if distance <= CLOSENESS or not pull(chain, s.target, objective, distance, s):
+            break
+        copy_chain_state(s.state, s.unpulled)
+        descend_chain(chain, s.pulled, objective, s, CLOSENESS, DESCENT_STEPS)
+        nearer = math.sqrt(2.0 * descend_chain(chain, s.target, objective, s, CLOSENESS, DESCENT_STEPS))
+        if not nearer < (1.0 - SAME) * distance:
+            copy_chain_state(s.unpulled, s.state)
+            break
+        distance = nearer
+    return distance
+
+
+@routine
+def load_seed(tables: ChainTables, seed: int, s: ChainScratch) -> None:
+    """Load a seed, and mark it as tried."""
+    load_chain(tables.chain, tables.seeds[seed], True, s.state)
+    s.distances[seed] = math.inf
+
+
+@routine
+def put_distances(tables: ChainTables, objective: PoseObjective, s: ChainScratch) -> None:
+    """Fill the squared distances of all seeds from the target."""
+    for k in range(len(tables.seeds)):
+        s.distances[k] = squared_distance(objective, s.target, tables.seed_poses[k])
+
+
+@routine
+def nearest_seed(s: ChainScratch, n: int) -> int:
+    """The seed that is nearest and not yet tried; -1 if there is none."""
+    seed, least = -1, math.inf
+    for k in range(n):
+        if s.distances[k] < least:
+            seed, least = k, s.distances[k]
+    return seed
+
+
+@routine
+def next_seed(s: ChainScratch, k: int, n: int) -> int:
+    """The first seed from the k-th on that is not yet tried; -1 if there is none."""
+    for seed in range(k, n):
+        if s.distances[seed] < math.inf:
+            return seed
+    return -1
+
+
+@routine
+def squared_distance(objective: PoseObjective, target: Floats, X: Floats) -> float:
+    """Squared distance of two poses in the components of the objective: lengths in L, rotations by their chords."""
+    total, w = 0.0, objective.platform
+    for i in range(3):
+        weight = 1.0 if w[i] == LOCKED else w[i]
+        total += weight * (X[i, 3] - target[i, 3]) ** 2
+    turning = w[5] if objective.frame == HALF_WAY else w[3]
+    if turning == 0.0 or objective.frame == HALF_WAY:
+        return total
+    weight = 1.0 if turning == LOCKED else turning
+    for i in range(3):
+        for j in range(3):
+            if j == 2 or objective.frame != TARGET_AXES:
+                share = 1.0 if objective.frame == TARGET_AXES else 0.5
+                total += share * weight * (X[i, j] - target[i, j]) ** 2
+    return total
