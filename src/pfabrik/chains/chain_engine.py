@@ -52,14 +52,25 @@ class ChainEngine(Engine):
         return bool(self.model.path_closure.idle.any())
 
     def answer(
-        self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool = False,
     ) -> Configurations:
-        """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose."""
+        """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose.
+
+        With `nearby` by searches that stay around the start.
+        """
         begin = self._home if start is None else start.coordinates
         if not self._are_idle_within(begin):
             return self._joint_space.answer(targets, start, options, keep_mode=keep_mode)
         rows, coordinates = new_rows(self.model, len(targets)), np.empty((len(targets), begin.shape[1]))
-        n_missed = self._run(question_of(start is not None, keep_mode), options, targets, begin, coordinates, rows)
+        n_missed = self._run(
+            question_of(start is not None, keep_mode, nearby=nearby), options, targets, begin, coordinates, rows
+        )
         answers = Configurations(rows, coordinates)
         failed = np.flatnonzero(rows.status > PROJECTED) if n_missed else np.zeros(0, np.intp)
         if len(failed):
@@ -159,12 +170,21 @@ class ChainEngine(Engine):
         begin, rows = joint_coordinates(self.model, start), new_rows(self.model, len(targets))
         status, answers = rows.status, Configurations(rows, np.empty((len(targets), begin.shape[1])))
         self._run(
-            question_of(start is not None, True, follows=True), options, targets, begin, answers.coordinates, rows
+            question_of(start is not None, True, nearby=True, follows=True),
+            options,
+            targets,
+            begin,
+            answers.coordinates,
+            rows,
         )
         n = 1 + int(np.argmax(np.append(status[:-1] != REACHED, True)))
         if status[n - 1] <= PROJECTED:
             return answers.at(np.arange(n))
-        return answers.at(np.arange(n - 1)) if n > 1 else self.answer(targets[:1], start, options, keep_mode=True)
+        return (
+            answers.at(np.arange(n - 1))
+            if n > 1
+            else self.answer(targets[:1], start, options, keep_mode=True, nearby=True)
+        )
 
     def _follow_bent(
         self, target: Floats, start: Configurations | None, options: Options, bent: BentConfiguration
@@ -172,7 +192,9 @@ class ChainEngine(Engine):
         """Solve one target of a path, from the answer before it and from the last bent configuration."""
         assert bent.coordinates is not None
         begin = self.as_configurations(walk(self.model, bent.coordinates))
-        answer, bent_answer = (self.answer(target, each, options, keep_mode=True) for each in (start, begin))
+        answer, bent_answer = (
+            self.answer(target, each, options, keep_mode=True, nearby=True) for each in (start, begin)
+        )
         return bent_answer if bent.is_preferred(target, answer.rows, bent_answer.rows) else answer
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:

@@ -32,15 +32,18 @@ TRIES_OF_FEW, TRIES = 40, 8
 DESCENTS_OF_FEW, DESCENTS = 60, 15
 """Seeds from which descents to the nearest start, likewise."""
 
-AGREEMENTS_OF_FEW, AGREEMENTS = 10, 4
-"""Descents that must end at the least distance before the others are left out, likewise."""
+BENDS = 20
+"""Starts of descents around the start."""
+
+AGREEMENTS = 3
+"""Descents that must end at the least distance before the others are left out, and as many more as end elsewhere."""
 
 
 @lru_cache(maxsize=16)
-def question_of(has_start: bool, keeps_mode: bool, *, follows: bool = False) -> Handle[Question]:
+def question_of(has_start: bool, keeps_mode: bool, *, nearby: bool = False, follows: bool = False) -> Handle[Question]:
     """What is asked of all rows."""
     asked = np.zeros(1, QUESTION)
-    asked[0] = has_start, keeps_mode, follows, UNBOUNDED
+    asked[0] = has_start, keeps_mode, nearby, follows, UNBOUNDED
     return Handle(Question(asked))
 
 
@@ -72,7 +75,8 @@ def _tables(
         "is_short": is_short,
         "tries": TRIES_OF_FEW if is_short else TRIES,
         "descents": DESCENTS_OF_FEW if is_short else DESCENTS,
-        "agreements": AGREEMENTS_OF_FEW if is_short else AGREEMENTS,
+        "bends": BENDS,
+        "agreements": AGREEMENTS,
         "position": tolerance or TOLERANCES.position * length,
         "rotation": rotation_tolerance,
         "limit": TOLERANCES.limit,

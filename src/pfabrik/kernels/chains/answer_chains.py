@@ -117,8 +117,8 @@ def answer_chain(
     copy_table(s.X, s.start_X)
     error, hold = reach(tables, question, s), HOLD_NOTHING
     if is_clipped or error > tables.machine[0]["met"]:
-        copy_chain_state(s.start if question["keeps_mode"] == 1 else s.nearest, s.own)
-        distance, hold = project(tables, question["keeps_mode"] == 1, has_start, s)
+        copy_chain_state(s.nearest, s.own)
+        distance, hold = project(tables, question, has_start, s)
         if distance == math.inf:
             return FAILED
     return write_answer(tables, hold, s, coordinates, counters, pose, actuators, measures)

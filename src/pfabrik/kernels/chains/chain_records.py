@@ -47,6 +47,7 @@ MACHINE = np.dtype(
         ("is_short", "i8"),  # 1: limits leave many local minima
         ("tries", "i8"),  # most seeds that a target is reached from
         ("descents", "i8"),  # most seeds that a search for the nearest starts from
+        ("bends", "i8"),  # most starts of one around the start
         ("agreements", "i8"),  # of its ends, that end it
         ("position", "f8"),  # tolerances of what counts as reached [length], [rad]
         ("rotation", "f8"),
@@ -74,6 +75,7 @@ QUESTION = np.dtype(
     [
         ("has_start", "i8"),  # 1: the start was given, 0: it is home
         ("keeps_mode", "i8"),  # 1: answers are in the working mode of the start
+        ("is_nearby", "i8"),  # 1: as along a path, searches stay around the start
         ("follows", "i8"),  # 1: each row starts from the answer to the one before, up to one that is not reached
         ("effort", "i8"),  # steps of all searches for a row after which no further one begins
     ]

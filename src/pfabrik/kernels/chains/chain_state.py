@@ -45,6 +45,7 @@ class ChainScratch(NamedTuple):
     pulled: Floats  # (4, 4): a target farther out
     pose: Floats  # (4, 4) [length]: the target as it is asked for, exactly orthonormal
     coordinates: Floats  # (columns,), dimensionless
+    bent: Floats  # (columns,), dimensionless
     effort: Records  # (1,): EFFORT
     tally: Records  # (1,): TALLY
     log: Records  # (n,): ATTEMPT; most have no rows
@@ -102,6 +103,7 @@ def new_chain_scratch(chain: SerialChain, columns: int, attempts: int) -> ChainS
         pulled=np.zeros((4, 4)),
         pose=np.zeros((4, 4)),
         coordinates=np.zeros(columns),
+        bent=np.zeros(columns),
         effort=np.zeros(1, EFFORT),
         tally=np.zeros(1, TALLY),
         log=np.zeros(attempts, ATTEMPT),

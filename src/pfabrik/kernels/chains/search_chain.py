@@ -50,6 +50,9 @@ most times that this is done."""
 SAME = 1e-7
 """Relative difference of distances that count as equal."""
 
+BENT = 0.25
+"""How far towards a seed a start is bent, as a share of the way."""
+
 NEARLY, DESCENTS_NEARBY = 1e-2, 120
 """Distance below which a target out of reach of a short chain is tried from more seeds [L], and how many these are."""
 
@@ -89,7 +92,7 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
     for step in range(1, CONTINUATION_STEPS + 1):
         put_between(step / CONTINUATION_STEPS, s)
         error = reach_target(chain, s.between, objective, s.state, s, CLOSENESS, STEPS)
-    if error <= tables.machine[0]["met"]:
+    if error < least or error <= tables.machine[0]["met"]:
         keep_nearest(s)
     return min(error, least)
 
@@ -159,23 +162,28 @@ def distances(tables: ChainTables, X: Floats, s: ChainScratch) -> tuple[float, f
 
 
 @routine
-def project(tables: ChainTables, keeps_mode: bool, has_start: bool, s: ChainScratch) -> tuple[float, int]:
-    """Find the nearest configuration, left in `s.nearest`, from `s.own` and seeds; its distance [L] and what it holds.
+def project(tables: ChainTables, question: Record, has_start: bool, s: ChainScratch) -> tuple[float, int]:
+    """Find the nearest configuration, left in `s.nearest`; its distance [L] and what it holds.
 
     Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
     target than a start that was given, nothing is held.
     """
     last, weights, distance, hold = len(tables.holds) - 1, tables.weights, math.inf, HOLD_NOTHING
-    seeds = 0 if keeps_mode else tables.machine[0]["descents"]
+    machine, around = tables.machine[0], question["keeps_mode"] == 1
+    n_seeds, agreements = machine["bends"] if around else machine["descents"], machine["agreements"]
+    n_seeds = 1 if question["is_nearby"] == 1 else n_seeds
     for aim in range(1, last + 1):
         if distance == math.inf:
-            distance, hold = search_for(tables, aim, seeds, s), tables.holds[aim]
+            distance, hold = search_for(tables, aim, around, n_seeds, agreements, s), tables.holds[aim]
+            if not around and machine["is_short"] == 1 and distance > machine["met"] and distance < NEARLY:
+                copy_chain_state(s.nearest, s.own)
+                distance = search_for(tables, aim, False, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
     if has_start and last > 1 and hold == tables.holds[1]:
         position, rotation = distances(tables, s.start_X, s)
         if is_too_far(distance, weights[1], hold, position, rotation):
             copy_chain_state(s.nearest, s.held)
             copy_table(s.nearest_X, s.held_X)
-            released = search_for(tables, last, 0, s)
+            released = search_for(tables, last, around, n_seeds if around else 0, agreements, s)
             if brings_nearer(released, weights[last], position, rotation):
                 return released, HOLD_NOTHING
             copy_chain_state(s.held, s.nearest)
@@ -184,38 +192,27 @@ def project(tables: ChainTables, keeps_mode: bool, has_start: bool, s: ChainScra
 
 
 @routine
-def search_for(tables: ChainTables, aim: int, n_seeds: int, s: ChainScratch) -> float:
-    """Find the nearest configuration by one objective, left in `s.nearest`; its distance [L], or infinity."""
-    objective, machine, tally = objective_of(tables, aim), tables.machine[0], s.tally[0]
-    copy_chain_state(s.own, s.state)
-    walk_chain(tables.chain, s.state, s)
-    keep_nearest(s)
+def search_for(tables: ChainTables, aim: int, around: bool, n_seeds: int, agreements: int, s: ChainScratch) -> float:
+    """Find the nearest configuration by one objective, left in `s.nearest`; its distance [L], or infinity.
+
+    Descents begin at `s.own`, then at seeds, until enough ends agree. Those `around` the start begin there, then at
+    `s.own`, then where the start is bent a little: where links are stretched out, it is chance which way they bend.
+    """
+    objective, tally, effort, seed = objective_of(tables, aim), s.tally[0], s.effort[0], -1
     clear_tally(tally)
-    descend_from_all(tables, objective, aim, n_seeds, machine["agreements"], s)
-    least = tally["least"]
-    if n_seeds > 0 and machine["is_short"] == 1 and least > machine["met"] and least < NEARLY:
-        copy_chain_state(s.nearest, s.own)
-        descend_from_all(tables, objective, aim, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
-    return tally["least"]
-
-
-@routine
-def descend_from_all(
-    tables: ChainTables, objective: PoseObjective, aim: int, n_seeds: int, agreements: int, s: ChainScratch
-) -> None:
-    """Descend from `s.own`, then from so many seeds, until enough ends agree; the nearest stays in `s.nearest`."""
-    tally, effort = s.tally[0], s.effort[0]
-    if n_seeds > 0:
+    if n_seeds > 0 and not around:
         put_distances(tables, objective, s)
     for k in range(n_seeds + 1):
-        seed = -1
-        if k > 0:
+        if k == 0 or (around and k == 1):
+            copy_chain_state(s.start if around and k == 0 else s.own, s.state)
+        elif around:
+            seed = k - 2
+            load_bent(tables, seed, s)
+        else:
             seed = nearest_seed(s, len(tables.seeds)) if k % 2 == 1 else next_seed(s, k // 2, len(tables.seeds))
             if seed < 0:
                 break
             load_seed(tables, seed, s)
-        else:
-            copy_chain_state(s.own, s.state)
         before = effort["steps"]
         value = descend_chain(tables.chain, s.target, objective, s, CLOSENESS, DESCENT_STEPS)
         distance = pull_nearer(tables.chain, objective, math.sqrt(2.0 * value), s)
@@ -225,6 +222,15 @@ def descend_from_all(
             keep_nearest(s)
         if is_agreed(tally, agreements) or tally["least"] <= CLOSENESS or is_spent(effort):
             break
+    return tally["least"]
+
+
+@routine
+def load_bent(tables: ChainTables, seed: int, s: ChainScratch) -> None:
+    """Load the start, moved a little towards a seed."""
+    for j in range(len(s.coordinates)):
+        s.bent[j] = s.coordinates[j] + BENT * (tables.seeds[seed, j] - s.coordinates[j])
+    load_chain(tables.chain, s.bent, True, s.state)
 
 
 @routine
