@@ -32,11 +32,12 @@ TRIES_OF_FEW, TRIES = 40, 8
 DESCENTS_OF_FEW, DESCENTS = 60, 15
 """Seeds from which descents to the nearest start, likewise."""
 
-BENDS = 20
-"""Starts of descents around the start."""
+BENDS_OF_FEW, BENDS = 20, 0
+"""Starts of descents around the start, beside itself, likewise."""
 
-AGREEMENTS = 3
-"""Descents that must end at the least distance before the others are left out, and as many more as end elsewhere."""
+AGREEMENTS_OF_FEW, AGREEMENTS = 10, 4
+"""Descents that must end at the least distance before the others are left out, likewise; one more for each that ended
+farther away before."""
 
 
 @lru_cache(maxsize=16)
@@ -75,8 +76,8 @@ def _tables(
         "is_short": is_short,
         "tries": TRIES_OF_FEW if is_short else TRIES,
         "descents": DESCENTS_OF_FEW if is_short else DESCENTS,
-        "bends": BENDS,
-        "agreements": AGREEMENTS,
+        "bends": BENDS_OF_FEW if is_short else BENDS,
+        "agreements": AGREEMENTS_OF_FEW if is_short else AGREEMENTS,
         "position": tolerance or TOLERANCES.position * length,
         "rotation": rotation_tolerance,
         "limit": TOLERANCES.limit,

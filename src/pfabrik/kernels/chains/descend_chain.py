@@ -18,8 +18,14 @@ from .curvature import fill_curvature, model_change, plan_newton_step
 from .reach_target import largest, reach_target
 from .walk_chain import bound_steps, copy_chain_state, move_chain, walk_chain
 
+MOST_STEPS = 200
+"""Most steps of a descent, those that are not taken included; most need a dozen."""
+
 LONGEST_STEP = 1.0
 """Longest step of a freedom [rad or L]."""
+
+HOPE, NEAR, HOPEFUL = 10.0, 0.01, 1e-3
+"""Times its predicted reduction that a step may promise, and objective below which no descent is without hope"""
 
 SWEEPS = 12
 """Most times that freedoms are fixed at their bounds and released in one step."""
@@ -50,11 +56,12 @@ RESTORING, RESTORED = 8, 1e-10
 
 @routine
 def descend_chain(
-    chain: SerialChain, target: Floats, objective: PoseObjective, s: ChainScratch, closeness: float, most_steps: int
+    chain: SerialChain, target: Floats, objective: PoseObjective, least: float, s: ChainScratch, closeness: float
 ) -> float:
     """Descend from `s.state` to a local minimum, left there with its pose in `s.X`; the objective, or infinity.
 
-    It is infinite where the held components cannot be met from here.
+    It is infinite where the held components cannot be met from here. A descent ends early where it would not end
+    nearer than at `least`, which another one has found.
     """
     state, best = s.state, s.best
     reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING)
@@ -63,7 +70,7 @@ def descend_chain(
         return math.inf
     estimate_multipliers(chain, held, s)
     damping, predicted, is_kept = FIRST_DAMPING, math.inf, True
-    for _ in range(most_steps):
+    for _ in range(MOST_STEPS):
         s.effort[0]["steps"] += 1
         if value <= NOTHING or abs(predicted) <= CONVERGED * value or damping > MOST_DAMPING:
             break
@@ -94,6 +101,8 @@ def descend_chain(
                 s.multipliers[k] = s.wanted[k]
             damping = max(10.0 * damping, FIRST_DAMPING)
             continue
+        if value > NEAR and value - HOPE * predicted > least and damping <= HOPEFUL:
+            break
         copy_chain_state(state, best)
         move_chain(chain, state, s)
         if held > 0:

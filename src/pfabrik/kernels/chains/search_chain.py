@@ -33,9 +33,6 @@ CLOSENESS = 1e-12
 STEPS = 30
 """Most steps of an attempt to reach a target; those that converge need ten."""
 
-DESCENT_STEPS = 200
-"""Most steps of a descent, those that are not taken included; most need a dozen."""
-
 NEARER = 0.25
 """The start goes before a seed that is not nearer than this share of its squared distance."""
 
@@ -214,10 +211,11 @@ def search_for(tables: ChainTables, aim: int, around: bool, n_seeds: int, agreem
                 break
             load_seed(tables, seed, s)
         before = effort["steps"]
-        value = descend_chain(tables.chain, s.target, objective, s, CLOSENESS, DESCENT_STEPS)
+        least = tally["least"]
+        value = descend_chain(tables.chain, s.target, objective, 0.5 * least * least, s, CLOSENESS)
         distance = pull_nearer(tables.chain, objective, math.sqrt(2.0 * value), s)
         note_attempt(aim, seed, effort["steps"] - before, distance, effort, s.log)
-        if distance < math.inf and count_ending(distance, tally):
+        if distance < math.inf and distance <= (1.0 + SAME) * least and count_ending(distance, tally):
             walk_chain(tables.chain, s.state, s)
             keep_nearest(s)
         if is_agreed(tally, agreements) or tally["least"] <= CLOSENESS or is_spent(effort):
@@ -242,8 +240,8 @@ def pull_nearer(chain: SerialChain, objective: PoseObjective, distance: float, s
         if distance <= CLOSENESS or not pull(chain, s.target, objective, distance, s):
             break
         copy_chain_state(s.state, s.unpulled)
-        descend_chain(chain, s.pulled, objective, s, CLOSENESS, DESCENT_STEPS)
-        nearer = math.sqrt(2.0 * descend_chain(chain, s.target, objective, s, CLOSENESS, DESCENT_STEPS))
+        descend_chain(chain, s.pulled, objective, math.inf, s, CLOSENESS)
+        nearer = math.sqrt(2.0 * descend_chain(chain, s.target, objective, math.inf, s, CLOSENESS))
         if not nearer < (1.0 - SAME) * distance:
             copy_chain_state(s.unpulled, s.state)
             break
