@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import accumulate, zip_longest
+from itertools import zip_longest
 
 import numpy as np
 
@@ -26,35 +26,18 @@ def leg_records(home: RecordedHome, forms: Sequence[LegForm]) -> RecordedRecords
     recorded = RecordedRecords.of(fields, K.LEG)
     legs = recorded.records
     _put_frames(legs, forms)
-    counts = row_counts(legs)
-    legs["first_row"] = [0, *accumulate(counts)][:-1]
-    legs["has_rows"] = _has_rows(legs, counts)
+    legs["first_row"] = np.cumsum(legs["n_rows"]) - legs["n_rows"]
+    legs["has_rows"] = _has_rows(legs)
     return recorded
 
 
-def row_counts(legs: Records) -> list[int]:
-    """The number of constraints of each leg."""
-    counts = []
-    for leg in legs:
-        if leg["kind"] == K.PIVOT:
-            counts.append(int(3 - leg["slides"] + leg["axis_rows"]))
-            continue
-        if leg["kind"] == K.REDUNDANT:
-            counts.append(0)
-            continue
-        is_rigid = not leg["slides"] and leg["proximal"] in (K.NO_PROXIMAL, K.SHARED)
-        hinges = int(leg["base_end"] == K.HINGE) + int(leg["platform_end"] == K.HINGE)
-        counts.append(int(is_rigid) + hinges + int(leg["twists"]))
-    return counts
-
-
-def _has_rows(legs: Records, counts: Sequence[int]) -> list[bool]:
+def _has_rows(legs: Records) -> list[bool]:
     """Flags `has_rows`: the leg, or a rod on the same proximal joint, contributes constraint rows.
 
     Rods on a proximal joint follow the one that has it. A redundant joint has rows if a leg on it has.
     """
     first_rods = np.maximum.accumulate(np.where(legs["proximal"] != K.SHARED, np.arange(len(legs)), 0))
-    has_rows = [bool(np.sum(np.array(counts)[first_rods == first_rod])) for first_rod in first_rods]
+    has_rows = [bool(np.sum(legs["n_rows"][first_rods == first_rod])) for first_rod in first_rods]
     for k in range(len(legs) - 1, -1, -1):
         for joint in (legs["redundant"][k], legs["mirror_of"][k]):
             if joint >= 0:
@@ -68,7 +51,7 @@ def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
     legs["redundant"] = [-1 if form.on is None else numbers[id(form.on)] for form in forms]
     mirrored = [form.mirror_of if isinstance(form, RedundantJoint) else None for form in forms]
     legs["mirror_of"] = [-1 if mirror_of is None else numbers[id(mirror_of)] for mirror_of in mirrored]
-    is_redundant = legs["kind"] == K.REDUNDANT
+    is_redundant = np.array([isinstance(form, RedundantJoint) for form in forms])
     is_own = is_redundant & (legs["mirror_of"] < 0)
     legs["makes"][is_redundant], legs["column"][is_own] = (
         K.FIXED + np.arange(is_redundant.sum()),
@@ -76,8 +59,8 @@ def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
     )
     legs["column"][is_redundant & ~is_own] = legs["column"][legs["mirror_of"][is_redundant & ~is_own]]
     for leg, form in zip(legs, forms, strict=True):
-        is_own = isinstance(form, RedundantJoint) and form.is_inner
-        leg["inner"] = is_own or (leg["redundant"] >= 0 and legs["inner"][leg["redundant"]])
+        is_inner = isinstance(form, RedundantJoint) and form.is_inner
+        leg["inner"] = is_inner or (leg["redundant"] >= 0 and legs["inner"][leg["redundant"]])
     legs["frame"] = np.where(
         legs["redundant"] >= 0,
         legs["makes"][legs["redundant"]],
@@ -86,13 +69,13 @@ def _put_frames(legs: Records, forms: Sequence[LegForm]) -> None:
 
 
 def _orienting(form: LegForm, after: LegForm | None) -> Fields:
-    """Fields of a redundant joint that orients the rod after it: the side that it takes at home."""
+    """The side that a redundant joint that orients the rod after it takes at home."""
     if not (isinstance(form, RedundantJoint) and form.orients and isinstance(after, Rod)):
         return {}
     if form.element.kind != "R":
-        return {"orients": 1}
+        return {}
     across = cross(form.element.axis, after.base_ending.elements[0].axis)
-    return {"orients": 1, "side": -sign(across @ (after.platform_end - form.element.point))}
+    return {"side": -sign(across @ (after.platform_end - form.element.point))}
 
 
 def _fields(home: RecordedHome, form: LegForm) -> Fields:
@@ -130,15 +113,15 @@ def _pivot_fields(home: RecordedHome, pivot: Pivot) -> Fields:
         "fixed_rows": _rows_square_to(slides) if slides else _unit_vectors(home),
     }
     if kind == "triple":
-        fields["side"] = _home_side(axes, axes[2])
-    return fields | _axis_rows(kind, axes)
+        fields |= {"side": _home_side(axes, axes[2]), "line": axes[2], "base_end_aimed": 1}
+    return fields | _axis_rows(kind, axes, len(slides))
 
 
 def _kept_axis_fields(form: KeptAxis) -> Fields:
     """The fields of a pivot with three slides, whose hinge is the axis."""
     axes = [form.ending.elements[0].axis]
     fields: Fields = {"kind": K.PIVOT, "base_end": K.HINGE, "slides": 3, "base_end_axes": axes}
-    return fields | _axis_rows("hinge", axes)
+    return fields | _axis_rows("hinge", axes, 3)
 
 
 def _redundant_fields(home: RecordedHome, form: RedundantJoint) -> Fields:
@@ -150,6 +133,8 @@ def _redundant_fields(home: RecordedHome, form: RedundantJoint) -> Fields:
         "proximal": _PROXIMAL[element.kind],
         "proximal_axis": element.axis,
         "proximal_point": _platform_point(home, element.point, form.is_reversed or not form.at_platform_end),
+        "orients": form.orients,
+        "implicit": not form.orients,
     }
 
 
@@ -178,10 +163,10 @@ def _rows_square_to(axes: Sequence[Vector]) -> list[Vector]:
     return [cross(*axes) / area(*axes)] if len(axes) == 2 else []
 
 
-def _axis_rows(kind: str, axes: Sequence[Vector]) -> Fields:
+def _axis_rows(kind: str, axes: Sequence[Vector], n_slides: int) -> Fields:
     pairs = _axis_pairs(kind, axes)
     return {
-        "axis_rows": len(pairs),
+        "n_rows": 3 - n_slides + len(pairs),
         "upright": {"hinge": 1, "weld": 3}.get(kind, 0),
         "kept": [kept for kept, _ in pairs],
         "moved": [moved for _, moved in pairs],
@@ -206,9 +191,11 @@ def _home_side(axes: Sequence[Vector], line: Vector) -> Scalar:
 def _rod_fields(home: RecordedHome, rod: Rod) -> Fields:
     length = norm(rod.platform_end - rod.base_end)
     line = (rod.platform_end - rod.base_end) / length
-    twists = keeps_from_spinning(rod)
+    twists, has_proximal = keeps_from_spinning(rod), rod.proximal is not None
+    hinges = [ending.kind for ending in (rod.base_ending, rod.platform_ending)].count("hinge")
     fields: Fields = {
         "kind": K.ROD,
+        "n_rows": (rod.slide is None and not has_proximal) + hinges + twists,
         "reversed": rod.is_reversed,
         "base_end_point": rod.base_end,
         "length": length,
@@ -217,6 +204,7 @@ def _rod_fields(home: RecordedHome, rod: Rod) -> Fields:
         "slides": rod.slide is not None,
         "twists": twists,
         "proximal": K.SHARED if rod.is_shared else K.NO_PROXIMAL,
+        "has_proximal": has_proximal,
     }
     for end, ending, order in (("base_end", rod.base_ending, 1), ("platform_end", rod.platform_ending, -1)):
         axes = _axes(ending, order)

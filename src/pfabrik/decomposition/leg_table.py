@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Records
+from ..arrays import Floats, Mask, Records
 from ..description.graph import cone_line
 from ..description.joint_coordinates import deviations
 from ..description.joints import Joint
@@ -23,7 +23,7 @@ from .decompose import sub_chains
 from .elementary_joints import ElementaryJoint, NoLeg
 from .intermediate_platforms import legs_of_sub_chain
 from .leg_forms import LegForm, RedundantJoint, Rod, closed_form_coordinates
-from .leg_records import leg_records, row_counts
+from .leg_records import leg_records
 from .recorded_home import RecordedHome
 from .recording import Fields, RecordedRecords, Recording
 from .tape import area, largest, sign
@@ -68,9 +68,14 @@ class LegTable:
         return np.array(self.legs["side"], dtype=float)[None]
 
     @cached_property
+    def is_redundant(self) -> Mask:
+        """Mask of the legs that are redundant joints."""
+        return np.asarray(self.legs["kind"] == K.REDUNDANT)
+
+    @cached_property
     def redundant(self) -> Records:
         """The coordinates of redundant joints; their columns number them."""
-        redundant: Records = self.known[self.legs["kind"][self.known["leg"]] == K.REDUNDANT]
+        redundant: Records = self.known[self.is_redundant[self.known["leg"]]]
         redundant["column"] = np.arange(len(redundant))
         return redundant
 
@@ -86,7 +91,7 @@ class LegTable:
     @cached_property
     def implicit_joints(self) -> Records:
         """The coordinates of implicit joints: in an array of sides their values stand in the place of a side."""
-        return np.asarray(self.redundant[self.legs["orients"][self.redundant["leg"]] == 0])
+        return np.asarray(self.redundant[self.legs["implicit"][self.redundant["leg"]] == 1])
 
     @cached_property
     def has_free_redundant(self) -> bool:
@@ -189,12 +194,12 @@ def _forms(home: RecordedHome) -> list[LegForm]:
 
 
 def _aimed(legs: Records, coordinates: Records) -> Records:
-    """Legs set to compute the angles of endings that have one of the coordinates too."""
+    """Legs set to compute the angles of rods' endings that have one of the coordinates too."""
     legs = legs.copy()
+    coordinates = coordinates[legs["kind"][coordinates["leg"]] == K.ROD]
     for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
-        is_aimed = legs[f"{end}_aimed"] == 1
-        is_aimed[coordinates["leg"][(coordinates["place"] >= start) & (coordinates["place"] < start + 3)]] = True
-        legs[f"{end}_aimed"] = is_aimed & (legs["kind"] == K.ROD)
+        is_at_end = (coordinates["place"] >= start) & (coordinates["place"] < start + 3)
+        legs[f"{end}_aimed"][coordinates["leg"][is_at_end]] = 1
     return legs
 
 
@@ -280,8 +285,8 @@ def _task(home: RecordedHome, legs: Records) -> RecordedRecords:
     task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(description.axes) - description.rotations
     if mechanism.end_effector_is_joint:  # it has no orientation: home's
         task["rotations"] = 0
-    task["rows"], task["farthest"] = sum(row_counts(legs)), COMPLETED_WITHIN
-    redundant = legs[(legs["kind"] == K.REDUNDANT) & (legs["mirror_of"] < 0)]
+    task["rows"], task["farthest"] = legs["n_rows"].sum(), COMPLETED_WITHIN
+    redundant = legs[(legs["makes"] > 0) & (legs["mirror_of"] < 0)]
     task["redundant"] = len(redundant) if redundant["has_rows"].any() else 0
-    task["implicit"] = bool((redundant["has_rows"] & (redundant["orients"] == 0)).any())
+    task["implicit"] = bool((redundant["has_rows"] & redundant["implicit"]).any())
     return recorded_task

@@ -31,9 +31,8 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
 
     None if some leg is not like that, the task leaves some of the pose open, or a redundant joint is beyond its range.
     """
-    legs = table.legs
-    is_redundant = legs["kind"] == K.REDUNDANT
-    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["redundant"] < 0) & ~is_redundant
+    legs, is_redundant = table.legs, table.is_redundant
+    is_otherwise = (legs["frame"] != K.FROM_BASE) & (legs["redundant"] < 0)
     is_otherwise |= (
         (legs["at_platform_end"] == 1) | (legs["orients"] == 1) | (legs["reversed"] == 1) | (legs["inner"] == 1)
     )
@@ -44,7 +43,7 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
         or not _are_within_ranges(table, sides)
     ):
         return None
-    displacements = _displacements(legs, sides)
+    displacements = _displacements(table, sides)
     on_redundant = {name: is_redundant[getattr(table, name)["leg"]] for name in ("limited", "cones", "driven", "known")}
     numbers = np.cumsum(~is_redundant) - 1
     parts = {name: getattr(table, name)[~mask] for name, mask in on_redundant.items()}
@@ -67,21 +66,21 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
 
 def _are_within_ranges(table: LegTable, sides: Floats) -> bool:
     """True if redundant joints are within their ranges."""
-    limits = table.limited[table.legs["kind"][table.limited["leg"]] == K.REDUNDANT]
+    limits = table.limited[table.is_redundant[table.limited["leg"]]]
     values = limits["sense"] * sides[limits["leg"]]
     return bool(((limits["lo"] <= values) & (values <= limits["hi"])).all())
 
 
-def _displacements(legs: Records, sides: Floats) -> Floats:
+def _displacements(table: LegTable, sides: Floats) -> Floats:
     """The displacements from home of the bodies that legs are on, or that redundant joints move, (legs, 4, 4) [L]."""
-    displacements = np.repeat(np.eye(4)[None], len(legs), axis=0)
-    for k, leg in enumerate(legs):
-        motion = np.eye(4)
-        if leg["kind"] == K.REDUNDANT and leg["proximal"] == K.CRANK:
-            motion[:3, :3] = from_rotvec(sides[k] * leg["proximal_axis"])
+    displacements = np.repeat(np.eye(4)[None], len(table.legs), axis=0)
+    for k, leg in enumerate(table.legs):
+        motion, q = np.eye(4), sides[k] if table.is_redundant[k] else 0.0
+        if leg["proximal"] == K.CRANK:
+            motion[:3, :3] = from_rotvec(q * leg["proximal_axis"])
             motion[:3, 3] = leg["proximal_point"] - motion[:3, :3] @ leg["proximal_point"]
-        elif leg["kind"] == K.REDUNDANT:
-            motion[:3, 3] = sides[k] * leg["proximal_axis"]
+        else:
+            motion[:3, 3] = q * leg["proximal_axis"]
         displacements[k] = displacements[leg["redundant"]] @ motion if leg["redundant"] >= 0 else motion
     return displacements
 

@@ -55,10 +55,9 @@ def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
     if not sets_whole_pose or len(machine.legs) != 6 or machine.equations:
         return None
     legs = [machine.legs[driven.leg] for driven in machine.driven]
-    rods = [leg.record["kind"] == K.ROD and leg.record["proximal"] == K.NO_PROXIMAL for leg in legs]
-    if [driven.place for driven in machine.driven] != [K.SLIDE] * 6 or not all(rods):
+    if [driven.place for driven in machine.driven] != [K.SLIDE] * 6:
         return None
-    if any(leg.record["reversed"] for leg in legs):
+    if any(leg.record["reversed"] or leg.record["proximal"] != K.NO_PROXIMAL for leg in legs):
         return None
     ends = [(np.asarray(leg.numbers["base_end"]), np.asarray(leg.numbers["platform_end"])) for leg in legs]
     offsets = [driven.home - _length(leg) for driven, leg in zip(machine.driven, legs, strict=True)]

@@ -11,7 +11,6 @@ import numpy as np
 from ..arrays import Floats, Record
 from ..closure.parasitic import has_other_assemblies
 from ..decomposition.leg_forms import RedundantJoint, Rod
-from ..decomposition.leg_records import row_counts
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
@@ -69,8 +68,7 @@ class ExportedLeg(NamedTuple):
     @property
     def keeps_its_length(self) -> bool:
         """True for a rigid rod on a proximal joint of its own: with this joint held its length is an equation."""
-        has_proximal = self.record["kind"] == K.ROD and self.record["proximal"] in (K.CRANK, K.CARRIAGE)
-        return bool(has_proximal and not self.record["slides"])
+        return bool(self.record["has_proximal"] and not self.record["slides"])
 
 
 class Machine:
@@ -106,7 +104,7 @@ class Machine:
         drives = table.driven[np.argsort(table.driven["column"])]
         self.limited = [_coordinate(record, mechanism.coordinates[record["column"]].kind) for record in table.limited]
         self.driven = [_coordinate(record, mechanism.drives[record["column"]].kind) for record in drives]
-        self.equations = sum(row_counts(table.legs)) + sum(leg.keeps_its_length for leg in self.legs)
+        self.equations = int(table.legs["n_rows"].sum()) + sum(leg.keeps_its_length for leg in self.legs)
 
     @cached_property
     def links(self) -> ExportedLinks | None:

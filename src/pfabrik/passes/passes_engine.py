@@ -23,7 +23,6 @@ from ..decomposition.plan import compile_plan
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import LOCKED
-from ..kernels.legs.records import REDUNDANT
 from ..kernels.passes import plan as P
 from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
@@ -113,9 +112,8 @@ class PassesEngine(InverseEngine):
         if not self._model.has_legs:
             return np.zeros((1, 0))
         legs, home = self._model.legs.legs, self._model.legs.home_sides
-        has_side = (legs["kind"] != REDUNDANT) | (legs["orients"] == 1)
         sides = home if configurations is None else sides_at(self._model, configurations)
-        return np.where(has_side, sides, 0.0)
+        return np.where(legs["implicit"] == 1, 0.0, sides)
 
     def _solve_from(self, targets: Floats, begin: Floats, keep_mode: bool) -> Configurations:
         """Solve for poses by passes from joint coordinates (n, columns); FAILED where that ends in none feasible."""

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..batch import put, take
 from ..closure.configurations import Configurations, Places
 from ..derived import derived
-from ..kernels.legs import records as K
 from ..kernels.rows import Rows
 from ..model import Model
 from .coordinates import joint_coordinates, read_coordinates
@@ -124,7 +123,7 @@ def sides_at(model: Model, start: Configurations) -> Floats:
         redundant = table.implicit_joints
         redundant_columns = [table.known["column"][table.known["leg"] == k][0] for k in redundant["leg"]]
         sides[:, redundant["leg"]] = redundant["sense"] * start.coordinates[:, redundant_columns] / redundant["unit"]
-    two_sided, columns = columns_of_sides(model)
+    two_sided, columns, groups = columns_of_sides(model)
     if not len(two_sided):
         return sides
     closure = model.path_closure
@@ -134,8 +133,7 @@ def sides_at(model: Model, start: Configurations) -> Floats:
     else:
         q = start.coordinates
     is_angle = closure.turning[columns] > 0.0
-    is_on_redundant = table.legs["kind"][two_sided] != K.REDUNDANT
-    for group in (~is_on_redundant, is_on_redundant):  # legs on redundant joints come after these joints
+    for group in groups:
         errors = []
         for factor in (1.0, -1.0):
             candidate, candidate_q = sides.copy(), np.zeros_like(q)
@@ -150,15 +148,17 @@ def sides_at(model: Model, start: Configurations) -> Floats:
 
 
 @derived
-def columns_of_sides(model: Model) -> tuple[NDArray[np.intp], list[int]]:
-    """The legs with two solutions, and the column of the coordinate in which these differ."""
+def columns_of_sides(model: Model) -> tuple[NDArray[np.intp], list[int], tuple[Mask, Mask]]:
+    """The legs with two solutions, the columns of the coordinates in which these differ, and masks of two groups.
+
+    It is a leg's first coordinate. The first group are redundant joints: the legs on them come after them.
+    """
     table = model.legs
     two_sided = np.flatnonzero(table.home_sides[0])
-    places = np.where(table.legs["kind"] == K.PIVOT, K.BASE_END, K.Q_PROXIMAL)
-    columns = [
-        table.known[(table.known["leg"] == k) & (table.known["place"] == places[k])]["column"][0] for k in two_sided
-    ]
-    return two_sided, columns
+    known = np.sort(table.known, order=("leg", "place"))
+    columns = known["column"][np.searchsorted(known["leg"], two_sided)].tolist()
+    is_redundant = table.is_redundant[two_sided]
+    return two_sided, columns, (is_redundant, ~is_redundant)
 
 
 def _coordinates_of(model: Model, start: Configurations | None, sides: Floats) -> Callable[[Places], Floats | None]:

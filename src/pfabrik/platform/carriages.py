@@ -14,7 +14,7 @@ from ..tolerances import TOLERANCES
 
 def proximal_coordinates(table: LegTable) -> Records:
     """The coordinates of proximal joints among the known ones."""
-    on_rods = table.legs["kind"][table.known["leg"]] == K.ROD
+    on_rods = table.legs["has_proximal"][table.known["leg"]] == 1
     return np.asarray(table.known[on_rods & (table.known["place"] == K.Q_PROXIMAL)])
 
 
@@ -35,7 +35,7 @@ def carriages_along(table: LegTable) -> Along:
         if way is None:
             return stays_there(table)
         rows[k, :, way] = table.legs["proximal_axis"][way]
-        rows[k, :, n:] = -np.eye(3) if k not in way or table.legs["kind"][k] == K.ROD else 0.0
+        rows[k, :, n:] = -np.eye(3) if k not in way or not table.is_redundant[k] else 0.0
         if not rows[k, :, n:].any():
             rows[k] = 0.0  # the legs on this carriage tell
     _, sizes, directions = np.linalg.svd(rows.reshape(3 * n, n + 3))
@@ -54,11 +54,7 @@ def _carriages_to(legs: Records, k: int) -> list[int] | None:
     while at >= 0:
         leg = legs[at]
         is_first = leg["redundant"] < 0
-        if (
-            leg["at_platform_end"]
-            or (leg["kind"] == K.REDUNDANT and leg["mirror_of"] >= 0)
-            or (is_first and leg["frame"] != K.FROM_BASE)
-        ):
+        if leg["at_platform_end"] or leg["mirror_of"] >= 0 or (is_first and leg["frame"] != K.FROM_BASE):
             return None
         if leg["proximal"] == K.SHARED:
             return None

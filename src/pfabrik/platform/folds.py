@@ -10,7 +10,6 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..closure.configurations import Configurations, new_rows
 from ..derived import derived
-from ..kernels.legs import records as K
 from ..model import Model
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, columns_of_sides, sides_at
@@ -55,9 +54,8 @@ def home_answer(model: Model) -> LegAnswers:
 def _folded(model: Model, poses: Floats, sides: Floats) -> Mask:
     """True for legs whose two solutions coincide at poses (n, 4, 4) [length], (n, legs)."""
     table, folded = model.legs, np.zeros(sides.shape, bool)
-    two_sided, columns = columns_of_sides(model)
-    is_on_redundant = table.legs["kind"][two_sided] != K.REDUNDANT
-    for group in (~is_on_redundant, is_on_redundant):
+    two_sided, columns, groups = columns_of_sides(model)
+    for group in groups:
         q = np.zeros((2, len(sides), len(model.path_closure.scale)))
         for factor, values in zip((1.0, -1.0), q, strict=True):
             candidate = sides.copy()

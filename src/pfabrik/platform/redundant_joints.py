@@ -14,7 +14,6 @@ from ..decomposition.leg_table import LegTable
 from ..decomposition.plan import compile_trunks
 from ..derived import derived
 from ..kernels.clearance.link_records import NO_LINKS
-from ..kernels.legs import records as K
 from ..kernels.passes import plan as P
 from ..kernels.platform import redundant_sets as R
 from ..kernels.platform.nearest import NO_STARTS
@@ -163,14 +162,14 @@ def split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
     if table.task["unset"][0] > 0 or table.task["rows"][0] > 0:
         return ((table, slice(None)),)
     legs, parts = table.legs, []
-    starts = np.flatnonzero((legs["kind"] == K.REDUNDANT) & (legs["redundant"] < 0)).tolist()
+    starts = np.flatnonzero(table.is_redundant & (legs["redundant"] < 0)).tolist()
     for k, next_start in zip(starts, [*starts[1:], len(legs)], strict=True):
         end = k + 1
         while end < next_start and legs[end]["redundant"] >= k:
             end += 1
         part_legs, n_before = legs[k:end].copy(), legs[k]["makes"] - 2
         part_legs["redundant"] -= np.where(part_legs["redundant"] >= 0, k, 0)
-        part_legs["makes"] -= n_before
+        part_legs["makes"] -= n_before * (part_legs["makes"] > 0)
         part_legs["frame"] -= np.where(part_legs["frame"] >= 2, n_before, 0)
         records = {name: getattr(table, name) for name in ("limited", "cones", "known")}
         records = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in records.items()}

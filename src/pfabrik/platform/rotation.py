@@ -76,10 +76,10 @@ def without_idle_legs(table: LegTable) -> TableHandle:
     for k in range(len(legs)):
         is_second = legs["proximal"][k] == K.SHARED
         first_leg = first_leg if is_second else k
-        has_first = is_second and legs["kind"][first_leg] == K.ROD
+        has_first = is_second and legs["kind"][first_leg] != K.IDLE
         leg_idle = is_idle[legs["first_row"][k] : row_ends[k]]
         if len(leg_idle) and leg_idle.all() and k not in limited and (has_first or k not in cones["leg"]):
-            legs["kind"][k] = K.IDLE
+            legs["kind"][k], legs["has_proximal"][k] = K.IDLE, 0
             cones["leg"][cones["leg"] == k] = first_leg
     return Handle(kernel_table(table)._replace(legs=legs, cones=with_pointing_cones(legs, cones[_is_tightest(cones)])))
 

@@ -168,7 +168,7 @@ def _distances_from(starts: Starts, k: int) -> Floats:
 
 def _sided_pivots(table: LegTable) -> NDArray[np.intp]:
     """The legs that are pivots of three hinges, which have two solutions."""
-    pivots = np.flatnonzero((table.legs["kind"] == K.PIVOT) & (table.legs["side"] != 0.0))
+    pivots = np.flatnonzero((table.legs["proximal"] == K.NO_PROXIMAL) & (table.legs["side"] != 0.0))
     return pivots[_by_place(table, pivots)]
 
 

@@ -29,12 +29,8 @@ OF_POINTING = -1
 def kernel_table(table: LegTable) -> K.Table:
     """The records of a leg table, with the index of each proximal, then redundant, coordinate among the unknowns."""
     columns = np.full(len(table.legs), -1)
-    has_proximal = (table.legs["kind"] == K.ROD) & np.isin(table.legs["proximal"], (K.CRANK, K.CARRIAGE))
-    is_redundant, is_mirror = (
-        (table.legs["kind"] == K.REDUNDANT) & proximal_legs
-        for proximal_legs in (table.legs["mirror_of"] < 0, table.legs["mirror_of"] >= 0)
-    )
-    proximal_legs = np.concatenate([np.flatnonzero(has_proximal), np.flatnonzero(is_redundant)])
+    is_mirror = table.legs["mirror_of"] >= 0
+    proximal_legs = [*np.flatnonzero(table.legs["has_proximal"]), *np.flatnonzero(table.is_redundant & ~is_mirror)]
     columns[proximal_legs] = 6 + np.arange(len(proximal_legs))
     columns[is_mirror] = columns[table.legs["mirror_of"][is_mirror]]
     return K.Table(table.legs, table.limited, table.cones, table.driven, table.known, table.task, columns)
@@ -75,11 +71,10 @@ def with_pointing_cones(legs: Records, cones: Records) -> Records:
     pointing = []
     for k, leg in enumerate(legs):
         for end, place in (("base_end", K.BASE_LINE), ("platform_end", K.PLATFORM_LINE)):
-            is_pivot = leg["kind"] == K.PIVOT and leg[end] == K.TRIPLE
-            if not is_pivot and (leg["kind"] != K.ROD or leg[end] != K.CROSS):
+            if not leg[f"{end}_aimed"] or leg[end] == K.HINGE:
                 continue
-            a, b, c = leg[f"{end}_axes"]
-            A, B = np.arccos(np.clip([a @ b, b @ (c if is_pivot else leg["line"])], -1.0, 1.0))
+            is_pivot, (a, b, _) = leg[end] == K.TRIPLE, leg[f"{end}_axes"]
+            A, B = np.arccos(np.clip([a @ b, b @ leg["line"]], -1.0, 1.0))
             for axis, half_angle in ((a, min(A + B, 2.0 * np.pi - A - B)), (-a, np.pi - abs(A - B))):
                 if half_angle < np.pi - TOLERANCES.alignment:
                     pointing.append(

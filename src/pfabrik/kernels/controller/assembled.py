@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ...arrays import Floats, Ints
 from .._jit import routine
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose
-from ..legs.records import REDUNDANT, Table
+from ..legs.records import Table
 from ..platform.equations import evaluate_legs
 from ..platform.forward import (
     ASSEMBLED,
@@ -68,7 +68,7 @@ def assemble(own: Assembling, reaching: Reaching, actuators: Floats, pose: Float
     copy_row(reaching.home.sides[0], reaching.begin)
     for i in range(table.driven.shape[0]):  # there may be several places of an implicit joint at a pose
         driven = table.driven[i]
-        if table.legs[driven["leg"]]["kind"] == REDUNDANT and table.legs[driven["leg"]]["orients"] == 0:
+        if table.legs[driven["leg"]]["implicit"] == 1:
             reaching.begin[driven["leg"]] = driven["sense"] * own.deviations[0, driven["column"]]
     put_start(own.start, reaching, pose)
     own.scratch.steps[0] = 0

@@ -12,7 +12,6 @@ from ..legs.answer import (
     Completion,
     complete_pose,
     deviation,
-    end_of_rows,
     place_legs,
     put_rows,
 )
@@ -262,7 +261,7 @@ def farthest_leg(table: Table, rows: Floats) -> int:
     """Index of the leg with the largest equation, lengths of rods on proximal joints among them if they have rows."""
     worst, leg = 0.0, 0
     for k in range(table.legs.shape[0]):
-        for row in range(table.legs[k]["first_row"], end_of_rows(table.legs, k, table.task[0]["rows"])):
+        for row in range(table.legs[k]["first_row"], table.legs[k]["first_row"] + table.legs[k]["n_rows"]):
             if not abs(rows[row]) <= worst:
                 worst, leg = abs(rows[row]), k
         if rows.shape[0] > table.task[0]["rows"] and has_proximal(table.legs[k]):

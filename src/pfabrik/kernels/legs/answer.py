@@ -12,14 +12,15 @@ from .._jit import allocator, flattened, routine
 from ..linear import solve_spd
 from ..quaternions import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
-from ..vectors import copy_row, cross, dot, norm, put, scale, vec, wrap_into
+from ..vectors import copy_row, cross, dot, move, norm, put, scale, vec, wrap_into
 from .complete_poses import read_target, set_yaw, turn_pose
 from .endings import LEAST_MARGIN
-from .frames import new_frames, orienting_coordinate, place_redundant, q_redundant_of, redundant_slope, set_frames
+from .frames import new_frames, orienting_coordinate, q_redundant_of, redundant_slope, set_frames
+from .kinds import evaluate, leg_rows, leg_slopes
 from .open_table import open_table
-from .pivots import any_across, pivot_rows, pivot_slopes, place_pivot
-from .records import N_VALUES, PIVOT, REDUNDANT, ROD, SHARED, Table
-from .rods import place_rod, rod_rows, rod_slopes
+from .pivots import any_across
+from .records import N_VALUES, SHARED, Table
+from .rods import solve_proximal
 
 # Largest constraint of a completed pose, and of one that the task sets whole [L or rad]: solutions close to 1e-9, and
 # the closure residual of a loop may be a few times its constraint.
@@ -73,17 +74,13 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
     singularity_margin, margin_of_rows, owner = 1.0, 1.0, 0
     for k in range(legs.shape[0]):
         leg = legs[k]
-        frame, margin = frames[leg["frame"]], 1.0
+        frame, q, margin = frames[leg["frame"]], q_redundant_of(legs, k, sides), 1.0
         owner = owner if leg["proximal"] == SHARED else k
-        if leg["kind"] == PIVOT:
-            margin = place_pivot(leg, frame, sides[k], values[k])
-        elif leg["kind"] == REDUNDANT:
-            q = q_redundant_of(legs, k, sides)
-            if leg["orients"] == 1:
-                q, margin = orienting_coordinate(leg, legs[k + 1], frame, q)
-            place_redundant(leg, q, frames, values[k])
-        else:
-            margin = place_rod(leg, legs[owner], frame, sides[k], values[owner], values[k], lines[k])
+        if leg["has_proximal"] == 1:
+            margin = solve_proximal(leg, move(frame, vec(leg["platform_end_point"])), sides[k], values[k])
+        if leg["orients"] == 1:
+            q, margin = orienting_coordinate(leg, legs[k + 1], frame, q)
+        margin = min(margin, evaluate(legs, k, owner, q, sides[k], frames, values, lines))
         singularity_margin = min(singularity_margin, margin)
         margin_of_rows = min(margin_of_rows, margin) if leg["has_rows"] == 1 else margin_of_rows
     return singularity_margin, margin_of_rows
@@ -94,12 +91,8 @@ def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows:
     """Fill the constraints of all legs; the largest of them, infinite if one is not a number."""
     owner = 0
     for k in range(legs.shape[0]):
-        leg = legs[k]
-        owner = owner if leg["proximal"] == SHARED else k
-        if leg["kind"] == PIVOT:
-            pivot_rows(leg, frames[leg["frame"]], rows)
-        elif leg["kind"] == ROD:
-            rod_rows(leg, legs[owner], frames[leg["frame"]], values[owner], values[k], lines[k], rows)
+        owner = owner if legs[k]["proximal"] == SHARED else k
+        leg_rows(legs, k, owner, frames, values, lines, rows)
     worst = 0.0
     for i in range(rows.shape[0]):
         worst = max(worst, abs(rows[i])) if abs(rows[i]) < math.inf else math.inf
@@ -117,12 +110,8 @@ def put_slopes(
         owner = owner if leg["proximal"] == SHARED else k
         if leg["has_rows"] == 0:
             continue
-        frame = frames[leg["frame"]]
-        if leg["kind"] == PIVOT:
-            pivot_slopes(leg, frame, slopes)
-        elif leg["kind"] == ROD:
-            rod_slopes(leg, legs[owner], frame, values[owner], values[k], lines[k], proximal_slopes[owner], slopes)
-        for row in range(leg["first_row"], end_of_rows(legs, k, slopes.shape[0])):
+        leg_slopes(legs, k, owner, frames, values, lines, proximal_slopes, slopes)
+        for row in range(leg["first_row"], leg["first_row"] + leg["n_rows"]):
             put_redundant_slopes(legs, k, values, slopes[row])
 
 
@@ -138,12 +127,6 @@ def put_redundant_slopes(legs: Records, k: int, values: Floats, slope: Floats) -
     if legs[k]["inner"] == 1:
         for j in range(6):
             slope[j] = 0.0
-
-
-@routine
-def end_of_rows(legs: Records, k: int, rows: int) -> int:
-    """Index after a leg's last constraint, given the number of all rows."""
-    return int(legs[k + 1]["first_row"]) if k + 1 < legs.shape[0] else rows
 
 
 @routine
@@ -215,7 +198,7 @@ def newton_step(table: Table, scratch: Completion) -> float:
         set_yaw(pose, yaw)
     for k in range(table.legs.shape[0] if task["implicit"] == 1 else 0):
         leg = table.legs[k]
-        if leg["kind"] == REDUNDANT and leg["orients"] == 0 and leg["mirror_of"] < 0:
+        if leg["implicit"] == 1 and leg["mirror_of"] < 0:
             scratch.sides[k] += share * normal[unset + leg["column"], n]
     return share * step
 

@@ -48,7 +48,7 @@ from .columns import (
 from .complete_poses import ROUNDED
 from .endings import LEAST_MARGIN
 from .open_table import open_table
-from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, NO_PROXIMAL, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
+from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
 
 TURN = 2.0 * math.pi
 
@@ -76,7 +76,7 @@ def fill_rod(rod: Record, proximal: Record, n: int, S: Floats) -> None:
         if proximal["proximal"] == CARRIAGE:
             subtract_carriage(vec(proximal["proximal_axis"]), n, S)
     fill_length(rod["length"], n, S)
-    if rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED):
+    if rod["slides"] == 0 and rod["has_proximal"] == 0:
         track_constraint(VALUES + SLIDE, n, S)
     fill_hinges(rod, proximal, n, S)
 
@@ -275,7 +275,7 @@ def answer_blocks(
         for k in range(legs.shape[0]):
             if legs[k]["proximal"] != SHARED:
                 owner = k
-            if legs[k]["proximal"] == CRANK or legs[k]["proximal"] == CARRIAGE:
+            if legs[k]["has_proximal"] == 1:
                 fill_sides(sides, k, first, n, S)
             fill_rod(legs[k], legs[owner], n, S)
             while a < limited.shape[0] and limited[a]["leg"] == k:

@@ -10,11 +10,11 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..quaternions import difference, turn_about_z, yaw_difference
 from ..vectors import angle_between, copy_row, scale, vec
-from .answer import KEPT, NEARLY_CLOSED, complete_pose, deviation, end_of_rows, new_completion, put_rows
+from .answer import KEPT, NEARLY_CLOSED, complete_pose, deviation, new_completion, put_rows
 from .complete_poses import put_pose, read_target, tilt_to, turn_pose
 from .endings import pointing_error
 from .open_table import open_table
-from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, CROSS, PIVOT, PLATFORM_END, PLATFORM_LINE, ROD, SLIDE, TRIPLE
+from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, SLIDE
 
 PARTS, MORE_PARTS = 4, 16
 """Steps of the continuation from the start to a target, tried where a pose completed in one step is not feasible. The
@@ -135,27 +135,18 @@ def interpolate_target(target: Floats, start: Floats, share: float, task: Record
 @routine
 def reach_margin(leg: Record, values: Floats) -> float:
     """Minus the gap that a rod leaves where its proximal joint does not reach, as a share of its length."""
-    if leg["kind"] == ROD and (leg["proximal"] == CRANK or leg["proximal"] == CARRIAGE):
-        return -abs(values[SLIDE]) / leg["length"]
-    return 0.0
+    return -abs(values[SLIDE]) / leg["length"] if leg["has_proximal"] == 1 else 0.0
 
 
 @routine
 def largest_pointing_error(leg: Record, values: Floats) -> float:
     """The largest angle by which crossed hinges of a leg, or the first two of three, miss their direction [rad]."""
-    if leg["kind"] == PIVOT and leg["base_end"] == TRIPLE:
-        axes = leg["base_end_axes"]
-        return pointing_error(axes, vec(axes[2]), vec(values[BASE_LINE:]), values[BASE_END:])
-    worst = 0.0
-    if leg["kind"] == ROD and leg["base_end_aimed"] == 1 and leg["base_end"] == CROSS:
-        worst = pointing_error(leg["base_end_axes"], vec(leg["line"]), vec(values[BASE_LINE:]), values[BASE_END:])
-    if leg["kind"] == ROD and leg["platform_end_aimed"] == 1 and leg["platform_end"] == CROSS:
-        worst = max(
-            worst,
-            pointing_error(
-                leg["platform_end_axes"], vec(leg["line"]), vec(values[PLATFORM_LINE:]), values[PLATFORM_END:]
-            ),
-        )
+    line, worst = vec(leg["line"]), 0.0
+    if leg["base_end_aimed"] == 1 and leg["base_end"] != HINGE:
+        worst = pointing_error(leg["base_end_axes"], line, vec(values[BASE_LINE:]), values[BASE_END:])
+    if leg["platform_end_aimed"] == 1 and leg["platform_end"] == CROSS:
+        missed = pointing_error(leg["platform_end_axes"], line, vec(values[PLATFORM_LINE:]), values[PLATFORM_END:])
+        worst = max(worst, missed)
     return worst
 
 
@@ -163,6 +154,6 @@ def largest_pointing_error(leg: Record, values: Floats) -> float:
 def largest_constraint(legs: Records, rows: Floats, k: int) -> float:
     """The largest constraint of a leg [L or rad]."""
     worst = 0.0
-    for i in range(legs[k]["first_row"], end_of_rows(legs, k, rows.shape[0])):
+    for i in range(legs[k]["first_row"], legs[k]["first_row"] + legs[k]["n_rows"]):
         worst = max(worst, abs(rows[i]))
     return worst

@@ -24,7 +24,7 @@ from ...arrays import Floats, Record, Records
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
 from .endings import solve_angle, turned
-from .records import CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, Q_PROXIMAL, RATE, REDUNDANT
+from .records import CRANK, FIXED, FROM_BASE, FROM_ITSELF, FROM_PLATFORM, Q_PROXIMAL, RATE
 
 ZERO: Vec = (0.0, 0.0, 0.0)
 # Rows of a frame.
@@ -36,7 +36,7 @@ def new_frames(legs: Records) -> Floats:
     """Allocate the frames of a machine."""
     n = FIXED
     for k in range(legs.shape[0]):
-        n += 1 if legs[k]["kind"] == REDUNDANT else 0
+        n = max(n, legs[k]["makes"] + 1)
     frames = np.zeros((n, N_ROWS, 4))
     for i in range(3):
         frames[FROM_BASE, AXES + i, i] = frames[FROM_ITSELF, i, i] = frames[FROM_ITSELF, AXES + i, i] = 1.0

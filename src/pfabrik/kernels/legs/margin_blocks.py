@@ -29,7 +29,7 @@ from .columns import (
 )
 from .feasibility import relative_margin
 from .open_table import open_table
-from .records import CARRIAGE, CRANK, HINGE, NO_PROXIMAL, SHARED, SLIDE
+from .records import SHARED, SLIDE
 
 # Difference up to which cosines of one group are equal, so that margins are to `KEPT`, but beside the axis of a cone.
 SAME = 1e-12
@@ -110,25 +110,18 @@ def track_leg(rod: Record, reach: int, closed: int, n: int, S: Floats) -> None:
     """Lower LEAST to the margins of reaching and of closing of a rod; `reach` and `closed` are their limits."""
     for i in range(n):
         S[IS_KNOWN, i] = S[IS_KNOWN, i] if (S[LENGTH, i] > 0.0) & (S[LENGTH, i] < math.inf) else 0.0
-    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
+    if rod["has_proximal"] == 1:
         for i in range(n):
             margin = -abs(S[VALUES + SLIDE, i]) / rod["length"]
             S[VALUE, i] = margin if margin < -NEARLY_CLOSED else math.inf
         track_margin(VALUE, reach, n, S)
-    if has_rows(rod):
+    if rod["n_rows"] > 0:
         for i in range(n):
             row, before = S[ROW, i], S[LARGEST, i]
             S[VALUE, i] = -row if row > NEARLY_CLOSED else math.inf
             S[LARGEST, i] = row if row > before else before
             S[ROW, i] = 0.0
         track_margin(VALUE, closed, n, S)
-
-
-@routine
-def has_rows(rod: Record) -> bool:
-    """True if a rod has constraints on the pose."""
-    is_rigid = rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED)
-    return bool(is_rigid or rod["base_end"] == HINGE or rod["platform_end"] == HINGE or rod["twists"] == 1)
 
 
 @kernel
@@ -163,7 +156,7 @@ def margins_in_blocks(
         for k in range(n_legs):
             if legs[k]["proximal"] != SHARED:
                 owner = k
-            if legs[k]["proximal"] == CRANK or legs[k]["proximal"] == CARRIAGE:
+            if legs[k]["has_proximal"] == 1:
                 fill_sides(sides, k, 0, n, S)
             fill_rod(legs[k], legs[owner], n, S)
             while a < limited.shape[0] and limited[a]["leg"] == k:

@@ -71,7 +71,7 @@ def pivot_rows(pivot: Record, frame: Floats, rows: Floats) -> None:
     for i in range(pivot["upright"]):
         axis = vec(pivot["base_end_axes"][i])
         penalty = where(dot(axis, turn(frame, axis)) < 0.0, TURNED_OVER, penalty)
-    for i in range(pivot["axis_rows"]):
+    for i in range(pivot["n_rows"] - n_fixed):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
         rows[n + n_fixed + i] = dot(kept, moved) - pivot["value"][i] + penalty
 
@@ -82,6 +82,6 @@ def pivot_slopes(pivot: Record, frame: Floats, slopes: Floats) -> None:
     n, n_fixed = pivot["first_row"], 3 - pivot["slides"]
     for i in range(n_fixed):
         put_pose_slope(pivot, frame, vec(pivot["fixed_rows"][i]), ZERO, slopes[n + i])
-    for i in range(pivot["axis_rows"]):
+    for i in range(pivot["n_rows"] - n_fixed):
         kept, moved = vec(pivot["kept"][i]), turn(frame, vec(pivot["moved"][i]))
         put_pose_slope(pivot, frame, ZERO, cross(moved, kept), slopes[n + n_fixed + i])

@@ -35,21 +35,20 @@ LEG = np.dtype(
         ("reversed", "i8"),
         ("redundant", "i8"),  # index of the redundant joint that it is on; -1 if none
         ("frame", "i8"),  # the frame that it is read in
-        ("makes", "i8"),  # of a redundant joint: the frame that it defines
+        ("makes", "i8"),  # of a redundant joint: the frame that it defines; 0 of other legs
         ("mirror_of", "i8"),  # of a redundant joint: the leg whose coordinate it copies; -1 if none
         ("column", "i8"),  # of a redundant joint: column of its derivatives, after the six of the pose
         ("inner", "i8"),  # 1: it connects bodies placed by redundant joints, and does not depend on the pose
         ("at_platform_end", "i8"),  # of a redundant joint, 1: it moves the body of the platform ends
-        (
-            "orients",
-            "i8",
-        ),  # of a redundant joint, 1: it orients the base hinge of the next rod towards the platform end
+        ("orients", "i8"),  # of a redundant joint, 1: it turns the base hinge of the next rod towards the platform end
+        ("implicit", "i8"),  # of a redundant joint, 1: without a closed form; its coordinate stands in place of a side
         ("proximal", "i8"),
+        ("has_proximal", "i8"),  # 1: a rod with a proximal joint of its own
         ("slides", "i8"),  # 1: a rod that changes its length; of a pivot, how many slides there are
         ("twists", "i8"),  # 1: both endings keep the rod from spinning about its line
         ("base_end", "i8"),  # ending of a rod at its base end, or of a pivot
         ("platform_end", "i8"),
-        ("base_end_aimed", "i8"),  # 1: the angles of this ending are needed
+        ("base_end_aimed", "i8"),  # 1: the angles of this ending are needed, as always of three hinges of a pivot
         ("platform_end_aimed", "i8"),
         ("proximal_axis", *_vector),
         ("proximal_point", *_vector),  # of a crank: the point of its axis where the lever starts
@@ -59,7 +58,7 @@ LEG = np.dtype(
         ("base_end_point", *_vector),
         ("platform_end_point", *_vector),  # as mapped by the frame: from the reference point, if not reversed
         ("length", "f8"),
-        ("line", *_vector),  # unit vector from base end to platform end
+        ("line", *_vector),  # unit vector from base end to platform end; the last of three hinges of a pivot
         ("base_end_axes", "f8", (3, 3)),  # hinges in order from the body of the base end
         ("platform_end_axes", "f8", (3, 3)),  # hinges in order from the body of the platform end
         ("base_end_side", "f8"),  # home's side of two crossed hinges
@@ -71,11 +70,11 @@ LEG = np.dtype(
             (3, 3),
         ),  # of a pivot: the first `slides` rows give the slides from the centre's displacement
         ("fixed_rows", "f8", (3, 3)),  # of a pivot: directions in which its centre cannot move, 3 - slides of them
-        ("axis_rows", "i8"),  # of a pivot: number of conditions kept . R moved = value of its ending
-        ("kept", "f8", (3, 3)),
+        ("kept", "f8", (3, 3)),  # of a pivot: the conditions kept . R moved = value of its ending
         ("moved", "f8", (3, 3)),
         ("value", *_vector),
         ("first_row", "i8"),  # index of its first constraint
+        ("n_rows", "i8"),  # number of its constraints; of a pivot, 3 - slides and then the conditions of its ending
         ("has_rows", "i8"),  # 1: it, a rod on its proximal joint, or a leg on this redundant joint has constraint rows
         ("upright", "i8"),  # of a pivot: number of its `base_end_axes` that R must not turn over
     ]

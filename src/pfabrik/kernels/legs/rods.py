@@ -86,27 +86,12 @@ def turned_by_proximal(proximal: Record, values: Floats, v: Vec, sense: float) -
 
 
 @routine
-def place_rod(
-    rod: Record, proximal: Record, frame: Floats, side: float, proximal_values: Floats, values: Floats, line: Floats
-) -> float:
-    """Fill the values of a rod and its `line` from base end to platform end; the singularity margin.
-
-    Parameters
-    ----------
-    proximal, proximal_values : the rod whose proximal joint it is on and that rod's values; its own if it shares none.
-    """
-    singularity_margin = 1.0
-    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
-        singularity_margin = solve_proximal(rod, move(frame, vec(rod["platform_end_point"])), side, values)
-    return min(singularity_margin, evaluate_rod(rod, proximal, frame, proximal_values, values, line))
-
-
-@routine
 def evaluate_rod(
     rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, values: Floats, line: Floats
 ) -> float:
-    """Fill the values and the line of a rod whose proximal joint is already placed; the singularity margin.
+    """Fill the values of a rod and its `line` from base end to platform end; the singularity margin.
 
+    Its proximal joint is already placed: that of the rod `proximal`, which is itself if it shares none.
     Two crossed hinges point a rod in either of two ways, half a turn about it apart: home's side is used, unless the
     twist then differs from home's by more than a quarter turn.
     """
@@ -277,7 +262,7 @@ def rod_rows(
 ) -> None:
     """Fill the constraints of a rod."""
     n, span = rod["first_row"], vec(line)
-    if rod["slides"] == 0 and (rod["proximal"] == NO_PROXIMAL or rod["proximal"] == SHARED):
+    if rod["slides"] == 0 and rod["has_proximal"] == 0:
         rows[n] = values[SLIDE]
         n += 1
     if rod["base_end"] == HINGE:
@@ -304,7 +289,7 @@ def rod_slopes(
     """Fill the derivatives of a rod's constraints, and of its proximal coordinate (`proximal_slopes`)."""
     n, span = rod["first_row"], vec(line)
     u = scale(1.0 / norm(span), span)
-    if rod["proximal"] == CRANK or rod["proximal"] == CARRIAGE:
+    if rod["has_proximal"] == 1:
         put_proximal_slope(rod, frame, values, u, proximal_slopes)
     elif rod["slides"] == 0:
         put_slope(rod, proximal, frame, proximal_values, proximal_slopes, u, ZERO, ZERO, slopes[n])

@@ -9,7 +9,7 @@ from .._jit import routine
 from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
-from ..legs.records import REDUNDANT, Table
+from ..legs.records import Table
 from ..projecting import brings_nearer, is_too_far
 from ..rows import (
     CERTAIN,
@@ -195,7 +195,7 @@ def reach_moved(
     if status == REACHED or question["has_start"] == 0 or question["keeps_mode"] == 1:
         return status
     for k in range(legs.shape[0]):
-        if legs[k]["kind"] == REDUNDANT and legs[k]["orients"] == 0:
+        if legs[k]["implicit"] == 1:
             sides[0, k] = tables.home.sides[0, k]
     status = reach_by_redundant(tables, scratch, table, targets, tables.home.poses[0], question, answer)
     if status != REACHED:

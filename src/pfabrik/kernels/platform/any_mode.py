@@ -19,7 +19,7 @@ from ..legs.complete_poses import read_target
 from ..legs.endings import LEAST_MARGIN
 from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
-from ..legs.records import REDUNDANT, Table
+from ..legs.records import Table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
 from .equations import owner_of
@@ -68,7 +68,7 @@ def note_choices(table: Table, sides: Floats, choices: Ints) -> int:
     """List the legs that have two sides; their number."""
     legs, n = table.legs, 0
     for k in range(legs.shape[0]):
-        if sides[k] != 0.0 and (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1):
+        if sides[k] != 0.0 and legs[k]["implicit"] == 0:
             choices[n] = k
             n += 1
     return n

@@ -15,28 +15,25 @@ import numpy as np
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..legs.answer import end_of_rows
 from ..legs.endings import turned
 from ..legs.frames import (
     ZERO,
     new_frames,
     orienting_coordinate,
-    place_redundant,
     put_pose_slope,
     q_redundant_of,
     redundant_slope,
     set_frames,
 )
-from ..legs.pivots import pivot_rows, pivot_slopes, place_pivot
+from ..legs.kinds import evaluate, leg_rows, place_frame
+from ..legs.pivots import pivot_slopes
 from ..legs.records import (
-    CARRIAGE,
     COSINE,
     CRANK,
     HINGE,
     N_VALUES,
     PIVOT,
     Q_PROXIMAL,
-    REDUNDANT,
     ROD,
     SHARED,
     SINE,
@@ -45,9 +42,7 @@ from ..legs.records import (
 )
 from ..legs.rods import (
     base_end_of,
-    evaluate_rod,
     proximal_rate,
-    rod_rows,
     solve_proximal,
     turned_by_proximal,
     twist_rate,
@@ -111,7 +106,7 @@ def count_proximal(table: Table) -> int:
 @routine
 def has_proximal(leg: Record) -> bool:
     """True if a leg is a rod with a proximal joint of its own."""
-    return bool(leg["kind"] == ROD and (leg["proximal"] == CRANK or leg["proximal"] == CARRIAGE))
+    return bool(leg["has_proximal"] == 1)
 
 
 @routine
@@ -145,22 +140,14 @@ def evaluate_leg(table: Table, k: int, owner: int, state: PlatformState, leg_eva
     ----------
     owner : the leg that owns its proximal joint, evaluated before; itself if it shares none.
     """
-    legs, values, lines, rows = table.legs, leg_eval.values, leg_eval.lines, leg_eval.rows
-    leg, proximal = legs[k], legs[owner]
-    frame = leg_eval.frames[leg["frame"]]
-    if leg["kind"] == PIVOT:
-        place_pivot(leg, frame, state.sides[k], values[k])
-        pivot_rows(leg, frame, leg_eval.rows)
-    elif leg["kind"] == REDUNDANT:
-        place_redundant(leg, q_redundant_of(legs, k, state.q), leg_eval.frames, values[k])
-    elif leg["kind"] == ROD:
-        if has_proximal(leg):
-            values[k, Q_PROXIMAL] = state.q[k]
-            values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
-        evaluate_rod(leg, proximal, frame, values[owner], values[k], lines[k])
-        rod_rows(leg, proximal, frame, values[owner], values[k], lines[k], leg_eval.rows)
-        if has_proximal(leg):
-            rows[length_row(table, k)] = values[k, SLIDE]
+    legs, frames, values, lines, rows = table.legs, leg_eval.frames, leg_eval.values, leg_eval.lines, leg_eval.rows
+    if has_proximal(legs[k]):
+        values[k, Q_PROXIMAL] = state.q[k]
+        values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
+    evaluate(legs, k, owner, q_redundant_of(legs, k, state.q), state.sides[k], frames, values, lines)
+    leg_rows(legs, k, owner, frames, values, lines, rows)
+    if has_proximal(legs[k]):
+        rows[length_row(table, k)] = values[k, SLIDE]
 
 
 @routine
@@ -180,8 +167,7 @@ def close_rods(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> N
             )
             if singularity_margin > FAR_FROM_DEAD_POINT:
                 q[k] = wrap(coordinate, q[k]) if leg["proximal"] == CRANK else coordinate
-        if leg["kind"] == REDUNDANT:
-            place_redundant(leg, q_redundant_of(table.legs, k, q), leg_eval.frames, values[k])
+        place_frame(table.legs, k, q, leg_eval.frames, values)
         if has_proximal(leg):
             platform_end = move(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
             if (
@@ -234,7 +220,7 @@ def put_leg_slopes(table: Table, k: int, owner: int, leg_eval: LegEvaluation) ->
     leg, slopes = table.legs[k], leg_eval.slopes
     if leg["kind"] == PIVOT:
         pivot_slopes(leg, leg_eval.frames[leg["frame"]], leg_eval.slopes)
-        for row in range(leg["first_row"], end_of_rows(table.legs, k, table.task[0]["rows"])):
+        for row in range(leg["first_row"], leg["first_row"] + leg["n_rows"]):
             put_redundant_slopes(table, k, leg_eval, slopes[row])
     elif leg["kind"] == ROD:
         if has_proximal(leg):

@@ -17,8 +17,9 @@ from .._jit import kernel, opener, routine
 from ..legs.answer import KEPT, deviation, excess_of, largest_entry
 from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
 from ..legs.endings import turned
+from ..legs.kinds import is_redundant
 from ..legs.open_table import SAMPLE, open_table
-from ..legs.records import CRANK, FROM_BASE, PIVOT, Q_PROXIMAL, REDUNDANT, Table
+from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, Table
 from ..linear import solve_spd, solve_square
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
@@ -119,8 +120,7 @@ def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
 @routine
 def drives_proximal(table: Table, i: int) -> bool:
     """True if an actuator drives a proximal or redundant joint."""
-    driven = table.driven[i]
-    return bool(driven["place"] == Q_PROXIMAL and table.legs[driven["leg"]]["kind"] != PIVOT)
+    return bool(table.driven[i]["place"] == Q_PROXIMAL)
 
 
 @routine
@@ -146,7 +146,7 @@ def carries_all(table: Table, k: int) -> bool:
     while legs[root]["redundant"] >= 0:
         root = legs[root]["redundant"]
         n_carriers += 1
-    if legs[k]["kind"] != REDUNDANT or legs[root]["frame"] != FROM_BASE or n_carriers != k:
+    if not is_redundant(legs[k]) or legs[root]["frame"] != FROM_BASE or n_carriers != k:
         return False
     for j in range(k, legs.shape[0]):  # joints come before the legs that are on them
         joint = j

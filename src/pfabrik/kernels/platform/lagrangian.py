@@ -8,7 +8,6 @@ from ...arrays import Floats
 from .._jit import routine
 from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, project, put_multipliers
-from ..legs.answer import end_of_rows
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
 from ..sqp import PROBE, symmetrise
@@ -92,7 +91,7 @@ def note_involved(table: Table, objective: PlatformObjective, search: SearchScra
     offset = 2 * n_ranges + table.cones.shape[0]
     for k in range(n):
         largest = multipliers[offset + k]
-        for r in range(legs[k]["first_row"], end_of_rows(legs, k, table.task[0]["rows"])):
+        for r in range(legs[k]["first_row"], legs[k]["first_row"] + legs[k]["n_rows"]):
             largest = max(largest, abs(equation_multipliers[r]))
         if has_proximal(legs[k]):
             largest = max(largest, abs(equation_multipliers[length_row(table, k)]))

@@ -17,7 +17,7 @@ from ..holding import limit_multipliers
 from ..legs.answer import deviation, excess_of
 from ..legs.complete_poses import orthonormalise
 from ..legs.open_table import SAMPLE, open_table
-from ..legs.records import REDUNDANT, Table
+from ..legs.records import Table
 from ..projecting import (
     EFFORT,
     TALLY,
@@ -168,7 +168,7 @@ def holds_all(objective: PoseObjective) -> bool:
 def is_other_mode(legs: Records, own_sides: Floats, sides: Floats) -> bool:
     """True if some leg takes its other side."""
     for k in range(sides.shape[0]):
-        if (legs[k]["kind"] != REDUNDANT or legs[k]["orients"] == 1) and own_sides[k] * sides[k] < 0.0:
+        if legs[k]["implicit"] == 0 and own_sides[k] * sides[k] < 0.0:
             return True
     return False
 

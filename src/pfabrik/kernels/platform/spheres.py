@@ -13,8 +13,9 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import routine
-from ..legs.frames import AXES, place_redundant, set_frames
-from ..legs.records import COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, Q_PROXIMAL, REDUNDANT, ROD, SINE, SLIDE, Table
+from ..legs.frames import AXES, set_frames
+from ..legs.kinds import place_frame
+from ..legs.records import COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, PIVOT, Q_PROXIMAL, ROD, SINE, SLIDE, Table
 from ..legs.rods import base_end_of
 from ..vectors import add, cross, dot, put, scale, sub, turn, vec
 from .equations import LegEvaluation, PlatformState, has_proximal, owner_of
@@ -50,16 +51,10 @@ def _are_spheres(table: Table, driven: Collection[tuple[int, int]]) -> bool:
     """
     for k, leg in enumerate(table.legs):
         is_loose = leg["proximal"] != NO_PROXIMAL and (owner_of(table, k), Q_PROXIMAL) not in driven
-        turns = leg["kind"] != REDUNDANT and (
-            leg["base_end"] == HINGE or leg["platform_end"] == HINGE or leg["twists"] == 1
-        )
+        turns = leg["base_end"] == HINGE or leg["platform_end"] == HINGE or leg["twists"] == 1
         is_on_base = leg["frame"] == FROM_BASE or leg["redundant"] >= 0
-        is_read = (
-            leg["kind"] in (ROD, REDUNDANT)
-            and is_on_base
-            and leg["at_platform_end"] == leg["reversed"] == leg["inner"] == 0
-        )
-        if leg["kind"] != IDLE and (is_loose or turns or not is_read):
+        is_read = is_on_base and leg["at_platform_end"] == leg["reversed"] == leg["inner"] == 0
+        if leg["kind"] == PIVOT or (leg["kind"] != IDLE and (is_loose or turns or not is_read)):
             return False
     return all(entry in (Q_PROXIMAL, SLIDE) for _, entry in driven)
 
@@ -74,9 +69,8 @@ def set_spheres(table: Table, values: Floats, state: PlatformState, leg_eval: Le
     p = (pose[0, 3], pose[1, 3], pose[2, 3])
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
-        if legs[k]["kind"] == REDUNDANT:
-            place_redundant(legs[k], q[k], leg_eval.frames, leg_values[k])
-        elif has_proximal(legs[k]):
+        place_frame(legs, k, q, leg_eval.frames, leg_values)
+        if has_proximal(legs[k]):
             leg_values[k, Q_PROXIMAL], leg_values[k, COSINE], leg_values[k, SINE] = q[k], math.cos(q[k]), math.sin(q[k])
     for e in range(spheres.legs.shape[0]):
         k, i = spheres.legs[e], spheres.drivers[e]

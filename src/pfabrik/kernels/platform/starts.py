@@ -9,8 +9,9 @@ from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import pose_gradient
 from ..legs.complete_poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
-from ..legs.frames import ZERO, orienting_coordinate, place_redundant, q_redundant_of, set_frames
-from ..legs.records import CRANK, Q_PROXIMAL, REDUNDANT, Table
+from ..legs.frames import ZERO, orienting_coordinate, q_redundant_of, set_frames
+from ..legs.kinds import is_redundant, place_frame
+from ..legs.records import CRANK, Q_PROXIMAL, Table
 from ..legs.rods import solve_proximal
 from ..quaternions import yaw_of
 from ..vectors import Vec, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec, wrap
@@ -101,11 +102,10 @@ def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) 
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg, values = table.legs[k], leg_eval.values[k]
-        q[k] = q_redundant_of(table.legs, k, sides) if leg["kind"] == REDUNDANT else 0.0
+        q[k] = q_redundant_of(table.legs, k, sides) if is_redundant(leg) else 0.0
         if leg["orients"] == 1:
             q[k], _ = orienting_coordinate(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
-        if leg["kind"] == REDUNDANT:
-            place_redundant(leg, q[k], leg_eval.frames, values)
+        place_frame(table.legs, k, q, leg_eval.frames, leg_eval.values)
         if has_proximal(leg):
             platform_end = move(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
             solve_proximal(leg, platform_end, -sides[k], values)
@@ -146,8 +146,7 @@ def place_held(
         leg = table.legs[k]
         if leg["orients"] == 1:
             q[k] = nearest_orienting(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
-        if leg["kind"] == REDUNDANT:
-            place_redundant(leg, q_redundant_of(table.legs, k, q), leg_eval.frames, leg_eval.values[k])
+        place_frame(table.legs, k, q, leg_eval.frames, leg_eval.values)
         if has_proximal(leg):
             q[k] = nearest_q_proximal(leg, leg_eval.frames[leg["frame"]], q[k], leg_eval.values[k])
 
@@ -184,12 +183,11 @@ def put_sides(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> No
     sides, q = state.sides, state.q
     for k in range(q.shape[0]):
         leg = table.legs[k]
-        if leg["kind"] == REDUNDANT:
-            if leg["orients"] == 0:
-                sides[k] = q[k]
-            elif sides[k] != 0.0:
-                sides[k] = redundant_side(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
-            place_redundant(leg, q[k], leg_eval.frames, leg_eval.values[k])
+        if leg["implicit"] == 1:
+            sides[k] = q[k]
+        elif leg["orients"] == 1 and sides[k] != 0.0:
+            sides[k] = redundant_side(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], q[k])
+        place_frame(table.legs, k, q, leg_eval.frames, leg_eval.values)
         if has_proximal(leg):
             frame = leg_eval.frames[leg["frame"]]
             platform_end = move(frame, vec(leg["platform_end_point"]))
