@@ -10,7 +10,6 @@ from .._jit import routine
 from ..legs.answer import put_slopes
 from ..legs.endings import LEAST_MARGIN
 from ..legs.frames import redundant_slope
-from ..legs.kinds import is_redundant
 from ..legs.records import Table
 from ..legs.rods import put_proximal_slope
 from ..platform.equations import LegEvaluation, direction, has_proximal
@@ -97,7 +96,7 @@ def put_actuator_rates(own: Rating, proximal_slopes: Floats) -> None:
             column = table.columns[k]
             if column < 0 or slope[column] == 0.0:
                 continue
-            if is_redundant(legs[k]):
+            if legs[k]["makes"] > 0:
                 drive[6 + legs[k]["column"]] += slope[column] if legs[k]["mirror_of"] < 0 else 0.0
                 continue
             for j in range(6):

@@ -5,7 +5,7 @@ A rod, a pivot and a redundant joint are a file each (`rods`, `pivots`, `frames`
 
 from __future__ import annotations
 
-from ...arrays import Floats, Record, Records
+from ...arrays import Floats, Records
 from .._jit import routine
 from .frames import place_redundant, q_redundant_of
 from .pivots import pivot_rows, pivot_slopes, place_pivot
@@ -14,15 +14,9 @@ from .rods import evaluate_rod, rod_rows, rod_slopes
 
 
 @routine
-def is_redundant(leg: Record) -> bool:
-    """True for redundant joints."""
-    return bool(leg["kind"] == REDUNDANT)
-
-
-@routine
 def place_frame(legs: Records, k: int, q: Floats, frames: Floats, values: Floats) -> None:
     """Fill the frame that a leg defines, and its values, at coordinates q (legs,); nothing if it defines none."""
-    if is_redundant(legs[k]):
+    if legs[k]["kind"] == REDUNDANT:
         place_redundant(legs[k], q_redundant_of(legs, k, q), frames, values[k])
 
 
@@ -43,7 +37,7 @@ def evaluate(
         return evaluate_rod(leg, legs[owner], frame, values[owner], values[k], lines[k])
     if leg["kind"] == PIVOT:
         return place_pivot(leg, frame, side, values[k])
-    if is_redundant(leg):
+    if leg["kind"] == REDUNDANT:
         place_redundant(leg, q, frames, values[k])
     return 1.0
 

@@ -11,7 +11,6 @@ import math
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..free_motions import FreeMotions, put_step, restoring_step
-from ..legs.kinds import is_redundant
 from ..legs.records import Table
 from ..sqp import (
     CLOSED,
@@ -123,7 +122,7 @@ def is_near(legs: Records, state: PlatformState, incumbent: PlatformState, block
             if abs(pose[i, j] - other[i, j]) > NEAR_INCUMBENT:
                 return False
     for k in range(q.shape[0]):
-        is_free = blocking[k] == 0 and is_redundant(legs[k])
+        is_free = blocking[k] == 0 and legs[k]["makes"] > 0
         if not is_free and abs(wrap(q[k] - incumbent.q[k], 0.0)) > NEAR_INCUMBENT:
             return False
     return True

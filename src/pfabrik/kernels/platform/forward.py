@@ -17,7 +17,6 @@ from .._jit import kernel, opener, routine
 from ..legs.answer import KEPT, deviation, excess_of, largest_entry
 from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
 from ..legs.endings import turned
-from ..legs.kinds import is_redundant
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, Table
 from ..linear import solve_spd, solve_square
@@ -146,7 +145,7 @@ def carries_all(table: Table, k: int) -> bool:
     while legs[root]["redundant"] >= 0:
         root = legs[root]["redundant"]
         n_carriers += 1
-    if not is_redundant(legs[k]) or legs[root]["frame"] != FROM_BASE or n_carriers != k:
+    if legs[k]["makes"] == 0 or legs[root]["frame"] != FROM_BASE or n_carriers != k:
         return False
     for j in range(k, legs.shape[0]):  # joints come before the legs that are on them
         joint = j

@@ -10,7 +10,7 @@ from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, Pos
 from ..closure.pose_objective import pose_gradient
 from ..legs.complete_poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.frames import ZERO, orienting_coordinate, q_redundant_of, set_frames
-from ..legs.kinds import is_redundant, place_frame
+from ..legs.kinds import place_frame
 from ..legs.records import CRANK, Q_PROXIMAL, Table
 from ..legs.rods import solve_proximal
 from ..quaternions import yaw_of
@@ -102,7 +102,7 @@ def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) 
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
         leg, values = table.legs[k], leg_eval.values[k]
-        q[k] = q_redundant_of(table.legs, k, sides) if is_redundant(leg) else 0.0
+        q[k] = q_redundant_of(table.legs, k, sides) if leg["makes"] > 0 else 0.0
         if leg["orients"] == 1:
             q[k], _ = orienting_coordinate(leg, table.legs[k + 1], leg_eval.frames[leg["frame"]], sides[k])
         place_frame(table.legs, k, q, leg_eval.frames, leg_eval.values)
