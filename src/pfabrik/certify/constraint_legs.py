@@ -25,9 +25,7 @@ def leg_that_restricts(table: LegTable, shifts: Floats, turns: Floats) -> int:
     owner = 0
     for k, leg in enumerate(table.legs):
         owner = owner if leg["proximal"] == K.SHARED else k
-        is_known = leg["frame"] in (0, 1) and leg["kind"] in (K.ROD, K.PIVOT)
-        if leg["kind"] == K.IDLE and leg["frame"] in (0, 1):
-            continue
+        is_known = leg["frame"] in (0, 1) and not table.is_redundant[k]
         if not is_known or not motion.keeps(leg, table.legs, owner) or not _has_bounds(table, k):
             return k
     return -1
@@ -46,14 +44,11 @@ def joints_without_bounds(table: LegTable) -> str:
     names = []
     for i, coordinate in enumerate(table.limited):
         leg, place = table.legs[coordinate["leg"]], int(coordinate["place"])
-        if leg["kind"] == K.ROD:
-            ending = leg["base_end"] if place < K.SLIDE else leg["platform_end"]
-            is_known = (
-                place in (K.Q_PROXIMAL, K.SLIDE) or ending == K.HINGE or (ending == K.CROSS and not leg["twists"])
-            )
-        else:
-            is_known = leg["kind"] == K.PIVOT and K.PLATFORM_END <= place < K.PLATFORM_END + leg["slides"]
-        if not is_known:
+        ending = leg["base_end"] if place < K.SLIDE else leg["platform_end"]
+        is_known = place in (K.Q_PROXIMAL, K.SLIDE) or ending == K.HINGE or (ending == K.CROSS and not leg["twists"])
+        if leg["kind"] == K.PIVOT:
+            is_known = place >= K.PLATFORM_END
+        if not is_known or table.is_redundant[coordinate["leg"]]:
             names.append(table.limits[2 * i][0])
     return ", ".join(dict.fromkeys(names))
 
@@ -63,7 +58,7 @@ def _has_bounds(table: LegTable, k: int) -> bool:
     leg, places = table.legs[k], table.limited["place"][table.limited["leg"] == k]
     for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
         is_limited = ((places >= start) & (places < start + 3)).any()
-        if leg["kind"] == K.ROD and leg[f"{end}_aimed"] == 1 and leg[end] != K.HINGE and not is_limited:
+        if leg[f"{end}_aimed"] == 1 and leg[end] == K.CROSS and not is_limited:
             return False
     return True
 
@@ -91,7 +86,7 @@ class _RegionMotion:
         if leg["kind"] == K.PIVOT:
             return self._keeps_pivot(leg)
         proximal = legs[k]
-        if leg["slides"] == 0 and leg["proximal"] in (K.NO_PROXIMAL, K.SHARED) and not self._is_parallel(leg, proximal):
+        if leg["slides"] == 0 and not leg["has_proximal"] and not self._is_parallel(leg, proximal):
             return False
         for end in ("base_end", "platform_end"):
             if leg[end] == K.HINGE and not self._stays_across(leg[f"{end}_axes"][0], proximal):
@@ -112,7 +107,8 @@ class _RegionMotion:
             np.abs(self.shifts @ row).max(initial=0.0) > KEPT or not (is_centred or self.is_about(row)) for row in fixed
         ):
             return False
-        pairs = zip(pivot["kept"][: pivot["axis_rows"]], pivot["moved"][: pivot["axis_rows"]], strict=True)
+        n_pairs = pivot["n_rows"] - len(fixed)
+        pairs = zip(pivot["kept"][:n_pairs], pivot["moved"][:n_pairs], strict=True)
         return all(not self.turns or self.is_about(kept) or self.is_about(moved) for kept, moved in pairs)
 
     def _is_parallel(self, rod: Record, proximal: Record) -> bool:

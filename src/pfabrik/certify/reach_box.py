@@ -57,7 +57,7 @@ def _reaches(table: LegTable, rotation: Floats | None) -> list[tuple[Floats, Flo
     """M (k, 3), centre [L] and radius [L] of legs read from the base; without a rotation for any orientation."""
     reaches = []
     for k, leg in enumerate(table.legs):
-        if leg["frame"] != 0:
+        if leg["frame"] != 0 or table.is_redundant[k]:
             continue
         ranges = {
             int(each["place"]): max(abs(each["lo"]), abs(each["hi"])) for each in table.limited if each["leg"] == k
@@ -67,23 +67,20 @@ def _reaches(table: LegTable, rotation: Floats | None) -> list[tuple[Floats, Flo
             point, slack = np.zeros(3), float(np.linalg.norm(point))
         else:
             point = rotation @ point
-        reach = _reach_of(leg, ranges)
-        if reach is not None:
-            M, centre, radius = reach
-            reaches.append((M, centre - point, radius + slack))
-        elif leg["kind"] == K.PIVOT:
+        if leg["kind"] == K.PIVOT:
             for i in range(leg["slides"]):
                 row = leg["slide_rows"][i]
                 if math.isfinite(bound := ranges.get(K.PLATFORM_END + i, math.inf)):
                     radius = bound + slack * float(np.linalg.norm(row))
                     reaches.append((row[None], leg["base_end_point"] - point, radius))
+        elif (reach := _reach_of(leg, ranges)) is not None:
+            M, centre, radius = reach
+            reaches.append((M, centre - point, radius + slack))
     return reaches
 
 
 def _reach_of(leg: Record, ranges: dict[int, float]) -> tuple[Floats, Floats, float] | None:
     """M, centre and radius of a rod, by its platform end; None if it has no end."""
-    if leg["kind"] != K.ROD:
-        return None
     length, proximal = float(leg["length"]), leg["proximal"]
     if proximal == K.CRANK:
         return np.eye(3), leg["proximal_point"], length + float(np.linalg.norm(leg["crank"]))

@@ -75,7 +75,8 @@ def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> Records:
         joint = step.joint
         if joint.type not in ("revolute", "prismatic"):
             raise NotExpressible(f"joint {joint.name}, below a branching body, is {joint.type}")
-        record["kind"] = P.SLIDE if joint.type == "prismatic" else P.TURN
+        record["turns"] = joint.type == "revolute"
+        record["unit"] = 1.0 if record["turns"] else mechanism.characteristic_length
         record["point"], record["axis"] = joint.at or 0.0, np.array(mechanism.home_axis(joint.name)) * step.sign
         record["lo"], record["hi"] = _from_home(mechanism, joint)
     return records

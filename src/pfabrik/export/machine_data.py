@@ -66,6 +66,11 @@ class ExportedLeg(NamedTuple):
     joints: tuple[str, ...]
 
     @property
+    def is_pivot(self) -> bool:
+        """True for a leg without length."""
+        return bool(self.record["kind"] == K.PIVOT)
+
+    @property
     def keeps_its_length(self) -> bool:
         """True for a rigid rod on a proximal joint of its own: with this joint held its length is an equation."""
         return bool(self.record["has_proximal"] and not self.record["slides"])

@@ -61,13 +61,13 @@ def groups_of(machine: Machine) -> list[LegGroup]:
 
 
 def _likeness(leg: ExportedLeg) -> tuple[Any, ...]:
-    names = ("kind", "frame", "proximal", "base_end", "platform_end", "slides", "twists", "axis_rows", "upright")
+    names = ("kind", "frame", "proximal", "base_end", "platform_end", "slides", "twists", "n_rows", "upright")
     return tuple(int(leg.record[name]) for name in names)
 
 
 def _name(leg: ExportedLeg) -> str:
     record = leg.record
-    if record["kind"] == K.PIVOT:
+    if leg.is_pivot:
         return "pivots"
     if record["proximal"] == K.SHARED:
         return "shared"
@@ -79,7 +79,7 @@ def _name(leg: ExportedLeg) -> str:
 def _kind(machine: Machine, group: LegGroup, by_leg: dict[int, tuple[str, int]]) -> dict[str, Any]:
     legs = [machine.legs[place] for place in group.legs]
     record = legs[0].record
-    is_pivot = record["kind"] == K.PIVOT
+    is_pivot = legs[0].is_pivot
     kind: dict[str, Any] = {
         "kind": "pivot" if is_pivot else "rod",
         "n": len(legs),
@@ -89,8 +89,9 @@ def _kind(machine: Machine, group: LegGroup, by_leg: dict[int, tuple[str, int]])
         "proximal": PROXIMAL.get(int(record["proximal"])),
         "main": None,
     }
-    if is_pivot:
+    if kind["proximal"] or kind["base_end"] == "triple":
         kind["side"] = tuple(float(leg.record["side"]) for leg in legs)
+    if is_pivot:
         kind["square"] = nested([leg.numbers["square"] for leg in legs])
         kind["pairs"] = _pairs(legs, kind["base_end"])
         return kind
@@ -98,8 +99,6 @@ def _kind(machine: Machine, group: LegGroup, by_leg: dict[int, tuple[str, int]])
     if record["proximal"] == K.SHARED:
         mains = [by_leg[leg.main] for leg in legs]
         kind["main"] = (mains[0][0], tuple(place for _, place in mains))
-    if kind["proximal"]:
-        kind["side"] = tuple(float(leg.record["side"]) for leg in legs)
     for end in ("base", "platform"):
         if kind[f"{end}_end"] == "cross":
             kind[f"{end}_side"] = tuple(float(leg.record[f"{end}_end_side"]) for leg in legs)
@@ -110,7 +109,7 @@ def _pairs(legs: list[ExportedLeg], ending: str) -> tuple[Any, ...]:
     """Pairs of directions that keep their angle: numbers of hinges, or vectors of every leg."""
     if ending == "cross":
         return ((0, 1),)
-    n = int(legs[0].record["axis_rows"])
+    n = int(legs[0].record["n_rows"] + legs[0].record["slides"]) - 3
     kept, moved = (np.array([leg.record[name] for leg in legs]) for name in ("kept", "moved"))
     if ending == "hinge":
         return tuple((nested(kept[:, place]), 0) for place in range(n))
@@ -138,7 +137,7 @@ def _dimensions(machine: Machine, group: LegGroup) -> Iterator[tuple[str, Rows]]
     def numbers(name: str) -> np.ndarray[Any, Any]:
         return np.array([leg.numbers[name] for leg in legs])
 
-    if kind["kind"] == "pivot":
+    if legs[0].is_pivot:
         yield "centre", nested(numbers("base_end"))
         if hinges := HINGES[kind["base_end"]]:
             yield "axes", nested(numbers("base_end_axes")[:, :hinges])
@@ -165,14 +164,13 @@ def nested(values: Any) -> Rows:
 def place_of(coordinate: Coordinate, machine: Machine, groups: list[LegGroup]) -> Place:
     """Where the routines find a coordinate."""
     name, leg = next((g.name, g.legs.index(coordinate.leg)) for g in groups if coordinate.leg in g.legs)
-    is_pivot = machine.legs[coordinate.leg].record["kind"] == K.PIVOT
     if coordinate.place == K.Q_PROXIMAL:
         return name, leg, "proximal", 0
     if coordinate.place == K.SLIDE:
         return name, leg, "slide", 0
     if coordinate.place >= K.PLATFORM_END:
-        number = coordinate.place - K.PLATFORM_END
-        return (name, leg, "pivot slide", number) if is_pivot else (name, leg, "platform", number)
+        what = "pivot slide" if machine.legs[coordinate.leg].is_pivot else "platform"
+        return name, leg, what, coordinate.place - K.PLATFORM_END
     return name, leg, "base", coordinate.place - K.BASE_END
 
 
@@ -192,4 +190,4 @@ def cones_of(machine: Machine, groups: list[LegGroup]) -> Iterator[tuple[Any, ..
 
 def arms_of(machine: Machine) -> list[str]:
     """Names of the joints that legs are on, whose coordinates poses do not set in one step."""
-    return list(dict.fromkeys(leg.joints[0] for leg in machine.legs if leg.record["kind"] == K.REDUNDANT))
+    return list(dict.fromkeys(leg.joints[0] for leg in machine.legs if leg.record["makes"] > 0))

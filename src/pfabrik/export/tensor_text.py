@@ -64,7 +64,7 @@ def _conditions(machine: TensorMachine) -> set[str]:
         "CRANKS": "crank" in proximal,
         "CARRIAGES": "carriage" in proximal,
         "SHARED": any(kind["main"] for kind in kinds),
-        "PIVOTS": any(kind["kind"] == "pivot" for kind in kinds),
+        "PIVOTS": len(rods) < len(kinds),
         "TWISTS": is_task and any(kind["twists"] for kind in rods),
         "HINGED": is_task and "hinge" in endings,
         "ANGLES": len(machine.machine.limited) > 0 or any(kind["twists"] for kind in rods),
@@ -215,12 +215,7 @@ def _limit_names(machine: TensorMachine) -> Iterator[str]:
 
 def _dead_points(machine: TensorMachine) -> list[tuple[str, int]]:
     """Legs that have a singularity margin: on a proximal joint of their own, or pivots of three hinges."""
-    return [
-        (group.name, leg)
-        for group in machine.groups
-        if group.kind["proximal"] or (group.kind["kind"] == "pivot" and group.kind["base_end"] == "triple")
-        for leg in range(group.kind["n"])
-    ]
+    return [(group.name, leg) for group in machine.groups if "side" in group.kind for leg in range(group.kind["n"])]
 
 
 def _dimensions(machine: TensorMachine) -> Iterator[str]:

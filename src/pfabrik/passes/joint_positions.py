@@ -151,7 +151,7 @@ def _motion(joint: Any, values: Floats) -> Floats:
     axis, point = joint["axis"], joint["point"]
     T = np.zeros((len(values), 4, 4))
     T[:] = np.eye(4)
-    if joint["kind"] == P.SLIDE:
+    if not joint["turns"]:
         T[:, :3, 3] = values[:, None] * axis
         return T
     T[:, :3, :3] = from_rotvec(values[:, None] * axis)

@@ -73,8 +73,7 @@ def _trunks(model: Model) -> tuple[Trunks, ...]:
         compiled = compile_trunks(model.mechanism, frozenset(table.redundant_joints), from_platform)
         if compiled is not None:
             legs = np.array([places[name] for name in compiled.trunk_joints])
-            is_slide = compiled.plan.trunk_joints["kind"] == P.SLIDE
-            units = np.array([senses[leg] for leg in legs.tolist()]) * np.where(is_slide, model.length, 1.0)
+            units = np.array([senses[leg] for leg in legs.tolist()]) * compiled.plan.trunk_joints["unit"]
             trunks.append(Trunks(compiled.plan, settings, legs, units, from_platform))
     return tuple(trunks)
 

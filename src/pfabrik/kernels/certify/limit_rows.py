@@ -79,7 +79,7 @@ def put_limits(table: Table, sides: Floats, uncertain: float, k: int, n: int, ro
         put_unknown(b, 1.0, 1.0)
         if leg["kind"] == PIVOT:
             put_moved(bounds.end, vec(leg["base_end_point"]), n, bounds.span)
-        elif leg["kind"] == ROD and m > k:
+        elif m > k:
             put_span(leg, legs[k], n, bounds)
         elif leg["kind"] == ROD and not put_rod(leg, sides[m], n, 2.0 * uncertain, bounds):
             put_unknown(bounds.b, 1.0, 1.0)
@@ -139,7 +139,7 @@ def put_coordinate(
     leg: Record, owner: Record, place: int, cell: PoseCell, n: int, bounds: LegBounds, value: Floats
 ) -> None:
     """A coordinate of a leg over a cell; unknown where its place has no bounds yet."""
-    if leg["kind"] == PIVOT and place >= PLATFORM_END and place < PLATFORM_END + leg["slides"]:
+    if leg["kind"] == PIVOT and place >= PLATFORM_END:
         put_along(bounds.span, vec(leg["slide_rows"][place - PLATFORM_END]), n, value)
     elif leg["kind"] != ROD:
         put_unknown(value, -math.inf, math.inf)
@@ -239,9 +239,6 @@ def put_cones(table: Table, m: int, k: int, n: int, rows: LimitRows) -> None:
             put_unknown(row, 1.0, 1.0)
             continue
         cosine = math.cos(cone["half_angle"])
-        if table.legs[m]["kind"] != ROD:
-            put_unknown(row, -1.0 - cosine, 1.0 - cosine)
-            continue
         if cone["place"] == BASE_LINE:
             put_base_line(table.legs[m], table.legs[k], n, bounds)
         else:

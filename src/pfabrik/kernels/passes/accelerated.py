@@ -27,7 +27,7 @@ from .half_spaces import (
 )
 from .meet import reach_end
 from .moving_frames import move_carriers
-from .plan import SLIDE, TRANSLATES, TURN, TURNS, Configuration, PassResults, Plan, Seeds, Settings
+from .plan import TRANSLATES, TURNS, Configuration, PassResults, Plan, Seeds, Settings
 from .solve import load_seed, move_to_centroid, new_configuration, write_row
 
 # Passes of a trunk from one start; how many in a row may fail to leave this share of the excess, first and, where no
@@ -74,8 +74,10 @@ def move_trunk(plan: Plan, trunk: int, config: Configuration, spaces: HalfSpaces
     programme = spaces.programme[0]
     for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
         joint = plan.trunk_joints[j]
-        unit = plan.length if joint["kind"] == SLIDE else 1.0
-        value = config.trunks[j] + share * unit * programme["trunk_scale"] * spaces.x[programme["trunk_column"] + j]
+        value = (
+            config.trunks[j]
+            + share * joint["unit"] * programme["trunk_scale"] * spaces.x[programme["trunk_column"] + j]
+        )
         config.trunks[j] = min(max(value, joint["lo"]), joint["hi"])
 
 
@@ -105,8 +107,7 @@ def reach_from_start(
     copy_row(config.trunks, spaces.start)
     for n in range(PASSES + 1):
         for j in range(first, last):
-            unit = plan.length if plan.trunk_joints[j]["kind"] == SLIDE else 1.0
-            spaces.x[j - first] = (spaces.start[j] - config.trunks[j]) / unit if near else 0.0
+            spaces.x[j - first] = (spaces.start[j] - config.trunks[j]) / plan.trunk_joints[j]["unit"] if near else 0.0
         far = math.sqrt(dot_of(spaces.x, spaces.x, last - first))
         programme["margin"], programme["window"] = margin, max(margin, far * plan.length)
         programme["trunk_scale"] = 1.0
@@ -143,7 +144,7 @@ def start_trunk(plan: Plan, trunk: int, config: Configuration, start: int, insid
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
     for j in range(first, min(last, first + VARIED)):
         joint, end = plan.trunk_joints[j], 1.0 if (start >> (j - first)) & 1 else -1.0
-        step = OPEN if joint["kind"] == TURN else OPEN * plan.length
+        step = OPEN * joint["unit"]
         lo, hi = max(joint["lo"], -step), min(joint["hi"], step)
         if joint["lo"] > -math.inf and joint["hi"] < math.inf:
             lo, hi = joint["lo"], joint["hi"]

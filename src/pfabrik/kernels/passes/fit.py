@@ -7,7 +7,7 @@ from ..legs.complete_poses import orthonormalise, turn_pose
 from ..linear import solve_spd
 from ..vectors import Vec, add, along, cross, dot, move, norm, scale, sub, turn, vec
 from .moving_frames import move_carriers
-from .plan import SLIDE, TURN, Configuration, Plan
+from .plan import Configuration, Plan
 
 # Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
 FIT_STEPS, FIT_DAMPING = 2, 1e-12
@@ -51,14 +51,14 @@ def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
 @routine
 def trunk_unit(plan: Plan, j: int) -> float:
     """Joint motion per unit of a trunk joint's unknown, which is a length: 1 / L for a turn, 1 for a slide."""
-    return 1.0 / plan.length if plan.trunk_joints[j]["kind"] == TURN else 1.0
+    return float(plan.trunk_joints[j]["unit"] / plan.length)
 
 
 @routine
 def point_rate(plan: Plan, config: Configuration, j: int, p: Vec) -> Vec:
     """Velocity of the point `p` of a carrier per unit rate of its trunk joint `j`."""
     axis = vec(config.screws[j, 1])
-    return axis if plan.trunk_joints[j]["kind"] == SLIDE else cross(axis, sub(p, vec(config.screws[j, 0])))
+    return cross(axis, sub(p, vec(config.screws[j, 0]))) if plan.trunk_joints[j]["turns"] == 1 else axis
 
 
 @routine

@@ -21,7 +21,7 @@ from .._jit import allocator, routine
 from ..qp import QP, new_qp, solve_with_equations
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
 from .meet import base_of, is_two_part, reach_end
-from .plan import CARRIER_CONE, PLATFORM_CONE, SLIDE, TRANSLATES, TURNS, Configuration, Plan, Settings
+from .plan import CARRIER_CONE, PLATFORM_CONE, TRANSLATES, TURNS, Configuration, Plan, Settings
 from .restrict import NO_LENGTH, NO_SIDE, any_normal, hinge_angle
 
 # What it costs to miss half-spaces by a length beside the same step: those that contradict each other are missed alike,
@@ -132,9 +132,8 @@ def fill_row(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, g: V
     if trunk >= 0:
         for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
             axis = vec(config.screws[j, 1])
-            if plan.trunk_joints[j]["kind"] == SLIDE:
-                rate = dot(g, axis)
-            else:
+            rate = dot(g, axis)
+            if plan.trunk_joints[j]["turns"] == 1:
                 rate = (dot(g, cross(axis, sub(t, vec(config.screws[j, 0])))) + dot(w, axis)) / plan.length
             row[programme["trunk_column"] + j] = -rate * programme["trunk_scale"]
 
@@ -166,13 +165,12 @@ def add_ranges(plan: Plan, first: int, last: int, config: Configuration, spaces:
     programme, rows = spaces.programme[0], spaces.problem.G
     for j in range(first, last):
         joint = plan.trunk_joints[j]
-        unit = plan.length if joint["kind"] == SLIDE else 1.0
         for bound, sign in ((joint["lo"], -1.0), (joint["hi"], 1.0)):
             if abs(bound) < math.inf:
                 for i in range(programme["n_unknowns"]):
                     rows[programme["n_rows"], i] = 0.0
                 rows[programme["n_rows"], programme["trunk_column"] + j] = sign * programme["trunk_scale"]
-                keep_row(spaces, sign * (config.trunks[j] - bound) / unit, False)
+                keep_row(spaces, sign * (config.trunks[j] - bound) / joint["unit"], False)
 
 
 @routine
@@ -239,9 +237,9 @@ def add_strut(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces) -> 
     for c in range(branch["cone_first"], branch["cone_last"]):
         cone = plan.cones[c]
         a = vec(cone["axis"])
-        a = turn(carrier, a) if cone["kind"] == CARRIER_CONE else scale(-1.0, turn(config.pose, a))
+        a = turn(carrier, a) if cone["fixed_to"] == CARRIER_CONE else scale(-1.0, turn(config.pose, a))
         excess, g = cone_excess(a, cone["cosine"], cone["sine"], d)
-        w = cross(g, d) if cone["kind"] == PLATFORM_CONE else zero
+        w = cross(g, d) if cone["fixed_to"] == PLATFORM_CONE else zero
         gap = max(gap, add_half_space(plan, b, config, spaces, excess, g, w))
     return gap
 

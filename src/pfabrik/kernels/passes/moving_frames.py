@@ -6,7 +6,7 @@ from ...arrays import Floats
 from .._jit import routine
 from ..legs.complete_poses import turn_pose
 from ..vectors import Vec, add, along, move, put, rotate, scale, sub, turn, vec
-from .plan import TURN, Configuration, Plan
+from .plan import Configuration, Plan
 
 
 @routine
@@ -30,7 +30,7 @@ def move_carriers(plan: Plan, config: Configuration) -> None:
             point = add(turn(T, vec(plan.trunk_joints[j]["point"])), (T[0, 3], T[1, 3], T[2, 3]))
             put(screws[j, 0], point)
             put(screws[j, 1], axis)
-            if plan.trunk_joints[j]["kind"] == TURN:
+            if plan.trunk_joints[j]["turns"] == 1:
                 turn_pose(T, scale(trunk_values[j], axis))
                 moved = rotate(sub((T[0, 3], T[1, 3], T[2, 3]), point), axis, trunk_values[j])
                 set_position(T, add(point, moved))

@@ -15,8 +15,6 @@ from ...arrays import Floats, Ints, Records
 
 # The body that the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2
-# Trunk joints.
-TURN, SLIDE = 0, 1
 
 _vector = ("f8", (3,))
 
@@ -55,7 +53,7 @@ BRANCH = np.dtype(
 CHAIN = np.dtype([("first", "i8"), ("last", "i8"), ("trunk", "i8")])  # branches first ... last - 1; trunk or -1
 CONE = np.dtype(
     [
-        ("kind", "i8"),
+        ("fixed_to", "i8"),
         ("node", "i8"),
         ("axis", *_vector),
         ("half_angle", "f8"),
@@ -64,8 +62,16 @@ CONE = np.dtype(
     ]
 )
 TRUNK_SPAN = np.dtype([("first", "i8"), ("last", "i8")])
-TRUNK_JOINT = np.dtype([("kind", "i8"), ("point", *_vector), ("axis", *_vector), ("lo", "f8"), ("hi", "f8")])
-
+TRUNK_JOINT = np.dtype(
+    [
+        ("turns", "i8"),  # 1: about its axis; 0: it slides along it
+        ("unit", "f8"),  # 1 for angles, L for lengths
+        ("point", *_vector),
+        ("axis", *_vector),
+        ("lo", "f8"),
+        ("hi", "f8"),
+    ]
+)
 
 # Motions of a revised target: bits of Settings.free.
 TRANSLATES, TURNS = 1, 2

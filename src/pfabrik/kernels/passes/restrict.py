@@ -89,9 +89,9 @@ def hinge_angle(plan: Plan, branch: Records, k: int, carrier: Floats, normal: Ve
 def cone_axis(cone: Records, carrier: Floats, pose: Floats, normal: Vec, nodes: Floats) -> Vec:
     """The present direction of a cone's axis."""
     a = vec(cone["axis"])
-    if cone["kind"] == CARRIER_CONE:
+    if cone["fixed_to"] == CARRIER_CONE:
         return turn(carrier, a)
-    if cone["kind"] == PLATFORM_CONE:
+    if cone["fixed_to"] == PLATFORM_CONE:
         return turn(pose, a)
     k = cone["node"]
     link = sub(vec(nodes[k]), vec(nodes[k - 1]))
@@ -123,7 +123,7 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
             d = flatten(d, turn(pose, vec(branch["end_normal"])))
         for c in range(branch["cone_first"], branch["cone_last"]):
             cone = plan.cones[c]
-            if cone["kind"] == PLATFORM_CONE:
+            if cone["fixed_to"] == PLATFORM_CONE:
                 if at_end:
                     axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
                     d = keep_in_cone(cone, axis, d)
@@ -148,14 +148,14 @@ def restrict_step_inward(
         start = d
         for c in range(branch["cone_first"], branch["cone_last"]):
             cone = plan.cones[c]
-            if cone["kind"] != PLATFORM_CONE and cone["node"] == k:
+            if cone["fixed_to"] != PLATFORM_CONE and cone["node"] == k:
                 axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
                 d = keep_in_cone(cone, axis, d)
         if at_end and branch["end_plane"] == 1:
             d = flatten(d, turn(pose, vec(branch["end_normal"])))
         for c in range(branch["cone_first"], branch["cone_last"]):
             cone = plan.cones[c]
-            if cone["kind"] == PLATFORM_CONE and at_end:
+            if cone["fixed_to"] == PLATFORM_CONE and at_end:
                 d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d)
         if norm(sub(d, start)) <= UNMOVED * norm(start):
             break
