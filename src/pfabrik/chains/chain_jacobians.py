@@ -48,10 +48,7 @@ def inverse_of_chain(model: Model, q: Floats) -> Floats:
     lengths[:3] = model.length
     inverse = np.full(np.swapaxes(forward, 1, 2).shape, np.nan)
     valid = np.isfinite(q).all(axis=1)
-    left, values, right = np.linalg.svd(forward[valid] / lengths[:, None] / scale, full_matrices=False)
-    with np.errstate(divide="ignore"):
-        inverses = np.where(values > TOLERANCES.rank, 1.0 / values, 0.0)
-    solved = np.swapaxes(right, 1, 2) * inverses[:, None, :] @ np.swapaxes(left, 1, 2)
+    solved = np.linalg.pinv(forward[valid] / lengths[:, None] / scale, rcond=TOLERANCES.rank)
     inverse[valid] = solved / scale[:, None] / lengths
     return inverse
 

@@ -74,9 +74,9 @@ def accuracy(
 ) -> PoseAccuracy:
     """The error of the pose by errors of actuators, play in joints and tolerances of parts, at any configurations.
 
-    To first order, x = F e - sum R' d + P p: with the forward Jacobian F, errors e of the actuators, play d of joints,
-    whose reactions to a wrench w are R w, and the sensitivity P to parameters p. "worst" is the largest |x| for all
-    |e_i|, |d_j| and |p_k| within bounds, found at their corners; "rms" takes them for independent, with a mean of 0.
+    To first order, x = F e + sum R d + P p: with the forward Jacobian F, errors e of the actuators, responses R to play d
+    of joints, and the sensitivity P to parameters p. "worst" is the largest |x| for all |e_i|, |d_j| and |p_k| within
+    bounds, found at their corners; "rms" takes them for independent, with a mean of 0.
 
     Parameters
     ----------
@@ -165,17 +165,15 @@ def _errors(mechanism: Mechanism, given: float | Mapping[str, float]) -> tuple[F
 def _by_joint(solution: Solution, maps: Maps, errors: Mapping[int, float]) -> tuple[Floats, Mask]:
     """Twists by play of joints, (n, j, r, 3), and a mask of rows at which these are not known, (n,).
 
-    By virtual work, w . x + (R w) . d = 0. Where joints work against each other, play that would open loops is none.
+    Where joints work against each other, play that would open loops is none.
     """
     found, joints = responses_of(solution, maps, "given the play of its joints"), list(errors)
-    reactions = found.forces[:, joints]
-    left, sizes, _ = np.linalg.svd(
-        np.concatenate([found.open[:, joints], np.zeros((*reactions.shape[:3], 3))], axis=-1)
-    )
+    opened = found.open[:, joints]
+    left, sizes, _ = np.linalg.svd(np.concatenate([opened, np.zeros((*opened.shape[:3], 3))], axis=-1))
     plays = left * (sizes <= TOLERANCES.alignment)[..., None, :]
     bounds = np.array(list(errors.values()))[:, None, None]
     twists = np.zeros((len(maps.forward), len(joints), maps.forward.shape[1], 3))
-    twists[found.places] = -np.swapaxes(reactions, -1, -2) @ plays @ np.swapaxes(plays, -1, -2) * bounds
+    twists[found.places] = found.twists[:, joints] @ plays @ np.swapaxes(plays, -1, -2) * bounds
     is_loose = np.zeros(len(twists), bool)
     is_loose[found.places] = found.is_singular
     return twists, is_loose

@@ -84,7 +84,7 @@ def pairs_of(mechanism: Mechanism, q: Floats) -> Pairs:
 def _balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
     first, owners = JointRates(model_of(mechanism), q), column_joints(mechanism)
     actuators, by_loop = first.wrench(np.einsum("nci,ncik->nck", first.screws, carried[:, owners]))
-    wrenches = -(carried + _of_joints(mechanism, by_loop))
+    wrenches = -(carried + of_joints(mechanism, by_loop))
     undone = -np.einsum("nci,ncik->nck", first.screws, wrenches[:, owners])
     undone[:, first.actuated] += actuators
     sizes = TOLERANCES.alignment * np.abs(carried).max(axis=(1, 2), initial=0.0)
@@ -94,12 +94,12 @@ def _balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
         is_held=held.max(axis=1, initial=0.0) <= sizes,
         is_idle=idle.max(axis=1, initial=0.0) > sizes,
         wrenches=wrenches,
-        open=_of_joints(mechanism, first.open),
+        open=of_joints(mechanism, first.open),
         is_singular=first.is_singular,
     )
 
 
-def _of_joints(mechanism: Mechanism, by_loop: Floats) -> Floats:
+def of_joints(mechanism: Mechanism, by_loop: Floats) -> Floats:
     """Wrenches (n, joints, 6, k) from those of loops, (n, 6 loops, k)."""
     joints, (n, _, k) = graph_of(mechanism).of_joints, by_loop.shape
     return np.asarray(np.einsum("lj,nlik->njik", joints, by_loop.reshape(n, len(joints), 6, k)))

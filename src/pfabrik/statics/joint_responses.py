@@ -1,4 +1,4 @@
-"""What joints transmit per unit of each component of a wrench on the end effector."""
+"""How the end effector responds to displacements at joints, such as play, or the end of a rod that stretches."""
 
 from __future__ import annotations
 
@@ -8,32 +8,31 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints, Mask
+from ..closure.first_order import JointRates
 from ..description.graph import tree_of
 from ..errors import UnsupportedMechanism
-from ..motion.displacements import placed
+from ..model import model_of
+from ..motion.joint_rates import graph_of
 from .first_order_maps import Maps, is_redundantly_actuated
-from .joint_balance import balance
-from .rod_forces import rods_of, tensions
+from .joint_balance import of_joints
 
 
 class Responses(NamedTuple):
-    """Reactions by wrench at some rows of a solution; r is 6, or 3 for a joint end effector.
+    """Twists by displacements of each joint's second body from its first, at some rows of a solution.
+
+    By virtual work these are also the forces that joints transmit, per wrench on the end effector.
 
     Attributes
     ----------
     places : indices of the rows, (n,).
-    forces : of each joint's first body on its second, per wrench about the reference point, (n, joints, 3, r).
-    open : forces that equilibrium leaves open, (n, joints, 3, z).
-    rods : forces along rods per wrench, (n, rods, r), in the order of `rods_of`.
-    open_rods : the largest that is left open along each, (n, rods).
+    twists : at held actuators, per length, (n, joints, r, 3); r is 6, or 3 for a joint end effector.
+    open : what loops resist of displacements, (n, joints, 3, z); 0 where they give way.
     is_singular : rows in a constraint singularity, in which the others mean nothing, (n,).
     """
 
     places: Ints
-    forces: Floats
+    twists: Floats
     open: Floats
-    rods: Floats
-    open_rods: Floats
     is_singular: Mask
 
 
@@ -42,23 +41,18 @@ def responses_of(solution: Solution, maps: Maps, purpose: str) -> Responses:
 
     Raises
     ------
-    UnsupportedMechanism : actuators work against each other, so that forces do not follow from equilibrium.
+    UnsupportedMechanism : actuators work against each other, so that they hold no displacement.
     """
-    mechanism = solution.mechanism
+    mechanism, places = solution.mechanism, np.flatnonzero(maps.is_valid)
     if is_redundantly_actuated(mechanism):
         reason = "there are more actuators than motions, and forces do not follow from equilibrium alone"
         raise UnsupportedMechanism(mechanism.name, [reason], purpose)
-    places = np.flatnonzero(maps.is_valid)
-    q, length = solution._configurations.coordinates_at(places), mechanism.characteristic_length
-    wrenches = np.diag(np.repeat([length, 1.0], 3))[:, : maps.forward.shape[1]]
-    path = tree_of(mechanism).paths[mechanism.end_effector_body]
-    found = balance(mechanism, q, np.broadcast_to(path[:, None, None] * wrenches, (len(q), len(path), *wrenches.shape)))
-    centres, rods = placed(mechanism, q)[1], rods_of(mechanism)
-    return Responses(
-        places,
-        found.wrenches[:, :, :3] / length,
-        found.open[:, :, :3],
-        tensions(rods, found.wrenches, centres) / length,
-        np.linalg.norm(tensions(rods, found.open, centres), axis=-1),
-        found.is_singular,
+    first, r = JointRates(model_of(mechanism), solution._configurations.coordinates_at(places)), maps.forward.shape[1]
+    path, shift = tree_of(mechanism).paths[mechanism.end_effector_body], np.eye(6, 3)
+    openings = np.einsum("lj,ik->lijk", graph_of(mechanism).of_joints, shift).reshape(-1, 3 * len(path))
+    rates = first.geometry(openings, np.zeros((len(first.actuated), openings.shape[1])))
+    twists = (first.twists @ rates)[:, :r].reshape(-1, r, len(path), 3) + np.multiply.outer(path, shift[:r]).swapaxes(
+        0, 1
     )
+    twists[:, 3:] /= mechanism.characteristic_length
+    return Responses(places, np.swapaxes(twists, 1, 2), of_joints(mechanism, first.open)[:, :, :3], first.is_singular)

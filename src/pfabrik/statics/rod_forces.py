@@ -52,6 +52,10 @@ def tensions(rods: Rods, wrenches: Floats, centres: Floats) -> Floats:
     wrenches : what joints transmit from their first body to their second, [force; moment], (n, joints, 6, k).
     centres : of joints, (n, joints, 3) [length].
     """
-    along = centres[:, rods.ends] - centres[:, rods.starts]
-    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    return np.asarray(np.einsum("nri,nrik,r->nrk", along, wrenches[:, rods.ends, :3], rods.signs))
+    return np.asarray(np.einsum("nri,nrik->nrk", along(rods, centres), wrenches[:, rods.ends, :3]))
+
+
+def along(rods: Rods, centres: Floats) -> Floats:
+    """Displacements of the end joints' second bodies that make rods longer, (n, rods, 3)."""
+    lines = centres[:, rods.ends] - centres[:, rods.starts]
+    return np.asarray(lines * (rods.signs / np.linalg.norm(lines, axis=-1))[..., None])

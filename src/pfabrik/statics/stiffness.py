@@ -13,7 +13,7 @@ from ..arrays import Floats, Mask, shaped
 from ..checks import require_names, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
-from ..motion.displacements import actuator_units
+from ..motion.displacements import actuator_units, placed
 from ..motion.mobility import generic_of
 from ..poses import as_floats
 from ..tolerances import TOLERANCES
@@ -23,7 +23,7 @@ from .forces import Forces
 from .joint_balance import pairs_of
 from .joint_responses import responses_of
 from .reasons import Reasons, add_reason, has_reason, in_shape
-from .rod_forces import rods_of
+from .rod_forces import along, rods_of
 
 SLACK = "slack cables leave a direction without stiffness"
 UNKNOWN_FORCES = "the forces that say which cables are slack are not known"
@@ -172,10 +172,13 @@ def _side_by_side(solution: Solution, maps: Maps, values: Floats) -> tuple[Float
 def _give_rods(solution: Solution, maps: Maps, compliance: Floats, by_rod: Floats) -> Mask:
     """Add what rods give to compliance (n, r, r), lengths in L; mask of the rows at which that is not known, (n,)."""
     found, stretched = responses_of(solution, maps, "given the stiffness of its rods"), by_rod > 0.0
-    along = found.rods[:, stretched] / twist_units(solution.mechanism)
-    compliance[found.places] += np.einsum("nra,nrb,r->nab", along, along, 1.0 / by_rod[stretched])
+    mechanism, rods = solution.mechanism, rods_of(solution.mechanism)
+    lines = along(rods, placed(mechanism, solution._configurations.coordinates_at(found.places))[1])[:, stretched]
+    ends = rods.ends[stretched]
+    by_length = np.einsum("nri,nrai->nra", lines, found.twists[:, ends]) / twist_units(mechanism)
+    compliance[found.places] += np.einsum("nra,nrb,r->nab", by_length, by_length, 1.0 / by_rod[stretched])
     is_open = np.zeros(len(compliance), bool)
-    opened = np.asarray(found.open_rods[:, stretched] > TOLERANCES.alignment)
+    opened = np.linalg.norm(np.einsum("nri,nriz->nrz", lines, found.open[:, ends]), axis=-1) > TOLERANCES.alignment
     is_open[found.places] = opened.any(axis=1) | found.is_singular
     return is_open
 
