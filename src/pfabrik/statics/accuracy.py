@@ -74,8 +74,8 @@ def accuracy(
 ) -> PoseAccuracy:
     """The error of the pose by errors of actuators, play in joints and tolerances of parts, at any configurations.
 
-    To first order, x = F e + sum R d + P p: with the forward Jacobian F, errors e of the actuators, responses R to play d
-    of joints, and the sensitivity P to parameters p. "worst" is the largest |x| for all |e_i|, |d_j| and |p_k| within
+    To first order, x = F e + sum R d + P p: with the forward Jacobian F, errors e of the actuators, responses R to play
+    d of joints, and the sensitivity P to parameters p. "worst" is the largest |x| for all |e_i|, |d_j| and |p_k| within
     bounds, found at their corners; "rms" takes them for independent, with a mean of 0.
 
     Parameters
