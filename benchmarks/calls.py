@@ -14,8 +14,9 @@ from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.description.geometry import geometry_of
 from pfabrik.model import Model, model_of
 from pfabrik.motion.displacements import rate_units
-from pfabrik.motion.joint_rates import actuated_columns
-from pfabrik.motion.singularities import measures
+from pfabrik.motion.joint_rates import actuated_columns, right_singular
+from pfabrik.motion.joint_rates import first_order as conditions_and_twist
+from pfabrik.motion.mobility import generic_of
 from table import Row, cells, machine, table
 from timing import best_times, draw
 from yardstick import one_core
@@ -83,6 +84,13 @@ def out_of_reach(name: str, what: str, rng: np.random.Generator, runs: int) -> I
     yield Row(f"{what}, one solve_ik, out of reach", len(far), one / len(far), "a pose of a batch", batch / len(far))
 
 
+def singular_vectors(mechanism: pf.Mechanism, q: Array) -> None:
+    """Those of the loops' conditions, and of what the motions do that these allow."""
+    closure, twist = conditions_and_twist(mechanism, q)
+    motions = right_singular(closure)[1][0, generic_of(mechanism).rank :].T
+    np.linalg.svd(np.concatenate([twist[0] @ motions, motions[actuated_columns(mechanism)]]))
+
+
 def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     """Jacobians, singularity and margins of new answers of the 6-UPS."""
     mechanism = pf.load("stewart")
@@ -95,7 +103,7 @@ def first_order(rng: np.random.Generator, runs: int) -> Iterator[Row]:
         lambda: [pf.singularity(pf.solve_ik(mechanism, target)) for target in targets],
         lambda: [pf.margins(pf.solve_ik(mechanism, target)) for target in targets],
         lambda: [strut_jacobian(struts, pose) for _ in range(20)],
-        lambda: [measures(mechanism, q) for _ in range(20)],
+        lambda: [singular_vectors(mechanism, q) for _ in range(20)],
     )
     yield Row("6-UPS, one solve_ik and inverse_jacobian", 20, inverse / 20, "NumPy, lines of the struts", lines / 20)
     yield Row(

@@ -23,6 +23,7 @@ from pfabrik.kernels.handle import Handle
 from pfabrik.kernels.platform.jacobians import jacobians, new_jacobian_tables
 from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns, end_effector_pose, gaps, loop_errors, rate_units
+from pfabrik.motion.joint_rates import first_order
 from pfabrik.motion.mobility import generic_of
 from pfabrik.motion.singularities import KINDS
 from pfabrik.tolerances import TOLERANCES
@@ -523,6 +524,14 @@ class TestSingularity:
         twist = np.ones(forward.shape[1])
         twist[:3] = machine.characteristic_length
         forward, inverse = forward * units / twist[:, None], inverse / units[:, None] * twist
+        (closure, twists), generic = first_order(machine, q), generic_of(machine)
+        shown = generic.mobility.platform + generic.mobility.internal
+        for row, conditions in enumerate(closure):
+            resisted = [np.inf, *np.linalg.svd(conditions, compute_uv=False)] if len(conditions) else [np.inf]
+            motions = null_space(conditions, 1e-6) if len(conditions) else np.eye(conditions.shape[1])
+            seen = np.linalg.svd(np.vstack([twists[row] @ motions, motions[drives(machine)]]), compute_uv=False)
+            assert near.constraint[row] == pytest.approx(resisted[generic.rank], rel=1e-9)
+            assert near.passive[row] == pytest.approx(seen[shown - 1], rel=1e-9)
         assert near.parallel == pytest.approx(1 / np.linalg.norm(forward, 2, axis=(1, 2)), rel=1e-9)
         assert near.serial == pytest.approx(1 / np.linalg.norm(inverse, 2, axis=(1, 2)), rel=1e-9)
         for row in range(len(q)):

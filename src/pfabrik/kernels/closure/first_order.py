@@ -385,27 +385,33 @@ def least_ratio(pairs: Floats, first: int, last: int, most: int, least: float, s
 
 
 @routine
-def orthogonalise(pairs: Floats, first: int, last: int) -> bool:
+def orthogonalise(rows: Floats, first: int, last: int) -> bool:
     """Make the columns of all rows from `first` to `last` orthonormal, by Gram and Schmidt; the others go along.
 
     False where next to nothing is left of one.
     """
-    n, width = pairs.shape
-    for k in range(n):
-        size = size_of(pairs, k, first, last)
-        for _ in range(2):  # what is left of a row after much of it was taken is not orthogonal yet
-            before = size
-            for j in range(k):
-                share = 0.0
-                for i in range(first, last):
-                    share += pairs[j, i] * pairs[k, i]
-                for i in range(width):
-                    pairs[k, i] -= share * pairs[j, i]
-            size = size_of(pairs, k, first, last)
-            if size > ENOUGH * before:
-                break
+    for k in range(rows.shape[0]):
+        size = set_apart(rows, k, first, last)
         if not size > REGULAR:
             return False
-        for i in range(width):
-            pairs[k, i] /= size
+        for i in range(rows.shape[1]):
+            rows[k, i] /= size
     return True
+
+
+@routine
+def set_apart(rows: Floats, k: int, first: int, last: int) -> float:
+    """Take from a row what it has of those before, orthonormal from `first` to `last`; the size of what is left."""
+    size = size_of(rows, k, first, last)
+    for _ in range(2):  # what is left of a row after much of it was taken is not orthogonal yet
+        before = size
+        for j in range(k):
+            share = 0.0
+            for i in range(first, last):
+                share += rows[j, i] * rows[k, i]
+            for i in range(rows.shape[1]):
+                rows[k, i] -= share * rows[j, i]
+        size = size_of(rows, k, first, last)
+        if size > ENOUGH * before:
+            break
+    return size

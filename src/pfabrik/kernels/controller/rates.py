@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from ...arrays import Floats, Ints
 from .._jit import routine
+from ..closure.first_order import set_apart
 from ..legs.answer import put_slopes
 from ..legs.endings import LEAST_MARGIN
 from ..legs.frames import redundant_slope
@@ -52,7 +52,7 @@ def put_rates(own: Rating, reaching: Reaching, pose: Floats, is_raw: int, turns:
             own.basis[count, j] = 1.0 if j == 3 + i else 0.0
         count += 1
     for i in range(own.rows.shape[0] if is_raw == 0 else 0):
-        if own.used[i] == 0 and count < 6 and make_orthogonal(own, count, own.rows[i]):
+        if own.used[i] == 0 and count < 6 and bars(own, count, own.rows[i]):
             count += 1
     for i in range(own.drives.shape[0]):
         for k in range(count):
@@ -139,22 +139,10 @@ def take_off(row: Floats, pivot: Floats, k: int) -> None:
 
 
 @routine
-def make_orthogonal(own: Rating, count: int, row: Floats) -> bool:
+def bars(own: Rating, count: int, row: Floats) -> bool:
     """Add a row to an orthonormal basis of `count` rows; False where rounding is all that is left of it."""
-    basis, size = own.basis, 0.0
-    for j in range(6):
-        basis[count, j] = row[j]
-    for _ in range(2):  # what is left after much was taken is not orthogonal yet
-        for k in range(count):
-            share = 0.0
-            for j in range(6):
-                share += basis[k, j] * basis[count, j]
-            for j in range(6):
-                basis[count, j] -= share * basis[k, j]
-        size = 0.0
-        for j in range(6):
-            size += basis[count, j] * basis[count, j]
-    size = math.sqrt(size)
+    copy_row(row[:6], own.basis[count])
+    size = set_apart(own.basis, count, 0, 6)
     for j in range(6 if size > RANK else 0):
-        basis[count, j] /= size
+        own.basis[count, j] /= size
     return size > RANK
