@@ -7,7 +7,6 @@ import math
 from ...arrays import Floats, Ints
 from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
-from ..closure.pose_objective import pose_gradient
 from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
 from ..quaternions import difference
@@ -15,8 +14,8 @@ from ..vectors import copy_table, norm, vec
 from .chain_records import SerialChain
 from .chain_state import ChainScratch
 from .curvature import fill_curvature, model_change, plan_newton_step
-from .reach_target import largest, reach_target
-from .walk_chain import bound_steps, copy_chain_state, move_chain, walk_chain
+from .reach_target import largest, measure_pose, reach_target
+from .walk_chain import copy_chain_state, move_chain
 
 MOST_STEPS = 200
 """Most steps of a descent, those that are not taken included; most need a dozen."""
@@ -24,7 +23,7 @@ MOST_STEPS = 200
 LONGEST_STEP = 1.0
 """Longest step of a freedom [rad or L]."""
 
-HOPE, NEAR, HOPEFUL = 10.0, 0.01, 1e-3
+HOPE, NEAR, HOPEFUL = 30.0, 0.01, 1e-3
 """Times its predicted reduction that a step may promise, and objective below which no descent is without hope"""
 
 SWEEPS = 12
@@ -64,8 +63,7 @@ def descend_chain(
     nearer than at `least`, which another one has found.
     """
     state, best = s.state, s.best
-    reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING)
-    value, held = evaluate(chain, target, objective, s)
+    value, held = reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING)
     if largest(s.gradient.errors, held) > RESTORED:
         return math.inf
     estimate_multipliers(chain, held, s)
@@ -76,7 +74,7 @@ def descend_chain(
             break
         if not is_kept:
             copy_chain_state(best, state)
-            evaluate(chain, target, objective, s)
+            measure_pose(chain, target, objective, state, s)
             is_kept = True
         fill_curvature(objective, target, held, 1.0, s)
         scale = lay_out_step(chain, s)
@@ -105,11 +103,9 @@ def descend_chain(
             break
         copy_chain_state(state, best)
         move_chain(chain, state, s)
-        if held > 0:
-            keep(s, s.fixed)
-            reach_target(chain, target, objective, state, s, closeness, RESTORING)
-            keep_none(s)
-        trial, _ = evaluate(chain, target, objective, s)
+        keep(s, s.fixed)
+        trial, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING)
+        keep_none(s)
         actual = value - trial
         enough = max(SUFFICIENT * predicted, 0.0) if predicted > FINE * value else -CONVERGED * value
         is_kept = largest(s.gradient.errors, held) <= RESTORED and actual >= enough
@@ -123,7 +119,7 @@ def descend_chain(
             damping *= 5.0
     if not is_kept:
         copy_chain_state(best, state)
-        evaluate(chain, target, objective, s)
+        measure_pose(chain, target, objective, state, s)
     return value
 
 
@@ -173,14 +169,6 @@ def longest_step(s: ChainScratch) -> float:
     for d in range(len(s.step)):
         longest = max(longest, abs(s.step[d]))
     return longest
-
-
-@routine
-def evaluate(chain: SerialChain, target: Floats, objective: PoseObjective, s: ChainScratch) -> tuple[float, int]:
-    """The objective at `s.state`, and the number of held components; with screws, force and errors."""
-    walk_chain(chain, s.state, s)
-    bound_steps(chain, s.state, s)
-    return pose_gradient(objective, target, s.X, s.gradient, True)
 
 
 @routine

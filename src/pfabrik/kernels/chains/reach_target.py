@@ -37,12 +37,11 @@ PATIENCE = 4
 @routine
 def measure_pose(
     chain: SerialChain, target: Floats, objective: PoseObjective, state: ChainState, s: ChainScratch
-) -> int:
-    """Walk the chain, and write the held components of its pose and their derivatives; the number of components."""
+) -> tuple[float, int]:
+    """The objective at a configuration, and the number of held components; with screws, bounds, force and errors."""
     walk_chain(chain, state, s)
     bound_steps(chain, state, s)
-    _, held = pose_gradient(objective, target, s.X, s.gradient, True)
-    return held
+    return pose_gradient(objective, target, s.X, s.gradient, True)
 
 
 @routine
@@ -54,12 +53,13 @@ def reach_target(
     s: ChainScratch,
     closeness: float,
     most_steps: int,
-) -> float:
-    """Move a configuration until the held components are met, or no step brings them nearer; the error.
+) -> tuple[float, int]:
+    """Move a configuration until the held components are met, or no step brings them nearer; as `measure_pose`.
 
     The best configuration is left in `state`, with its pose, screws and errors in the scratch memory.
     """
-    errors, held = s.gradient.errors, measure_pose(chain, target, objective, state, s)
+    errors = s.gradient.errors
+    distance, held = measure_pose(chain, target, objective, state, s)
     value = squares(errors, held)
     damping, idle, steps = 1e-3, 0, 0
     while steps < most_steps and largest(errors, held) > closeness and idle < PATIENCE:
@@ -68,7 +68,7 @@ def reach_target(
         plan_least_step(chain, s, held, damping * min(1.0, value))
         copy_chain_state(state, s.saved)
         move_chain(chain, state, s)
-        measure_pose(chain, target, objective, state, s)
+        distance, _ = measure_pose(chain, target, objective, state, s)
         moved = squares(errors, held)
         idle = 0 if moved < ENOUGH * value else idle + 1
         if moved < value:
@@ -76,9 +76,9 @@ def reach_target(
             damping = max(0.1 * damping, LEAST_DAMPING)
             continue
         copy_chain_state(s.saved, state)
-        measure_pose(chain, target, objective, state, s)
+        distance, _ = measure_pose(chain, target, objective, state, s)
         damping = max(10.0 * damping, 1e-4)
-    return largest(errors, held)
+    return distance, held
 
 
 @routine

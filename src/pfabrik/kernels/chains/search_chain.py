@@ -24,7 +24,7 @@ from ..vectors import copy_table
 from .chain_records import ChainTables, SerialChain
 from .chain_state import ChainScratch
 from .descend_chain import descend_chain, pull
-from .reach_target import reach_target
+from .reach_target import largest, reach_target
 from .walk_chain import copy_chain_state, load_chain, walk_chain
 
 CLOSENESS = 1e-12
@@ -88,7 +88,8 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
     copy_chain_state(s.start, s.state)
     for step in range(1, CONTINUATION_STEPS + 1):
         put_between(step / CONTINUATION_STEPS, s)
-        error = reach_target(chain, s.between, objective, s.state, s, CLOSENESS, STEPS)
+        _, held = reach_target(chain, s.between, objective, s.state, s, CLOSENESS, STEPS)
+        error = largest(s.gradient.errors, held)
     if error < least or error <= tables.machine[0]["met"]:
         keep_nearest(s)
     return min(error, least)
@@ -98,7 +99,8 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
 def reach_from(tables: ChainTables, objective: PoseObjective, seed: int, s: ChainScratch) -> float:
     """Reach the target from `s.state`, and note the attempt; the error."""
     before = s.effort[0]["steps"]
-    error = reach_target(tables.chain, s.target, objective, s.state, s, CLOSENESS, STEPS)
+    _, held = reach_target(tables.chain, s.target, objective, s.state, s, CLOSENESS, STEPS)
+    error = largest(s.gradient.errors, held)
     note_attempt(0, seed, s.effort[0]["steps"] - before, error, s.effort[0], s.log)
     return error
 
