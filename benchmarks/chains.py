@@ -26,7 +26,9 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 from pfabrik.chains.chain_engine import ChainEngine
+from pfabrik.chains.chain_tables import question_of
 from pfabrik.closure.closure_engine import ClosureEngine
+from pfabrik.kernels.platform.tables import BY_LEGS
 from pfabrik.model import model_of
 from table import Row, machine
 from timing import best_times
@@ -155,12 +157,12 @@ def timed(solve: Callable[[], Array], runs: int = 3) -> tuple[float, Array]:
 def own(mechanism: pf.Mechanism, targets: Array, most: float, in_space: bool) -> Iterator[tuple[str, float, float]]:
     """The library, and its parts alone: name, share reached [%], and time a target [s]."""
     poses, n, count = pf.pose(targets), len(mechanism.joints), len(targets)
-    engine, home = ChainEngine(model_of(mechanism)), np.zeros((count, n))
+    engine, home, closing = ChainEngine(model_of(mechanism)), np.zeros((count, n)), question_of(True, False, last=BY_LEGS, seeds=0)
     pf.solve_ik(mechanism, targets[:2])
     fabrik_all(home[:1].copy(), targets[:1], most, 1, 0.0)
     seconds, q = timed(lambda: pf.solve_ik(mechanism, targets).q)
     yield "pfabrik", share(q, targets, most, in_space), seconds / count
-    seconds, q = timed(lambda: engine._try(poses, home, 0)[0].coordinates)
+    seconds, q = timed(lambda: engine._run(closing, pf.Options(), poses, home)[1].coordinates)
     yield "closing alone, from home", share(q, targets, most, in_space), seconds / count
     if in_space:
         return
@@ -168,7 +170,7 @@ def own(mechanism: pf.Mechanism, targets: Array, most: float, in_space: bool) ->
     start = time.process_time()
     fabrik_all(begin, targets, most, 1, 0.0)
     passed = time.process_time() - start
-    seconds, q = timed(lambda: engine._try(poses, begin, 0)[0].coordinates)
+    seconds, q = timed(lambda: engine._run(closing, pf.Options(), poses, begin)[1].coordinates)
     yield "a pass from home, then closing", share(q, targets, most, in_space), (passed + seconds) / count
 
     def passes() -> Array:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,19 +16,22 @@ from ..closure.attempts import HELD, Attempt, with_verdicts
 from ..closure.close import Closing, measure_configurations
 from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, coordinates_for, joint_coordinates, new_rows, steps_of
-from ..closure.engine_contract import Engine
+from ..closure.engine_contract import Engine, Prepared
 from ..closure.projection import ProjectionMode
 from ..closure.stretched import BentConfiguration
-from ..kernels.chains.chain_records import Question
 from ..kernels.handle import Handle
+from ..kernels.platform.tables import BY_LEGS, Question
 from ..kernels.rows import PROJECTED, REACHED, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from ..options import Options
+from ..options import USUAL, Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .chain_tables import MET, question_of, tables_of
 from .run_chains import ROWS_A_BLOCK, new_scratch, scratch_of_chain, walk
+
+if TYPE_CHECKING:
+    from ..kernels.chains.chain_state import ChainScratch
 
 MOST_BENT = 100
 """Coordinates up to which links that are stretched out on a path bend back: the check takes their cube."""
@@ -67,17 +71,19 @@ class ChainEngine(Engine):
         begin = self._home if start is None else start.coordinates
         if not self._are_idle_within(begin):
             return self._joint_space.answer(targets, start, options, keep_mode=keep_mode)
-        rows, coordinates = new_rows(self.model, len(targets)), np.empty((len(targets), begin.shape[1]))
-        n_missed = self._run(
-            question_of(start is not None, keep_mode, nearby=nearby), options, targets, begin, coordinates, rows
-        )
-        answers = Configurations(rows, coordinates)
-        failed = np.flatnonzero(rows.status > PROJECTED) if n_missed else np.zeros(0, np.intp)
+        n_missed, answers = self._run(question_of(start is not None, keep_mode, nearby=nearby), options, targets, begin)
+        failed = np.flatnonzero(answers.rows.status > PROJECTED) if n_missed else np.zeros(0, np.intp)
         if len(failed):
             block = start if start is None or len(start) == 1 else start.at(failed)
             fallback = self._joint_space.answer(targets[failed], block, options, keep_mode=keep_mode)
             answers = answers.with_rows(failed, fallback)
         return answers
+
+    @cached_property
+    def _kernel(self) -> Callable[..., int]:
+        from ..kernels.chains.answer_chains import answer_chains
+
+        return answer_chains
 
     def _run(
         self,
@@ -85,54 +91,54 @@ class ChainEngine(Engine):
         options: Options,
         targets: Floats,
         starts: Floats,
-        coordinates: Floats,
-        rows: Rows,
-    ) -> int:
-        """Answer targets (n, 4, 4) from joint coordinates (n or 1, columns), as of the kernel; how many are missed."""
-        from ..kernels.chains.answer_chains import answer_chains
+        *,
+        follows: bool = False,
+        scratch: Handle[ChainScratch] | None = None,
+    ) -> tuple[int, Configurations]:
+        """How many targets (n, 4, 4) are not reached from joint coordinates (n or 1, columns), and all answers."""
+        model, n = self.model, len(targets)
+        rows, coordinates, tables = new_rows(model, n), np.empty((n, starts.shape[1])), tables_of(model, options)
+        used = scratch or scratch_of_chain(model)
 
-        tables, scratch = tables_of(self.model, options), scratch_of_chain(self.model)
+        def call(*arrays: Any) -> int:  # each thread has its own scratch memory
+            return self._kernel(tables.address, used.address, question.address, follows, *arrays)
 
-        def run(targets: Floats, starts: Floats, coordinates: Floats, rows: Rows) -> int:
-            addresses = tables.address, scratch.address, question.address
-            return answer_chains(
-                *addresses,
-                targets,
-                starts,
-                coordinates,
-                rows.status,
-                rows.counters,
-                rows.poses,
-                rows.actuators,
-                rows.measures,
-            )
-
-        if len(targets) == 1 or question.record.asked["follows"][0]:
-            return run(targets, starts, coordinates, rows)
-
-        def run_block(block: slice) -> int:
+        def run(block: slice) -> int:
             begin = starts[block] if len(starts) > 1 else starts
-            return run(targets[block], begin, coordinates[block], take(rows, block))
+            return call(targets[block], begin, coordinates[block], *take(rows, block))
 
-        return sum(in_blocks(run_block, len(targets), ROWS_A_BLOCK))
+        if n == 1 or follows:
+            n_missed = call(targets, starts, coordinates, *rows)
+        else:
+            n_missed = sum(in_blocks(run, n, ROWS_A_BLOCK))
+        return n_missed, Configurations(rows, coordinates)
+
+    def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
+        """As `Engine.prepared`; None if joints beside the chain do not keep their limits at the start."""
+        begin = self._home if start is None else start.coordinates
+        if not self._are_idle_within(begin):
+            return None
+        question, tables = question_of(start is not None, keep_mode, last=BY_LEGS), tables_of(self.model, USUAL)
+        scratch = Handle(new_scratch(self.model, 0))
+        addresses = tables.address, scratch.address, question.address, False
+        return partial(self._kernel, *addresses, target, begin, np.empty_like(begin), *rows), (
+            scratch,
+            tables,
+            question,
+        )
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Iterator[Attempt]:
         """As `InverseEngine.attempts`: those of the chain, then of the fallback where these have no end."""
-        from ..kernels.chains.answer_chains import answer_chains
-
-        model, begin, is_answered = self.model, joint_coordinates(self.model, start), False
+        model, begin, rows = self.model, joint_coordinates(self.model, start), None
         if self._are_idle_within(begin):
-            scratch, tables = Handle(new_scratch(model, MOST_NOTED)), tables_of(model, options)
-            question, rows = question_of(start is not None, keep_mode), new_rows(model, 1)
-            addresses = tables.address, scratch.address, question.address
-            answer_chains(*addresses, target, begin, np.empty_like(begin), *rows)
-            is_answered = bool(rows.status[0] <= PROJECTED)
-            noted = scratch.record.log[: scratch.record.effort["searches"][0]]
+            scratch, holds = Handle(new_scratch(model, MOST_NOTED)), tables_of(model, options).record.holds
+            _, answer = self._run(question_of(start is not None, keep_mode), options, target, begin, scratch=scratch)
+            rows, noted = answer.rows, scratch.record.log[: scratch.record.effort["searches"][0]]
             for phase, searches in groupby(noted, lambda each: int(each["phase"])):
-                yield from _told(model, np.array(list(searches)), int(tables.record.holds[phase]), int(rows.holds[0]))
-        if not is_answered:
+                yield from _told(model, np.array(list(searches)), int(holds[phase]), int(rows.holds[0]))
+        if rows is None or rows.status[0] > PROJECTED:
             yield from self._joint_space.attempts(target, start, options, keep_mode=keep_mode)
 
     def follow(
@@ -167,24 +173,15 @@ class ChainEngine(Engine):
 
     def _follow_some(self, targets: Floats, start: Configurations | None, options: Options) -> Configurations:
         """The answers to the first targets of a path, up to one that is not reached."""
-        begin, rows = joint_coordinates(self.model, start), new_rows(self.model, len(targets))
-        status, answers = rows.status, Configurations(rows, np.empty((len(targets), begin.shape[1])))
-        self._run(
-            question_of(start is not None, True, nearby=True, follows=True),
-            options,
-            targets,
-            begin,
-            answers.coordinates,
-            rows,
-        )
+        question, begin = question_of(start is not None, True, nearby=True), joint_coordinates(self.model, start)
+        _, answers = self._run(question, options, targets, begin, follows=True)
+        status = answers.rows.status
         n = 1 + int(np.argmax(np.append(status[:-1] != REACHED, True)))
         if status[n - 1] <= PROJECTED:
             return answers.at(np.arange(n))
-        return (
-            answers.at(np.arange(n - 1))
-            if n > 1
-            else self.answer(targets[:1], start, options, keep_mode=True, nearby=True)
-        )
+        if n > 1:
+            return answers.at(np.arange(n - 1))
+        return self.answer(targets[:1], start, options, keep_mode=True, nearby=True)
 
     def _follow_bent(
         self, target: Floats, start: Configurations | None, options: Options, bent: BentConfiguration

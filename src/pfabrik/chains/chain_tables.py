@@ -9,8 +9,9 @@ import numpy as np
 from ..closure.projection import projection_modes
 from ..derived import derived
 from ..description.home_mobility import column_moves
-from ..kernels.chains.chain_records import COLUMN, MACHINE, QUESTION, ChainTables, Question
+from ..kernels.chains.chain_records import COLUMN, MACHINE, ChainTables
 from ..kernels.handle import Handle
+from ..kernels.platform.tables import BY_LEGS, NEAREST, QUESTION, Question
 from ..kernels.projecting import UNBOUNDED
 from ..kernels.rows import HOLD_NOTHING
 from ..model import Model
@@ -41,10 +42,12 @@ farther away before."""
 
 
 @lru_cache(maxsize=16)
-def question_of(has_start: bool, keeps_mode: bool, *, nearby: bool = False, follows: bool = False) -> Handle[Question]:
-    """What is asked of all rows."""
+def question_of(
+    has_start: bool, keeps_mode: bool, *, nearby: bool = False, last: int = NEAREST, seeds: int = UNBOUNDED
+) -> Handle[Question]:
+    """What is asked of all rows: BY_LEGS to reach targets only, else the nearest, from so many seeds at most."""
     asked = np.zeros(1, QUESTION)
-    asked[0] = has_start, keeps_mode, nearby, follows, UNBOUNDED
+    asked[0] = False, BY_LEGS, last, has_start, keeps_mode, nearby, seeds, UNBOUNDED, UNBOUNDED, 0.0
     return Handle(Question(asked))
 
 

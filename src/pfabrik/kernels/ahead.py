@@ -84,7 +84,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (assemble, tuple(_values("i i F2 i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),
     (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
-    (answer_chains, tuple(_values("i i i F3 F2 f2 i1 i2 f3 f2 f2"))),
+    (answer_chains, tuple(_values("i i i b F3 F2 f2 i1 i2 f3 f2 f2"))),
     (measure_home, tuple(_values("f1 i f1 i1"))),
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),

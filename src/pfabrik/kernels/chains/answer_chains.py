@@ -9,6 +9,7 @@ from .._jit import routine, search
 from ..closure.loops import SIGHT
 from ..legs.complete_poses import is_pose, orthonormalise
 from ..platform.answer_row import errors
+from ..platform.tables import BY_LEGS
 from ..rows import (
     FAILED,
     HOLD,
@@ -38,6 +39,7 @@ def answer_chains(
     tables_address: int,
     scratch_address: int,
     question_address: int,
+    follows: bool,
     targets: Floats,
     starts: Floats,
     coordinates: Floats,
@@ -52,20 +54,21 @@ def answer_chains(
     Parameters
     ----------
     tables_address, scratch_address, question_address : of `ChainTables`, of `ChainScratch`, and of a QUESTION.
+    follows : each row starts from the answer to the one before, up to one that is not reached.
     starts : joint coordinates, deviations from home, one row for each target or one for all [length or rad].
     coordinates : of the answers, (n, columns) [length or rad].
     status, counters, poses, actuators, measures : as in `Rows`.
 
     Returns
     -------
-    The number of rows that are not REACHED. If each starts from the one before, rows after the first such are left out.
+    The number of rows that are not REACHED.
     """
     tables, s, question = (
         open_tables(tables_address),
         open_chain_scratch(scratch_address),
         open_question(question_address).asked[0],
     )
-    n_missed, follows = 0, question["follows"] == 1
+    n_missed = 0
     for row in range(targets.shape[0]):
         if follows and row > 0:
             copy_row(coordinates[row - 1], coordinates[row])
@@ -117,6 +120,8 @@ def answer_chain(
     copy_table(s.X, s.start_X)
     error, hold = reach(tables, question, s), HOLD_NOTHING
     if is_clipped or error > tables.machine[0]["met"]:
+        if question["last"] == BY_LEGS:
+            return PENDING
         copy_chain_state(s.nearest, s.own)
         distance, hold = project(tables, question, has_start, s)
         if distance == math.inf:

@@ -71,23 +71,6 @@ COLUMN = np.dtype(
 )
 """A coordinate of a joint, beside the chain too."""
 
-QUESTION = np.dtype(
-    [
-        ("has_start", "i8"),  # 1: the start was given, 0: it is home
-        ("keeps_mode", "i8"),  # 1: answers are in the working mode of the start
-        ("is_nearby", "i8"),  # 1: as along a path, searches stay around the start
-        ("follows", "i8"),  # 1: each row starts from the answer to the one before, up to one that is not reached
-        ("effort", "i8"),  # steps of all searches for a row after which no further one begins
-    ]
-)
-"""What is asked of all rows."""
-
-
-class Question(NamedTuple):
-    """What is asked of targets."""
-
-    asked: Records  # (1,): QUESTION
-
 
 class ChainTables(NamedTuple):
     """All that is needed to answer targets."""

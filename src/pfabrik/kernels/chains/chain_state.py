@@ -14,8 +14,9 @@ from ...arrays import Floats, Ints, Records
 from .._jit import opener
 from ..closure.loops import BALL
 from ..closure.pose_objective import PoseGradient
+from ..platform.tables import QUESTION, Question
 from ..projecting import ATTEMPT, EFFORT, TALLY
-from .chain_records import COLUMN, MACHINE, QUESTION, SEEDS, ChainTables, Question, SerialChain
+from .chain_records import COLUMN, MACHINE, SEEDS, ChainTables, SerialChain
 
 
 class ChainState(NamedTuple):

@@ -75,7 +75,7 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
     farther than one step, by way of others between.
     """
     if question["keeps_mode"] == 0:
-        return reach_in_any_mode(tables, s)
+        return reach_in_any_mode(tables, question["seeds"], s)
     chain, objective = tables.chain, objective_of(tables, 0)
     copy_chain_state(s.start, s.state)
     least = reach_from(tables, objective, -1, s)
@@ -106,10 +106,10 @@ def reach_from(tables: ChainTables, objective: PoseObjective, seed: int, s: Chai
 
 
 @routine
-def reach_in_any_mode(tables: ChainTables, s: ChainScratch) -> float:
-    """`reach` from the start and from the seeds nearest to the target."""
+def reach_in_any_mode(tables: ChainTables, most: int, s: ChainScratch) -> float:
+    """`reach` from the start and from the seeds nearest to the target, at most so many."""
     objective, least = objective_of(tables, 0), math.inf
-    tries = 0 if is_beyond(tables, s) else tables.machine[0]["tries"]
+    tries = 0 if is_beyond(tables, s) else min(most, tables.machine[0]["tries"])
     n_seeds = len(tables.seeds) if tries > 0 else 0
     limit, is_tried = 0.0, False
     if tries > 0:
@@ -170,7 +170,7 @@ def project(tables: ChainTables, question: Record, has_start: bool, s: ChainScra
     last, weights, distance, hold = len(tables.holds) - 1, tables.weights, math.inf, HOLD_NOTHING
     machine, around = tables.machine[0], question["keeps_mode"] == 1
     n_seeds, agreements = machine["bends"] if around else machine["descents"], machine["agreements"]
-    n_seeds = 1 if question["is_nearby"] == 1 else n_seeds
+    n_seeds = min(n_seeds, 1 if question["is_nearby"] == 1 else question["seeds"])
     for aim in range(1, last + 1):
         if distance == math.inf:
             distance, hold = search_for(tables, aim, around, n_seeds, agreements, s), tables.holds[aim]
