@@ -18,14 +18,14 @@ from duals import dual, duals, on_duals
 from machines import EVERY, FILES, machine
 from pfabrik.decomposition.elementary_joints import NoLeg
 from pfabrik.kernels import vectors
-from pfabrik.kernels.legs import answer, endings, frames, pivots, rods
+from pfabrik.kernels.legs import answer, endings, frames, kinds, pivots, rods
 from pfabrik.kernels.legs import records as K
 from pfabrik.kernels.platform import equations, limits
 from pfabrik.model import model_of
 from pfabrik.platform.table import kernel_table, with_pointing_cones
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-MODULES = (vectors, endings, frames, pivots, rods, answer, equations, limits)
+MODULES = (vectors, endings, frames, pivots, rods, kinds, answer, equations, limits)
 LEAST_MARGIN = 1e-2
 """Singularity margin of a leg from which it is compared: nearer to dead points slopes grow without bound."""
 CLOSED = 1e-9
@@ -74,12 +74,11 @@ def evaluated(table: K.Table, pose: np.ndarray, choices: dict[str, set[bool]]) -
     with on_duals(MODULES, choices) as patch:
         equations.set_frames(state.pose, table.task[0], derived.frames)
         for k in range(len(legs)):
-            for name, place in (("evaluate_rod", rods.evaluate_rod), ("place_pivot", pivots.place_pivot)):
 
-                def noted(*given: Any, place: Any = place, k: int = k) -> None:
-                    margins[k] = dual(place(*given)).value
+            def noted(*given: Any, k: int = k) -> None:
+                margins[k] = dual(kinds.evaluate(*given)).value
 
-                patch.setattr(equations, name, noted)
+            patch.setattr(equations, "evaluate", noted)
             equations.evaluate_leg(table, k, equations.owner_of(table, k), state, derived)
     return hand, derived, margins
 
@@ -94,10 +93,10 @@ def assert_equal(hand: np.ndarray, derived: Any, of: str, motions: np.ndarray | 
 @pytest.mark.parametrize("name", [*EVERY, *FILES])
 def test_slopes_of_equations_and_limits_are_those_of_what_legs_compute(name: str) -> None:
     table = table_of(name)
-    legs, ends = table.legs, [*table.legs["first_row"][1:], table.task[0]["rows"]]
+    legs = table.legs
     for pose in poses_of(name):
         hand, derived, margins = evaluated(table, pose, {})
-        rows = [slice(leg["first_row"], end) for leg, end in zip(legs, ends, strict=True)]
+        rows = [slice(leg["first_row"], leg["first_row"] + leg["n_rows"]) for leg in legs]
         for k in np.flatnonzero(margins > LEAST_MARGIN):
             for slope, row in zip(hand.slopes[rows[k]], derived.rows[rows[k]], strict=True):
                 assert_equal(slope, row, f"constraint of leg {k}")

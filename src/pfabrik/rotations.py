@@ -31,6 +31,17 @@ def _within_a_turn(vectors: Floats) -> Floats:
     return np.asarray(axes / np.maximum(sizes, np.finfo(float).tiny) * turns)
 
 
+def whole_turns(angles: Floats, to: Floats | float = 0.0) -> Floats:
+    """The whole turns that bring angles nearest to others [rad]."""
+    return np.asarray(2.0 * np.pi * np.round((to - angles) / (2.0 * np.pi)))
+
+
+def nearest_turn(angles: Floats, to: Floats | float = 0.0, lo: float = -np.inf, hi: float = np.inf) -> Floats:
+    """Angles moved by whole turns to where they are nearest to others; as they were where that is out of a range."""
+    turned = angles + whole_turns(angles, to)
+    return np.where((turned >= lo) & (turned <= hi), turned, angles)
+
+
 MANY_TURNS = 1e6
 """Length beyond which whole turns are left out of a rotation vector [rad]."""
 

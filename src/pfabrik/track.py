@@ -28,6 +28,7 @@ from .model import model_of
 from .motion.singularities import assembly_signs
 from .options import Options, checked_options
 from .poses import between
+from .rotations import whole_turns
 from .targets import Target, as_targets, refuse_invalid
 from .tolerances import TOLERANCES
 
@@ -166,6 +167,6 @@ def _continue_turns(mechanism: Mechanism, rows: Rows, start: Floats) -> None:
         if drive.kind != "angle" or high - low <= 2.0 * np.pi or not len(valid):
             continue
         values = rows.actuators[valid, column]
-        values += 2.0 * np.pi * np.round((start[column] - values[0]) / (2.0 * np.pi))
+        values += whole_turns(values[0], start[column])
         if (values >= low - TOLERANCES.limit).all() and (values <= high + TOLERANCES.limit).all():
             rows.actuators[valid, column] = values

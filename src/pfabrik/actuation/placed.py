@@ -21,6 +21,7 @@ from ..motion.joint_path import JointPath
 from ..options import Options
 from ..platform.coordinates import read_coordinates
 from ..platform.jacobians import actuator_slopes
+from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .assembly_mode import AssemblyMode
 from .task_path import Coordinates, TaskPath
@@ -260,7 +261,7 @@ class Placer:
         """True where a solution has coordinates q (n, k); turns without a range may differ by whole turns."""
         gaps = self.values(solution) - q
         turns = np.array(self.coordinates.is_angle) & ~np.isfinite(self.coordinates.high - self.coordinates.low)
-        gaps[:, turns] -= 2.0 * np.pi * np.round(gaps[:, turns] / (2.0 * np.pi))
+        gaps[:, turns] = nearest_turn(gaps[:, turns])
         gaps[:, ~np.array(self.coordinates.is_angle)] /= self.mechanism.characteristic_length
         return np.asarray(np.abs(gaps).max(axis=1) <= TOLERANCES.same_mode)
 

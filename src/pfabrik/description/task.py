@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES
-from ..rotations import angles_between, from_rotvec, shortest_turns, yaws
+from ..rotations import angles_between, from_rotvec, nearest_turn, shortest_turns, yaws
 from .joint_types import TASK_TURNS
 from .mechanism import Mechanism
 
@@ -93,8 +93,7 @@ class Task:
     @staticmethod
     def _yaw_errors(poses: Floats, others: Floats) -> Floats:
         """By how much poses yaw more than others, within half a turn, (n,) [rad]."""
-        angles = yaws(poses[:, :3, :3]) - yaws(others[:, :3, :3])
-        return np.asarray(angles - 2.0 * np.pi * np.round(angles / (2.0 * np.pi)))
+        return nearest_turn(yaws(poses[:, :3, :3]) - yaws(others[:, :3, :3]))
 
 
 @derived

@@ -18,7 +18,7 @@ from ..kernels.legs import records as K
 from ..model import model_of
 from ..motion.mobility import generic_of
 from ..platform.links_of_legs import keeps_links
-from ..rotations import square_to
+from ..rotations import nearest_turn, square_to
 from .exported_links import ExportedLinks, exported_links
 
 Number = float | Floats
@@ -141,8 +141,8 @@ class Machine:
     def largest_difference(self, actuators: Floats, others: Floats) -> Floats:
         """The largest difference between two arrays of actuators (n, n_a), modulo whole turns, (n,) [L or rad]."""
         difference, size = actuators - others, self.mechanism.characteristic_length
-        wrapped = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
-        difference = np.where([coordinate.is_length for coordinate in self.driven], difference / size, wrapped)
+        is_length = [coordinate.is_length for coordinate in self.driven]
+        difference = np.where(is_length, difference / size, nearest_turn(difference))
         return np.asarray(np.abs(difference).max(axis=1))
 
 

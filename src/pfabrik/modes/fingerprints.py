@@ -13,6 +13,7 @@ from ..description.mechanism import Mechanism
 from ..motion.closure import Closure
 from ..motion.displacements import centres, columns
 from ..motion.limited_coordinates import within_turns
+from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .lists import ALONG
 
@@ -168,6 +169,5 @@ def count_from_home(closure: Closure, coordinates: Floats) -> None:
     for name, span in columns(closure.mechanism).items():
         if closure.mechanism.joint(name).type == "spherical":
             turns[span] = False
-    angles = coordinates[:, turns]
-    coordinates[:, turns] = angles - 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
+    coordinates[:, turns] = nearest_turn(coordinates[:, turns])
     within_turns(closure.mechanism, coordinates)

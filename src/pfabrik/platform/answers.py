@@ -15,6 +15,7 @@ from ..closure.configurations import Configurations, Places
 from ..derived import derived
 from ..kernels.rows import Rows
 from ..model import Model
+from ..rotations import nearest_turn
 from .coordinates import joint_coordinates, read_coordinates
 
 MOST_LAYERS = 16
@@ -140,9 +141,7 @@ def sides_at(model: Model, start: Configurations) -> Floats:
             candidate[:, two_sided[group]] *= factor
             read_coordinates(table, start.rows.poses, candidate, candidate_q)
             difference = candidate_q[:, columns] - q[:, columns]
-            errors.append(
-                np.abs(np.where(is_angle, np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi, difference))[:, group]
-            )
+            errors.append(np.abs(np.where(is_angle, nearest_turn(difference), difference))[:, group])
         sides[:, two_sided[group]] *= np.where(errors[0] <= errors[1], 1.0, -1.0)
     return sides
 

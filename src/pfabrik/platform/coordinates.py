@@ -12,6 +12,7 @@ from ..derived import derived
 from ..model import Model
 from ..motion.closure import Closure
 from ..motion.limited_coordinates import within_turns
+from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .table import reading_scratch, reading_table
 
@@ -54,7 +55,7 @@ def joint_coordinates(
     coordinates = _closed(closure, _known_columns(table), poses, actuators, coordinates)
     if start is not None:
         angles = np.setdiff1d(table.known["column"][table.known["turns"] == 1], closure.actuated)
-        coordinates[:, angles] += 2.0 * np.pi * np.round((start - coordinates)[:, angles] / (2.0 * np.pi))
+        coordinates[:, angles] = nearest_turn(coordinates[:, angles], start[:, angles])
     within_turns(model.mechanism, coordinates)
     return coordinates
 

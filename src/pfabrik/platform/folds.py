@@ -11,6 +11,7 @@ from ..arrays import Floats, Mask
 from ..closure.configurations import Configurations, new_rows
 from ..derived import derived
 from ..model import Model
+from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, columns_of_sides, sides_at
 from .coordinates import read_coordinates
@@ -61,7 +62,7 @@ def _folded(model: Model, poses: Floats, sides: Floats) -> Mask:
             candidate = sides.copy()
             candidate[:, two_sided[group]] *= factor
             read_coordinates(table, poses, candidate, values)
-        turns = np.where(model.path_closure.turning[columns] > 0.0, 2.0 * np.pi, np.inf)
-        apart = np.abs(np.subtract(*q)[:, columns])
-        folded[:, two_sided[group]] = (np.minimum(apart, np.abs(turns - apart)) <= TOLERANCES.same_mode)[:, group]
+        apart = np.subtract(*q)[:, columns]
+        apart = np.where(model.path_closure.turning[columns] > 0.0, nearest_turn(apart), apart)
+        folded[:, two_sided[group]] = (np.abs(apart) <= TOLERANCES.same_mode)[:, group]
     return folded

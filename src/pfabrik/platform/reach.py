@@ -17,6 +17,7 @@ from ..kernels.threads import in_blocks
 from ..model import Model
 from ..options import Options
 from ..poses import between
+from ..rotations import nearest_turn
 from .redundant_joints import split_by_redundant, step_redundant_joints
 from .rows_one_by_one import Answers, answer_phases, request_from
 from .table import TableHandle, legs_at_rest, local_table, table_handle
@@ -179,9 +180,8 @@ def count_turns(model: Model, start_values: Floats, rows: Rows) -> None:
         is_solved = rows.status != PENDING
         values, previous = rows.actuators[is_solved, driven["column"]], start_values[:, driven["column"]]
         previous = previous if len(start_values) == 1 else previous[is_solved]
-        nearest = values - 2.0 * np.pi * np.round((values - previous) / (2.0 * np.pi))
-        is_inside = (nearest >= driven["home"] + driven["lo"]) & (nearest <= driven["home"] + driven["hi"])
-        rows.actuators[is_solved, driven["column"]] = np.where(is_inside, nearest, values)
+        lo, hi = driven["home"] + driven["lo"], driven["home"] + driven["hi"]
+        rows.actuators[is_solved, driven["column"]] = nearest_turn(values, previous, lo, hi)
 
 
 def turns_repeatedly(table: LegTable) -> bool:
