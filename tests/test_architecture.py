@@ -273,3 +273,14 @@ def test_the_guide_names_every_file_that_asks_for_the_kind_of_a_leg() -> None:
     }
     assert asking <= named, sorted(asking - named)
     assert all((PACKAGE / name).exists() for name in named)
+
+
+def test_each_kind_of_leg_answers_what_kinds_ask() -> None:
+    """A question that is put to rods is put to pivots, and their files answer it; redundant joints have no rows."""
+    folder = PACKAGE / "kernels" / "legs"
+    asked = re.findall(r"^from \.(\w+) import (.*)$", (folder / "kinds.py").read_text(encoding="utf-8"), re.MULTILINE)
+    questions = {
+        kind: {name.replace(kind, "*") for _, names in asked for name in names.split(", ") if kind in name.split("_")}
+        for kind in ("rod", "pivot")
+    }
+    assert questions["rod"] == questions["pivot"] == {"place_*", "*_rows", "*_slopes"}

@@ -76,9 +76,9 @@ def evaluated(table: K.Table, pose: np.ndarray, choices: dict[str, set[bool]]) -
         for k in range(len(legs)):
 
             def noted(*given: Any, k: int = k) -> None:
-                margins[k] = dual(kinds.evaluate(*given)).value
+                margins[k] = dual(kinds.place_leg(*given)).value
 
-            patch.setattr(equations, "evaluate", noted)
+            patch.setattr(equations, "place_leg", noted)
             equations.evaluate_leg(table, k, equations.owner_of(table, k), state, derived)
     return hand, derived, margins
 

@@ -25,7 +25,7 @@ def leg_that_restricts(table: LegTable, shifts: Floats, turns: Floats) -> int:
     owner = 0
     for k, leg in enumerate(table.legs):
         owner = owner if leg["proximal"] == K.SHARED else k
-        is_known = leg["frame"] in (0, 1) and not table.is_redundant[k]
+        is_known = leg["frame"] in (0, 1) and leg["kind"] in (K.ROD, K.PIVOT)
         if not is_known or not motion.keeps(leg, table.legs, owner) or not _has_bounds(table, k):
             return k
     return -1
@@ -48,7 +48,7 @@ def joints_without_bounds(table: LegTable) -> str:
         is_known = place in (K.Q_PROXIMAL, K.SLIDE) or ending == K.HINGE or (ending == K.CROSS and not leg["twists"])
         if leg["kind"] == K.PIVOT:
             is_known = place >= K.PLATFORM_END
-        if not is_known or table.is_redundant[coordinate["leg"]]:
+        if not is_known or leg["kind"] not in (K.ROD, K.PIVOT):
             names.append(table.limits[2 * i][0])
     return ", ".join(dict.fromkeys(names))
 

@@ -57,7 +57,7 @@ def _reaches(table: LegTable, rotation: Floats | None) -> list[tuple[Floats, Flo
     """M (k, 3), centre [L] and radius [L] of legs read from the base; without a rotation for any orientation."""
     reaches = []
     for k, leg in enumerate(table.legs):
-        if leg["frame"] != 0 or table.is_redundant[k]:
+        if leg["frame"] != 0:
             continue
         ranges = {
             int(each["place"]): max(abs(each["lo"]), abs(each["hi"])) for each in table.limited if each["leg"] == k
@@ -73,7 +73,7 @@ def _reaches(table: LegTable, rotation: Floats | None) -> list[tuple[Floats, Flo
                 if math.isfinite(bound := ranges.get(K.PLATFORM_END + i, math.inf)):
                     radius = bound + slack * float(np.linalg.norm(row))
                     reaches.append((row[None], leg["base_end_point"] - point, radius))
-        elif (reach := _reach_of(leg, ranges)) is not None:
+        elif leg["kind"] == K.ROD and (reach := _reach_of(leg, ranges)) is not None:
             M, centre, radius = reach
             reaches.append((M, centre - point, radius + slack))
     return reaches

@@ -20,19 +20,24 @@ NUMBERS_PER_LINE = 6
 """Most numbers of a record in a line."""
 
 
+def fields_read(text: str) -> set[str]:
+    """The fields of structs that C text reads."""
+    return set(re.findall(r"(?:->|\.)(\w+)", text))
+
+
 class StaticData:
     """Static data of a file: tables are constants, all other arrays memory of calls.
 
     Parameters
     ----------
     program : the translated program.
-    text : the translated program: arrays that it does not read are left out.
+    text : the translated program: arrays, and fields of records, that it does not read are left out.
     size : bytes of a real number.
     """
 
     def __init__(self, program: Any, text: str, size: int) -> None:
         self._program, self._size = program, size
-        self._fields = set(re.findall(r"(?:->|\.)(\w+)", text))
+        self._fields = fields_read(text)
         self.n_constant = self.n_memory = 0  # bytes
         self._arrays: dict[int, tuple[str, Any]] = {}  # by identity, with the array, so that it stays alive
         self.lines = ["static double pfk_nothing[1]; /* where there are no numbers */"]
@@ -57,7 +62,10 @@ class StaticData:
             return
         name = f"pfk_{path.replace('.', '_')}"
         self._arrays[id(array)] = name, array
-        element, fields = self._element(array), [array.dtype[name] for name in array.dtype.names or ()] or [array.dtype]
+        element = self._element(array)
+        if read := [field for field in array.dtype.names or () if self._is_read(f".{field}")]:
+            array = array[read]
+        fields = [array.dtype[field] for field in array.dtype.names or ()] or [array.dtype]
         size = array.size * sum(each.itemsize // 8 * (self._size if each.base.kind == "f" else 4) for each in fields)
         self.n_constant, self.n_memory = self.n_constant + is_constant * size, self.n_memory + (not is_constant) * size
         qualifier = "static const" if is_constant else "static"

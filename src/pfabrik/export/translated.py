@@ -21,7 +21,7 @@ from ..kernels.platform.search_records import SETTINGS
 from ..kernels.platform.tables import MACHINE
 from ..to_c import Program
 from .controller_tables import ASKED, ControllerTables
-from .static_data import StaticData
+from .static_data import StaticData, fields_read
 from .wording import Precision
 
 SINGLE = {
@@ -89,7 +89,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
             assert made.name == kernel.__name__ and not made.allocates, made.name
             names.append(made.name)
     used = f"int {', '.join(names)};\n"
-    text = program.text(used).removesuffix(used)
+    text = _without_unread(program.text(used).removesuffix(used))
     data = _data(tables, program, text, precision)
     lines = _prefixed("\n".join(data.lines), program)
     return Translated(_own(_prefixed(text, program)), lines, data.n_constant, data.n_memory)
@@ -132,6 +132,18 @@ def _parts(value: Any) -> Iterator[Any]:
         yield value
         for item in value:
             yield from _parts(item)
+
+
+def _without_unread(text: str) -> str:
+    """C text without the fields of records that it does not read."""
+    read = fields_read(text)
+
+    def shortened(struct: re.Match[str]) -> str:
+        fields = re.sub(r"    \w+ (\w+).*\n", lambda field: field[0] if field[1] in read else "", struct[1])
+        return struct[0].replace(struct[1], fields or struct[1])
+
+    records = "|".join(sorted(Program().records.values()))
+    return re.sub(rf"typedef struct \{{\n([^{{}}]*)\}} (?:{records});\n", shortened, text)
 
 
 def _data(tables: ControllerTables, program: Program, text: str, precision: Precision) -> StaticData:

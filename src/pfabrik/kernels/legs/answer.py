@@ -16,7 +16,7 @@ from ..vectors import copy_row, cross, dot, move, norm, put, scale, vec, wrap_in
 from .complete_poses import read_target, set_yaw, turn_pose
 from .endings import LEAST_MARGIN
 from .frames import new_frames, orienting_coordinate, q_redundant_of, redundant_slope, set_frames
-from .kinds import evaluate, leg_rows, leg_slopes
+from .kinds import leg_rows, leg_slopes, place_leg
 from .open_table import open_table
 from .pivots import any_across
 from .records import N_VALUES, SHARED, Table
@@ -80,7 +80,7 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
             margin = solve_proximal(leg, move(frame, vec(leg["platform_end_point"])), sides[k], values[k])
         if leg["orients"] == 1:
             q, margin = orienting_coordinate(leg, legs[k + 1], frame, q)
-        margin = min(margin, evaluate(legs, k, owner, q, sides[k], frames, values, lines))
+        margin = min(margin, place_leg(legs, k, owner, q, sides[k], frames, values, lines))
         singularity_margin = min(singularity_margin, margin)
         margin_of_rows = min(margin_of_rows, margin) if leg["has_rows"] == 1 else margin_of_rows
     return singularity_margin, margin_of_rows

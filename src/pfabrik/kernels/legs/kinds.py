@@ -10,7 +10,7 @@ from .._jit import routine
 from .frames import place_redundant, q_redundant_of
 from .pivots import pivot_rows, pivot_slopes, place_pivot
 from .records import PIVOT, REDUNDANT, ROD
-from .rods import evaluate_rod, rod_rows, rod_slopes
+from .rods import place_rod, rod_rows, rod_slopes
 
 
 @routine
@@ -21,7 +21,7 @@ def place_frame(legs: Records, k: int, q: Floats, frames: Floats, values: Floats
 
 
 @routine
-def evaluate(
+def place_leg(
     legs: Records, k: int, owner: int, q: float, side: float, frames: Floats, values: Floats, lines: Floats
 ) -> float:
     """Fill the values of a leg at a pose; the singularity margin.
@@ -34,7 +34,7 @@ def evaluate(
     """
     leg, frame = legs[k], frames[legs[k]["frame"]]
     if leg["kind"] == ROD:
-        return evaluate_rod(leg, legs[owner], frame, values[owner], values[k], lines[k])
+        return place_rod(leg, legs[owner], frame, values[owner], values[k], lines[k])
     if leg["kind"] == PIVOT:
         return place_pivot(leg, frame, side, values[k])
     if leg["kind"] == REDUNDANT:

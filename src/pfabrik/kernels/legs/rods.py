@@ -86,7 +86,7 @@ def turned_by_proximal(proximal: Record, values: Floats, v: Vec, sense: float) -
 
 
 @routine
-def evaluate_rod(
+def place_rod(
     rod: Record, proximal: Record, frame: Floats, proximal_values: Floats, values: Floats, line: Floats
 ) -> float:
     """Fill the values of a rod and its `line` from base end to platform end; the singularity margin.

@@ -25,7 +25,7 @@ from ..legs.frames import (
     redundant_slope,
     set_frames,
 )
-from ..legs.kinds import evaluate, leg_rows, place_frame
+from ..legs.kinds import leg_rows, place_frame, place_leg
 from ..legs.pivots import pivot_slopes
 from ..legs.records import (
     COSINE,
@@ -144,7 +144,7 @@ def evaluate_leg(table: Table, k: int, owner: int, state: PlatformState, leg_eva
     if has_proximal(legs[k]):
         values[k, Q_PROXIMAL] = state.q[k]
         values[k, COSINE], values[k, SINE] = math.cos(state.q[k]), math.sin(state.q[k])
-    evaluate(legs, k, owner, q_redundant_of(legs, k, state.q), state.sides[k], frames, values, lines)
+    place_leg(legs, k, owner, q_redundant_of(legs, k, state.q), state.sides[k], frames, values, lines)
     leg_rows(legs, k, owner, frames, values, lines, rows)
     if has_proximal(legs[k]):
         rows[length_row(table, k)] = values[k, SLIDE]
