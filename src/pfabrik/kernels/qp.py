@@ -159,9 +159,10 @@ def drop(p: QP, n: int, m: int, a: int) -> None:
 def take_up(p: QP, n: int, kept: int, m: int, c: int, violation: float) -> int:
     """Make limit `c` active; the number of active limits, or -1 if it contradicts the others.
 
-    The first `kept` active ones are equations, which are never dropped.
+    Then the multipliers are those of the contradiction, if it is none of rounding: G^T m = 0 and h m > 0. The first `kept` active ones are
+    equations, which are never dropped.
     """
-    multiplier = 0.0
+    multiplier, is_rounding = 0.0, violation <= ROUNDED
     for _change in range(4 * n + 4):
         rate = divide(p, n, m, c)
         leaving, limit = -1, math.inf
@@ -170,7 +171,12 @@ def take_up(p: QP, n: int, kept: int, m: int, c: int, violation: float) -> int:
                 leaving, limit = a, p.multipliers[p.active[a]] / p.share[a]
         full = violation / rate if rate > 0.0 else math.inf
         length = min(limit, full)
+        if length == math.inf and is_rounding:
+            return -1
         if length == math.inf:
+            for a in range(m):
+                p.multipliers[p.active[a]] = -p.share[a]
+            p.multipliers[c] = 1.0
             return -1
         for a in range(m):
             p.multipliers[p.active[a]] -= length * p.share[a]

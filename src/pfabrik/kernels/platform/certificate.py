@@ -26,7 +26,6 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES
 from ..free_motions import put_multipliers
@@ -46,6 +45,7 @@ from ..legs.records import (
     SLIDE,
     Table,
 )
+from ..sqp import note_multipliers, sum_of_multipliers
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
 from .lagrangian import put_limited_gradient
@@ -53,6 +53,12 @@ from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction
 from .linearise import linearise
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
+
+CONTRADICTING = 1e-6
+"""Least excess that proves a contradiction, in units of the sum of its multipliers [L or rad]."""
+
+FARTHEST = 1e2
+"""How far from a contradiction positions are thought to be [L]: as far as targets are sought."""
 
 NEARER = 1e-7
 """Relative error of the squared distance up to which the end of a search counts as nearest."""
@@ -85,30 +91,59 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
     nearer = NEARER * dot(gradient, gradient) / unit
     total, pushing, shares = gradient, 0.0, 0.0
     for root in range(table.legs.shape[0]):
-        leg_force, push, share = leg_share(table, root, nearer, search)
+        leg_force, push, share, _ = leg_share(table, root, nearer, BALANCED, search)
         total, pushing, shares = add(total, leg_force), pushing + push, shares + share
     return bool(norm(total) <= BALANCED * norm(gradient) and shares < unit - pushing)
 
 
 @routine
-def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> tuple[Vec, float, float]:
-    """Force, push and share of the rods that reach the base by one leg, as found by `path_to_base`.
+def is_held_nowhere(table: Table, objective: PlatformObjective, search: SearchScratch) -> bool:
+    """True if no feasible configuration has the rotation of `search.best`, where the limits of a programme contradict.
+
+    The sum of the certificate without the distance is not positive for any feasible configuration. With the multipliers
+    of the contradiction it is positive here, and by the same bounds no less anywhere.
+    """
+    used, reduced, gradient = search.elimination.used, search.first, search.objective_gradient
+    if objective.pose.frame != BASE_AXES or objective.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
+        return False
+    note_multipliers(reduced.linear, search.p, search.hessian)
+    for j in range(gradient.shape[0]):
+        gradient[j] = 0.0
+    put_limited_gradient(table, search, search.here)
+    put_multipliers(search.here, reduced, search.equation_multipliers)
+    size = sum_of_multipliers(search.p.multipliers, reduced.linear.totals[0]["limits"])
+    total, pushing, shares, violated = ZERO, 0.0, 0.0, -CONTRADICTING * size
+    for root in range(table.legs.shape[0]):
+        leg_force, push, share, excess = leg_share(table, root, BALANCED * size, math.inf, search)
+        total, pushing, shares, violated = add(total, leg_force), pushing + push, shares + share, violated + excess
+    return bool(shares < -pushing and FARTHEST * norm(total) < violated)
+
+
+@routine
+def leg_share(
+    table: Table, root: int, nearer: float, slack: float, search: SearchScratch
+) -> tuple[Vec, float, float, float]:
+    """Force, push, share and excess of the rods that reach the base by one leg, as found by `path_to_base`.
 
     The force is that on the platform, the push the sum of the m_k, and the share what the leg's proximal joints need;
-    infinite if these joints may bring something nearer.
+    infinite if these joints may bring something nearer. The excess is the sum of the terms here.
+
+    Parameters
+    ----------
+    slack : of limits that take part; infinite if `search.best` is not feasible.
     """
-    leg_eval, force, pushing, moved = search.leg_eval, ZERO, 0.0, ZERO
+    leg_eval, force, pushing, moved, violated = search.leg_eval, ZERO, 0.0, ZERO, 0.0
     A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hinge, slide = -1, -1
     for k in range(root, table.legs.shape[0]):
         path_root, on_hinge, on_slide = path_to_base(table, k)
         if path_root != root:
             continue
-        m, at_base_end, at_platform_end = rod_multipliers(table, k, search)
+        m, at_base_end, at_platform_end, excess = rod_multipliers(table, k, slack, search)
         if m == 0.0 and norm(at_base_end) + norm(at_platform_end) == 0.0:
             continue
         if (hinge >= 0 and on_hinge not in (-1, hinge)) or (slide >= 0 and on_slide not in (-1, slide)):
-            return force, pushing, math.inf
+            return force, pushing, math.inf, 0.0
         axes = leg_eval.frames[table.legs[k]["frame"], AXES:]
         line, at_base_end, at_platform_end = (
             turn(axes, vec(leg_eval.lines[k])),
@@ -116,7 +151,7 @@ def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> 
             turn(axes, at_platform_end),
         )
         pull = along(scale(m, line), -1.0, at_platform_end)
-        force, pushing = add(force, sub(at_base_end, pull)), pushing + m
+        force, pushing, violated = add(force, sub(at_base_end, pull)), pushing + m, violated + excess
         axis, lever, slide_axis = ZERO, ZERO, ZERO
         if on_hinge >= 0:
             hinge, axis = on_hinge, axis_of(table, on_hinge, leg_eval)
@@ -136,7 +171,7 @@ def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> 
     if slide >= 0 and (b != 0.0 or push != 0.0):
         slack = (largest_cosine_term(table, slide, b, nearer, search) - push) * (0.5 if hinge >= 0 else 1.0)
         if slack <= 0.0:
-            return force, pushing, math.inf
+            return force, pushing, math.inf, 0.0
         share = push * push / slack
         if hinge >= 0:
             lowest, highest = travel_left(table, slide, search)
@@ -144,7 +179,7 @@ def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> 
     if hinge >= 0 and (A != 0.0 or B != 0.0):
         slack = largest_cosine_term(table, hinge, B, nearer, search) - A
         share = share + dot(moved, moved) / slack if slack > 0.0 else math.inf
-    return force, pushing, share
+    return force, pushing, share, violated
 
 
 @routine
@@ -189,8 +224,8 @@ def platform_end_from(table: Table, k: int, hinge: int, leg_eval: LegEvaluation)
 
 
 @routine
-def rod_multipliers(table: Table, k: int, search: SearchScratch) -> tuple[float, Vec, Vec]:
-    """Multiplier m of a rod's length, and the parts of b at its base end and at its platform end.
+def rod_multipliers(table: Table, k: int, slack: float, search: SearchScratch) -> tuple[float, Vec, Vec, float]:
+    """Multiplier m of a rod's length, the parts of b at its base end and at its platform end, and the terms here.
 
     Times the unit of the objective, in the body of the base end.
     """
@@ -213,17 +248,20 @@ def rod_multipliers(table: Table, k: int, search: SearchScratch) -> tuple[float,
             search.equation_multipliers[row],
             current_direction(table, k, owner, AT_PLATFORM_END, vec(leg["platform_end_axes"][0]), leg_eval),
         )
-    u = direction(leg_eval.lines[k])
+    u, excess = direction(leg_eval.lines[k]), 0.5 * pull * (length - leg["length"] * leg["length"] / length)
+    excess += dot(add(at_base_end, at_platform_end), vec(leg_eval.lines[k]))
     for i in range(table.limited.shape[0]):
         limited, at_lo, at_hi = table.limited[i], multipliers[2 * i], multipliers[2 * i + 1]
         if limited["leg"] != k or max(at_lo, at_hi) == 0.0:
             continue
         value, entry, sense = deviation(limited, leg_eval.values), limited["place"], limited["sense"]
-        at_lo = at_lo if value - limited["lo"] < BALANCED else 0.0
-        at_hi = at_hi if limited["hi"] - value < BALANCED else 0.0
+        at_lo = at_lo if value - limited["lo"] < slack else 0.0
+        at_hi = at_hi if limited["hi"] - value < slack else 0.0
         half = 0.5 * (limited["hi"] - limited["lo"])
         if entry == SLIDE:
+            bound = leg["length"] + sense * (limited["hi"] if at_hi > at_lo else limited["lo"])
             pull += sense * (at_hi - at_lo)
+            excess += 0.5 * sense * (at_hi - at_lo) * (length - bound * bound / length)
         elif half < math.pi and (
             (entry == BASE_END and leg["base_end"] == HINGE) or (entry == PLATFORM_END and leg["platform_end"] == HINGE)
         ):
@@ -237,31 +275,57 @@ def rod_multipliers(table: Table, k: int, search: SearchScratch) -> tuple[float,
                 current_direction(table, k, owner, end, vec(hinge[0]), leg_eval),
                 sense * (limited["lo"] + half - value),
             )
-            stretch, lengthwise, push = bound_by(leg, max(at_lo, at_hi) / length, half)
-            pull, at_platform_end = pull + stretch, along(at_platform_end, lengthwise, u)
+            angle = abs(value - limited["lo"] - half) if slack == math.inf else half
+            excess -= math.inf if abs(dot(u, middle) - math.cos(angle)) > BALANCED and slack == math.inf else 0.0
+            stretch, lengthwise, push, over = bound_by(table, k, max(at_lo, at_hi) / length, half, angle, length)
+            pull, excess, at_platform_end = pull + stretch, excess + over, along(at_platform_end, lengthwise, u)
             at_base_end = along(at_base_end, -push, middle) if end == AT_BASE_END else at_base_end
             at_platform_end = along(at_platform_end, -push, middle) if end == AT_PLATFORM_END else at_platform_end
     for i in range(table.cones.shape[0]):
         cone, push = table.cones[i], multipliers[2 * n_ranges + i]
-        if cone["leg"] != k or push == 0.0 or cone_slope(table, cone, leg_eval) < cone["half_angle"] - BALANCED:
+        if cone["leg"] != k or push == 0.0:
+            continue
+        angle = cone_slope(table, cone, leg_eval)
+        if angle < cone["half_angle"] - slack:
             continue
         end = AT_BASE_END if cone["place"] == BASE_LINE else AT_PLATFORM_END
         axis = current_direction(table, k, owner, end, vec(cone["axis"]), leg_eval)
-        stretch, lengthwise, push = bound_by(leg, push / length, cone["half_angle"])
-        pull, at_platform_end = pull + stretch, along(at_platform_end, lengthwise, u)
+        angle = angle if slack == math.inf else cone["half_angle"]
+        stretch, lengthwise, push, over = bound_by(table, k, push / length, cone["half_angle"], angle, length)
+        pull, excess, at_platform_end = pull + stretch, excess + over, along(at_platform_end, lengthwise, u)
         at_base_end = along(at_base_end, -push, axis) if end == AT_BASE_END else at_base_end
         at_platform_end = along(at_platform_end, -push, axis) if end == AT_PLATFORM_END else at_platform_end
-    return -pull / length, at_base_end, at_platform_end
+    return -pull / length, at_base_end, at_platform_end, excess
 
 
 @routine
-def bound_by(leg: Record, push: float, half_angle: float) -> tuple[float, float, float]:
-    """Pull along, push along, and push from the axis, of a rod kept within an angle from an axis."""
-    push /= max(math.sin(half_angle), BALANCED)
-    lengthwise = push * math.cos(half_angle)
-    if leg["slides"] == 0:
-        return lengthwise, 0.0, push
-    return 0.0, max(lengthwise, 0.0), push
+def bound_by(
+    table: Table, k: int, push: float, half_angle: float, angle: float, length: float
+) -> tuple[float, float, float, float]:
+    """Pull along, push along, push from the axis, and the term of a rod kept within an angle from an axis.
+
+    Parameters
+    ----------
+    angle, length : of the rod here.
+    """
+    push /= max(math.sin(angle), BALANCED)
+    lengthwise, within, here = push * math.cos(angle), push * math.cos(half_angle), push * math.cos(angle)
+    if table.legs[k]["slides"] == 0:
+        rest = table.legs[k]["length"]
+        return lengthwise, 0.0, push, within * rest - here * length + 0.5 * lengthwise * (length - rest * rest / length)
+    return 0.0, max(lengthwise, 0.0), push, (within - here) * bound_of_slide(table, k, within < here)
+
+
+@routine
+def bound_of_slide(table: Table, k: int, is_longest: bool) -> float:
+    """The least or the largest length of a rod that slides."""
+    length = math.inf if is_longest else 0.0
+    for i in range(table.limited.shape[0]):
+        limited = table.limited[i]
+        if limited["leg"] == k and limited["place"] == SLIDE:
+            is_high = is_longest == (limited["sense"] > 0.0)
+            length = table.legs[k]["length"] + limited["sense"] * (limited["hi"] if is_high else limited["lo"])
+    return max(length, 0.0)
 
 
 @routine

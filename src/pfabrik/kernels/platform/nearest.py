@@ -46,7 +46,7 @@ from ..rows import (
 )
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
-from .certificate import is_global
+from .certificate import is_global, is_held_nowhere
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .leg_links import place_links
@@ -291,6 +291,8 @@ def search_row(
             distances_to_held[seed + 1], _ = pose_gradient(
                 phase1_objective.pose, target, start_pose, search.gradient, True
             )
+            if is_in_place and search.control[0]["steps"] == 0 and is_held_nowhere(table, objective, search):
+                return math.inf
     fix_held(phase1_objective.pose, False, search)
     while (
         phase1_objective.pose.max_iterations > 0
