@@ -25,6 +25,7 @@ second at least - w d^2 / 2 + twist^2 / w (cos q - 1) for any w, here half of wh
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 from .._jit import routine
 from ..closure.loops import BASE_AXES
@@ -63,6 +64,9 @@ FARTHEST = 1e2
 NEARER = 1e-7
 """Relative error of the squared distance up to which the end of a search counts as nearest."""
 
+Terms: TypeAlias = tuple[float, float, float, float, float, float, float, int, int]
+"""V, A and B of a hinge; m, b, lean and twist of a slide; the hinge, and the slide, -1 for none."""
+
 BALANCED = 1e-7
 """Largest imbalance of the multipliers, as a share of the distance, and largest slack of an active limit [rad or L]."""
 
@@ -91,7 +95,7 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
     nearer = NEARER * dot(gradient, gradient) / unit
     total, pushing, shares = gradient, 0.0, 0.0
     for root in range(table.legs.shape[0]):
-        leg_force, push, share, _ = leg_share(table, root, nearer, BALANCED, search)
+        leg_force, push, share = leg_share(table, root, nearer, search)
         total, pushing, shares = add(total, leg_force), pushing + push, shares + share
     return bool(norm(total) <= BALANCED * norm(gradient) and shares < unit - pushing)
 
@@ -112,21 +116,72 @@ def is_held_nowhere(table: Table, objective: PlatformObjective, search: SearchSc
     put_limited_gradient(table, search, search.here)
     put_multipliers(search.here, reduced, search.equation_multipliers)
     size = sum_of_multipliers(search.p.multipliers, reduced.linear.totals[0]["limits"])
-    total, pushing, shares, violated = ZERO, 0.0, 0.0, -CONTRADICTING * size
+    total, pushing, violated, levers = ZERO, 0.0, -CONTRADICTING * size, 0.0
     for root in range(table.legs.shape[0]):
-        leg_force, push, share, excess = leg_share(table, root, BALANCED * size, math.inf, search)
-        total, pushing, shares, violated = add(total, leg_force), pushing + push, shares + share, violated + excess
-    return bool(shares < -pushing and FARTHEST * norm(total) < violated)
+        leg_force, push, excess, terms = leg_terms(table, root, math.inf, search)
+        total, pushing, violated = add(total, leg_force), pushing + push, violated + excess
+        levers += terms[0] + abs(terms[3])
+    if pushing >= 0.0:
+        return False
+    for root in range(table.legs.shape[0] if violated > 0.0 else 0):
+        _, _, _, terms = leg_terms(table, root, math.inf, search)
+        violated -= largest_loss(table, terms, -levers / pushing, search)
+    return bool(FARTHEST * norm(total) < violated)
 
 
 @routine
-def leg_share(
-    table: Table, root: int, nearer: float, slack: float, search: SearchScratch
-) -> tuple[Vec, float, float, float]:
-    """Force, push, share and excess of the rods that reach the base by one leg, as found by `path_to_base`.
+def largest_loss(table: Table, terms: Terms, by_curvature: float, search: SearchScratch) -> float:
+    """By how much the sum may be less than here, by a leg's proximal joint, each having a share by its lever.
+
+    Parameters
+    ----------
+    by_curvature : the sum of all levers, per sum of the m_k.
+    """
+    lever, A, B, push, b, _, _, hinge, slide = terms
+    if hinge >= 0 and slide >= 0:
+        return math.inf
+    if hinge >= 0:
+        A += lever * by_curvature * lever
+        lowest, highest = travel_left(table, hinge, search)
+        middle = math.atan2(B, A)
+        is_opposite = lowest <= middle + math.pi <= highest or lowest <= middle - math.pi <= highest
+        least = -1.0 if is_opposite else min(math.cos(lowest - middle), math.cos(highest - middle))
+        return A - math.hypot(A, B) * least
+    if slide >= 0:
+        push += abs(push) * by_curvature * abs(push)
+        lowest, highest = travel_left(table, slide, search)
+        loss = max((0.5 * push * lowest - b) * lowest, (0.5 * push * highest - b) * highest)
+        return max(loss, -0.5 * b * b / push) if push < 0.0 else loss
+    return 0.0
+
+
+@routine
+def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> tuple[Vec, float, float]:
+    """Force, push and share of the rods that reach the base by one leg, as found by `path_to_base`.
 
     The force is that on the platform, the push the sum of the m_k, and the share what the leg's proximal joints need;
-    infinite if these joints may bring something nearer. The excess is the sum of the terms here.
+    infinite if these joints may bring something nearer.
+    """
+    force, pushing, _, terms = leg_terms(table, root, BALANCED, search)
+    lever, A, B, push, b, lean, twist, hinge, slide = terms
+    share = 0.0
+    if slide >= 0 and (b != 0.0 or push != 0.0):
+        slack = (largest_cosine_term(table, slide, b, nearer, search) - push) * (0.5 if hinge >= 0 else 1.0)
+        if slack <= 0.0:
+            return force, pushing, math.inf
+        share = push * push / slack
+        if hinge >= 0:
+            lowest, highest = travel_left(table, slide, search)
+            A += twist * twist / slack + (max(lean * lowest, lean * highest) if lean != 0.0 else 0.0)
+    if hinge >= 0 and (A != 0.0 or B != 0.0):
+        slack = largest_cosine_term(table, hinge, B, nearer, search) - A
+        share = share + lever * lever / slack if slack > 0.0 else math.inf
+    return force, pushing, share
+
+
+@routine
+def leg_terms(table: Table, root: int, slack: float, search: SearchScratch) -> tuple[Vec, float, float, Terms]:
+    """Force, push, sum and `Terms` of the rods that reach the base by one leg, as found by `path_to_base`.
 
     Parameters
     ----------
@@ -143,7 +198,7 @@ def leg_share(
         if m == 0.0 and norm(at_base_end) + norm(at_platform_end) == 0.0:
             continue
         if (hinge >= 0 and on_hinge not in (-1, hinge)) or (slide >= 0 and on_slide not in (-1, slide)):
-            return force, pushing, math.inf, 0.0
+            return ZERO, math.inf, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1, -1)
         axes = leg_eval.frames[table.legs[k]["frame"], AXES:]
         line, at_base_end, at_platform_end = (
             turn(axes, vec(leg_eval.lines[k])),
@@ -167,19 +222,7 @@ def leg_share(
             weight = along(pull if turns else at_base_end, m, lever)
             lean += dot(weight, flatten(slide_axis, axis)) if turns else -dot(weight, flatten(slide_axis, axis))
             twist += dot(weight, cross(axis, slide_axis))
-    share = 0.0
-    if slide >= 0 and (b != 0.0 or push != 0.0):
-        slack = (largest_cosine_term(table, slide, b, nearer, search) - push) * (0.5 if hinge >= 0 else 1.0)
-        if slack <= 0.0:
-            return force, pushing, math.inf, 0.0
-        share = push * push / slack
-        if hinge >= 0:
-            lowest, highest = travel_left(table, slide, search)
-            A += twist * twist / slack + (max(lean * lowest, lean * highest) if lean != 0.0 else 0.0)
-    if hinge >= 0 and (A != 0.0 or B != 0.0):
-        slack = largest_cosine_term(table, hinge, B, nearer, search) - A
-        share = share + dot(moved, moved) / slack if slack > 0.0 else math.inf
-    return force, pushing, share, violated
+    return force, pushing, violated, (norm(moved), A, B, push, b, lean, twist, hinge, slide)
 
 
 @routine
