@@ -11,7 +11,8 @@ from .answers.answer_fields import PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .arrays import Floats
-from .closure.closure_engine import close_on_targets, to_answers
+from .closure.close import measure_configurations
+from .closure.closure_engine import ClosureEngine
 from .closure.configurations import Configurations
 from .closure.engine_contract import InverseEngine
 from .closure.parasitic import has_parasitic_motion
@@ -92,9 +93,11 @@ def _reach_missed(
             break
         begin = solutions.at(rows) if from_answers else start if start is None or len(start) == 1 else start.at(rows)
         leg_by_leg = from_answers and not model.has_legs and has_parasitic_motion(model.path_closure)
-        closing = close_on_targets(model, targets[rows], begin, leg_by_leg=leg_by_leg)
-        found = to_answers(model, closing, targets[rows], np.full(len(rows), HOLD_NOTHING), options)
-        reached = np.flatnonzero((found.rows.status == REACHED) & engine.as_configurations(closing).is_within_limits)
+        found = ClosureEngine(model).close_as_expected(targets[rows], begin, options, leg_by_leg=leg_by_leg)
+        reached = np.flatnonzero(found.rows.status == REACHED)
+        if len(reached):
+            measured = engine.as_configurations(measure_configurations(model, found.coordinates[reached]))
+            reached = reached[measured.is_within_limits]
         if len(reached):
             solutions = solutions.with_rows(rows[reached], found.at(reached))
     return solutions

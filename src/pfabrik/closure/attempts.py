@@ -1,4 +1,4 @@
-"""The attempts of a search, repeated one by one to look into an answer."""
+"""The attempts of a search, to look into an answer."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints, Records
+from ..kernels.closure.joint_tables import AT_END, AT_START, TO_CLOSE
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
-from ..motion.closure import Closure
 from ..tolerances import TOLERANCES
-from .descend import MOST_STEPS, clip_targets, nearest_configurations
-from .multistart import seeds_of
-from .projection import ProjectionMode
 
+STARTS_NAMED = {AT_START: "the start", AT_END: "where loops closed worst"}
 HELD = {HOLD_NOTHING: "nothing held", HOLD_ORIENTATION: "orientation held", HOLD_POSITION: "position held"}
 
 
@@ -50,19 +48,15 @@ def with_verdicts(phase: str, starts: Sequence[str], steps: Sequence[int], dista
         yield Attempt(phase, start, n_steps, distance, ending)
 
 
-def descents(
-    closure: Closure, target: Floats, start: Floats, projections: Sequence[ProjectionMode], *, seeds: bool
-) -> Iterator[Attempt]:
-    """Searches in joint coordinates for one target (1, 4, 4), from a start (1, columns) and from seeds."""
-    starts = np.concatenate([start, *(seed[None] for seed in (seeds_of(closure) if seeds else ()))])
-    names = ["the start", *(f"seed {k + 1}" for k in range(len(starts) - 1))]
-    targets = np.repeat(clip_targets(closure.mechanism, target), len(starts), axis=0)
-    frame, length = closure.task.frame, closure.mechanism.characteristic_length
-    for projection in projections:
-        ends = nearest_configurations(
-            closure, starts, targets, platform=projection.weights, frame=frame, steps=MOST_STEPS
-        )
-        distances = length * projection.distances(closure, ends.poses, np.repeat(target, len(starts), axis=0))
-        distances = np.where(ends.feasible, distances, np.nan)
-        phase = f"joint coordinates, {HELD[projection.hold]}"
-        yield from with_verdicts(phase, names, ends.iterations.tolist(), distances)
+def attempts_of(log: Records, holds: Ints, length: float) -> Iterator[Attempt]:
+    """The attempts of a search in joint coordinates, from its log and from what each projection holds."""
+    for aim in range(TO_CLOSE, len(holds)):
+        chosen = log[log["aim"] == aim]
+        starts = [STARTS_NAMED.get(start, f"seed {start}") for start in chosen["start"].tolist()]
+        distances = np.where(np.isfinite(chosen["distance"]), length * chosen["distance"], np.nan)
+        if aim == TO_CLOSE and len(chosen):
+            ending = "not reached" if np.isnan(distances[0]) else "reached"
+            yield Attempt("loops closed on the target", starts[0], int(chosen["steps"][0]), distances[0], ending)
+        elif len(chosen):
+            phase = f"joint coordinates, {HELD[int(holds[aim])]}"
+            yield from with_verdicts(phase, starts, chosen["steps"].tolist(), distances)

@@ -37,7 +37,7 @@ CLOSED = 0.3 * TOLERANCES.position
 
 
 @derived
-def _locking(closure: Closure, locked: frozenset[int]) -> tuple[Handle[K.Layout], Scratch[ClosingScratch]]:
+def locking(closure: Closure, locked: frozenset[int]) -> tuple[Handle[K.Layout], Scratch[ClosingScratch]]:
     """The layout with the coordinates of some columns locked, and scratch memory to close loops in it."""
     from ..kernels.closure.close import new_closing_scratch
 
@@ -186,7 +186,7 @@ def _run(closure: Closure, locked: frozenset[int], problem: K.ClosureProblem, cl
     from ..kernels.closure.close import close as close_rows
 
     machine = closure.machine.address
-    layout, scratch = _locking(closure, locked)
+    layout, scratch = locking(closure, locked)
 
     def run(block: slice) -> None:
         part = problem._replace(centres=problem.centres[block])

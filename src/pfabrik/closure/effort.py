@@ -54,8 +54,13 @@ def descents_within(closure: Closure, starts: int, most: int, n_limits: int = 0)
     starts, most : descents and steps that are wanted.
     n_limits : limits that a step may add to the active set, one by one.
     """
-    moving = max(1, int(np.count_nonzero(~closure.idle)))
-    steps = int(DESCENDING / (moving**2 * (moving + LIMIT_COST * n_limits)))
+    steps = descending_steps(closure, n_limits)
     n = min(starts, max(1, steps // A_DESCENT))
     steps = min(most, steps // n)
     return n, steps if steps >= FEWEST else 0
+
+
+def descending_steps(closure: Closure, n_limits: int = 0) -> int:
+    """Most steps of all descents of one answer."""
+    moving = max(1, int(np.count_nonzero(~closure.idle)))
+    return int(DESCENDING / (moving**2 * (moving + LIMIT_COST * n_limits)))

@@ -10,9 +10,11 @@ from .certify.prove import prove
 from .chains.answer_chains import answer_chains, walk_chains
 from .clearance.capsules import capsule_clearance, place_ends
 from .clearance.least_clearance import least_clearance
+from .closure.answer_joints import answer_joints
 from .closure.close import close
 from .closure.descend import nearest_configuration
 from .closure.first_order import rates
+from .closure.joint_tables import Answered
 from .closure.loops import Closed, ClosureProblem, Objective, PoseObjective, Rates, RatesPlan
 from .home import measure_home
 from .lattice import join, number_points
@@ -71,6 +73,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, tuple(_values("i F3 F3 F2 i1 f3 f2 f2"))),
     (answer, tuple(_values("i F3 F3 f2 i1 f3 f2 f2"))),
     (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
+    (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
     (solve_by_passes, _PASSES),
     (solve_by_half_spaces, _PASSES),
     (move_trunks, (_PASSES[0], *_values("F3 f2"), _PASSES[3], 0.0)),

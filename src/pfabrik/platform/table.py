@@ -8,10 +8,10 @@ import numpy as np
 
 from ..arrays import Records
 from ..batch import take
-from ..closure.target_closing import STRANGE
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
 from ..derived import derived
+from ..kernels.closure.reach_target import STRANGE
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES

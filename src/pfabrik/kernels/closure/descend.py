@@ -183,6 +183,31 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
     return int(control["steps"])
 
 
+@routine
+def nearest_of(
+    loops: Loops, row: int, objective: Objective, scratch: DescentScratch, closed: Closed, weights: Floats
+) -> None:
+    """Minimise the objective of a row, as of `nearest_configuration`."""
+    best, first = scratch.best, scratch.first
+    load_row(loops, row, closed, best)
+    closed.iterations[row] = 0
+    scratch.gradient.unit[0] = 1.0
+    linearise(loops, row, objective, best, scratch, first)
+    if objective.pose.max_iterations == 0:
+        scale_objective(first.linear)
+        for c in range(limit_multipliers(first.linear, objective.pose.near, scratch.p, scratch.pulls)):
+            weights[row, first.linear.which[c]] = scratch.p.x[c]
+        return
+    if restore_feasibility(loops, row, objective, best, CLOSED, scratch, first):
+        closed.iterations[row] = descend(loops, row, objective, scratch)
+    linearise(loops, row, objective, best, scratch, first)
+    store_row(loops, row, best, closed)
+    for group in range(closed.gaps.shape[1]):  # the measures of the whole mechanism, for every group
+        closed.gaps[row, group] = first.linear.totals[0]["gap"]
+        closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.pose.margin, 0.0)
+        closed.misses[row, group] = 0.0
+
+
 @search
 def nearest_configuration(
     machine: int, scratch_address: int, objective: Objective, closed: Closed, weights: Floats
@@ -197,22 +222,5 @@ def nearest_configuration(
     machine, scratch_address : addresses of `Loops` and `DescentScratch`.
     """
     loops, scratch = open_loops(machine), open_scratch(scratch_address)
-    best, first = scratch.best, scratch.first
     for row in range(len(closed.coordinates)):
-        load_row(loops, row, closed, best)
-        closed.iterations[row] = 0
-        scratch.gradient.unit[0] = 1.0
-        linearise(loops, row, objective, best, scratch, first)
-        if objective.pose.max_iterations == 0:
-            scale_objective(first.linear)
-            for c in range(limit_multipliers(first.linear, objective.pose.near, scratch.p, scratch.pulls)):
-                weights[row, first.linear.which[c]] = scratch.p.x[c]
-            continue
-        if restore_feasibility(loops, row, objective, best, CLOSED, scratch, first):
-            closed.iterations[row] = descend(loops, row, objective, scratch)
-        linearise(loops, row, objective, best, scratch, first)
-        store_row(loops, row, best, closed)
-        for group in range(closed.gaps.shape[1]):  # the measures of the whole mechanism, for every group
-            closed.gaps[row, group] = first.linear.totals[0]["gap"]
-            closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.pose.margin, 0.0)
-            closed.misses[row, group] = 0.0
+        nearest_of(loops, row, objective, scratch, closed, weights)
