@@ -159,8 +159,8 @@ def drop(p: QP, n: int, m: int, a: int) -> None:
 def take_up(p: QP, n: int, kept: int, m: int, c: int, violation: float) -> int:
     """Make limit `c` active; the number of active limits, or -1 if it contradicts the others.
 
-    Then the multipliers are those of the contradiction, if it is none of rounding: G^T m = 0 and h m > 0. The first `kept` active ones are
-    equations, which are never dropped.
+    Then the multipliers are those of the contradiction, if it is none of rounding: G^T m = 0 and h m > 0. The first
+    `kept` active ones are equations, which are never dropped.
     """
     multiplier, is_rounding = 0.0, violation <= ROUNDED
     for _change in range(4 * n + 4):
