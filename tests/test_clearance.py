@@ -179,7 +179,7 @@ def farthest(solid: tuple[Array, Array], n: Array) -> float:
 def measured(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[float, Array]:
     clearance, nearest, points = np.full(1, np.inf), np.full(1, -1), np.empty((1, 2, 3))
     sizes, places = np.stack([one[0], other[0]]), np.stack([one[1], other[1]])[None]
-    least_clearance(sizes, places, np.array([[0, 1]]), np.zeros(13), clearance, nearest, points)
+    least_clearance(sizes, places, np.array([[0, 1]]), 0, clearance, nearest, points)
     return float(clearance[0]), points[0]
 
 

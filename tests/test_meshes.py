@@ -53,7 +53,7 @@ def measured(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[floa
     sizes = np.zeros((2, max(len(one[0]), len(other[0]))))
     sizes[0, : len(one[0])], sizes[1, : len(other[0])] = one[0], other[0]
     places = np.stack([one[1], other[1]])[None]
-    least_clearance(sizes, places, np.array([[0, 1]]), np.zeros(13), clearance, nearest, points)
+    least_clearance(sizes, places, np.array([[0, 1]]), 0, clearance, nearest, points)
     return float(clearance[0]), points[0]
 
 

@@ -23,9 +23,6 @@ AT_ONCE = 256
 FLAT = 1e-6
 """Thickness of a mesh, relative to half its length, up to which it counts as flat: files have six digits or so."""
 
-SAME_PLANE = 1e-9
-"""Largest difference of the normals of two triangles of one face."""
-
 
 class UnusableMesh(Exception):
     """A file that gives no hull: what was found, and what was expected."""
@@ -41,14 +38,11 @@ class MeshHull(NamedTuple):
     Attributes
     ----------
     vertices : (v, 3); triangles : indices of three each, (t, 3), for pictures.
-    normals : of its faces, (f, 3); edges : two vertices and two faces each, (e, 4).
     margin : the mesh is within so much of the polyhedron, 0 where no vertex of its hull is left out.
     """
 
     vertices: Floats
     triangles: Ints
-    normals: Floats
-    edges: Ints
     margin: float
 
 
@@ -167,33 +161,17 @@ def _distance_beyond(points: Floats, hull: MeshHull) -> float:
     places[:, 0, 0], places[:, 0, 1:] = middle_of(hull), np.eye(3)
     places[:, 1, 0] = places[:, 1, 1] = points
     distances, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
-    pair, scratch, nearest_points = np.array([[0, 1]]), np.zeros(13), np.empty((len(points), 2, 3))
-    least_clearance(sizes, places, pair, scratch, distances, nearest, nearest_points)
+    least_clearance(sizes, places, np.array([[0, 1]]), 0, distances, nearest, np.empty((len(points), 2, 3)))
     return max(0.0, float(distances.max())) + 1e-12
 
 
 def _polyhedron(points: Floats, margin: float) -> MeshHull:
-    """The polyhedron of points that are all vertices, its triangles in one plane made one face."""
+    """The polyhedron of points that are all vertices."""
     hull = _qhull(points)
-    corners = hull.points
-    normals, faces = hull.equations[:, :3], np.zeros(len(hull.equations), np.int64)
-    kept: list[int] = []
-    for k, normal in enumerate(normals):
-        same = np.flatnonzero((np.abs(normals[kept] - normal) <= SAME_PLANE).all(axis=1))
-        faces[k] = int(same[0]) if len(same) else len(kept)
-        kept += [] if len(same) else [k]
-    a, b, c = np.moveaxis(corners[hull.simplices], 1, 0)
-    is_inward = np.einsum("ni,ni->n", np.cross(b - a, c - a), normals) < 0.0
+    a, b, c = np.moveaxis(hull.points[hull.simplices], 1, 0)
+    is_inward = np.einsum("ni,ni->n", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
     triangles = np.where(is_inward[:, None], hull.simplices[:, ::-1], hull.simplices)
-    edges: list[list[int]] = [
-        [*np.delete(hull.simplices[k], side).tolist(), faces[k], faces[beside]]
-        for k, around in enumerate(hull.neighbors)
-        for side, beside in enumerate(around)
-        if beside > k and faces[k] != faces[beside]
-    ]
-    return MeshHull(
-        corners, triangles.astype(np.int64), normals[kept], np.array(edges, np.int64).reshape(-1, 4), margin
-    )
+    return MeshHull(hull.points, triangles.astype(np.int64), margin)
 
 
 def _qhull(points: Floats) -> Any:
@@ -213,7 +191,5 @@ def sizes_of(hull: MeshHull, scale: float) -> Floats:
     from .kernels.clearance.solids import HULL
 
     vertices = scale * (hull.vertices - middle_of(hull))
-    counts = [len(vertices), len(hull.normals), len(hull.edges)]
     reach = np.linalg.norm(vertices, axis=1).max()
-    lists = [vertices.ravel(), hull.normals.ravel(), hull.edges.ravel()]
-    return np.concatenate([[HULL, scale * hull.margin, *counts, reach], *lists])
+    return np.concatenate([[HULL, scale * hull.margin, len(vertices), reach, 0.0], vertices.ravel()])

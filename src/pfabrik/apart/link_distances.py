@@ -86,10 +86,7 @@ def _measure_solids(
     sizes = links_of(placed.mechanism).sizes
 
     def run(block: slice) -> None:
-        places = placed.places(block)
-        scratch = np.zeros(1 + places.shape[2] * places.shape[3])
-        scratch[0] = first
-        least_clearance(sizes, places, pairs, scratch, distances[block], nearest[block], points[block])
+        least_clearance(sizes, placed.places(block), pairs, first, distances[block], nearest[block], points[block])
 
     in_blocks(run, len(distances), ROWS_A_BLOCK)
 

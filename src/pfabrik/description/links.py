@@ -227,11 +227,10 @@ def overlaps_at_home(mechanism: Structure) -> list[tuple[float, int, int]]:
 
     links, least = links_of(mechanism), mechanism.clearance or 0.0
     clearance, nearest, points = np.empty(1), np.empty(1, np.int64), np.empty((1, 2, 3))
-    scratch, places = np.zeros(1 + links.places[0].size), links.places[None]
     overlaps: list[tuple[float, int, int]] = []
     for pair in links.pairs:
         clearance[0], nearest[0] = np.inf, -1
-        least_clearance(links.sizes, places, pair[None], scratch, clearance, nearest, points)
+        least_clearance(links.sizes, links.places[None], pair[None], 0, clearance, nearest, points)
         if clearance[0] < least - TOLERANCES.home_slack * mechanism.characteristic_length:
             overlaps.append((float(clearance[0]), int(pair[0]), int(pair[1])))
     return sorted(overlaps)

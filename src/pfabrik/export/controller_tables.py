@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Records
 from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
+from ..kernels.clearance.convex import MOST_CORNERS, new_polytope
 from ..kernels.clearance.solids import CAPSULE, KIND
 from ..kernels.controller.assembled import Assembling
 from ..kernels.controller.joints_in_series import Series
@@ -141,7 +142,7 @@ def _aimed(machine: Machine, legs: Records) -> Records:
 
 def _links_on_bodies(machine: Machine, parts: Sequence[str]) -> LinksOnBodies:
     links, length = machine.links_kept(parts), machine.mechanism.characteristic_length
-    memory = np.zeros((4, 3)), np.zeros((2, 3))
+    memory = new_polytope(MOST_CORNERS if links is not None and links.has_solids else 0), np.zeros((2, 3))
     if links is None:
         none = np.zeros((0, 4), np.int64), np.zeros((0, 7)), np.zeros((0, 5)), np.zeros((0, 4, 3))
         pairs = np.zeros((0, 2), np.int64)

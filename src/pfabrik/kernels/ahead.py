@@ -94,7 +94,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (join, tuple(_values("I2 i1"))),
     (place_ends, tuple(_values("F3 I2 F3 f3"))),
     (capsule_clearance, tuple(_values("F1 F3 I2 f1 f1"))),
-    (least_clearance, tuple(_values("F2 F4 I2 f1 f1 i1 f3"))),
+    (least_clearance, tuple(_values("F2 F4 I2 i f1 i1 f3"))),
     (prove, tuple(_values("i i"))),
     (walk_path, tuple(_values("F2 F1 F2 f3 f3"))),
     (second_derivatives, tuple(_values("F1 F2 f2"))),

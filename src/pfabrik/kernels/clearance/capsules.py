@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from ...arrays import Floats, Ints
 from .._jit import inlined, kernel, routine
 from ..vectors import Vec
 from .link_records import BASE, PLATFORM
-from .segments import between_segments
+from .segments import between_axes
 
 
 @kernel
@@ -64,13 +62,3 @@ def place_end(home: Floats, body: int, poses: Floats, end: Floats) -> None:
 @inlined
 def end(ends: Floats, first: int, row: int) -> Vec:
     return (ends[first, row], ends[first + 1, row], ends[first + 2, row])
-
-
-@inlined
-def between_axes(p: Vec, q: Vec, x: Vec, y: Vec) -> float:
-    """The distance of two segments."""
-    s, t = between_segments(p, q, x, y)
-    u = p[0] + s * (q[0] - p[0]) - x[0] - t * (y[0] - x[0])
-    v = p[1] + s * (q[1] - p[1]) - x[1] - t * (y[1] - x[1])
-    w = p[2] + s * (q[2] - p[2]) - x[2] - t * (y[2] - x[2])
-    return math.sqrt(u * u + v * v + w * w)

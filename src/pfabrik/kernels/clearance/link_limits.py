@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from .._jit import allocator, routine
-from ..vectors import Vec, dot, norm, put, scale, sub, vec
-from .capsules import between_axes
-from .least_clearance import clearance_of, middle_of, reach_of
+from ..vectors import Vec, dot, put, scale, sub, vec
+from .convex import MOST_CORNERS, new_polytope
+from .least_clearance import clearance_within
 from .link_records import LinkLimits
-from .solids import CAPSULE, KIND, ROUND, clamp
+from .solids import CAPSULE, KIND
 
 
 @allocator
 def new_link_limits(limits: LinkLimits) -> LinkLimits:
     """The same links, with memory of its own for their places."""
-    places, moved, points, pulls = np.zeros(limits.home.shape), np.zeros((4, 3)), np.zeros((2, 3)), np.zeros((4, 6))
+    has_solids = False
+    for i in range(limits.sizes.shape[0]):
+        has_solids = has_solids or limits.sizes[i, KIND] != CAPSULE
+    places, points, pulls = np.zeros(limits.home.shape), np.zeros((2, 3)), np.zeros((4, 6))
+    polytope = new_polytope(MOST_CORNERS if has_solids else 0)
     return LinkLimits(
-        limits.sizes, limits.home, limits.bodies, limits.pairs, limits.least, places, moved, points, pulls
+        limits.sizes, limits.home, limits.bodies, limits.pairs, limits.least, places, polytope, points, pulls
     )
 
 
@@ -29,18 +31,9 @@ def pair_excess(links: LinkLimits, pair: int, near: float) -> float:
 
     Pairs that are surely farther than `near` beyond it are not measured: minus infinity.
     """
-    i, j = links.pairs[pair, 0], links.pairs[pair, 1]
-    sizes, other, place, other_place = links.sizes[i], links.sizes[j], links.places[i], links.places[j]
-    farthest = links.least[0] + near
-    if sizes[KIND] == CAPSULE and other[KIND] == CAPSULE:
-        p, q, x, y = vec(place[0]), vec(place[1]), vec(other_place[0]), vec(other_place[1])
-        distance = between_axes(p, q, x, y) - sizes[ROUND] - other[ROUND]
-    else:
-        between = norm(sub(middle_of(sizes, place), middle_of(other, other_place)))
-        distance = between - reach_of(sizes, place) - reach_of(other, other_place)
-    if distance >= farthest:
-        return -math.inf
-    return links.least[0] - clearance_of(sizes, place, other, other_place, links.moved, links.points)
+    i, j, least = links.pairs[pair, 0], links.pairs[pair, 1], links.least[0]
+    one, other = (links.sizes[i], links.places[i]), (links.sizes[j], links.places[j])
+    return least - clearance_within(one, other, least + near, links.polytope, links.points)
 
 
 @routine
@@ -70,4 +63,4 @@ def share_of_end(links: LinkLimits, link: int, x: Vec) -> float:
     start = vec(links.places[link, 0])
     axis = sub(vec(links.places[link, 1]), start)
     square = dot(axis, axis)
-    return clamp(dot(sub(x, start), axis) / square, 0.0, 1.0) if square > 0.0 else 0.0
+    return min(max(dot(sub(x, start), axis) / square, 0.0), 1.0) if square > 0.0 else 0.0

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints
+from .convex import Polytope, new_polytope
 
 # The numbers of bodies that every engine knows; others are not negative.
 BASE, PLATFORM = -2, -1
@@ -24,7 +25,7 @@ class LinkLimits(NamedTuple):
     pairs: Ints  # (k, 2): two links each
     least: Floats  # (1,): the clearance [L]
     places: Floats  # (s, 4, 3): places [L]
-    moved: Floats  # (4, 3): space for the place of a link
+    polytope: Polytope  # memory of overlaps
     points: Floats  # (2, 3): nearest points of the pair that was measured last [L]
     pulls: Floats  # (4, 6): points at the ends of this pair's links, and forces there, as of `put_pulls`
 
@@ -36,7 +37,7 @@ NO_LINKS = LinkLimits(
     np.zeros((0, 2), np.int64),
     np.zeros(1),
     np.zeros((0, 4, 3)),
-    np.zeros((4, 3)),
+    new_polytope(0),
     np.zeros((2, 3)),
     np.zeros((4, 6)),
 )

@@ -1,14 +1,16 @@
-"""Distances of line segments: from each other in closed form, from convex solids by one root of a rising function."""
+"""Distances of line segments, the axes of capsules, in closed form."""
 
 from __future__ import annotations
 
+import math
+
 from ...arrays import Floats
 from .._jit import inlined, routine
-from ..vectors import Vec, along, cross, dot, sub
-from .solids import nearest_in
+from ..vectors import Vec, along, cross, dot, norm, put, scale, sub, vec
+from .solids import Solid, square_to
 
-# Most steps to the root: where the slope is smooth about eight suffice, and each four halve the interval at least.
-MOST_STEPS = 200
+# Sine of the angle below which two axes count as parallel where they touch.
+PARALLEL = 1e-9
 
 
 @inlined
@@ -33,35 +35,32 @@ def between_segments(p: Vec, q: Vec, x: Vec, y: Vec) -> tuple[float, float]:
     return s, t
 
 
-@routine
-def nearest_along(p: Vec, q: Vec, sizes: Floats, place: Floats) -> float:
-    """Parameter in [0, 1] of the point of a segment that is nearest to a convex core.
+@inlined
+def between_axes(p: Vec, q: Vec, x: Vec, y: Vec) -> float:
+    """The distance of two segments."""
+    s, t = between_segments(p, q, x, y)
+    u = p[0] + s * (q[0] - p[0]) - x[0] - t * (y[0] - x[0])
+    v = p[1] + s * (q[1] - p[1]) - x[1] - t * (y[1] - x[1])
+    w = p[2] + s * (q[2] - p[2]) - x[2] - t * (y[2] - x[2])
+    return math.sqrt(u * u + v * v + w * w)
 
-    Half the squared distance of x(t) = p + t d is convex in t, with the slope (x - nearest(x)) d, which rises: its
-    root, between the ends or at one of them, by the false position of Illinois.
-    """
-    d = sub(q, p)
-    low, high = 0.0, 1.0
-    at_low = dot(sub(p, nearest_in(sizes, place, p)), d)
-    at_high = dot(sub(q, nearest_in(sizes, place, q)), d)
-    if at_low >= 0.0:
-        return 0.0
-    if at_high <= 0.0:
-        return 1.0
-    t, side = 0.0, 0
-    for step in range(MOST_STEPS):
-        before = t
-        t = high - at_high * (high - low) / (at_high - at_low) if step % 4 < 3 else 0.5 * (low + high)
-        x = along(p, t, d)
-        slope = dot(sub(x, nearest_in(sizes, place, x)), d)
-        if slope == 0.0 or t == before or not low < t < high:
-            break
-        if slope > 0.0:
-            high, at_high = t, slope
-            at_low = 0.5 * at_low if side == 1 else at_low
-            side = 1
-        else:
-            low, at_low = t, slope
-            at_high = 0.5 * at_high if side == -1 else at_high
-            side = -1
-    return t
+
+@routine
+def capsule_points(one: Solid, other: Solid, points: Floats) -> float:
+    """Fill the nearest points of the axes of two capsules, (2, 3), and return their distance."""
+    p, q, x, y = vec(one[1][0]), vec(one[1][1]), vec(other[1][0]), vec(other[1][1])
+    s, t = between_segments(p, q, x, y)
+    put(points[0], along(p, s, sub(q, p)))
+    put(points[1], along(x, t, sub(y, x)))
+    return norm(sub(vec(points[1]), vec(points[0])))
+
+
+@routine
+def square_to_axes(one: Solid, other: Solid) -> Vec:
+    """A unit vector square to the axes of two capsules that touch each other: any way out is as short."""
+    d, e = sub(vec(one[1][1]), vec(one[1][0])), sub(vec(other[1][1]), vec(other[1][0]))
+    n = cross(d, e)
+    length = norm(n)
+    if length > PARALLEL * norm(d) * norm(e):
+        return scale(1.0 / length, n)
+    return square_to(d if dot(d, d) > dot(e, e) else e)

@@ -1,17 +1,17 @@
-"""Solids as the kernels see them: a core with a rounding radius, where it is, its nearest and its farthest points.
+"""Solids as the kernels see them: a convex core with a rounding radius, where it is, and its farthest points.
 
 A solid is a row of sizes, `KIND, ROUND, A, B, C`, and a table of places, (4, 3): of a capsule both ends (a sphere's
 coincide); of a box its centre and three unit axes; of a disc, a flat cylinder, its centre and its unit axis; of a hull,
 a convex polyhedron, the origin and the axes of its vertices.
-The sizes of a box are half its edges, of a disc its radius and half its height. Those of a hull are how many vertices,
-faces and edges it has. Behind them come its reach, and what it is made of: three numbers a vertex, three a face, its
-unit normal, and four an edge, the indices of its two vertices and of the two faces beside it. Rows of other solids are
-as long as those of hulls where there are some.
+The sizes of a box are half its edges, of a disc its radius and half its height. Those of a hull are how many vertices
+it has, and its reach; behind them come three numbers a vertex. Rows of other solids are as long as those of hulls where
+there are some.
 """
 
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 from ...arrays import Floats
 from .._jit import routine
@@ -19,44 +19,23 @@ from ..vectors import Vec, add, along, cross, dot, flatten, norm, scale, sub, ve
 
 CAPSULE, BOX, DISC, HULL = 0, 1, 2, 3
 KIND, ROUND, A, B, C, WIDTH = 0, 1, 2, 3, 4, 5
-REACH, VERTICES = 5, 6
+REACH, VERTICES = B, 5
+
+# Sine of the angle to the axis of a disc below which a direction counts as along it.
+ALONG_AXIS = 1e-14
+
+# Its row of sizes, and its place.
+Solid: TypeAlias = tuple[Floats, Floats]
 
 
 @routine
-def clamp(x: float, low: float, high: float) -> float:
-    return min(max(x, low), high)
-
-
-@routine
-def nearest_in(sizes: Floats, place: Floats, x: Vec) -> Vec:
-    """The point of a core that is nearest to x: x itself if it is inside."""
-    centre = vec(place[0])
-    offset = sub(x, centre)
-    if sizes[KIND] == CAPSULE:
-        line = sub(vec(place[1]), centre)
-        square = dot(line, line)
-        return along(centre, clamp(dot(offset, line) / square, 0.0, 1.0) if square > 0.0 else 0.0, line)
-    if sizes[KIND] == BOX:
-        y = centre
-        for k in range(3):
-            axis = vec(place[1 + k])
-            y = along(y, clamp(dot(offset, axis), -sizes[A + k], sizes[A + k]), axis)
-        return y
-    axis = vec(place[1])
-    height = dot(offset, axis)
-    flat = along(offset, -height, axis)
-    radius = norm(flat)
-    flat = scale(sizes[A] / radius, flat) if radius > sizes[A] else flat
-    return along(add(centre, flat), clamp(height, -sizes[B], sizes[B]), axis)
-
-
-@routine
-def farthest_in(sizes: Floats, place: Floats, n: Vec) -> Vec:
+def farthest_in(solid: Solid, n: Vec) -> Vec:
     """The point of a core that is farthest along n."""
+    sizes, place = solid
     centre = vec(place[0])
     if sizes[KIND] == CAPSULE:
         end = vec(place[1])
-        return end if dot(n, end) > dot(n, centre) else centre
+        return end if dot(n, sub(end, centre)) > 0.0 else centre
     if sizes[KIND] == BOX:
         y = centre
         for k in range(3):
@@ -64,61 +43,46 @@ def farthest_in(sizes: Floats, place: Floats, n: Vec) -> Vec:
             y = along(y, sizes[A + k] if dot(n, axis) > 0.0 else -sizes[A + k], axis)
         return y
     if sizes[KIND] == HULL:
-        return farthest_vertex(sizes, place, n)
+        u, v, w = dot(n, vec(place[1])), dot(n, vec(place[2])), dot(n, vec(place[3]))
+        most, farthest = -math.inf, VERTICES
+        for at in range(VERTICES, VERTICES + 3 * int(sizes[A]), 3):
+            height = sizes[at] * u + sizes[at + 1] * v + sizes[at + 2] * w
+            if height > most:
+                most, farthest = height, at
+        y = along(along(centre, sizes[farthest], vec(place[1])), sizes[farthest + 1], vec(place[2]))
+        return along(y, sizes[farthest + 2], vec(place[3]))
     axis = vec(place[1])
     height = dot(n, axis)
-    flat = flatten(flatten(n, axis), axis)  # twice: of n along the axis the first leaves rounding in any direction
+    flat = flatten(flatten(n, axis), axis)  # twice: of n nearly along the axis the first leaves rounding along it
     radius = norm(flat)
-    y = along(centre, sizes[A] / radius if radius > 0.0 else 0.0, flat)
+    y = along(centre, sizes[A] / radius if radius > ALONG_AXIS * norm(n) else 0.0, flat)
     return along(y, sizes[B] if height > 0.0 else -sizes[B], axis)
 
 
 @routine
-def farthest_vertex(sizes: Floats, place: Floats, n: Vec) -> Vec:
-    """The vertex of a hull that is farthest along n."""
-    u, v, w = dot(n, vec(place[1])), dot(n, vec(place[2])), dot(n, vec(place[3]))
-    most, first = -math.inf, VERTICES
-    for at in range(VERTICES, VERTICES + 3 * int(sizes[A]), 3):
-        height = sizes[at] * u + sizes[at + 1] * v + sizes[at + 2] * w
-        if height > most:
-            most, first = height, at
-    return point_of_hull(sizes, place, first)
+def middle_of(solid: Solid) -> Vec:
+    """The middle of a solid."""
+    sizes, place = solid
+    centre = vec(place[0])
+    return scale(0.5, add(centre, vec(place[1]))) if sizes[KIND] == CAPSULE else centre
 
 
 @routine
-def point_of_hull(sizes: Floats, place: Floats, at: int) -> Vec:
-    """The point of a hull whose three coordinates begin in a place of its row."""
-    return add(vec(place[0]), turned_out(place, vec(sizes[at : at + 3])))
-
-
-@routine
-def turned_out(place: Floats, a: Vec) -> Vec:
-    """A vector in the axes of a solid, in base axes."""
-    return along(along(scale(a[0], vec(place[1])), a[1], vec(place[2])), a[2], vec(place[3]))
-
-
-@routine
-def turned_in(place: Floats, a: Vec) -> Vec:
-    """A vector in base axes, in the axes of a solid."""
-    return (dot(a, vec(place[1])), dot(a, vec(place[2])), dot(a, vec(place[3])))
-
-
-@routine
-def direction_of(sizes: Floats, place: Floats, k: int) -> Vec:
-    """The k-th of the directions that shape a core, of unit length: of a box 3, a hull none, others 1; zero beyond."""
+def reach_of(solid: Solid) -> float:
+    """How far a solid reaches from its middle."""
+    sizes, place = solid
+    if sizes[KIND] == CAPSULE:
+        return 0.5 * norm(sub(vec(place[1]), vec(place[0]))) + sizes[ROUND]
     if sizes[KIND] == HULL:
-        return (0.0, 0.0, 0.0)
-    if sizes[KIND] != CAPSULE:
-        return vec(place[1 + k]) if k == 0 or sizes[KIND] == BOX else (0.0, 0.0, 0.0)
-    line = sub(vec(place[1]), vec(place[0]))
-    length = norm(line)
-    return scale(1.0 / length, line) if k == 0 and length > 0.0 else (0.0, 0.0, 0.0)
+        return sizes[REACH] + sizes[ROUND]
+    return norm((sizes[A], sizes[B], sizes[C] if sizes[KIND] == BOX else 0.0)) + sizes[ROUND]
 
 
 @routine
 def square_to(n: Vec) -> Vec:
-    """A unit vector square to a unit vector."""
+    """A unit vector square to a vector."""
     x, y, z = math.fabs(n[0]), math.fabs(n[1]), math.fabs(n[2])
     axis = (1.0, 0.0, 0.0) if x <= y and x <= z else ((0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0))
-    found = cross(n, axis)
-    return scale(1.0 / norm(found), found)
+    square = cross(n, axis)
+    length = norm(square)
+    return scale(1.0 / length, square) if length > 0.0 else axis

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from ...arrays import Floats, Ints
 from .._jit import routine
-from ..clearance.capsules import between_axes
-from ..clearance.least_clearance import clearance_of, middle_of, reach_of
-from ..clearance.solids import CAPSULE, KIND, ROUND
+from ..clearance.convex import Polytope
+from ..clearance.least_clearance import clearance_within
+from ..clearance.solids import CAPSULE, KIND
 from ..legs.records import FROM_BASE, Table
 from ..vectors import Vec, along, copy_table, move, norm, put, rotate, scale, sub, turn, vec
 
@@ -37,7 +37,7 @@ class LinksOnBodies(NamedTuple):
     least: Floats  # (1,): the clearance
     displaced: Floats  # (2 + m, 4, 4): bodies
     places: Floats  # (s, 4, 3)
-    moved: Floats  # (4, 3): space for the place of a link
+    polytope: Polytope  # memory of overlaps
     points: Floats  # (2, 3): nearest points
 
 
@@ -55,15 +55,8 @@ def nearest_pair(
     nearest, distance[0] = 0, math.inf
     for pair in range(links.pairs.shape[0]):
         i, j = links.pairs[pair, 0], links.pairs[pair, 1]
-        sizes, other, place, other_place = links.sizes[i], links.sizes[j], links.places[i], links.places[j]
-        if sizes[KIND] == CAPSULE and other[KIND] == CAPSULE:
-            between = between_axes(vec(place[0]), vec(place[1]), vec(other_place[0]), vec(other_place[1]))
-            between -= sizes[ROUND] + other[ROUND]
-        else:
-            between = norm(sub(middle_of(sizes, place), middle_of(other, other_place)))
-            if between - reach_of(sizes, place) - reach_of(other, other_place) >= distance[0]:
-                continue
-            between = clearance_of(sizes, place, other, other_place, links.moved, links.points)
+        one, other = (links.sizes[i], links.places[i]), (links.sizes[j], links.places[j])
+        between = clearance_within(one, other, distance[0], links.polytope, links.points)
         if between < distance[0]:
             nearest, distance[0] = pair, between
     return nearest
