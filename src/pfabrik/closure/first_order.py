@@ -11,7 +11,7 @@ from ..arrays import Floats, Mask
 from ..batch import take
 from ..derived import derived
 from ..description.home_mobility import body_twist, loop_conditions
-from ..kernels.closure.loops import CONSTRAINT, JACOBIANS, JOINTS, MEASURES, Rates, RatesPlan
+from ..kernels.closure.loops import CONSTRAINT, JACOBIANS, JOINTS, MEASURES, FirstOrder, FirstOrderPlan
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
@@ -22,7 +22,7 @@ from ..motion.singularities import Singularity, loop_basis, singularity_of
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
-    from ..kernels.closure.first_order import RatesScratch
+    from ..kernels.closure.first_order import FirstOrderScratch
 
 ROWS_A_BLOCK = 64
 
@@ -143,7 +143,7 @@ class JointRates:
         return np.asarray((sizes > TOLERANCES.singular) & (np.arange(sizes.shape[1]) < self._most))
 
 
-def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> Rates:
+def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> FirstOrder:
     """What is asked of coordinates q, (n, c), lengths in L; NaN where q is.
 
     Parameters
@@ -156,7 +156,7 @@ def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> Rate
     own = _prepared(model, asks) if like is None else _made(model, asks, like)
     closure, n = model.closure, len(q)
     coordinates = q * closure.scale
-    found = Rates(*(none if shape is None else np.full((n, *shape), np.nan) for shape, none in own.results))
+    found = FirstOrder(*(none if shape is None else np.full((n, *shape), np.nan) for shape, none in own.results))
 
     def run(block: slice) -> None:
         part = found if n <= ROWS_A_BLOCK else take(found, block)
@@ -169,8 +169,8 @@ def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> Rate
 class _Prepared(NamedTuple):
     """What the kernel takes; shapes of what is asked for, row by row, and arrays without rows for all else."""
 
-    plan: RatesPlan
-    scratch: Scratch[RatesScratch]
+    plan: FirstOrderPlan
+    scratch: Scratch[FirstOrderScratch]
     results: list[tuple[tuple[int, ...] | None, Floats]]
 
 
@@ -180,11 +180,11 @@ def _prepared(model: Model, asks: int) -> _Prepared:
 
 
 def _made(model: Model, asks: int, like: Model) -> _Prepared:
-    from ..kernels.closure.first_order import new_rates_scratch
+    from ..kernels.closure.first_order import new_first_order_scratch
 
     mechanism, generic = model.mechanism, generic_of(like.mechanism)
     graph, counts, actuated = graph_of(mechanism), generic.mobility, actuated_columns(mechanism)
-    plan = RatesPlan(
+    plan = FirstOrderPlan(
         loops=np.ascontiguousarray(graph.orthonormal),
         way=np.array(graph.path, float),
         rates=np.array(graph.rates),
@@ -202,8 +202,8 @@ def _made(model: Model, asks: int, like: Model) -> _Prepared:
     of_joints = {"screws": (c, 6), "motions": (c, c - plan.rank), "sizes": (c - plan.rank,), "joints": (c, n_a)}
     of_joints |= {"closing": (c, 6 * len(plan.loops)), "measures": (4,)}
     asked, shapes = of_joints if asks == JOINTS else of_pose, of_pose | of_joints
-    results = [(asked.get(name), np.empty((0, *shapes[name]))) for name in Rates._fields]
-    return _Prepared(plan, Scratch(new_rates_scratch, model.closure.loops, plan), results)
+    results = [(asked.get(name), np.empty((0, *shapes[name]))) for name in FirstOrder._fields]
+    return _Prepared(plan, Scratch(new_first_order_scratch, model.closure.loops, plan), results)
 
 
 @derived

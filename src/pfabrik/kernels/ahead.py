@@ -15,7 +15,7 @@ from .closure.close import close
 from .closure.descend import nearest_configuration
 from .closure.first_order import rates
 from .closure.joint_tables import Answered
-from .closure.loops import Closed, ClosureProblem, Objective, PoseObjective, Rates, RatesPlan
+from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Objective, PoseObjective
 from .home import measure_home
 from .lattice import join, number_points
 from .legs.answer import answer
@@ -57,8 +57,8 @@ def _values(codes: str) -> list[Any]:
 
 
 _CLOSED = Closed(*_values("f2 f3 f2 f2 f2 i1"))
-_RATES = Rates(*_values("f3 f3 f2 f2 f2 f3 f3 f2 f3 f3"))
-_RATES_PLAN = RatesPlan(*_values("F2 F1 F2 I1 F2 i i i f f i"))
+_FIRST_ORDER = FirstOrder(*_values("f3 f3 f2 f2 f2 f3 f3 f2 f3 f3"))
+_FIRST_ORDER_PLAN = FirstOrderPlan(*_values("F2 F1 F2 I1 F2 i i i f f i"))
 _PASSES = (
     P.Plan._make([*(_read(np.zeros(0, record)) for record in _PLAN_RECORDS), 0.0]),
     *_values("F3"),
@@ -80,7 +80,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("F1 F2")), _CLOSED, *_values("f2"))),
     (evaluate_poses, tuple(_values("i i F3 F2 F2 f2 f2 f3"))),
     (jacobians, tuple(_values("i F3 i f3"))),
-    (rates, (*_values("i i"), _RATES_PLAN, *_values("F2"), _RATES)),
+    (rates, (*_values("i i"), _FIRST_ORDER_PLAN, *_values("F2"), _FIRST_ORDER)),
     (feasibility, tuple(_values("i F3 F3 F2 f1 i1"))),
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),

@@ -22,7 +22,7 @@ import numpy as np
 from ...arrays import Floats
 from .._jit import opener, routine, search
 from ..quaternions import turn_ball
-from .loops import BALL, CONSTRAINT, JOINTS, MEASURES, PARALLEL, PASSIVE, SERIAL, Loops, Rates, RatesPlan
+from .loops import BALL, CONSTRAINT, JOINTS, MEASURES, PARALLEL, PASSIVE, SERIAL, FirstOrder, FirstOrderPlan, Loops
 from .path_kinematics import LAYOUT, LOOPS, Equations, State, end_path, new_equations, new_state, open_loops, walk_path
 
 SWEEPS = 40
@@ -39,7 +39,7 @@ SHOWS = 1e-6
 """Twist from which a motion that the loops hold back least is said to be gained [L or rad]."""
 
 
-class RatesScratch(NamedTuple):
+class FirstOrderScratch(NamedTuple):
     """Scratch memory of one thread; a width for the twist, the actuators and, where asked for, all joints."""
 
     state: State
@@ -54,7 +54,7 @@ class RatesScratch(NamedTuple):
     sizes: Floats  # (columns,)
 
 
-def new_rates_scratch(loops: Loops, plan: RatesPlan) -> RatesScratch:
+def new_first_order_scratch(loops: Loops, plan: FirstOrderPlan) -> FirstOrderScratch:
     """Scratch memory of one thread."""
     n, m, (twists, directions) = len(loops.lo), 6 * plan.loops.shape[0], plan.directions.shape
     width = twists + len(plan.actuated) + (n if plan.asks == JOINTS else 0)
@@ -68,23 +68,23 @@ def new_rates_scratch(loops: Loops, plan: RatesPlan) -> RatesScratch:
         (directions, n - plan.rank + twists),
         (n,),
     )
-    return RatesScratch(new_state(loops), new_equations(loops, LAYOUT), *(np.zeros(shape) for shape in shapes))
+    return FirstOrderScratch(new_state(loops), new_equations(loops, LAYOUT), *(np.zeros(shape) for shape in shapes))
 
 
 NONE = np.zeros((0, 0))
-PLAN = RatesPlan(NONE, np.zeros(0), NONE, np.zeros(0, np.int64), NONE, 0, 0, 0, 0.0, 0.0, 0)
+PLAN = FirstOrderPlan(NONE, np.zeros(0), NONE, np.zeros(0, np.int64), NONE, 0, 0, 0, 0.0, 0.0, 0)
 """A plan of the types that kernels are compiled for."""
 
-open_scratch = opener(new_rates_scratch(LOOPS, PLAN))
+open_scratch = opener(new_first_order_scratch(LOOPS, PLAN))
 
 
 @search
-def rates(machine: int, scratch_address: int, plan: RatesPlan, coordinates: Floats, found: Rates) -> None:
+def rates(machine: int, scratch_address: int, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder) -> None:
     """Fill what is asked of dimensionless joint coordinates (n, columns); rows that are no numbers stay as they are.
 
     Parameters
     ----------
-    machine, scratch : see `open_loops` and `new_rates_scratch`.
+    machine, scratch : see `open_loops` and `new_first_order_scratch`.
     """
     loops, scratch = open_loops(machine), open_scratch(scratch_address)
     table, motions, pairs, sizes = scratch.table, scratch.motions, scratch.pairs, scratch.sizes
@@ -128,7 +128,7 @@ def rates(machine: int, scratch_address: int, plan: RatesPlan, coordinates: Floa
 
 
 @routine
-def put_joint_rates(plan: RatesPlan, scratch: RatesScratch, seen: int, row: int, found: Rates) -> None:
+def put_joint_rates(plan: FirstOrderPlan, scratch: FirstOrderScratch, seen: int, row: int, found: FirstOrder) -> None:
     """Fill joint rates from motions that are turned so that those that show most are first."""
     motions, pairs, resisted, sizes = scratch.motions, scratch.pairs, scratch.resisted, scratch.sizes
     n, m, largest = scratch.screws.shape[0], 6 * plan.loops.shape[0], 0.0
@@ -153,7 +153,7 @@ def put_joint_rates(plan: RatesPlan, scratch: RatesScratch, seen: int, row: int,
 
 
 @routine
-def put_resisted(plan: RatesPlan, scratch: RatesScratch, seen: int) -> None:
+def put_resisted(plan: FirstOrderPlan, scratch: FirstOrderScratch, seen: int) -> None:
     """Fill orthonormal motions that loops resist, by how much; the conditions in the order of the loops."""
     table, resisted, m = scratch.table, scratch.resisted, 6 * plan.loops.shape[0]
     put_columns(table, 0, 0, resisted)
@@ -168,7 +168,7 @@ def put_resisted(plan: RatesPlan, scratch: RatesScratch, seen: int) -> None:
 
 
 @routine
-def put_lost(plan: RatesPlan, scratch: RatesScratch, place: int, measures: Floats, lost: Floats) -> None:
+def put_lost(plan: FirstOrderPlan, scratch: FirstOrderScratch, place: int, measures: Floats, lost: Floats) -> None:
     """Fill the twist that is lost: of pairs that at a place, of all motions the one that they show least of."""
     is_passive, across = measures[PASSIVE] < min(measures[SERIAL], plan.singular), scratch.across
     rows = scratch.motions if is_passive else scratch.pairs
@@ -185,7 +185,7 @@ def put_lost(plan: RatesPlan, scratch: RatesScratch, place: int, measures: Float
 
 
 @routine
-def put_gained(scratch: RatesScratch, m: int, forward: Floats, gained: Floats) -> None:
+def put_gained(scratch: FirstOrderScratch, m: int, forward: Floats, gained: Floats) -> None:
     """Fill the twist of the motion that the loops hold back least, at locked actuators, where it shows."""
     resisted, twists = scratch.resisted, len(gained)
     rank, size = resisted.shape[0], 0.0
@@ -231,7 +231,7 @@ def load_coordinates(loops: Loops, coordinates: Floats, state: State) -> bool:
 
 
 @routine
-def put_screws(loops: Loops, plan: RatesPlan, state: State, eq: Equations, screws: Floats) -> None:
+def put_screws(loops: Loops, plan: FirstOrderPlan, state: State, eq: Equations, screws: Floats) -> None:
     """Present screws of orthonormal joint rates: velocity of the reference point, angular velocity."""
     for j in range(screws.shape[0]):
         for i in range(6):
@@ -258,7 +258,7 @@ def put_screws(loops: Loops, plan: RatesPlan, state: State, eq: Equations, screw
 
 
 @routine
-def lay_out_motions(plan: RatesPlan, screws: Floats, table: Floats) -> None:
+def lay_out_motions(plan: FirstOrderPlan, screws: Floats, table: Floats) -> None:
     """By joint rates: the loops' conditions, the end effector's twist, rates of the actuators, rates of all joints."""
     m, twists = 6 * plan.loops.shape[0], plan.directions.shape[0]
     seen = m + twists + plan.actuated.shape[0]

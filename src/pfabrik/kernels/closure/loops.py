@@ -87,14 +87,14 @@ class Closed(NamedTuple):
     iterations: Ints  # (n,)
 
 
-# Columns of Rates.measures.
+# Columns of FirstOrder.measures.
 SERIAL, PARALLEL, CONSTRAINT, PASSIVE = 0, 1, 2, 3
 
 # What is asked for: Jacobians alone, with all measures, or joint rates.
 JACOBIANS, MEASURES, JOINTS = 0, 1, 2
 
 
-class RatesPlan(NamedTuple):
+class FirstOrderPlan(NamedTuple):
     """What is asked of a mechanism, and what holds of it in general."""
 
     loops: Floats  # (loops, columns): orthonormal combinations of the loops
@@ -110,7 +110,7 @@ class RatesPlan(NamedTuple):
     asks: int  # JACOBIANS, MEASURES or JOINTS
 
 
-class Rates(NamedTuple):
+class FirstOrder(NamedTuple):
     """What holds at n configurations, by orthonormal joint rates; lengths in L. No rows of what is not asked for."""
 
     forward: Floats  # (n, twists, n_a)
