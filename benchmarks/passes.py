@@ -14,7 +14,6 @@ from pfabrik.closure.projection import projection_modes
 from pfabrik.decomposition.leg_table import LegTable, leg_table
 from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels.legs.answer import answer
-from pfabrik.kernels.passes.accelerated import solve_by_half_spaces
 from pfabrik.kernels.passes.solve import solve_by_passes
 from pfabrik.model import model_of
 from pfabrik.passes.joint_positions import new_pass_results
@@ -54,9 +53,8 @@ def kernel_call(mechanism: pf.Mechanism, targets: Array, options: pf.passes.Opti
     """One call of the kernel of passes for all targets, from home."""
     compiled, model = compile_plan(mechanism), model_of(mechanism)
     settings = settings_of(model, options, projection_modes(model.path_closure, options.hold, None)[0])
-    kernel = solve_by_half_spaces if options.method == "accelerated" else solve_by_passes
     settings, results = settings._replace(max_rounds=0), new_pass_results(compiled, len(targets))
-    return partial(kernel, compiled.plan, targets, compiled.home_seed, settings, results)
+    return partial(solve_by_passes, compiled.plan, targets, compiled.home_seed, settings, results)
 
 
 def legs_alone(mechanism: pf.Mechanism, targets: Array) -> Solve | None:

@@ -20,7 +20,7 @@ from machines.trunks import TRUNKS
 from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import linear, quaternions, vectors
 from pfabrik.kernels.legs import complete_poses
-from pfabrik.kernels.passes import half_spaces, moving_frames, restrict, solve
+from pfabrik.kernels.passes import half_spaces, moving_frames, restrict
 from pfabrik.kernels.passes import passes as reach
 from pfabrik.kernels.passes import plan as P
 
@@ -57,7 +57,7 @@ def solve_spd(A, n, damping):
 
 
 def room(plan):
-    return solve.new_configuration(plan)
+    return P.new_configuration(plan)
 
 
 def move_carriers(plan, now):
@@ -493,7 +493,7 @@ def test_half_spaces_are_the_slopes_of_what_limits_are_exceeded_by(name: str) ->
     compiled = compile_plan(pf.load("nrpm") if name == "nrpm" else TRUNKS[name]())
     plan, rng, step = compiled.plan, np.random.default_rng(17), 1e-6
     length, column, lever = plan.length, half_spaces.PLATFORM, 0.7 * plan.length
-    settings = P.Settings(1e-9 * length, 10, 0, P.TRANSLATES + P.TURNS, 0, lever)
+    settings = P.Settings(1e-9 * length, 10, 0, P.TRANSLATES + P.TURNS, 0, lever, 1)
     now = at_home(compiled)
     disturb(compiled, now, rng, 0.1)
     pose, trunks = now.pose.copy(), now.trunks.copy()

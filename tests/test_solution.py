@@ -13,7 +13,8 @@ import pfabrik as pf
 from machines import ring
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.decomposition.plan import compile_plan
-from pfabrik.passes.joint_positions import joint_points, new_pass_results
+from pfabrik.kernels.passes.moving_frames import move_carriers
+from pfabrik.kernels.passes.plan import new_configuration
 
 FIELDS = ("pose", "actuators", "position_error", "rotation_error", "residual", "limit_excess", "iterations", "rounds")
 
@@ -185,15 +186,13 @@ def test_centres_along_a_trunk_move_with_the_joints_before_them() -> None:
         ]
     machine = Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
     compiled = compile_plan(machine)
-    values = np.array([[0.3, 12.0, -0.5]])
-    reached = new_pass_results(compiled, 1)._replace(
-        poses=np.eye(4)[None], nodes=compiled.home_seed.nodes, trunks=values
-    )
-    points = joint_points(compiled, reached)
+    config, places = new_configuration(compiled.plan), dict(compiled.trunk_points)
+    config.trunks[:] = 0.3, 12.0, -0.5
+    move_carriers(compiled.plan, config)
     shoulder = Rotation.from_rotvec([0, 0.3, 0])
     at = np.array((100.0, 0, 0)) + shoulder.apply((90.0 - 100, 0, 40) - 12.0 * np.array((-1, 0, 3)) / np.sqrt(10))
-    np.testing.assert_allclose(points["shoulder"][0], (100, 0, 0), atol=1e-12)
-    np.testing.assert_allclose(points["elbow"][0], at, atol=1e-12)
+    np.testing.assert_allclose(config.screws[places["shoulder"], 0], (100, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(config.screws[places["elbow"], 0], at, atol=1e-12)
 
 
 @pytest.mark.parametrize("distance, named", [(0.9e-7, True), (1.1e-7, False)])

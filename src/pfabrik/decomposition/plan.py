@@ -77,7 +77,7 @@ def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Seque
     trunks = [trunk for trunk, _ in chains if trunk]
     steps = [step for trunk in trunks for step in trunk]
     plan = P.Plan(
-        nodes=_nodes(forms),
+        nodes=np.concatenate([form.nodes for form in forms]),
         branches=_branches(forms, carried_by),
         chains=_spans([branches for _, branches in chains], P.CHAIN),
         cones=_cones(forms),
@@ -86,13 +86,12 @@ def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Seque
         length=mechanism.characteristic_length,
     )
     plan.chains["trunk"] = carriers - 1
-    home_nodes = plan.nodes["home"][plan.nodes["stored"] >= 0]
     return CompiledPlan(
         plan,
         tuple(_points(forms, plan.branches)),
         tuple(step.joint.name for step in steps),
         tuple((step.joint.name, place) for place, step in enumerate(steps) if step.joint.at is not None),
-        P.Seeds(mechanism.home_pose[None].copy(), home_nodes[None], np.zeros((1, len(steps)))),
+        P.Seeds(mechanism.home_pose[None].copy(), plan.nodes["home"][None].copy(), np.zeros((1, len(steps)))),
     )
 
 
@@ -106,14 +105,6 @@ def _spans(parts: Sequence[Sized], dtype: np.dtype[np.void]) -> Records:
     spans, starts = np.zeros(len(parts), dtype), _offsets(parts)
     spans["first"], spans["last"] = starts[:-1], starts[1:]
     return spans
-
-
-def _nodes(forms: Sequence[BranchForm]) -> Records:
-    """The nodes of all branches; those that are stored are numbered."""
-    nodes = np.concatenate([form.nodes for form in forms])
-    stored = nodes["stored"] >= 0
-    nodes["stored"][stored] = np.arange(stored.sum())
-    return nodes
 
 
 def _cones(forms: Sequence[BranchForm]) -> Records:

@@ -34,7 +34,7 @@ class BranchForm:
     ----------
     joints : names of the joints at each node; several where they act as one.
     shifts : from each node to the centre of its joints, along the axis of its hinge, (nodes,) [length].
-    nodes, record, cones : as of `kernels.passes.plan`; a node that is stored has the place 0.
+    nodes, record, cones : as of `kernels.passes.plan`.
     determined : joints whose value follows from the nodes.
     """
 
@@ -189,10 +189,8 @@ def _place_nodes(mechanism: Mechanism, draft: _Draft) -> None:
     """Fill the nodes: centres of hinges moved along their axes into one plane, and segments with their strokes."""
     joint_nodes, planar, nodes = draft.joint_nodes, draft.planar, draft.nodes
     nodes["home"] = [joint_node.at for joint_node in joint_nodes]
-    nodes["stored"][-1], nodes["angle_lo"], nodes["angle_hi"] = -1, *FREE
+    nodes["angle_lo"], nodes["angle_hi"] = FREE
     nodes["hinge"][: min(planar, len(joint_nodes) - 1)] = 1
-    if draft.rail is None:
-        nodes["stored"][0] = -1
     in_plane = joint_nodes[min(planar, len(joint_nodes) - 1)].at if not draft.align else joint_nodes[0].at
     for k in range(planar):
         _shift(draft, k, draft.normal, in_plane)

@@ -23,7 +23,6 @@ from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.margin_blocks import margins_in_blocks
 from .passes import plan as P
-from .passes.accelerated import solve_by_half_spaces
 from .passes.move_trunks import move_trunks
 from .passes.solve import solve_by_passes
 from .platform.answer_rows import answer_rows
@@ -63,8 +62,8 @@ _PASSES = (
     P.Plan._make([*(_read(np.zeros(0, record)) for record in _PLAN_RECORDS), 0.0]),
     *_values("F3"),
     P.Seeds(*_values("F3 F3 F2")),
-    P.Settings(*_values("f i i i i f")),
-    P.PassResults(*_values("f3 f3 f2 f1 i1 i1")),
+    P.Settings(*_values("f i i i i f i")),
+    P.PassResults(*_values("f3 f3 f4 f3 f1 i1 i1")),
 )
 
 _POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i f f i"))
@@ -75,7 +74,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
     (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
     (solve_by_passes, _PASSES),
-    (solve_by_half_spaces, _PASSES),
     (move_trunks, (_PASSES[0], *_values("F3 f2"), _PASSES[3], 0.0)),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("F1 F2")), _CLOSED, *_values("f2"))),
     (evaluate_poses, tuple(_values("i i F3 F2 F2 f2 f2 f3"))),

@@ -15,9 +15,8 @@ from ..arrays import Floats, Ints
 from ._jit import allocator, routine
 
 # Violation up to which a limit counts as kept; violation that may remain when no more limit can be made active; share
-# of a gradient's square, orthogonal to the active gradients, below which it counts as dependent on them, and that below
-# which an equation counts as following from others.
-KEPT, ROUNDED, DEPENDENT, IMPLIED = 1e-14, 1e-9, 1e-12, 1e-6
+# of a gradient's square, orthogonal to the active gradients, below which it counts as dependent on them.
+KEPT, ROUNDED, DEPENDENT = 1e-14, 1e-9, 1e-12
 
 
 class QP(NamedTuple):
@@ -195,26 +194,16 @@ def take_up(p: QP, n: int, kept: int, m: int, c: int, violation: float) -> int:
 
 
 @routine
-def keep_equations(p: QP, n: int, equations: int) -> int:
-    """Move x to the nearest point where the first rows are equations, and make active those that others do not imply.
-
-    Returns how many are active.
-    """
-    m = 0
-    for c in range(equations):
-        if m == n:
-            break
-        full_rate, rate = put_pull(p, n, m, c)
-        if rate > IMPLIED * full_rate:
-            off = p.h[c]
-            for i in range(n):
-                off += p.G[c, i] * p.x[i]
-            divide(p, n, m, c)
-            for i in range(n):
-                p.x[i] -= off / rate * p.step[i]
-            p.active[m] = c
-            m += 1
-    return m
+def take_up_equation(p: QP, n: int, m: int, c: int) -> int:
+    """Make row `c` active as an equation, as m others are; how many are then, as many as before if they imply it."""
+    value = p.h[c]
+    for i in range(n):
+        value += p.G[c, i] * p.x[i]
+    if value < 0.0:
+        p.h[c] = -p.h[c]
+        for i in range(n):
+            p.G[c, i] = -p.G[c, i]
+    return max(m, take_up(p, n, m, m, c, abs(value)))
 
 
 @routine
@@ -231,7 +220,9 @@ def solve_with_equations(p: QP, n: int, equations: int, k: int) -> bool:
     apply_inverse(p.factor, n, p.g, p.x)
     for i in range(n):
         p.x[i] = -p.x[i]
-    kept = keep_equations(p, n, equations)
+    kept = 0
+    for c in range(equations):
+        kept = take_up_equation(p, n, kept, c)
     m = kept
     for _round in range(4 * (n + k)):
         c, violation = worst_violated(p, n, equations, k)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
-
 import numpy as np
 
 from ..arrays import Floats
@@ -16,7 +14,6 @@ from ..description.task import Weights
 from ..kernels.passes import plan as P
 from ..motion.closure import Closure
 from ..motion.displacements import columns, displacements
-from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 
 RESTARTS = 24
@@ -25,14 +22,12 @@ RESTARTS = 24
 
 def positions_of(mechanism: Mechanism, compiled: CompiledPlan, coordinates: Floats) -> P.Seeds:
     """Node positions and trunk coordinates at joint coordinates (n, columns), deviations from home."""
-    plan, bodies = compiled.plan, displacements(mechanism, coordinates)
-    home, n = compiled.home_seed, len(coordinates)
-    nodes, trunks = np.repeat(home.nodes, n, axis=0), np.zeros((n, home.trunks.shape[1]))
+    bodies, n = displacements(mechanism, coordinates), len(coordinates)
+    home = compiled.home_seed.nodes[0]
+    nodes, trunks = np.repeat(home[None], n, axis=0), np.zeros((n, len(compiled.trunk_joints)))
     for point in compiled.points:
-        node = plan.nodes[point.node]
-        if node["stored"] >= 0:
-            T = bodies[mechanism.joint(point.joint).connects[0]]
-            nodes[:, node["stored"]] = T[:, :3, :3] @ node["home"] + T[:, :3, 3]
+        T = bodies[mechanism.joint(point.joint).connects[0]]
+        nodes[:, point.node] = T[:, :3, :3] @ home[point.node] + T[:, :3, 3]
     for place, name in enumerate(compiled.trunk_joints):
         trunks[:, place] = coordinates[:, columns(mechanism)[name].start]
     return P.Seeds(platform_poses(mechanism, coordinates), nodes, trunks)
@@ -45,11 +40,12 @@ def holding(mechanism: Mechanism) -> Weights:
 
 def new_pass_results(compiled: CompiledPlan, n: int) -> P.PassResults:
     """Allocate n results."""
-    home = compiled.home_seed
+    plan = compiled.plan
     return P.PassResults(
         poses=np.empty((n, 4, 4)),
-        nodes=np.empty((n, *home.nodes.shape[1:])),
-        trunks=np.empty((n, home.trunks.shape[1])),
+        nodes=np.empty((n, len(plan.nodes), 3)),
+        carriers=np.empty((n, len(plan.trunks) + 1, 3, 4)),
+        trunk_points=np.empty((n, len(plan.trunk_joints), 3)),
         gaps=np.empty(n),
         iterations=np.empty(n, np.int64),
         rounds=np.empty(n, np.int64),
@@ -98,7 +94,9 @@ def _centres(mechanism: Mechanism, compiled: CompiledPlan, results: P.PassResult
 def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
     """Names of joints whose centres follow from node positions: not those merged with others into one joint."""
     compiled = compile_plan(mechanism)
-    home = new_pass_results(compiled, 1)._replace(**compiled.home_seed._asdict())
+    home = new_pass_results(compiled, 1)
+    home.poses[:], home.carriers[:] = mechanism.home_pose, np.eye(3, 4)
+    home.nodes[:], home.trunk_points[:] = compiled.plan.nodes["home"], compiled.plan.trunk_joints["point"]
     near = TOLERANCES.position * mechanism.characteristic_length
     return frozenset(
         name
@@ -109,51 +107,8 @@ def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
 
 def joint_points(compiled: CompiledPlan, results: P.PassResults) -> dict[str, Floats]:
     """Joint name -> position of its centre in the base frame, (n, 3); joints that act as one share a centre."""
-    carriers, trunk_centres = _carriers(compiled.plan, results.trunks)
-    points = {name: trunk_centres[joint] for name, joint in compiled.trunk_points}
+    points = {name: results.trunk_points[:, joint] for name, joint in compiled.trunk_points}
     for point in compiled.points:
-        rotations = results.poses[:, :3, :3] if point.carrier < 0 else carriers[point.carrier][:, :3, :3]
-        node = _node(compiled.plan, results, point.node, carriers)
-        points[point.joint] = node + rotations @ (point.shift * point.axis)
+        T = results.poses if point.carrier < 0 else results.carriers[:, point.carrier]
+        points[point.joint] = results.nodes[:, point.node] + T[:, :3, :3] @ (point.shift * point.axis)
     return points
-
-
-def _node(plan: P.Plan, results: P.PassResults, k: int, carriers: list[Floats]) -> Floats:
-    """Positions (n, 3) of node k: stored, on the platform, or on its carrier."""
-    node = plan.nodes[k]
-    if node["stored"] >= 0:
-        return results.nodes[:, node["stored"]]
-    branch = plan.branches[np.searchsorted(plan.branches["last"], k)]
-    if k == branch["last"]:
-        T, point = results.poses, branch["end"]
-    else:
-        T, point = carriers[branch["carrier"]], node["home"]
-    return cast(Floats, T[:, :3, :3] @ point + T[:, :3, 3])
-
-
-def _carriers(plan: P.Plan, trunk_values: Floats) -> tuple[list[Floats], list[Floats]]:
-    """Poses (n, 4, 4) of the carriers (the base and every trunk's body), and the centres (n, 3) of the trunk joints."""
-    n = len(trunk_values)
-    carriers = [np.broadcast_to(np.eye(4), (n, 4, 4))]
-    centres: list[Floats] = []
-    for trunk in plan.trunks:
-        T = carriers[0]
-        for j in range(trunk["first"], trunk["last"]):
-            joint = plan.trunk_joints[j]
-            centres.append(T[:, :3, :3] @ joint["point"] + T[:, :3, 3])
-            T = T @ _motion(joint, trunk_values[:, j])
-        carriers.append(T)
-    return carriers, centres
-
-
-def _motion(joint: Any, values: Floats) -> Floats:
-    """The displacements (n, 4, 4) of one trunk joint about or along its axis at home."""
-    axis, point = joint["axis"], joint["point"]
-    T = np.zeros((len(values), 4, 4))
-    T[:] = np.eye(4)
-    if not joint["turns"]:
-        T[:, :3, 3] = values[:, None] * axis
-        return T
-    T[:, :3, :3] = from_rotvec(values[:, None] * axis)
-    T[:, :3, 3] = point - T[:, :3, :3] @ point
-    return T

@@ -178,28 +178,18 @@ class PassesEngine(InverseEngine):
 
     def _run(self, targets: Floats, begin: Floats, settings: P.Settings) -> P.PassResults:
         """Run the kernel on all rows, on all cores; rotations of targets of a joint end effector are overwritten."""
-        solve = _kernel(self._options.method == "accelerated")
+        from ..kernels.passes.solve import solve_by_passes
+
         if self.mechanism.end_effector_is_joint:  # a point has no orientation; that of home is used
             targets[:, :3, :3] = np.eye(3)
         seeds = positions_of(self.mechanism, self._compiled, begin)
         results = new_pass_results(self._compiled, len(targets))
 
         def run(block: slice) -> None:
-            solve(self._compiled.plan, targets[block], take(seeds, block), settings, take(results, block))
+            solve_by_passes(self._compiled.plan, targets[block], take(seeds, block), settings, take(results, block))
 
         in_blocks(run, len(targets), ROWS_A_BLOCK)
         return results
-
-
-def _kernel(accelerated: bool) -> Callable[[P.Plan, Floats, P.Seeds, P.Settings, P.PassResults], None]:
-    """The kernel of the passes asked for; kernels are loaded where they are needed."""
-    if accelerated:
-        from ..kernels.passes.accelerated import solve_by_half_spaces
-
-        return solve_by_half_spaces
-    from ..kernels.passes.solve import solve_by_passes
-
-    return solve_by_passes
 
 
 def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configurations | None:
@@ -221,4 +211,5 @@ def settings_of(model: Model, options: PassOptions, projection: ProjectionMode) 
         free=P.TRANSLATES * any(free[:3]) + P.TURNS * any(free[3:]),
         keep_sides=0,
         lever=length * float(turning) ** 0.5,
+        is_accelerated=int(options.method == "accelerated"),
     )

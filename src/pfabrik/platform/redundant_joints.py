@@ -67,6 +67,7 @@ def _trunks(model: Model) -> tuple[Trunks, ...]:
         free=0,
         keep_sides=0,
         lever=model.length,
+        is_accelerated=1,
     )
     trunks = []
     for from_platform in (False, True):

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 
 from ...arrays import Floats
-from .._jit import routine, search
+from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..quaternions import difference
 from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
-from .fit import turn_to_fit
+from .fit import revise_target
 from .half_spaces import (
     PLATFORM,
     HalfSpaces,
@@ -23,12 +23,10 @@ from .half_spaces import (
     begin_programme,
     dot_of,
     least_step,
-    new_half_spaces,
 )
 from .meet import reach_end
-from .moving_frames import move_carriers
-from .plan import TRANSLATES, TURNS, Configuration, PassResults, Plan, Seeds, Settings
-from .solve import load_seed, move_to_centroid, new_configuration, write_row
+from .moving_frames import load_seed, move_carriers
+from .plan import TRANSLATES, TURNS, Configuration, Plan, Seeds, Settings
 
 # Passes of a trunk from one start; how many in a row may fail to leave this share of the excess, first and, where no
 # start succeeds, again.
@@ -281,7 +279,7 @@ def distance_from(
 
 
 @routine
-def project_target(
+def project_by_half_spaces(
     plan: Plan, config: Configuration, target: Floats, seeds: Seeds, row: int, settings: Settings, spaces: HalfSpaces
 ) -> tuple[float, int, int]:
     """Move a target that is not reached to a nearest pose that is; the largest gap, passes and rounds.
@@ -312,10 +310,7 @@ def project_target(
         gap = other_gap
     while gap > settings.enough and rounds < settings.max_rounds:
         rounds += 1
-        if settings.free & TRANSLATES:
-            move_to_centroid(plan, config)
-        if settings.free & TURNS:
-            turn_to_fit(plan, config, settings.free == TURNS)
+        revise_target(plan, config, settings)
         gap, _passes = reach_ends(plan, config, settings)
     return gap, passes + rounds, rounds
 
@@ -329,17 +324,3 @@ def start_at_target(config: Configuration, target: Floats, settings: Settings) -
         if settings.free & TURNS == 0:
             for j in range(3):
                 config.pose[i, j] = target[i, j]
-
-
-@search
-def solve_by_half_spaces(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, results: PassResults) -> None:
-    """Run passes with exact meetings and half-spaces towards every target, and move targets that are not reached."""
-    config, spaces = new_configuration(plan), new_half_spaces(plan)
-    for i in range(targets.shape[0]):
-        load_seed(plan, seeds, i, config)
-        copy_table(targets[i], config.pose)
-        gap, iterations, rounds = project_target(plan, config, targets[i], seeds, i, settings, spaces)
-        write_row(plan, i, config, results)
-        results.gaps[i] = gap
-        results.iterations[i] = iterations
-        results.rounds[i] = rounds

@@ -7,7 +7,7 @@ from ..legs.complete_poses import orthonormalise, turn_pose
 from ..linear import solve_spd
 from ..vectors import Vec, add, along, cross, dot, move, norm, scale, sub, turn, vec
 from .moving_frames import move_carriers
-from .plan import Configuration, Plan
+from .plan import TRANSLATES, TURNS, Configuration, Plan, Settings
 
 # Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
 FIT_STEPS, FIT_DAMPING = 2, 1e-12
@@ -62,6 +62,19 @@ def point_rate(plan: Plan, config: Configuration, j: int, p: Vec) -> Vec:
 
 
 @routine
+def move_to_centroid(plan: Plan, config: Configuration) -> None:
+    """The paper's projection: move the target by the mean gap of the ends, with its orientation held."""
+    n = plan.branches.shape[0]
+    shift = (0.0, 0.0, 0.0)
+    for b in range(n):
+        branch = plan.branches[b]
+        miss = sub(vec(config.nodes[branch["last"]]), move(config.pose, vec(branch["end"])))
+        shift = along(shift, 1.0 / n, miss)
+    for i in range(3):
+        config.pose[i, 3] += shift[i]
+
+
+@routine
 def turn_to_fit(plan: Plan, config: Configuration, about_reference: bool) -> None:
     """Turn the platform by one Gauss-Newton step of the rigid best fit of its points to the ends of chains.
 
@@ -99,3 +112,12 @@ def turn_to_fit(plan: Plan, config: Configuration, about_reference: bool) -> Non
     moved = sub(fixed, turn(config.pose, centre))
     for i in range(3):
         config.pose[i, 3] = moved[i]
+
+
+@routine
+def revise_target(plan: Plan, config: Configuration, settings: Settings) -> None:
+    """Move the target to where the ends of chains agree, as far as it may be moved."""
+    if settings.free & TRANSLATES:
+        move_to_centroid(plan, config)
+    if settings.free & TURNS:
+        turn_to_fit(plan, config, settings.free == TURNS)

@@ -8,8 +8,7 @@ from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import PATIENT, reach_from_start
 from .half_spaces import HalfSpaces, new_half_spaces
 from .moving_frames import move_carriers
-from .plan import Configuration, Plan, Settings
-from .solve import new_configuration
+from .plan import Configuration, Plan, Settings, new_configuration
 
 
 @routine

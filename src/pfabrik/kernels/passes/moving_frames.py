@@ -5,8 +5,8 @@ from __future__ import annotations
 from ...arrays import Floats
 from .._jit import routine
 from ..legs.complete_poses import turn_pose
-from ..vectors import Vec, add, along, move, put, rotate, scale, sub, turn, vec
-from .plan import Configuration, Plan
+from ..vectors import Vec, add, along, copy_row, copy_table, move, put, rotate, scale, sub, turn, vec
+from .plan import Configuration, Plan, Seeds
 
 
 @routine
@@ -55,3 +55,15 @@ def place_ends(plan: Plan, c: int, config: Configuration) -> None:
         if branch["rail"] == 0:
             put(config.nodes[first], move(config.carriers[branch["carrier"]], vec(plan.nodes[first]["home"])))
         put(config.nodes[last], move(config.pose, vec(branch["end"])))
+
+
+@routine
+def load_seed(plan: Plan, seeds: Seeds, i: int, config: Configuration) -> None:
+    """Load seed `i`, or the only one; the ends of branches follow from the pose and the trunks."""
+    row = i if seeds.poses.shape[0] > 1 else 0
+    copy_table(seeds.poses[row], config.pose)
+    copy_table(seeds.nodes[row], config.nodes)
+    copy_row(seeds.trunks[row], config.trunks)
+    move_carriers(plan, config)
+    for c in range(plan.chains.shape[0]):
+        place_ends(plan, c, config)

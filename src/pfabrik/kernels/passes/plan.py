@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Records
+from .._jit import allocator
 
 # The body that the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2
@@ -21,7 +22,6 @@ _vector = ("f8", (3,))
 NODE = np.dtype(
     [
         ("home", *_vector),
-        ("stored", "i8"),  # its place in PassResults.nodes; -1 if it follows from the pose and the trunks
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane
@@ -102,6 +102,22 @@ class Configuration(NamedTuple):
     system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 
+@allocator
+def new_configuration(plan: Plan) -> Configuration:
+    """Allocate a configuration."""
+    unknowns = max(plan.trunk_joints.shape[0], 3)
+    return Configuration(
+        np.zeros((4, 4)),
+        np.zeros((plan.nodes.shape[0], 3)),
+        np.zeros(plan.trunk_joints.shape[0]),
+        np.zeros((plan.trunks.shape[0] + 1, 3, 4)),
+        np.zeros((plan.trunk_joints.shape[0], 2, 3)),
+        np.zeros((plan.branches.shape[0], 3)),
+        np.zeros(plan.branches.shape[0], np.int64),
+        np.zeros((unknowns, unknowns + 1)),
+    )
+
+
 class Seeds(NamedTuple):
     """Configurations that passes start from: one for all rows, or one per row."""
 
@@ -119,14 +135,16 @@ class Settings(NamedTuple):
     free: int  # motions of a target that is not reached: TRANSLATES, TURNS, or both
     keep_sides: int  # 1: legs of two parts stay on their sides; with meetings only
     lever: float  # how a turn counts beside a distance [length per rad]; with half-spaces only
+    is_accelerated: int  # 1: with meetings and half-spaces
 
 
 class PassResults(NamedTuple):
     """Results of the passes, row by row: configurations whose loops are closed up to the gap."""
 
     poses: Floats  # (n, 4, 4)
-    nodes: Floats  # (n, n_stored, 3): the nodes that do not follow from the pose and the trunks
-    trunks: Floats  # (n, n_trunk_joints): deviation from home
+    nodes: Floats  # (n, n_nodes, 3)
+    carriers: Floats  # (n, n_trunks + 1, 3, 4)
+    trunk_points: Floats  # (n, n_trunk_joints, 3): present points of trunk joints
     gaps: Floats  # (n,): largest distance of a chain's end from its place on the platform
     iterations: Ints  # (n,)
     rounds: Ints  # (n,): number of revisions of the target

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...arrays import Floats
-from .._jit import allocator, routine, search
-from ..vectors import along, copy_row, copy_table, move, put, sub, vec
-from .fit import turn_to_fit
-from .moving_frames import move_carriers, place_ends
+from .._jit import routine, search
+from ..vectors import copy_table, put, vec
+from .accelerated import project_by_half_spaces
+from .fit import revise_target
+from .half_spaces import new_half_spaces
+from .moving_frames import load_seed, place_ends
 from .passes import reach_by_passes
-from .plan import TRANSLATES, TURNS, Configuration, PassResults, Plan, Seeds, Settings
+from .plan import Configuration, PassResults, Plan, Seeds, Settings, new_configuration
 
 
 @routine
@@ -24,82 +24,42 @@ def reach_pose(plan: Plan, config: Configuration, settings: Settings) -> tuple[f
 
 
 @routine
-def move_to_centroid(plan: Plan, config: Configuration) -> None:
-    """The paper's projection: move the target by the mean gap of the ends, with its orientation held."""
-    n = plan.branches.shape[0]
-    shift = (0.0, 0.0, 0.0)
-    for b in range(n):
-        branch = plan.branches[b]
-        miss = sub(vec(config.nodes[branch["last"]]), move(config.pose, vec(branch["end"])))
-        shift = along(shift, 1.0 / n, miss)
-    for i in range(3):
-        config.pose[i, 3] += shift[i]
-
-
-@routine
-def project_target(plan: Plan, config: Configuration, settings: Settings) -> tuple[float, int, int]:
+def project_by_centroid(plan: Plan, config: Configuration, settings: Settings) -> tuple[float, int, int]:
     """Revise the target round by round until every chain reaches it; the largest gap, iterations and rounds."""
     gap, iterations = reach_pose(plan, config, settings)
     rounds = 0
     while gap > settings.enough and rounds < settings.max_rounds:
-        if settings.free & TRANSLATES:
-            move_to_centroid(plan, config)
-        if settings.free & TURNS:
-            turn_to_fit(plan, config, settings.free == TURNS)
+        revise_target(plan, config, settings)
         rounds += 1
         gap, more = reach_pose(plan, config, settings)
         iterations += more
     return gap, iterations, rounds
 
 
-@allocator
-def new_configuration(plan: Plan) -> Configuration:
-    """Allocate a configuration."""
-    unknowns = max(plan.trunk_joints.shape[0], 3)
-    return Configuration(
-        np.zeros((4, 4)),
-        np.zeros((plan.nodes.shape[0], 3)),
-        np.zeros(plan.trunk_joints.shape[0]),
-        np.zeros((plan.trunks.shape[0] + 1, 3, 4)),
-        np.zeros((plan.trunk_joints.shape[0], 2, 3)),
-        np.zeros((plan.branches.shape[0], 3)),
-        np.zeros(plan.branches.shape[0], np.int64),
-        np.zeros((unknowns, unknowns + 1)),
-    )
-
-
-@routine
-def load_seed(plan: Plan, seeds: Seeds, i: int, config: Configuration) -> None:
-    """Load seed `i`, or the only one; nodes that are not stored follow from the pose and the trunks."""
-    row = i if seeds.poses.shape[0] > 1 else 0
-    copy_table(seeds.poses[row], config.pose)
-    copy_row(seeds.trunks[row], config.trunks)
-    move_carriers(plan, config)
-    for k in range(plan.nodes.shape[0]):
-        if plan.nodes[k]["stored"] >= 0:
-            put(config.nodes[k], vec(seeds.nodes[row, plan.nodes[k]["stored"]]))
-    for c in range(plan.chains.shape[0]):
-        place_ends(plan, c, config)
-
-
 @routine
 def write_row(plan: Plan, i: int, config: Configuration, results: PassResults) -> None:
-    """Write a configuration to row `i` of the results."""
+    """Write a configuration to row `i` of the results, with the ends of branches in their places on the platform."""
+    for c in range(plan.chains.shape[0]):
+        place_ends(plan, c, config)
     copy_table(config.pose, results.poses[i])
-    copy_row(config.trunks, results.trunks[i])
-    for k in range(plan.nodes.shape[0]):
-        if plan.nodes[k]["stored"] >= 0:
-            put(results.nodes[i, plan.nodes[k]["stored"]], vec(config.nodes[k]))
+    copy_table(config.nodes, results.nodes[i])
+    for k in range(plan.trunks.shape[0] + 1):
+        copy_table(config.carriers[k], results.carriers[i, k])
+    for j in range(plan.trunk_joints.shape[0]):
+        put(results.trunk_points[i, j], vec(config.screws[j, 0]))
 
 
 @search
 def solve_by_passes(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, results: PassResults) -> None:
-    """Run passes towards every target, and move targets that are not reached."""
-    config = new_configuration(plan)
+    """Run passes towards every target, plain or accelerated, and move targets that are not reached."""
+    config, spaces = new_configuration(plan), new_half_spaces(plan)
     for i in range(targets.shape[0]):
         load_seed(plan, seeds, i, config)
         copy_table(targets[i], config.pose)
-        gap, iterations, rounds = project_target(plan, config, settings)
+        if settings.is_accelerated == 1:
+            gap, iterations, rounds = project_by_half_spaces(plan, config, targets[i], seeds, i, settings, spaces)
+        else:
+            gap, iterations, rounds = project_by_centroid(plan, config, settings)
         write_row(plan, i, config, results)
         results.gaps[i] = gap
         results.iterations[i] = iterations

@@ -12,8 +12,7 @@ from .._jit import routine
 from ..legs.records import Table
 from ..passes.half_spaces import HalfSpaces, new_half_spaces
 from ..passes.move_trunks import move_trunk
-from ..passes.plan import Configuration, Plan, Settings
-from ..passes.solve import new_configuration
+from ..passes.plan import Configuration, Plan, Settings, new_configuration
 from ..vectors import copy_table, sub, turn
 from .nearest import NearestScratch, nearest_of_row, new_nearest_scratch
 from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
@@ -150,7 +149,7 @@ def step_trunks(trunks: MovedTrunks, scratch: TrunkScratch, home: Floats, target
     for i in range(values.shape[0]):
         values[i] = sides[trunks.legs[i]] * trunks.units[i]
     plan = Plan(trunks.nodes, trunks.branches, trunks.chains, trunks.cones, trunks.trunks, trunks.trunk_joints, length)
-    settings = Settings(enough, moving["iterations"], 0, 0, 0, length)
+    settings = Settings(enough, moving["iterations"], 0, 0, 0, length, 1)
     move_trunk(plan, pose, values, settings, enough, scratch.config, scratch.half_spaces)
     for i in range(values.shape[0]):
         sides[trunks.legs[i]] = values[i] / trunks.units[i]
