@@ -17,6 +17,9 @@ DEPENDENT = 1e-6
 LOOSE = 4.0
 """Largest entry left of such an equation where equations are not met, in units of the gap."""
 
+EASE = 1e-6
+"""Weight of a squared step beside the squared excess that it is to lower: it is to make the step unique, no more."""
+
 SHARED = 0.01
 """Factor for pivots of unknowns that legs have in common: they would couple the legs' equations."""
 
@@ -203,6 +206,29 @@ def add_limit(k: int, h: float, number: int, slope: Floats, reduced: FreeMotions
     project(slope, reduced, linear.G[k])
     linear.h[k], linear.which[k] = h, number
     return k + 1
+
+
+@routine
+def easing_step(reduced: FreeMotions, p: QP) -> bool:
+    """Fill `p.x` with the free motions after which the largest excess is least; False if it is none then.
+
+    The multipliers are those of the limits that then are exceeded alike.
+    """
+    linear = reduced.linear
+    motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
+    if motions >= p.x.shape[0]:
+        return False
+    for a in range(motions + 1):
+        p.g[a] = 0.0
+        for b in range(a + 1):
+            p.H[a, b] = EASE * linear.metric[a, b] if a < motions else float(b == motions)
+    for c in range(k):
+        p.h[c] = linear.h[c] + linear.drift[c]
+        for a in range(motions):
+            p.G[c, a] = linear.G[c, a]
+        p.G[c, motions] = -1.0
+    is_solved = factorise(p.H, motions + 1, 0.0, p.factor) and solve_qp(p, motions + 1, k)
+    return is_solved and p.x[motions] > 0.0
 
 
 @routine

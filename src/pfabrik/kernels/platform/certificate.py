@@ -29,7 +29,7 @@ from typing import TypeAlias
 
 from .._jit import routine
 from ..closure.loops import BASE_AXES
-from ..free_motions import put_multipliers
+from ..free_motions import easing_step, put_multipliers
 from ..legs.answer import deviation
 from ..legs.frames import AXES, ZERO
 from ..legs.records import (
@@ -48,6 +48,7 @@ from ..legs.records import (
 )
 from ..sqp import note_multipliers, sum_of_multipliers
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
+from .descend_pose import take_step
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
 from .lagrangian import put_limited_gradient
 from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction
@@ -101,15 +102,39 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
 
 
 @routine
-def is_held_nowhere(table: Table, objective: PlatformObjective, search: SearchScratch) -> bool:
-    """True if no feasible configuration has the rotation of `search.best`, where the limits of a programme contradict.
+def is_held_nowhere(table: Table, row: int, objective: PlatformObjective, steps: int, search: SearchScratch) -> bool:
+    """True if it is proved that no feasible configuration has the rotation of `search.best`.
 
-    The sum of the certificate without the distance is not positive for any feasible configuration. With the multipliers
-    of the contradiction it is positive here, and by the same bounds no less anywhere.
+    There the linearised limits contradict each other. If that proves nothing, it is asked again where the largest
+    excess is least.
+
+    Parameters
+    ----------
+    steps : most steps on the way there.
     """
-    used, reduced, gradient = search.elimination.used, search.first, search.objective_gradient
+    used, reduced = search.elimination.used, search.first
     if objective.pose.frame != BASE_AXES or objective.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
         return False
+    if contradicts(table, search):
+        return True
+    for _step in range(steps):
+        if not easing_step(reduced, search.p):
+            return False
+        if contradicts(table, search):
+            return True
+        take_step(table, reduced, search.p.x, search.best, search)
+        linearise(table, row, objective, search.best, search, reduced)
+    return False
+
+
+@routine
+def contradicts(table: Table, search: SearchScratch) -> bool:
+    """True if the multipliers in `search.p` prove that the limits linearised in `search.first` contradict each other.
+
+    The sum of the certificate without the distance is not positive for any feasible configuration. Here it is positive,
+    and by the same bounds no less than its excess anywhere.
+    """
+    reduced, gradient = search.first, search.objective_gradient
     note_multipliers(reduced.linear, search.p, search.hessian)
     for j in range(gradient.shape[0]):
         gradient[j] = 0.0

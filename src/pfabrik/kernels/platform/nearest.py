@@ -62,6 +62,10 @@ HOLDABLE = 1e-3
 """Largest phase 1 distance from which a search with the held part held is started [L or rad]."""
 
 
+EASING = 4
+"""Most steps from the own start to where a proof is sought that nothing can be held."""
+
+
 class NearestScratch(NamedTuple):
     """Scratch memory of one thread."""
 
@@ -291,7 +295,11 @@ def search_row(
             distances_to_held[seed + 1], _ = pose_gradient(
                 phase1_objective.pose, target, start_pose, search.gradient, True
             )
-            if is_in_place and search.control[0]["steps"] == 0 and is_held_nowhere(table, objective, search):
+            if (
+                is_in_place
+                and search.control[0]["steps"] == 0
+                and is_held_nowhere(table, row, objective, EASING if start == 0 else 0, search)
+            ):
                 return math.inf
     fix_held(phase1_objective.pose, False, search)
     while (
