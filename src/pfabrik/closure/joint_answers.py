@@ -19,7 +19,6 @@ from ..kernels.legs.records import TASK
 from ..kernels.rows import OPEN, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from ..motion.closure import Closure
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .close import CLOSED, in_lengths, locking
@@ -30,6 +29,7 @@ from .multistart import random_feasible, seeds_of
 from .parasitic import asks_too_much, follows_task, has_parasitic_motion
 from .projection import projection_modes
 from .random_starts import random_coordinates
+from .reaches import reaches_of
 
 if TYPE_CHECKING:
     from ..kernels.closure.joint_tables import JointScratch
@@ -177,15 +177,10 @@ def _prepared(
         np.array(task.held),
         np.array([projection.weights for projection in projections]),
         np.array([projection.hold for projection in projections]),
-        _reaches(closure),
+        reaches_of(closure.loops),
         seeds * scale,
         nearby * scale,
         in_lengths(poses, 1.0 / mechanism.characteristic_length),
         np.concatenate(random) * scale,
     )
     return Handle(tables), Scratch(new_joint_scratch, tables, *links_on_paths(mechanism))
-
-
-def _reaches(closure: Closure) -> Floats:
-    """The reach of each path, as of `JointTables`."""
-    return np.zeros((0, 7))

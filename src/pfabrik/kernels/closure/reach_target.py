@@ -336,15 +336,15 @@ def search_from_random(
 
 
 @routine
-def is_beyond_reach(tables: JointTables, scratch: JointScratch, pose: Floats) -> bool:
-    """True if some path is too short for a pose: a polygon through its joints, at any configuration."""
+def is_beyond_reach(tables: JointTables, pose: Floats) -> bool:
+    """True if some path is too short for a pose, at any configuration."""
     reaches = tables.reaches
     for path in range(reaches.shape[0]):
         square = 0.0
         for i in range(3):
             off = pose[i, 3] - reaches[path, i]
             for j in range(3):
-                off += pose[i, j] * reaches[path, 3 + j]
+                off -= pose[i, j] * reaches[path, 3 + j]
             square += off * off
         if math.sqrt(square) > reaches[path, 6]:
             return True
@@ -357,22 +357,17 @@ def reach(tables: JointTables, scratch: JointScratch, question: Record) -> bool:
 
     In one step and by continuation; if the mode need not be kept, from other configurations and leg by leg.
     """
-    machine, task, pose, begin, best = (
-        tables.machine[0],
-        tables.task[0],
-        scratch.pose,
-        scratch.begin,
-        scratch.reached,
-    )
+    machine, task, pose, begin, best = tables.machine[0], tables.task[0], scratch.pose, scratch.begin, scratch.reached
     verb, follows = question["verb"], machine["follows"] == 1
     is_fixed, is_step, is_completed = follows or machine["is_whole"] == 1, verb == STEP, True
     complete(task, scratch.target[0], begin.poses[0], pose)
-    if verb == EXPECTED:
+    is_beyond = machine["is_whole"] == 1 and is_beyond_reach(tables, pose)
+    if verb == EXPECTED and not is_beyond:
         return reach_as_expected(tables, scratch, question["leg_by_leg"] == 1)
     if follows:
         is_completed = complete_by_loops(tables, scratch, is_step)
     close_below(tables, scratch, begin, pose, is_fixed, STEPS if is_step else int(machine["closing_steps"]), best)
-    if is_step:
+    if is_step or is_beyond:
         return is_completed and is_feasible(tables, best)
     position, rotation = errors(task, begin.poses[0], pose, scratch.turn)
     is_long = question["keeps_mode"] == 1 and math.hypot(position, rotation) > LONGEST_STEP
