@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..kernels.closure.loops import BALL, SLIDE, Loops
 
 SLACK = 1e-6
@@ -30,7 +30,7 @@ def reaches_of(loops: Loops) -> Floats:
     return np.array([[*first, *(loops.end - last), reach] for first, last, reach in found])
 
 
-def _reach(loops: Loops, units: Floats) -> tuple[Floats, Floats, float]:
+def _reach(loops: Loops, units: Ints) -> tuple[Floats, Floats, float]:
     """First and last point of a path through some units, and how far they may be apart [L]."""
     turns = [k for k in units.tolist() if loops.kinds[k] != SLIDE]
     if not turns:
