@@ -7,7 +7,7 @@ import math
 import os
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
-from numbers import Real
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +40,13 @@ def require_finite(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, Real) or not _is_finite(value):
         raise InvalidArgument(name, reprlib.repr(value), "a finite number")
     return float(value)
+
+
+def require_count(name: str, value: Any) -> int:
+    """An integer from 1 to a million; InvalidArgument for anything else."""
+    if isinstance(value, bool) or not (isinstance(value, Integral) and 1 <= int(value) <= 1_000_000):
+        raise InvalidArgument(name, reprlib.repr(value), "an integer from 1 to 1000000")
+    return int(value)
 
 
 def require_path(name: str, value: Any) -> Path:

@@ -18,6 +18,7 @@ from .closure.engine_contract import InverseEngine
 from .closure.parasitic import has_parasitic_motion
 from .description.mechanism import Mechanism
 from .engine import engine_of, knows_all_modes
+from .errors import InvalidArgument
 from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, PROJECTED, REACHED, Rows
 from .model import model_of
 from .options import Options, checked_options
@@ -62,14 +63,16 @@ def solve_by(
     begin, before = start_of(mechanism, start, shape), start._request if isinstance(start, Solution) else None
     if begin is not None and before is not None and _is_certified(begin, before, targets, options):
         return Solution(mechanism, begin, shape, before)
-    keep_mode = keeps_mode(options, begin)
-    solutions = choose_engine(mechanism).answer(targets, begin, options, keep_mode=keep_mode)
+    keep_mode, engine = keeps_mode(options, begin), choose_engine(mechanism)
+    if options.most_steps and not engine.bounds_steps:
+        raise InvalidArgument("options.most_steps", repr(options.most_steps), "None, as legs have no closed form")
+    solutions = engine.answer(targets, begin, options, keep_mode=keep_mode)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
     if not is_missed:
         return Solution(mechanism, solutions, shape)
-    if not keep_mode and not knows_all_modes(mechanism):
+    if not (keep_mode or options.most_steps or knows_all_modes(mechanism)):
         solutions = _reach_missed(mechanism, solutions, targets, begin, options)
         if (solutions.rows.status == REACHED).all():
             return Solution(mechanism, solutions, shape)

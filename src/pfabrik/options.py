@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
-from .checks import require_choice, require_positive
+from .checks import require_choice, require_count, require_positive
 from .errors import InvalidArgument
 from .tolerances import TOLERANCES
 
@@ -35,6 +35,9 @@ class Options:
         sqrt(distance^2 + (rotation_length angle)^2). None is `Mechanism.rotation_length`.
     actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
         of more encoders than the mechanism has freedoms never agree better than they are exact.
+    most_steps : how many configurations the search for a projection may linearise in all; None for no bound. What it
+        finds until then is feasible, the start itself at worst, and `Solution.is_complete` is False. For control loops:
+        from a near start, answers are good. Of machines whose legs have closed forms.
     on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
     """
 
@@ -44,6 +47,7 @@ class Options:
     hold: Literal["orientation", "position"] | None = "orientation"
     rotation_length: float | None = None
     actuator_tolerance: float = TOLERANCES.position
+    most_steps: int | None = None
     on_invalid: Literal["raise", "mark"] = "raise"
 
     def __post_init__(self) -> None:
@@ -53,6 +57,8 @@ class Options:
             value = getattr(self, name)
             if value is not None or name in ("rotation_tolerance", "actuator_tolerance"):
                 require_positive(f"options.{name}", value)
+        if self.most_steps is not None:
+            require_count("options.most_steps", self.most_steps)
 
 
 def options_or(usual: Chosen, options: Chosen | None) -> Chosen:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -43,7 +44,14 @@ class Solver:
     overwrites them. Copy them to keep them, or use `solution`.
     """
 
-    def __init__(self, mechanism: Mechanism, *, start: Start | None = None, options: Options | None = None) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        *,
+        start: Start | None = None,
+        options: Options | None = None,
+        most_steps: int | None = None,
+    ) -> None:
         """Prepare what answers need, which takes tenths of a second.
 
         Parameters
@@ -51,12 +59,15 @@ class Solver:
         start : the start of every search, as of `solve_ik`; its working mode and its assembly mode are kept. Default:
             home, and any working mode.
         options : of every call.
+        most_steps : in place of that of `Options`.
 
         Raises
         ------
         InvalidArgument : no Mechanism; a start that is no single configuration of it.
         """
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
+        if most_steps is not None:
+            self.options = replace(self.options, most_steps=most_steps)
         self._start, begin = start, start_of(mechanism, start, ())
         prepare(mechanism)
         engine, keep_mode = engine_of(mechanism), keeps_mode(self.options, start)

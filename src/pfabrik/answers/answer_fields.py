@@ -149,6 +149,15 @@ class Answer:
         return cast("bool | NDArray[np.bool_]", self._shaped((status == Status.REACHED) | is_nearest))
 
     @property
+    def is_complete(self) -> bool | NDArray[np.bool_]:
+        most_steps = None if self._request is None else self._request.options.most_steps
+        is_cut = np.zeros(len(self._rows.status), bool)
+        if most_steps is not None:
+            is_cut = (self._rows.status == Status.PROJECTED) & ~self._rows.certain
+            is_cut &= self._rows.counters[:, ITERATIONS] >= most_steps
+        return cast("bool | NDArray[np.bool_]", self._shaped(~is_cut))
+
+    @property
     def actuator_error(self) -> float | Floats:
         return cast(float | Floats, self._shaped(self._rows.measures[:, ACTUATOR_ERROR]))
 

@@ -25,7 +25,13 @@ class InverseEngine(ABC):
 
     Every answer is a feasible configuration: REACHED within the tolerances of the options, or PROJECTED to the nearest
     one found. Rows are INVALID where the target is no pose, and FAILED where no feasible configuration is found.
+
+    Attributes
+    ----------
+    bounds_steps : True if `Options.most_steps` bounds its searches.
     """
+
+    bounds_steps = False
 
     @abstractmethod
     def answer(

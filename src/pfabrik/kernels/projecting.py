@@ -36,6 +36,9 @@ EFFORT = np.dtype(
         ("steps", "i8"),  # taken by all searches
         ("searches", "i8"),
         ("most", "i8"),  # steps after which no further search begins
+        ("linearised", "i8"),  # configurations that were linearised
+        ("bound", "i8"),  # how many may be, in all searches
+        ("is_cut", "i8"),  # 1 if a search ended because of that
     ]
 )
 """What searches have cost, and may."""
@@ -111,6 +114,14 @@ def note_attempt(phase: int, start: int, steps: int, distance: float, effort: Re
 def is_spent(effort: Record) -> bool:
     """True if no further search is to begin."""
     return bool(effort["steps"] >= effort["most"])
+
+
+@routine
+def is_over(effort: Record) -> bool:
+    """True if no further configuration is to be linearised: a search ends where it is, and is noted to be cut."""
+    if effort["linearised"] >= effort["bound"]:
+        effort["is_cut"] = 1
+    return bool(effort["linearised"] >= effort["bound"])
 
 
 @routine

@@ -98,6 +98,7 @@ CONTROL = np.dtype(
         ("is_rejected", "i8"),  # 1 if the last step was rejected
         ("is_exact", "i8"),  # 1 if its actual reduction was as predicted
         ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
+        ("closed", "f8"),  # objective at the last feasible configuration
     ]
 )
 """State of the step control."""

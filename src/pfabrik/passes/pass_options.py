@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Literal
 
-from ..checks import require_choice
-from ..errors import InvalidArgument
+from ..checks import require_choice, require_count
 from ..options import Options
 
 
@@ -32,9 +30,7 @@ class PassOptions(Options):
         super().__post_init__()
         require_choice("options.method", self.method, ("plain", "accelerated", "centroid"))
         for name in ("max_iterations", "max_rounds"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not (isinstance(value, Integral) and 1 <= int(value) <= 1_000_000):
-                raise InvalidArgument(f"options.{name}", repr(value), "an integer from 1 to 1000000")
+            require_count(f"options.{name}", getattr(self, name))
 
     @classmethod
     def paper(cls) -> PassOptions:

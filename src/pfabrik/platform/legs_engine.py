@@ -53,6 +53,7 @@ class LegsEngine(Engine):
     def __init__(self, model: Model) -> None:
         self._model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
+        self.bounds_steps = self._searches
 
     @cached_property
     def _single_forward(self) -> SingleAssembly:
@@ -79,7 +80,7 @@ class LegsEngine(Engine):
         """
         answered = partial(self._by_stages, options=options, keep_mode=keep_mode)
         answers = answered(targets, start, nearby=nearby)
-        if not keep_mode or not self._table.has_sides:
+        if options.most_steps or not keep_mode or not self._table.has_sides:
             return answers
         status = answers.rows.status
         is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()

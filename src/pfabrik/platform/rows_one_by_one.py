@@ -71,7 +71,10 @@ def answer_phases(
 
     has_seeds = last > IN_OTHER_MODES and (tolerance is not None or not nearby)  # values may fit in another mode alone
     tables = handle_of(model, options, with_seeds=has_seeds)
-    question = question_of(tolerance is not None, first, last, has_start, keep_mode, nearby, tolerance or 0.0)
+    most_steps = options.most_steps or 0
+    question = question_of(
+        tolerance is not None, first, last, has_start, keep_mode, nearby, most_steps, tolerance or 0.0
+    )
     scratch, distances, rows = scratch_of_answers(tables), np.empty(len(asked)), answers.rows
     found = rows.counters, rows.actuators, rows.measures, rows.status
     outputs = PoseSolutions(distances, rows.poses, answers.q, answers.sides, *found)

@@ -119,9 +119,16 @@ def has_seeds(model: Model) -> bool:
 
 @lru_cache(maxsize=64)
 def question_of(
-    assembles: bool, first: int, last: int, has_start: bool, keeps_mode: bool, is_nearby: bool, tolerance: float
+    assembles: bool,
+    first: int,
+    last: int,
+    has_start: bool,
+    keeps_mode: bool,
+    is_nearby: bool,
+    most_steps: int,
+    tolerance: float,
 ) -> Handle[T.Question]:
-    """What is asked, searches being bounded by the machine's own settings alone."""
-    asked = np.zeros(1, T.QUESTION)
-    asked[0] = assembles, first, last, has_start, keeps_mode, is_nearby, UNBOUNDED, UNBOUNDED, UNBOUNDED, tolerance
+    """What is asked, searches being bounded by the machine's own settings, and by `most_steps` unless that is 0."""
+    bounds, asked = (UNBOUNDED, UNBOUNDED, UNBOUNDED, most_steps), np.zeros(1, T.QUESTION)
+    asked[0] = assembles, first, last, has_start, keeps_mode, is_nearby, *bounds, tolerance
     return Handle(T.Question(asked))

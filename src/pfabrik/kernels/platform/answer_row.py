@@ -10,11 +10,12 @@ from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
 from ..legs.records import Table
-from ..projecting import brings_nearer, is_too_far
+from ..projecting import UNBOUNDED, brings_nearer, is_too_far
 from ..rows import (
     CERTAIN,
     HOLD,
     HOLD_NOTHING,
+    ITERATIONS,
     OPEN,
     PENDING,
     POSITION_ERROR,
@@ -83,6 +84,19 @@ def put_start(start: Start, answer: PoseSolutions) -> None:
         counters[0, k] = 0
     for k in range(measures.shape[1]):
         measures[0, k] = 0.0
+
+
+@routine
+def stay_at_start(tables: Tables, scratch: AnswerScratch, start: Start, target: Floats, answer: PoseSolutions) -> int:
+    """Fill an answer with its start; the status."""
+    measures, setting = answer.measures, tables.plan.settings[0]
+    put_start(start, answer)
+    copy_table(start.poses[0], answer.poses[0])
+    copy_row(start.actuators[0], answer.actuators[0])
+    distance, angle = errors(tables.legs.task[0], target, start.poses[0], scratch.nearest.search.gradient.turn)
+    measures[0, POSITION_ERROR], measures[0, ROTATION_ERROR] = distance * tables.legs.task[0]["length"], angle
+    is_reached = measures[0, POSITION_ERROR] <= setting["position"] and angle <= setting["rotation"]
+    return REACHED if is_reached else PROJECTED
 
 
 @routine
@@ -325,7 +339,10 @@ def project(
     """
     machine, settings, other = tables.machine[0], tables.plan.settings, scratch.other
     target, last, distance = targets[0], machine["projections"] - 1, math.inf
+    most, effort = question["most_steps"], scratch.nearest.search.effort[0]
     for aim in range(last + 1):
+        if most > 0:
+            effort["bound"] = most // (2 if aim < last else 1)
         if distance == math.inf:
             distance = search_for(tables, scratch, start, target, question, aim, targets, answer)
     if question["has_start"] == 1 and last > 0 and distance < math.inf:
@@ -425,15 +442,21 @@ def answer_row(
 
     Parameters
     ----------
-    scratch : as of `new_answer_scratch`; `scratch.nearest.effort` tells the steps and the searches that it took.
+    scratch : as of `new_answer_scratch`; `scratch.nearest.search.effort` tells the steps and the searches that it took.
     answer : filled with one row: the distance [L] of a projection, the pose [length], sides, actuators, measures, and
         in `counters` the steps of its search and what is held; q is NaN where closed forms answer.
     """
-    effort = scratch.nearest.effort[0]
-    effort["steps"], effort["searches"], effort["most"] = 0, 0, question["effort"]
+    effort, most = scratch.nearest.search.effort[0], question["most_steps"]
+    effort["steps"], effort["searches"], effort["most"], effort["linearised"] = 0, 0, question["effort"], 0
+    effort["bound"], effort["is_cut"] = most if most > 0 else UNBOUNDED, 0
     put_start(start, answer)
     put_start(start, scratch.other)
     status = answer_by_phases(tables, scratch, start, target, question, answer)
+    if most > 0 and status == PENDING:
+        status, effort["is_cut"] = stay_at_start(tables, scratch, start, target[0], answer), 1
+    status = PROJECTED if most > 0 and status == UNSURE else status
+    if most > 0 and status == PROJECTED:
+        answer.counters[0, ITERATIONS] = most if effort["is_cut"] == 1 else effort["linearised"]
     answer.status[0] = status
     if question["has_start"] == 1 and status != PENDING and status != OPEN:
         count_turns(tables.legs.driven, start.actuators[0], answer.actuators[0])

@@ -46,6 +46,7 @@ from ..legs.records import (
     SLIDE,
     Table,
 )
+from ..projecting import is_over
 from ..sqp import note_multipliers, sum_of_multipliers
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
 from .descend_pose import take_step
@@ -88,6 +89,8 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
     if search.leg_eval.rows.shape[0] == 0:
         evaluate_legs(table, search.best, search.leg_eval)
         put_objective(table, row, objective, search.best, search)
+    elif is_over(search.effort[0]):
+        return False
     else:
         linearise(table, row, objective, search.best, search, reduced)
         put_limited_gradient(table, search, search.here)
@@ -118,7 +121,7 @@ def is_held_nowhere(table: Table, row: int, objective: PlatformObjective, steps:
     if contradicts(table, search):
         return True
     for _step in range(steps):
-        if not easing_step(reduced, search.p):
+        if is_over(search.effort[0]) or not easing_step(reduced, search.p):
             return False
         if contradicts(table, search):
             return True

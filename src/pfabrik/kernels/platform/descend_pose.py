@@ -12,6 +12,7 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..free_motions import FreeMotions, put_step, restoring_step
 from ..legs.records import Table
+from ..projecting import is_over
 from ..sqp import (
     CLOSED,
     CORRECTIONS,
@@ -100,7 +101,8 @@ def restore_feasibility(
         if is_closed(reduced.linear, tolerance):
             return True
         gap = reduced.linear.totals[0]["gap"]
-        if not restoring_step(reduced, table.task[0]["redundant"] > 0 or gap > STUCK * before, search.p):
+        by_all = table.task[0]["redundant"] > 0 or gap > STUCK * before
+        if is_over(search.effort[0]) or not restoring_step(reduced, by_all, search.p):
             return False
         before = gap
         take_step(table, reduced, search.p.x, state, search)
@@ -169,12 +171,15 @@ def descend(
     """Restore feasibility at `best`, then descend to the nearest configuration; the distance there.
 
     Infinite if no feasible configuration is found, or if the search will not come as near as `best_distance`;
-    `best_distance` itself if it comes by the incumbent. If infeasible steps cannot be restored, the search goes on from
-    the last feasible configuration and restores after every step.
+    `best_distance` itself if it comes by the incumbent; that of the last feasible configuration if the effort is over.
+    If infeasible steps cannot be restored, the search goes on from the last feasible configuration and restores after
+    every step.
     """
     reduced, unit = search.first, search.gradient.unit
     search.near[0] = NEAR
     unit[0], search.control[0]["steps"], search.control[0]["is_restoring"] = 1.0, 0, 0
+    if is_over(search.effort[0]):
+        return math.inf
     linearise(table, row, objective, search.best, search, reduced)
     if not restore_feasibility(table, row, objective, search.best, CLOSED, search, reduced, RESTORING):
         return math.inf
@@ -183,7 +188,7 @@ def descend(
         search.objective_gradient[j] *= unit[0]
     if reduced.linear.totals[0]["value"] == 0.0:
         return 0.0
-    copy_platform_state(search.best, search.closed)
+    keep_closed(reduced, search)
     for closing in range(2):
         search.control[0]["is_restoring"] = closing
         if closing == 1:
@@ -193,7 +198,17 @@ def descend(
         set_platform_users(2, search)
         if distance >= 0.0:
             return distance
+        if is_over(search.effort[0]):
+            copy_platform_state(search.closed, search.best)
+            return math.sqrt(2.0 * search.control[0]["closed"] / unit[0])
     return math.inf
+
+
+@routine
+def keep_closed(reduced: FreeMotions, search: SearchScratch) -> None:
+    """Keep a feasible configuration, linearised in `reduced`, as the last one."""
+    copy_platform_state(search.best, search.closed)
+    search.control[0]["closed"] = reduced.linear.totals[0]["value"]
 
 
 @routine
@@ -217,10 +232,14 @@ def take_steps(
     begin_descent(reduced.linear, hessian, control)
     n_missed = 0
     while control["is_done"] == 0:
+        if is_over(search.effort[0]):
+            return -1.0
         if not has_same_curvature(reduced, other, control):
             control["largest"] = lagrangian_hessian(table, row, objective, search, reduced)
         is_accepted = False
         while not is_accepted and control["is_done"] == 0:
+            if is_over(search.effort[0]):
+                return -1.0
             if plan_step(reduced.linear, hessian, control, objective.pose.max_iterations, search.p):
                 copy_platform_state(search.best, search.trial)
                 share = take_step(table, reduced, search.p.x, search.trial, search)
@@ -251,7 +270,7 @@ def take_steps(
                     if is_hopeless(deficit, share, control):
                         return math.inf
                     if is_closed(reduced.linear, CLOSED):
-                        copy_platform_state(search.best, search.closed)
+                        keep_closed(reduced, search)
                         if reduced.linear.totals[0]["value"] <= 0.5 * unit[0] * ARRIVED * ARRIVED:
                             control["is_done"] = 1
             if is_stuck_infeasible(reduced.linear, is_accepted, objective.pose.max_iterations, control):

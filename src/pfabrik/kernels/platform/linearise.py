@@ -31,6 +31,7 @@ def linearise(
 ) -> None:
     """Fill the reduced linearisation at a configuration."""
     totals, errors = reduced.linear.totals[0], search.gradient.errors
+    search.effort[0]["linearised"] += 1
     gap = evaluate_legs(table, state, search.leg_eval)
     put_slopes(table, search.leg_eval)
     totals["value"], held = put_objective(table, row, objective, state, search)

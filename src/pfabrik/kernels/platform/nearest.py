@@ -19,13 +19,13 @@ from ..legs.complete_poses import orthonormalise
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import Table
 from ..projecting import (
-    EFFORT,
     TALLY,
     UNBOUNDED,
     clear_tally,
     count_effort,
     count_ending,
     is_agreed,
+    is_over,
     is_spent,
     seed_of,
 )
@@ -70,7 +70,6 @@ class NearestScratch(NamedTuple):
     """Scratch memory of one thread."""
 
     search: SearchScratch
-    effort: Records  # (1,): EFFORT
     best: PlatformState
     best_tally: Records  # (1,): TALLY
     phase1_tally: Records  # (1,): TALLY of phase 1 searches that ended away from the held part
@@ -84,11 +83,9 @@ def new_nearest_scratch(table: Table, plan: MultistartPlan, weighs_limits: bool)
     """Allocate the scratch memory of one thread, for the multipliers of limits too where these are asked for."""
     search, best = new_search_scratch(table, plan.links), new_platform_state(table.legs.shape[0])
     k, n = search.first.linear.G.shape if weighs_limits else (0, 0)
-    effort, tallies = np.zeros(1, EFFORT), (np.zeros(1, TALLY), np.zeros(1, TALLY))
-    effort["most"] = UNBOUNDED
+    tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
     return NearestScratch(
         search,
-        effort,
         best,
         *tallies,
         np.zeros(1 + plan.seeds.poses.shape[0]),
@@ -214,7 +211,7 @@ def search_from(
     """
     search, best, best_tally = scratch.search, scratch.best, scratch.best_tally[0]
     distance = descend(table, row, objective, best_tally["least"], best, search)
-    count_effort(search.control[0]["steps"], scratch.effort[0])
+    count_effort(search.control[0]["steps"], search.effort[0])
     is_infeasible = distance == math.inf and (best_tally["least"] == math.inf or search.control[0]["steps"] == 0)
     if distance < math.inf:
         put_sides(table, search.best, search.leg_eval)
@@ -259,7 +256,7 @@ def search_row(
         scratch.best_tally[0],
         scratch.phase1_tally[0],
         scratch.distances_to_held,
-        scratch.effort[0],
+        scratch.search.effort[0],
     )
     target = search.target
     nearest_seed, by = -1, way_along(table, objective.pose, target, along)
@@ -275,7 +272,7 @@ def search_row(
     for start in range(n_seeds + 2):
         if is_agreed(best_tally, agreements) or (start == n_seeds + 1 and best_tally["is_unbroken"] == 1):
             break
-        if is_spent(effort):
+        if is_spent(effort) or is_over(effort):
             break
         if start == 1 and n_seeds > 0:
             nearest_seed = nearest_start(objective.pose, by, seeds, search)
@@ -305,7 +302,7 @@ def search_row(
     while (
         phase1_objective.pose.max_iterations > 0
         and not is_agreed(best_tally, agreements)
-        and not is_spent(effort)
+        and not (is_spent(effort) or is_over(effort))
         and (best_tally["least"] < math.inf or not is_agreed(phase1_tally, agreements))
     ):
         seed = -1

@@ -180,7 +180,7 @@ def search_set(
         own[0, k] = sides[first + k]
     for i in range(legs.driven.shape[0]):
         values[0, legs.driven[i]["column"]] = legs.driven[i]["sense"] * own[0, legs.driven[i]["leg"]]
-    effort = scratch.nearest.effort[0]
+    effort = scratch.nearest.search.effort[0]
     effort["steps"], effort["most"] = 0, question["effort"]
     starts = Starts(begin, scratch.no_q, own)
     distance = nearest_of_row(
@@ -216,9 +216,10 @@ def search_sets(
     sides: Floats,
     pose: Floats,
 ) -> bool:
-    """Move the joints of all sets as `search_set` does; False once one is not found."""
+    """Move the joints of all sets as `search_set` does; False once one is not found, or if steps are bounded."""
     return (
-        search_set(sets.one, scratch.one, targets, begin, question, sides, pose)
+        question["most_steps"] == 0
+        and search_set(sets.one, scratch.one, targets, begin, question, sides, pose)
         and search_set(sets.two, scratch.two, targets, begin, question, sides, pose)
         and search_set(sets.three, scratch.three, targets, begin, question, sides, pose)
         and search_set(sets.four, scratch.four, targets, begin, question, sides, pose)

@@ -16,6 +16,7 @@ from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
 from ..legs.complete_poses import turn_pose
 from ..legs.records import Table
+from ..projecting import EFFORT, UNBOUNDED
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
@@ -55,6 +56,7 @@ class SearchScratch(NamedTuple):
     half_angles: Floats  # (cones, 3): half angles of all cones, their cosines and sines
     n_cones: Ints  # (1,): how many of these are constrained, the first ones
     links: LinkLimits
+    effort: Records  # (1,): EFFORT
 
 
 def new_search_scratch(table: Table, links: LinkLimits) -> SearchScratch:
@@ -65,7 +67,8 @@ def new_search_scratch(table: Table, links: LinkLimits) -> SearchScratch:
     elimination = new_elimination(n, rows)
     for j in range(n):
         elimination.used[j] = 2 if j < 6 else 1
-    half_angles = np.zeros((table.cones.shape[0], 3))
+    half_angles, effort = np.zeros((table.cones.shape[0], 3)), np.zeros(1, EFFORT)
+    effort["most"], effort["bound"] = UNBOUNDED, UNBOUNDED
     for i in range(half_angles.shape[0]):
         angle = table.cones[i]["half_angle"]
         half_angles[i, 0], half_angles[i, 1], half_angles[i, 2] = angle, math.cos(angle), math.sin(angle)
@@ -94,6 +97,7 @@ def new_search_scratch(table: Table, links: LinkLimits) -> SearchScratch:
         half_angles,
         np.full(1, half_angles.shape[0]),
         new_link_limits(links),
+        effort,
     )
 
 

@@ -55,6 +55,7 @@ QUESTION = np.dtype(
         ("seeds", "i8"),  # most starts of a search beside its own
         ("steps", "i8"),  # most steps of a search from one start
         ("effort", "i8"),  # steps of all searches after which no further one begins
+        ("most_steps", "i8"),  # configurations that may be linearised in all; 0 if there is no bound
         ("tolerance", "f8"),  # of assembly: how close actuators must come to values to be REACHED [L or rad]
     ]
 )
