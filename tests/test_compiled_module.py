@@ -100,10 +100,10 @@ def test_numbers_and_records_of_other_types_are_refused() -> None:
     for count in ("1", 1.5, 2**70, None):
         with pytest.raises(TypeError, match="argument 4: expected an integer"):
             number(codes, codes.copy(), codes.copy(), count, False, codes.copy())
-    walk, arrays = LIBRARY.kernel("chains.walk_chains"), (np.zeros((0, 0)), np.zeros((0, 0, 0)))
+    answer, arrays = LIBRARY.kernel("chains.answer_chains"), (np.zeros(0, np.int64), np.zeros((0, 0), np.int64))
     for record, expected in (((), "more fields"), (arrays, "more fields"), (None, "a record")):
-        with pytest.raises(TypeError, match=f"argument 3: expected .*{expected}"):
-            walk(0, 0, record, np.zeros((0, 0, 0)))
+        with pytest.raises(TypeError, match=f"argument 8: expected .*{expected}"):
+            answer(0, 0, 0, False, np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)), record)
 
 
 PLAIN = "answers are the same, and take 15 to 100 times as long; install a wheel, or compile them"

@@ -105,10 +105,10 @@ class ChainEngine(Engine):
 
         def run(block: slice) -> int:
             begin = starts[block] if len(starts) > 1 else starts
-            return call(targets[block], begin, coordinates[block], *take(rows, block))
+            return call(targets[block], begin, coordinates[block], take(rows, block))
 
         if n == 1 or follows:
-            n_missed = call(targets, starts, coordinates, *rows)
+            n_missed = call(targets, starts, coordinates, rows)
         else:
             n_missed = sum(in_blocks(run, n, ROWS_A_BLOCK))
         return n_missed, Configurations(rows, coordinates)
@@ -121,7 +121,7 @@ class ChainEngine(Engine):
         question, tables = question_of(start is not None, keep_mode, last=BY_LEGS), tables_of(self.model, USUAL)
         scratch = Handle(new_scratch(self.model, 0))
         addresses = tables.address, scratch.address, question.address, False
-        return partial(self._kernel, *addresses, target, begin, np.empty_like(begin), *rows), (
+        return partial(self._kernel, *addresses, target, begin, np.empty_like(begin), rows), (
             scratch,
             tables,
             question,

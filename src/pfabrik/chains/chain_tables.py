@@ -27,18 +27,11 @@ MET = 1e-10
 FEW = 12
 """Most joints of a chain that has few: with narrow limits these have the most local minima."""
 
-TRIES_OF_FEW, TRIES = 40, 8
-"""Seeds from which a target is tried, in chains of few joints and in longer ones."""
-
-DESCENTS_OF_FEW, DESCENTS = 60, 15
-"""Seeds from which descents to the nearest start, likewise."""
-
-BENDS_OF_FEW, BENDS = 20, 0
-"""Starts of descents around the start, beside itself, likewise."""
-
-AGREEMENTS_OF_FEW, AGREEMENTS = 10, 4
-"""Descents that must end at the least distance before the others are left out, likewise; one more for each that ended
-farther away before."""
+SHORT = {"tries": 40, "descents": 60, "bends": 20, "agreements": 10}
+LONG = {"tries": 8, "descents": 15, "bends": 0, "agreements": 4}
+"""Of chains of few joints and of longer ones: seeds from which a target is tried, and from which descents to the
+nearest start; starts of descents around the start, beside itself; and descents that must end at the least distance
+before the others are left out, one more for each that ended farther away before."""
 
 
 @lru_cache(maxsize=16)
@@ -77,10 +70,7 @@ def _tables(
         "home": mechanism.home_pose[:3, 3],
         "longest": stretched_length(model) * (1.0 + TOLERANCES.position) + TOLERANCES.position,
         "is_short": is_short,
-        "tries": TRIES_OF_FEW if is_short else TRIES,
-        "descents": DESCENTS_OF_FEW if is_short else DESCENTS,
-        "bends": BENDS_OF_FEW if is_short else BENDS,
-        "agreements": AGREEMENTS_OF_FEW if is_short else AGREEMENTS,
+        **(SHORT if is_short else LONG),
         "position": tolerance or TOLERANCES.position * length,
         "rotation": rotation_tolerance,
         "limit": TOLERANCES.limit,

@@ -31,6 +31,7 @@ from .platform.forward import assemble
 from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .replay import replay
+from .rows import Rows
 from .timing import fastest, second_derivatives
 from .walk_path import walk_path
 
@@ -85,7 +86,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (assemble, tuple(_values("i i F2 i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),
     (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
-    (answer_chains, tuple(_values("i i i b F3 F2 f2 i1 i2 f3 f2 f2"))),
+    (answer_chains, (*_values("i i i b F3 F2 f2"), Rows(*_values("i1 i2 f3 f2 f2")))),
     (measure_home, tuple(_values("f1 i f1 i1"))),
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),

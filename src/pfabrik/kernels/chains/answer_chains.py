@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints, Record
+from ...arrays import Floats, Record
 from .._jit import routine, search
 from ..closure.loops import SIGHT
 from ..legs.complete_poses import is_pose, orthonormalise
@@ -23,6 +23,7 @@ from ..rows import (
     PROJECTED,
     REACHED,
     ROTATION_ERROR,
+    Rows,
 )
 from ..vectors import copy_row, copy_table
 from .chain_records import ChainTables
@@ -43,11 +44,7 @@ def answer_chains(
     targets: Floats,
     starts: Floats,
     coordinates: Floats,
-    status: Ints,
-    counters: Ints,
-    poses: Floats,
-    actuators: Floats,
-    measures: Floats,
+    rows: Rows,
 ) -> int:
     """Answer targets (n, 4, 4) [length]: reached, or brought nearest; FAILED or PENDING where that finds nothing.
 
@@ -57,7 +54,6 @@ def answer_chains(
     follows : each row starts from the answer to the one before, up to one that is not reached.
     starts : joint coordinates, deviations from home, one row for each target or one for all [length or rad].
     coordinates : of the answers, (n, columns) [length or rad].
-    status, counters, poses, actuators, measures : as in `Rows`.
 
     Returns
     -------
@@ -75,19 +71,8 @@ def answer_chains(
         else:
             copy_row(starts[row if starts.shape[0] > 1 else 0], coordinates[row])
         has_start = question["has_start"] == 1 or (follows and row > 0)
-        status[row] = answer_chain(
-            tables,
-            s,
-            question,
-            has_start,
-            targets[row],
-            coordinates[row],
-            counters[row],
-            poses[row],
-            actuators[row],
-            measures[row],
-        )
-        if status[row] != REACHED:
+        rows.status[row] = answer_chain(tables, s, question, has_start, targets[row], coordinates[row], row, rows)
+        if rows.status[row] != REACHED:
             n_missed += 1
             if follows:
                 break
@@ -102,10 +87,8 @@ def answer_chain(
     has_start: bool,
     asked: Floats,
     coordinates: Floats,
-    counters: Ints,
-    pose: Floats,
-    actuators: Floats,
-    measures: Floats,
+    row: int,
+    rows: Rows,
 ) -> int:
     """Answer one target from joint coordinates, which become the answer's; the status."""
     chain, columns, effort = tables.chain, tables.columns, s.effort[0]
@@ -126,7 +109,7 @@ def answer_chain(
         distance, hold = project(tables, question, has_start, s)
         if distance == math.inf:
             return FAILED
-    return write_answer(tables, hold, s, coordinates, counters, pose, actuators, measures)
+    return write_answer(tables, hold, s, coordinates, row, rows)
 
 
 @routine
@@ -146,18 +129,10 @@ def read_target(machine: Record, asked: Floats, s: ChainScratch) -> bool:
 
 
 @routine
-def write_answer(
-    tables: ChainTables,
-    hold: int,
-    s: ChainScratch,
-    coordinates: Floats,
-    counters: Ints,
-    pose: Floats,
-    actuators: Floats,
-    measures: Floats,
-) -> int:
+def write_answer(tables: ChainTables, hold: int, s: ChainScratch, coordinates: Floats, row: int, rows: Rows) -> int:
     """Write the nearest configuration; the status."""
     machine, columns, driven = tables.machine[0], tables.columns, tables.driven
+    counters, pose, actuators, measures = rows.counters[row], rows.poses[row], rows.actuators[row], rows.measures[row]
     store_chain(tables.chain, s.nearest, s.coordinates)
     for j in range(coordinates.shape[0]):
         coordinates[j] = within_turns(columns[j], s.coordinates[j] / columns[j]["scale"])

@@ -45,36 +45,35 @@ class ChainScratch(NamedTuple):
     between: Floats  # (4, 4): a target on the way there
     pulled: Floats  # (4, 4): a target farther out
     pose: Floats  # (4, 4) [length]: the target as it is asked for, exactly orthonormal
-    coordinates: Floats  # (columns,), dimensionless
-    bent: Floats  # (columns,), dimensionless
-    effort: Records  # (1,): EFFORT
-    tally: Records  # (1,): TALLY
-    log: Records  # (n,): ATTEMPT; most have no rows
+    coordinates: Floats  # (columns,), dimensionless: of the start, then of the answer
+    bent: Floats  # (columns,), dimensionless: a start moved a little
     screws: Floats  # (n, 6)
+    couplings: Floats  # (n, 6)
+    rests: Floats  # (n, 7): right-hand sides: of the gradient, then of the held components
+    responses: Floats  # (n, 7): step, or slope of a fixed freedom; then its changes per unit of each multiplier
     centres: Floats  # (n, 3): a point on the axis of each freedom
     least: Floats  # (n,): bounds of the step of each freedom
     most: Floats  # (n,)
     bend: Floats  # (n,): second derivative of an active cone, times its multiplier
-    cones: Floats  # (cones, 5): how the freedoms of a joint near its cone are turned, as of `frame_cone`
     step: Floats  # (n,)
-    fixed: Ints  # (n,): 1 where the step of a freedom is that to its bound
-    kept: Ints  # (n,): 1 where a least step leaves a freedom where it is
     force: Floats  # (n,): gradient of the objective in the freedoms
+    pivots: Floats  # (n,)
+    fixed: Ints  # (n,): 1 where the step of a freedom is given, as of a bound, 2 where only this step's, else 0
+    cones: Floats  # (cones, 5): how the freedoms of a joint near its cone are turned, as of `frame_cone`
     gradient: PoseGradient
-    total: Floats  # (6,): force and moment at the end, of objective and multipliers
     sums: Floats  # (6, 6): of products of screws
-    A: Floats  # (6, 7): system of the held components, or of the rows to reach
-    wanted: Floats  # (6,): by what the held components are to change
-    multipliers: Floats  # (6,): of the held components
     P: Floats  # (6, 6): second derivatives of the objective, as of `fill_curvature`
     M: Floats  # (6, 6): those of the cost of the freedoms further out
-    pivots: Floats  # (n,)
-    couplings: Floats  # (n, 6)
-    rests: Floats  # (n, 7): right-hand sides: of the gradient, then of the held components
-    sides: Floats  # (7, 6): sums of these
+    A: Floats  # (6, 7): system of the held components, or of the rows to reach
+    sides: Floats  # (7, 6): sums of right-hand sides
     shifts: Floats  # (7, 6): twists of the freedoms further in
+    total: Floats  # (6,): force and moment at the end, of objective and multipliers
+    wanted: Floats  # (6,): by what the held components are to change
+    multipliers: Floats  # (6,): of the held components
     distances: Floats  # (SEEDS,): of the seeds from a target; infinite for those that were tried
-    responses: Floats  # (n, 7): step, or slope of a fixed freedom; then its changes per unit of each multiplier
+    effort: Records  # (1,): EFFORT
+    tally: Records  # (1,): TALLY
+    log: Records  # (attempts,): ATTEMPT; most have no rows
 
 
 def new_chain_state(chain: SerialChain) -> ChainState:
@@ -85,54 +84,28 @@ def new_chain_state(chain: SerialChain) -> ChainState:
 
 def new_chain_scratch(chain: SerialChain, columns: int, attempts: int) -> ChainScratch:
     """Allocate the memory of one thread, with room to note so many attempts."""
-    n = len(chain.lo)
-    return ChainScratch(
-        state=new_chain_state(chain),
-        best=new_chain_state(chain),
-        saved=new_chain_state(chain),
-        unpulled=new_chain_state(chain),
-        nearest=new_chain_state(chain),
-        start=new_chain_state(chain),
-        own=new_chain_state(chain),
-        held=new_chain_state(chain),
-        X=np.zeros((3, 4)),
-        start_X=np.zeros((3, 4)),
-        nearest_X=np.zeros((3, 4)),
-        held_X=np.zeros((3, 4)),
-        target=np.zeros((4, 4)),
-        between=np.zeros((4, 4)),
-        pulled=np.zeros((4, 4)),
-        pose=np.zeros((4, 4)),
-        coordinates=np.zeros(columns),
-        bent=np.zeros(columns),
-        effort=np.zeros(1, EFFORT),
-        tally=np.zeros(1, TALLY),
-        log=np.zeros(attempts, ATTEMPT),
-        screws=np.zeros((n, 6)),
-        centres=np.zeros((n, 3)),
-        least=np.zeros(n),
-        most=np.zeros(n),
-        bend=np.zeros(n),
-        cones=np.zeros((len(chain.cone_angles), 5)),
-        step=np.zeros(n),
-        fixed=np.zeros(n, np.int64),
-        kept=np.zeros(n, np.int64),
-        force=np.zeros(n),
-        gradient=PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
-        total=np.zeros(6),
-        sums=np.zeros((6, 6)),
-        A=np.zeros((6, 7)),
-        wanted=np.zeros(6),
-        multipliers=np.zeros(6),
-        P=np.zeros((6, 6)),
-        M=np.zeros((6, 6)),
-        pivots=np.zeros(n),
-        couplings=np.zeros((n, 6)),
-        rests=np.zeros((n, 7)),
-        sides=np.zeros((7, 6)),
-        shifts=np.zeros((7, 6)),
-        distances=np.zeros(SEEDS),
-        responses=np.zeros((n, 7)),
+    n, zeros = len(chain.lo), np.zeros
+    return ChainScratch._make(
+        (
+            *(new_chain_state(chain) for _ in range(8)),
+            *zeros((4, 3, 4)),
+            *zeros((4, 4, 4)),
+            *zeros((2, columns)),
+            *zeros((2, n, 6)),
+            *zeros((2, n, 7)),
+            zeros((n, 3)),
+            *zeros((6, n)),
+            zeros(n, np.int64),
+            zeros((len(chain.cone_angles), 5)),
+            PoseGradient(zeros(6), zeros((6, 6)), zeros(6), np.ones(1), zeros(6)),
+            *zeros((3, 6, 6)),
+            zeros((6, 7)),
+            *zeros((2, 7, 6)),
+            *zeros((3, 6)),
+            zeros(SEEDS),
+            *(zeros(1, record) for record in (EFFORT, TALLY)),
+            zeros(attempts, ATTEMPT),
+        )
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..legs.complete_poses import turn_pose
@@ -63,7 +63,7 @@ def descend_chain(
     nearer than at `least`, which another one has found.
     """
     state, best = s.state, s.best
-    value, held = reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING)
+    value, held = reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING, False)
     if largest(s.gradient.errors, held) > RESTORED:
         return math.inf
     estimate_multipliers(chain, held, s)
@@ -103,9 +103,7 @@ def descend_chain(
             break
         copy_chain_state(state, best)
         move_chain(chain, state, s)
-        keep(s, s.fixed)
-        trial, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING)
-        keep_none(s)
+        trial, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING, True)
         actual = value - trial
         enough = max(SUFFICIENT * predicted, 0.0) if predicted > FINE * value else -CONVERGED * value
         is_kept = largest(s.gradient.errors, held) <= RESTORED and actual >= enough
@@ -121,20 +119,6 @@ def descend_chain(
         copy_chain_state(best, state)
         measure_pose(chain, target, objective, state, s)
     return value
-
-
-@routine
-def keep(s: ChainScratch, fixed: Ints) -> None:
-    """Keep the freedoms that are fixed where they are."""
-    for d in range(len(fixed)):
-        s.kept[d] = fixed[d]
-
-
-@routine
-def keep_none(s: ChainScratch) -> None:
-    """Keep no freedom where it is."""
-    for d in range(len(s.kept)):
-        s.kept[d] = 0
 
 
 @routine

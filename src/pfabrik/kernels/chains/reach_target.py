@@ -53,10 +53,12 @@ def reach_target(
     s: ChainScratch,
     closeness: float,
     most_steps: int,
+    keeps: bool,
 ) -> tuple[float, int]:
     """Move a configuration until the held components are met, or no step brings them nearer; as `measure_pose`.
 
-    The best configuration is left in `state`, with its pose, screws and errors in the scratch memory.
+    The best configuration is left in `state`, with its pose, screws and errors in the scratch memory. With `keeps`,
+    freedoms that `s.fixed` has stay where they are.
     """
     errors = s.gradient.errors
     distance, held = measure_pose(chain, target, objective, state, s)
@@ -65,7 +67,7 @@ def reach_target(
     while steps < most_steps and largest(errors, held) > closeness and idle < PATIENCE:
         steps += 1
         s.effort[0]["steps"] += 1
-        plan_least_step(chain, s, held, damping * min(1.0, value))
+        plan_least_step(chain, s, held, damping * min(1.0, value), keeps)
         copy_chain_state(state, s.saved)
         move_chain(chain, state, s)
         distance, _ = measure_pose(chain, target, objective, state, s)
@@ -100,7 +102,7 @@ def largest(errors: Floats, held: int) -> float:
 
 
 @routine
-def plan_least_step(chain: SerialChain, s: ChainScratch, held: int, damping: float) -> None:
+def plan_least_step(chain: SerialChain, s: ChainScratch, held: int, damping: float, keeps: bool) -> None:
     """Write the least step within ranges that takes the held components to zero, to first order."""
     screws, step, least, most, n = s.screws, s.step, s.least, s.most, len(chain.lo)
     turns = has_turns(s, held)
@@ -108,8 +110,8 @@ def plan_least_step(chain: SerialChain, s: ChainScratch, held: int, damping: flo
     for i in range(held):
         s.wanted[i] = -s.gradient.errors[i]
     for d in range(n):
-        s.fixed[d] = s.kept[d]
-        if s.kept[d] == 1:
+        s.fixed[d] = 1 if keeps and s.fixed[d] == 1 else 0
+        if s.fixed[d] == 1:
             step[d] = 0.0
             fix_step(s, d, held, turns)
     for sweep in range(SWEEPS):
@@ -143,7 +145,7 @@ def plan_least_step(chain: SerialChain, s: ChainScratch, held: int, damping: flo
         for d in range(n):
             if s.fixed[d] == 0 and (step[d] < least[d] or step[d] > most[d]):
                 step[d] = min(max(step[d], least[d]), most[d])
-                s.fixed[d] = 1
+                s.fixed[d] = 2
                 n_fixed += 1
                 fix_step(s, d, held, turns)
         if n_fixed == 0 or n_fixed == n:

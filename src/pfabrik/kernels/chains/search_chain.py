@@ -88,7 +88,7 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
     copy_chain_state(s.start, s.state)
     for step in range(1, CONTINUATION_STEPS + 1):
         put_between(step / CONTINUATION_STEPS, s)
-        _, held = reach_target(chain, s.between, objective, s.state, s, CLOSENESS, STEPS)
+        _, held = reach_target(chain, s.between, objective, s.state, s, CLOSENESS, STEPS, False)
         error = largest(s.gradient.errors, held)
     if error < least or error <= tables.machine[0]["met"]:
         keep_nearest(s)
@@ -99,7 +99,7 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
 def reach_from(tables: ChainTables, objective: PoseObjective, seed: int, s: ChainScratch) -> float:
     """Reach the target from `s.state`, and note the attempt; the error."""
     before = s.effort[0]["steps"]
-    _, held = reach_target(tables.chain, s.target, objective, s.state, s, CLOSENESS, STEPS)
+    _, held = reach_target(tables.chain, s.target, objective, s.state, s, CLOSENESS, STEPS, False)
     error = largest(s.gradient.errors, held)
     note_attempt(0, seed, s.effort[0]["steps"] - before, error, s.effort[0], s.log)
     return error
