@@ -23,7 +23,7 @@ from pfabrik.kernels.legs.answer import answer
 from pfabrik.model import model_of
 from pfabrik.options import Options
 from pfabrik.platform.legs_engine import LegsEngine
-from pfabrik.platform.redundant_joints import step_redundant_joints
+from pfabrik.platform.rows_one_by_one import step_redundant_joints
 from pfabrik.platform.table import table_handle
 
 slow_interpreted = pytest.mark.skipif(INTERPRETED, reason="minutes")
@@ -323,10 +323,10 @@ def test_few_steps_solve_almost_all_that_arms_can_reach(name: str) -> None:
     model, wanted = model_of(mechanism), targets(mechanism, 200, 0.25, 0.3)
     answers = pf.solve_ik(mechanism, wanted)
     wanted = wanted[answers.status == pf.Status.REACHED]
-    places, home = np.arange(len(wanted)), mechanism.home_pose[None].copy()
+    home = mechanism.home_pose[None].copy()
     sides = np.repeat(model.legs.home_sides, len(wanted), axis=0)
     for _ in range(2):
-        step_redundant_joints(model, wanted, home, sides, places)
+        step_redundant_joints(model, wanted, sides)
         rows = new_rows(model, len(wanted))
         handle = table_handle(model.legs)
         n_unsolved = answer(handle.address, wanted, home, sides, rows.status, rows.poses, rows.actuators, rows.measures)

@@ -284,7 +284,7 @@ def disturb(compiled: CompiledPlan, now: Any, rng: np.random.Generator, share: f
     now.pose[:3, 3] += share * length * rng.uniform(-1, 1, 3) * keep
     now.pose[:3, :3] = Rotation.from_rotvec(share * rng.uniform(-1, 1, 3) * (1 - keep if planar else 1)).as_matrix()
     for j, joint in enumerate(compiled.plan.trunk_joints):
-        now.trunks[j] += share * rng.uniform(-1, 1) * (length if joint["kind"] == P.SLIDE else 1.0)
+        now.trunks[j] += share * rng.uniform(-1, 1) * joint["unit"]
     for branch in compiled.plan.branches:
         if branch["rail"]:
             home = compiled.plan.nodes[branch["first"]]["home"]
@@ -308,7 +308,7 @@ def test_carriers_are_products_of_exponentials(name: str) -> None:
             np.testing.assert_allclose(now.screws[j, 0], T[:3, :3] @ joint["point"] + T[:3, 3], rtol=0, atol=1e-12)
             np.testing.assert_allclose(now.screws[j, 1], T[:3, :3] @ joint["axis"], rtol=0, atol=1e-14)
             twist = np.zeros((4, 4))
-            if joint["kind"] == P.TURN:
+            if joint["turns"]:
                 twist[:3, :3] = np.cross(np.eye(3), joint["axis"])
                 twist[:3, 3] = -twist[:3, :3] @ joint["point"]
             else:
@@ -502,8 +502,7 @@ def test_half_spaces_are_the_slopes_of_what_limits_are_exceeded_by(name: str) ->
         now.pose[:] = pose
         now.pose[:3, 3] += length * x[:3]
         now.pose[:3, :3] = Rotation.from_rotvec(x[3:6] * length / lever).as_matrix() @ pose[:3, :3]
-        slides = plan.trunk_joints["kind"] == P.SLIDE
-        now.trunks[:] = trunks + x[6:] * np.where(slides, length, 1.0)
+        now.trunks[:] = trunks + x[6:] * plan.trunk_joints["unit"]
         move_carriers(plan, now)
         return half_spaces_of(plan, b, now, settings, column, 1e9 * length)
 

@@ -23,9 +23,8 @@ from .legs.blocks import answer_blocks
 from .legs.feasibility import feasibility
 from .legs.margin_blocks import margins_in_blocks
 from .passes import plan as P
-from .passes.move_trunks import move_trunks
 from .passes.solve import solve_by_passes
-from .platform.answer_rows import answer_rows
+from .platform.answer_rows import answer_rows, step_rows
 from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
 from .platform.jacobians import jacobians
@@ -64,7 +63,7 @@ _PASSES = (
     *_values("F3"),
     P.Seeds(*_values("F3 F3 F2")),
     P.Settings(*_values("f i i i i f i")),
-    P.PassResults(*_values("f3 f3 f4 f3 f1 i1 i1")),
+    P.PassResults(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
 _POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i f f i"))
@@ -75,7 +74,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
     (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
     (solve_by_passes, _PASSES),
-    (move_trunks, (_PASSES[0], *_values("F3 f2"), _PASSES[3], 0.0)),
+    (step_rows, tuple(_values("i i F3 f2"))),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("F1 F2")), _CLOSED, *_values("f2"))),
     (evaluate_poses, tuple(_values("i i F3 F2 F2 f2 f2 f3"))),
     (jacobians, tuple(_values("i F3 i f3"))),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Record
 from ..batch import put
 from ..closure.close import HELD, Closing, close, platform_poses
 from ..decomposition.plan import CompiledPlan, compile_plan
@@ -14,6 +14,7 @@ from ..description.task import Weights
 from ..kernels.passes import plan as P
 from ..motion.closure import Closure
 from ..motion.displacements import columns, displacements
+from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 
 RESTARTS = 24
@@ -44,8 +45,7 @@ def new_pass_results(compiled: CompiledPlan, n: int) -> P.PassResults:
     return P.PassResults(
         poses=np.empty((n, 4, 4)),
         nodes=np.empty((n, len(plan.nodes), 3)),
-        carriers=np.empty((n, len(plan.trunks) + 1, 3, 4)),
-        trunk_points=np.empty((n, len(plan.trunk_joints), 3)),
+        trunks=np.empty((n, len(plan.trunk_joints))),
         gaps=np.empty(n),
         iterations=np.empty(n, np.int64),
         rounds=np.empty(n, np.int64),
@@ -94,9 +94,7 @@ def _centres(mechanism: Mechanism, compiled: CompiledPlan, results: P.PassResult
 def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
     """Names of joints whose centres follow from node positions: not those merged with others into one joint."""
     compiled = compile_plan(mechanism)
-    home = new_pass_results(compiled, 1)
-    home.poses[:], home.carriers[:] = mechanism.home_pose, np.eye(3, 4)
-    home.nodes[:], home.trunk_points[:] = compiled.plan.nodes["home"], compiled.plan.trunk_joints["point"]
+    home = new_pass_results(compiled, 1)._replace(**compiled.home_seed._asdict())
     near = TOLERANCES.position * mechanism.characteristic_length
     return frozenset(
         name
@@ -107,8 +105,50 @@ def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
 
 def joint_points(compiled: CompiledPlan, results: P.PassResults) -> dict[str, Floats]:
     """Joint name -> position of its centre in the base frame, (n, 3); joints that act as one share a centre."""
-    points = {name: results.trunk_points[:, joint] for name, joint in compiled.trunk_points}
+    carriers, trunk_centres = _carriers(compiled.plan, results.trunks)
+    points = {name: trunk_centres[joint] for name, joint in compiled.trunk_points}
     for point in compiled.points:
-        T = results.poses if point.carrier < 0 else results.carriers[:, point.carrier]
-        points[point.joint] = results.nodes[:, point.node] + T[:, :3, :3] @ (point.shift * point.axis)
+        T = results.poses if point.carrier < 0 else carriers[point.carrier]
+        node = _node(compiled.plan, results, point.node, carriers)
+        points[point.joint] = node + T[:, :3, :3] @ (point.shift * point.axis)
     return points
+
+
+def _node(plan: P.Plan, results: P.PassResults, k: int, carriers: list[Floats]) -> Floats:
+    """Positions (n, 3) of node k: the last one of a branch is on the platform, the first on its carrier or a rail."""
+    branch = plan.branches[np.searchsorted(plan.branches["last"], k)]
+    if k == branch["last"]:
+        T, point = results.poses, branch["end"]
+    elif k == branch["first"] and not branch["rail"]:
+        T, point = carriers[branch["carrier"]], plan.nodes[k]["home"]
+    else:
+        return results.nodes[:, k]
+    return np.asarray(T[:, :3, :3] @ point + T[:, :3, 3])
+
+
+def _carriers(plan: P.Plan, trunk_values: Floats) -> tuple[list[Floats], list[Floats]]:
+    """Poses (n, 4, 4) of the carriers (the base and every trunk's body), and the centres (n, 3) of the trunk joints."""
+    n = len(trunk_values)
+    carriers = [np.broadcast_to(np.eye(4), (n, 4, 4))]
+    centres: list[Floats] = []
+    for trunk in plan.trunks:
+        T = carriers[0]
+        for j in range(trunk["first"], trunk["last"]):
+            joint = plan.trunk_joints[j]
+            centres.append(T[:, :3, :3] @ joint["point"] + T[:, :3, 3])
+            T = T @ _motion(joint, trunk_values[:, j])
+        carriers.append(T)
+    return carriers, centres
+
+
+def _motion(joint: Record, values: Floats) -> Floats:
+    """The displacements (n, 4, 4) of one trunk joint about or along its axis at home."""
+    axis, point = joint["axis"], joint["point"]
+    T = np.zeros((len(values), 4, 4))
+    T[:] = np.eye(4)
+    if not joint["turns"]:
+        T[:, :3, 3] = values[:, None] * axis
+        return T
+    T[:, :3, :3] = from_rotvec(values[:, None] * axis)
+    T[:, :3, 3] = point - T[:, :3, :3] @ point
+    return T

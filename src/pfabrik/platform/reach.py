@@ -18,8 +18,8 @@ from ..model import Model
 from ..options import Options
 from ..poses import between
 from ..rotations import nearest_turn
-from .redundant_joints import split_by_redundant, step_redundant_joints
-from .rows_one_by_one import Answers, answer_phases, request_from
+from .redundant_joints import split_by_redundant
+from .rows_one_by_one import Answers, answer_phases, request_from, step_redundant_joints
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -115,10 +115,9 @@ def rest_redundant(model: Model, start: Configurations | None, start_sides: Floa
 
     Each independent set alone: limits that end a projection may hold one where it is. Return the mask of rows changed.
     """
-    start_poses = model.mechanism.home_pose[None] if start is None else start.rows.poses
     start_sides = np.broadcast_to(start_sides, sides.shape)
     table, rested, is_changed = model.legs, start_sides.copy(), np.zeros(len(sides), bool)
-    step_redundant_joints(model, rows.poses, start_poses, rested, np.arange(len(sides)))
+    step_redundant_joints(model, rows.poses, rested)
     for _, legs in split_by_redundant(table):
         columns = np.intersect1d(table.implicit_joints["leg"], np.arange(len(table.legs))[legs])
         candidate, block = sides.copy(), take(rows, np.arange(len(sides)))

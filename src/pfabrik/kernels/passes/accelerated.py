@@ -71,11 +71,8 @@ def move_trunk(plan: Plan, trunk: int, config: Configuration, spaces: HalfSpaces
     """Move the joints of a trunk by a share of the step, within their ranges; carriers do not follow yet."""
     programme = spaces.programme[0]
     for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
-        joint = plan.trunk_joints[j]
-        value = (
-            config.trunks[j]
-            + share * joint["unit"] * programme["trunk_scale"] * spaces.x[programme["trunk_column"] + j]
-        )
+        joint, x = plan.trunk_joints[j], spaces.x[programme["trunk_column"] + j]
+        value = config.trunks[j] + share * joint["unit"] * programme["trunk_scale"] * x
         config.trunks[j] = min(max(value, joint["lo"]), joint["hi"])
 
 
@@ -105,7 +102,8 @@ def reach_from_start(
     copy_row(config.trunks, spaces.start)
     for n in range(PASSES + 1):
         for j in range(first, last):
-            spaces.x[j - first] = (spaces.start[j] - config.trunks[j]) / plan.trunk_joints[j]["unit"] if near else 0.0
+            away = (spaces.start[j] - config.trunks[j]) / plan.trunk_joints[j]["unit"]
+            spaces.x[j - first] = away if near else 0.0
         far = math.sqrt(dot_of(spaces.x, spaces.x, last - first))
         programme["margin"], programme["window"] = margin, max(margin, far * plan.length)
         programme["trunk_scale"] = 1.0

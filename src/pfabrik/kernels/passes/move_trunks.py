@@ -1,14 +1,14 @@
-"""The kernel that moves trunks, from where they are, by the least steps that let the branches on them reach."""
+"""Trunks moved, from where they are, by the least steps that let the branches on them reach."""
 
 from __future__ import annotations
 
 from ...arrays import Floats
-from .._jit import routine, search
+from .._jit import routine
 from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import PATIENT, reach_from_start
-from .half_spaces import HalfSpaces, new_half_spaces
+from .half_spaces import HalfSpaces
 from .moving_frames import move_carriers
-from .plan import Configuration, Plan, Settings, new_configuration
+from .plan import Configuration, Plan, Settings
 
 
 @routine
@@ -30,7 +30,14 @@ def move_trunk(
     config: Configuration,
     spaces: HalfSpaces,
 ) -> None:
-    """Move the trunks of one configuration, (n_trunk_joints,), as `move_trunks` does."""
+    """Move trunks (n_trunk_joints,), deviations from home, until their branches reach the target, if they can.
+
+    Every chain has a trunk. Where its branches reach already it stays; where it is caught, it is left there.
+
+    Parameters
+    ----------
+    margin : how far inside limits steps aim [length].
+    """
     copy_table(target, config.pose)
     copy_row(trunks, config.trunks)
     move_carriers(plan, config)
@@ -41,18 +48,3 @@ def move_trunk(
     for c in range(plan.chains.shape[0]):
         reach_from_start(plan, c, config, settings, spaces, margin, PATIENT, True)
     copy_row(config.trunks, trunks)
-
-
-@search
-def move_trunks(plan: Plan, targets: Floats, trunks: Floats, settings: Settings, margin: float) -> None:
-    """Move trunks (n, n_trunk_joints), deviations from home, until their branches reach targets (n, 4, 4), if they can.
-
-    Every chain has a trunk. Where its branches reach already it stays; where it is caught, it is left there.
-
-    Parameters
-    ----------
-    margin : how far inside limits steps aim [length].
-    """
-    config, spaces = new_configuration(plan), new_half_spaces(plan)
-    for i in range(targets.shape[0]):
-        move_trunk(plan, targets[i], trunks[i], settings, margin, config, spaces)

@@ -143,8 +143,7 @@ class PassResults(NamedTuple):
 
     poses: Floats  # (n, 4, 4)
     nodes: Floats  # (n, n_nodes, 3)
-    carriers: Floats  # (n, n_trunks + 1, 3, 4)
-    trunk_points: Floats  # (n, n_trunk_joints, 3): present points of trunk joints
+    trunks: Floats  # (n, n_trunk_joints): deviation from home
     gaps: Floats  # (n,): largest distance of a chain's end from its place on the platform
     iterations: Ints  # (n,)
     rounds: Ints  # (n,): number of revisions of the target

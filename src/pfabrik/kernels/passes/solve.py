@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from ...arrays import Floats
 from .._jit import routine, search
-from ..vectors import copy_table, put, vec
+from ..vectors import copy_row, copy_table
 from .accelerated import project_by_half_spaces
 from .fit import revise_target
 from .half_spaces import new_half_spaces
-from .moving_frames import load_seed, place_ends
+from .moving_frames import load_seed
 from .passes import reach_by_passes
 from .plan import Configuration, PassResults, Plan, Seeds, Settings, new_configuration
 
@@ -37,16 +37,11 @@ def project_by_centroid(plan: Plan, config: Configuration, settings: Settings) -
 
 
 @routine
-def write_row(plan: Plan, i: int, config: Configuration, results: PassResults) -> None:
-    """Write a configuration to row `i` of the results, with the ends of branches in their places on the platform."""
-    for c in range(plan.chains.shape[0]):
-        place_ends(plan, c, config)
+def write_row(i: int, config: Configuration, results: PassResults) -> None:
+    """Write a configuration to row `i` of the results."""
     copy_table(config.pose, results.poses[i])
     copy_table(config.nodes, results.nodes[i])
-    for k in range(plan.trunks.shape[0] + 1):
-        copy_table(config.carriers[k], results.carriers[i, k])
-    for j in range(plan.trunk_joints.shape[0]):
-        put(results.trunk_points[i, j], vec(config.screws[j, 0]))
+    copy_row(config.trunks, results.trunks[i])
 
 
 @search
@@ -60,7 +55,7 @@ def solve_by_passes(plan: Plan, targets: Floats, seeds: Seeds, settings: Setting
             gap, iterations, rounds = project_by_half_spaces(plan, config, targets[i], seeds, i, settings, spaces)
         else:
             gap, iterations, rounds = project_by_centroid(plan, config, settings)
-        write_row(plan, i, config, results)
+        write_row(i, config, results)
         results.gaps[i] = gap
         results.iterations[i] = iterations
         results.rounds[i] = rounds

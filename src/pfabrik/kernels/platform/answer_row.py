@@ -186,8 +186,7 @@ def reach_by_redundant(
     home, target, status = tables.home.poses[0], targets[0], PENDING
     copy_row(answer.sides[0], moved)
     if sets.from_base.legs.shape[0] + sets.from_platform.legs.shape[0] > 0:
-        step_trunks(sets.from_base, spare.from_base, home, target, moved)
-        step_trunks(sets.from_platform, spare.from_platform, home, target, moved)
+        step_trunks(sets, spare, home, target, moved)
         status = reach_from(table, target, begin, moved, scratch.completion, answer)
     if status != REACHED:
         copy_row(answer.sides[0], moved)

@@ -12,7 +12,7 @@ from ..rows import PROJECTED
 from .answer_row import answer_row
 from .assemble_row import assemble_row
 from .nearest import NO_STARTS, PLAN
-from .redundant_sets import MOVING, MovedTrunks, RedundantSet, RedundantSets
+from .redundant_sets import MOVING, MovedTrunks, RedundantSet, RedundantSets, step_trunks
 from .search_records import PoseSolutions
 from .tables import MACHINE, QUESTION, Question, RestingLegs, Start, Tables, new_answer_scratch
 
@@ -89,3 +89,11 @@ def answer_rows(
             found = answer_row(tables, scratch, start, asked[row:end], question, answer)
         n_left += 1 if found > PROJECTED else 0
     return n_left
+
+
+@search
+def step_rows(tables_address: int, scratch_address: int, targets: Floats, sides: Floats) -> None:
+    """Move the redundant joints of rows, (n, legs), by least steps towards targets (n, 4, 4), as `step_trunks` does."""
+    tables, scratch = open_tables(tables_address), open_scratch(scratch_address)
+    for row in range(targets.shape[0]):
+        step_trunks(tables.sets, scratch.sets, tables.home.poses[0], targets[row], sides[row])

@@ -125,7 +125,7 @@ def _emptied(scratch: Any) -> Any:
 
 
 @routine
-def step_trunks(trunks: MovedTrunks, scratch: TrunkScratch, home: Floats, target: Floats, sides: Floats) -> None:
+def step_trunks(sets: RedundantSets, scratch: SetsScratch, home: Floats, target: Floats, sides: Floats) -> None:
     """Move trunks by the least steps that keep the limits of the legs on them, to first order.
 
     Parameters
@@ -133,6 +133,13 @@ def step_trunks(trunks: MovedTrunks, scratch: TrunkScratch, home: Floats, target
     home, target : poses of home and of the target, (4, 4) [length].
     sides : coordinates of redundant joints, (legs,), before and after.
     """
+    _step_some(sets.from_base, scratch.from_base, home, target, sides)
+    _step_some(sets.from_platform, scratch.from_platform, home, target, sides)
+
+
+@routine
+def _step_some(trunks: MovedTrunks, scratch: TrunkScratch, home: Floats, target: Floats, sides: Floats) -> None:
+    """Step the trunks next to the base, or those next to the platform."""
     moving, values, pose = trunks.moving[0], scratch.values, scratch.pose
     length, enough = moving["length"], moving["enough"]
     if values.shape[0] == 0:
