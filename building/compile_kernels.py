@@ -25,7 +25,10 @@ BUILD = ROOT / "build" / "kernels"
 SOURCES = BUILD / "sources.sha256"
 """Hash of what the C text was made of."""
 
-LEVELLED = ("legs.answer_blocks", "legs.margins_in_blocks", "clearance.capsule_clearance")
+LEVELLED = (
+    *("legs.answer_blocks", "legs.margins_in_blocks"),
+    *("platform.assemble_in_blocks", "clearance.capsule_clearance"),
+)
 """Kernels whose loops are vectors: compiled for each level of processors. On all others a level has no effect."""
 
 LEVELS = {

@@ -27,6 +27,7 @@ from .passes.solve import solve_by_passes
 from .platform.answer_rows import answer_rows, step_rows
 from .platform.evaluate import evaluate_poses
 from .platform.forward import assemble
+from .platform.forward_blocks import assemble_in_blocks
 from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .replay import replay
@@ -82,7 +83,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (feasibility, tuple(_values("i F3 F3 F2 f1 i1"))),
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
-    (assemble, tuple(_values("i i F2 i i1 f2 f3 f2 f2 f2"))),
+    (assemble, tuple(_values("i i F2 i b i1 f2 f3 f2 f2 f2"))),
+    (assemble_in_blocks, tuple(_values("i I1 F2 i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),
     (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
     (answer_chains, (*_values("i i i b F3 F2 f2"), Rows(*_values("i1 i2 f3 f2 f2")))),

@@ -14,10 +14,9 @@ from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
 from .rows_one_by_one import Answers, Request, answer_phases
-from .single import AssemblyOutputs, scratch_of
-from .table import search_table
+from .single import AssemblyOutputs, assembling, scratch_of
 
-ROWS_A_BLOCK = 256
+ROWS_A_BLOCK = 1024
 
 
 def forward_kinematics(
@@ -49,18 +48,14 @@ def project_values(request: Request, values: Floats) -> Answers:
 
 def _assembled(model: Model, values: Floats, starts: Starts) -> tuple[Rows, AssemblyOutputs]:
     """Rows assembled at actuated values (n, n_a) from one start each, or one for all, on all cores."""
-    from ..kernels.platform.forward import assemble
-
     rows, shape = new_rows(model, len(values)), (len(values), len(model.legs.legs))
     outputs = AssemblyOutputs(np.zeros_like(values), np.zeros(shape), np.zeros(shape))
     rows.actuators[:] = values
-    legs, scratch = search_table(model.legs), scratch_of(model)
+    scratch = scratch_of(model)
 
     def run(block: slice) -> None:
-        own, found = Handle(take_each(starts, block)), take(rows, block)
-        deviations, q, sides = take(outputs, block)
-        ends = deviations, found.poses, q, sides, found.measures
-        assemble(legs.address, scratch.address, found.actuators, own.address, found.status, *ends)
+        own = Handle(take_each(starts, block))
+        assembling(model, own, scratch, take(rows, block), take(outputs, block))()
 
     in_blocks(run, len(values), ROWS_A_BLOCK)
     return rows, outputs

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..decomposition.resting import Resting
 from ..derived import derived
 from ..kernels.handle import Handle, Scratch
@@ -117,14 +118,7 @@ class SingleAssembly:
     def __init__(self, model: Model) -> None:
         self._model = model
         self.home = Handle(home_start(model))
-        self._legs = search_table(model.legs)
         self._n_actuators, self._n_legs = len(model.mechanism.actuator_names), len(model.legs.legs)
-
-    @cached_property
-    def _kernel(self) -> Callable[..., int]:
-        from ..kernels.platform.forward import assemble
-
-        return assemble
 
     @cached_property
     def _scratch(self) -> Scratch[NewtonScratch]:
@@ -146,14 +140,47 @@ class SingleAssembly:
 
         It is valid while the start, the scratch memory and this object are kept.
         """
-        inputs = self._legs.address, scratch.address, rows.actuators, start.address
-        return partial(
-            self._kernel, *inputs, rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
-        )
+        return assembling(self._model, start, scratch, rows, outputs)
 
     def assemble(self, start: Handle[Starts], rows: Rows, outputs: AssemblyOutputs) -> bool:
         """Assemble one row at `rows.actuators`; True on success."""
         return self.prepared(start, self._scratch, rows, outputs)() == 0
+
+
+def assembling(
+    model: Model,
+    starts: Handle[Starts],
+    scratch: Handle[NewtonScratch] | Scratch[NewtonScratch],
+    rows: Rows,
+    outputs: AssemblyOutputs,
+) -> Callable[[], int]:
+    """A call that assembles rows at `rows.actuators` from one start each, or one for all; it returns 0 if all are.
+
+    Six rods are assembled as blocks, of one row too, so that a row has the same digits alone and in a batch.
+    """
+    from ..kernels.platform.forward import assemble
+    from ..kernels.platform.forward_blocks import assemble_in_blocks
+
+    legs, places = search_table(model.legs).address, places_of_rods(model)
+    ends = rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
+    others = partial(assemble, legs, scratch.address, rows.actuators, starts.address, places is not None, *ends)
+    if places is None:
+        return others
+    blocks = partial(assemble_in_blocks, legs, places, rows.actuators, starts.address, *ends)
+    return lambda: blocks() and others()
+
+
+@derived
+def places_of_rods(model: Model) -> Ints | None:
+    """The places of rods in `assemble_in_blocks`, those first whose lines span most; None for legs that are others."""
+    table = model.legs
+    has_pointing_cones = len(search_table(table).record.cones) > len(table.cones)
+    is_six_rods = len(table.legs) == len(new_scratch(model).spheres.legs) == 6
+    if not (table.is_for_blocks and is_six_rods) or has_pointing_cones:
+        return None
+    lines = table.legs["line"]
+    first = max(combinations(range(6), 3), key=lambda rods: abs(np.linalg.det(lines[list(rods)])))
+    return np.argsort([*first, *(k for k in range(6) if k not in first)])
 
 
 def new_scratch(model: Model) -> NewtonScratch:

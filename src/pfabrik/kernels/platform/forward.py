@@ -462,6 +462,7 @@ def assemble(
     scratch_address: int,
     values: Floats,
     starts_address: int,
+    is_begun: bool,
     status: Ints,
     deviations: Floats,
     poses: Floats,
@@ -479,6 +480,7 @@ def assemble(
     machine, scratch_address : addresses of the kernel table and of `NewtonScratch`.
     values : (n, n_a) [length or rad].
     starts_address : address of `Starts`: one for each row or one for all.
+    is_begun : True if rows that are REACHED have their configurations, from `assemble_in_blocks`.
     deviations : filled by `put_deviations`, (n, n_a).
     poses, q, sides : filled with the configurations, as in `Starts`; poses in [length].
 
@@ -493,6 +495,8 @@ def assemble(
         0,
     )
     for row in range(values.shape[0]):
+        if is_begun and status[row] == REACHED:
+            continue
         put_deviations(table, values[row], deviations[row])
         own = row if starts.poses.shape[0] > 1 else 0
         status[row] = assemble_from_own(table, deviations[row], starts, own, scratch)
