@@ -14,7 +14,7 @@ from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
 from .rows_one_by_one import Answers, Request, answer_phases
-from .single import AssemblyOutputs, assembling, scratch_of
+from .single import AssemblyOutputs, assembling, new_outputs, scratch_of
 
 ROWS_A_BLOCK = 1024
 
@@ -48,10 +48,8 @@ def project_values(request: Request, values: Floats) -> Answers:
 
 def _assembled(model: Model, values: Floats, starts: Starts) -> tuple[Rows, AssemblyOutputs]:
     """Rows assembled at actuated values (n, n_a) from one start each, or one for all, on all cores."""
-    rows, shape = new_rows(model, len(values)), (len(values), len(model.legs.legs))
-    outputs = AssemblyOutputs(np.zeros_like(values), np.zeros(shape), np.zeros(shape))
+    rows, outputs, scratch = new_rows(model, len(values)), new_outputs(model, len(values)), scratch_of(model)
     rows.actuators[:] = values
-    scratch = scratch_of(model)
 
     def run(block: slice) -> None:
         own = Handle(take_each(starts, block))

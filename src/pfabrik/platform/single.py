@@ -1,4 +1,4 @@
-"""Single targets and single assemblies: kernel calls prepared once for each machine."""
+"""Single targets and assemblies: kernel calls prepared once for each machine."""
 
 from __future__ import annotations
 
@@ -112,39 +112,16 @@ class AssemblyOutputs(NamedTuple):
     sides: Floats  # (n, legs)
 
 
-class SingleAssembly:
-    """Forward kinematics of a machine, one row at a time, prepared likewise."""
+def new_outputs(model: Model, n: int) -> AssemblyOutputs:
+    """Allocate the outputs of n rows."""
+    shape = n, len(model.legs.legs)
+    return AssemblyOutputs(np.zeros((n, len(model.mechanism.actuator_names))), np.zeros(shape), np.zeros(shape))
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self.home = Handle(home_start(model))
-        self._n_actuators, self._n_legs = len(model.mechanism.actuator_names), len(model.legs.legs)
 
-    @cached_property
-    def _scratch(self) -> Scratch[NewtonScratch]:
-        return scratch_of(self._model)
-
-    def new_outputs(self) -> AssemblyOutputs:
-        """Allocate the outputs of one row."""
-        n_legs = self._n_legs
-        return AssemblyOutputs(np.empty((1, self._n_actuators)), np.empty((1, n_legs)), np.empty((1, n_legs)))
-
-    def prepared(
-        self,
-        start: Handle[Starts],
-        scratch: Handle[NewtonScratch] | Scratch[NewtonScratch],
-        rows: Rows,
-        outputs: AssemblyOutputs,
-    ) -> Callable[[], int]:
-        """A call that assembles one row at `rows.actuators` from one start, within all limits; it returns 0 on success.
-
-        It is valid while the start, the scratch memory and this object are kept.
-        """
-        return assembling(self._model, start, scratch, rows, outputs)
-
-    def assemble(self, start: Handle[Starts], rows: Rows, outputs: AssemblyOutputs) -> bool:
-        """Assemble one row at `rows.actuators`; True on success."""
-        return self.prepared(start, self._scratch, rows, outputs)() == 0
+@derived
+def assembly_home(model: Model) -> Handle[Starts]:
+    """Home as a start of assembly."""
+    return Handle(home_start(model))
 
 
 def assembling(
@@ -154,9 +131,10 @@ def assembling(
     rows: Rows,
     outputs: AssemblyOutputs,
 ) -> Callable[[], int]:
-    """A call that assembles rows at `rows.actuators` from one start each, or one for all; it returns 0 if all are.
+    """A call that assembles rows at `rows.actuators`, from one start each or one for all; it returns 0 if all are.
 
-    Six rods are assembled as blocks, of one row too, so that a row has the same digits alone and in a batch.
+    It is valid while starts and scratch memory are kept. Six rods are assembled in blocks, of one row too, so that a row
+    has the same digits alone and in a batch.
     """
     from ..kernels.platform.forward import assemble
     from ..kernels.platform.forward_blocks import assemble_in_blocks
