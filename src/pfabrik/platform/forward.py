@@ -14,7 +14,7 @@ from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
 from .rows_one_by_one import Answers, Request, answer_phases
-from .single import AssemblyOutputs, assembling, new_outputs, scratch_of
+from .single import AssemblyOutputs, assembly_of
 
 ROWS_A_BLOCK = 1024
 
@@ -48,12 +48,13 @@ def project_values(request: Request, values: Floats) -> Answers:
 
 def _assembled(model: Model, values: Floats, starts: Starts) -> tuple[Rows, AssemblyOutputs]:
     """Rows assembled at actuated values (n, n_a) from one start each, or one for all, on all cores."""
-    rows, outputs, scratch = new_rows(model, len(values)), new_outputs(model, len(values)), scratch_of(model)
+    assembly, rows = assembly_of(model), new_rows(model, len(values))
+    outputs = assembly.new_outputs(len(values))
     rows.actuators[:] = values
 
     def run(block: slice) -> None:
         own = Handle(take_each(starts, block))
-        assembling(model, own, scratch, take(rows, block), take(outputs, block))()
+        assembly.prepared(own, take(rows, block), take(outputs, block), assembly.scratch)()
 
     in_blocks(run, len(values), ROWS_A_BLOCK)
     return rows, outputs

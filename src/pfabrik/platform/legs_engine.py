@@ -36,7 +36,7 @@ from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
 from .rows_one_by_one import Answers, answer_phases, request_from
-from .single import SingleTarget, assembling, assembly_home, new_outputs, new_scratch, scratch_of
+from .single import Assembly, SingleTarget, assembly_of, new_scratch
 from .table import table_handle
 from .unreached import answer_unreached
 
@@ -54,6 +54,10 @@ class LegsEngine(Engine):
         self._model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
         self.bounds_steps = self._searches
+
+    @cached_property
+    def _assembly(self) -> Assembly:
+        return assembly_of(self._model)
 
     @cached_property
     def _searches(self) -> bool:
@@ -351,10 +355,10 @@ class LegsEngine(Engine):
         """The configurations at actuated values (n, n_a), from one start or one for each."""
         start_sides, outputs = self._sides_of(start), None
         if len(values) == 1:
-            rows, solution = outputs = self._single.new_rows(), new_outputs(self._model, 1)
+            rows, solution = outputs = self._single.new_rows(), self._assembly.new_outputs(1)
             rows.actuators[:] = values
-            home_or_start = self._forward_start(start, start_sides)
-            if assembling(self._model, home_or_start, scratch_of(self._model), rows, solution)() == 0:
+            own = self._forward_start(start, start_sides)
+            if self._assembly.prepared(own, rows, solution, self._assembly.scratch)() == 0:
                 return leg_answers(self._model, rows, solution.sides, solution.q, start, start_sides)
         nearby = start is not None and keep_mode
         request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
@@ -386,12 +390,12 @@ class LegsEngine(Engine):
         """As `Engine.prepared_forward`; with the call, its start and its scratch memory."""
         start_handle = self._forward_start(start, self._sides_of(start))
         scratch = Handle(new_scratch(self._model))
-        call = assembling(self._model, start_handle, scratch, rows, new_outputs(self._model, 1))
+        call = self._assembly.prepared(start_handle, rows, self._assembly.new_outputs(1), scratch)
         return call, (start_handle, scratch)
 
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
         if start is None:
-            return assembly_home(self._model)
+            return self._assembly.home
         return Handle(starts_at(self._model, start.rows.poses, sides))
 
     def _sides_of(self, start: Configurations | None) -> Floats:

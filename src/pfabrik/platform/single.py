@@ -112,40 +112,49 @@ class AssemblyOutputs(NamedTuple):
     sides: Floats  # (n, legs)
 
 
-def new_outputs(model: Model, n: int) -> AssemblyOutputs:
-    """Allocate the outputs of n rows."""
-    shape = n, len(model.legs.legs)
-    return AssemblyOutputs(np.zeros((n, len(model.mechanism.actuator_names))), np.zeros(shape), np.zeros(shape))
+class Assembly:
+    """Forward kinematics of a machine from starts, for one row or many, prepared likewise."""
+
+    def __init__(self, model: Model) -> None:
+        from ..kernels.platform.forward import assemble
+        from ..kernels.platform.forward_blocks import assemble_in_blocks
+
+        self.home, self.scratch = Handle(home_start(model)), Scratch(new_scratch, model)
+        self._legs, self._places = search_table(model.legs), places_of_rods(model)
+        self._n_actuators, self._n_legs = len(model.mechanism.actuator_names), len(model.legs.legs)
+        self._kernels: tuple[Callable[..., int], ...] = assemble, assemble_in_blocks
+
+    def new_outputs(self, n: int) -> AssemblyOutputs:
+        """Allocate the outputs of n rows."""
+        n_legs = self._n_legs
+        return AssemblyOutputs(np.zeros((n, self._n_actuators)), np.zeros((n, n_legs)), np.zeros((n, n_legs)))
+
+    def prepared(
+        self,
+        starts: Handle[Starts],
+        rows: Rows,
+        outputs: AssemblyOutputs,
+        scratch: Handle[NewtonScratch] | Scratch[NewtonScratch],
+    ) -> Callable[[], int]:
+        """A call that assembles rows at `rows.actuators`, from one start each or one for all; 0 if all are assembled.
+
+        It is valid while starts, scratch memory and this object are kept. Six rods are assembled in blocks, of one row
+        too, so that a row has the same digits alone and in a batch.
+        """
+        legs, given, places = self._legs.address, (rows.actuators, starts.address), self._places
+        assemble, assemble_in_blocks = self._kernels
+        ends = rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
+        others = partial(assemble, legs, scratch.address, *given, places is not None, *ends)
+        if places is None:
+            return others
+        in_blocks = partial(assemble_in_blocks, legs, places, *given, *ends)
+        return lambda: in_blocks() and others()
 
 
 @derived
-def assembly_home(model: Model) -> Handle[Starts]:
-    """Home as a start of assembly."""
-    return Handle(home_start(model))
-
-
-def assembling(
-    model: Model,
-    starts: Handle[Starts],
-    scratch: Handle[NewtonScratch] | Scratch[NewtonScratch],
-    rows: Rows,
-    outputs: AssemblyOutputs,
-) -> Callable[[], int]:
-    """A call that assembles rows at `rows.actuators`, from one start each or one for all; it returns 0 if all are.
-
-    It is valid while starts and scratch memory are kept. Six rods are assembled in blocks, of one row too, so that a row
-    has the same digits alone and in a batch.
-    """
-    from ..kernels.platform.forward import assemble
-    from ..kernels.platform.forward_blocks import assemble_in_blocks
-
-    legs, places = search_table(model.legs).address, places_of_rods(model)
-    ends = rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
-    others = partial(assemble, legs, scratch.address, rows.actuators, starts.address, places is not None, *ends)
-    if places is None:
-        return others
-    blocks = partial(assemble_in_blocks, legs, places, rows.actuators, starts.address, *ends)
-    return lambda: blocks() and others()
+def assembly_of(model: Model) -> Assembly:
+    """Assembly of a machine."""
+    return Assembly(model)
 
 
 @derived
@@ -166,12 +175,6 @@ def new_scratch(model: Model) -> NewtonScratch:
     from ..kernels.platform.forward import new_newton_scratch
 
     return new_newton_scratch(search_table(model.legs).record, not model.mechanism.end_effector_is_joint)
-
-
-@derived
-def scratch_of(model: Model) -> Scratch[NewtonScratch]:
-    """Scratch memory of assembly, for each thread its own."""
-    return Scratch(new_scratch, model)
 
 
 def _outputs(rows: Rows) -> tuple[NDArray[Any], ...]:
