@@ -221,6 +221,35 @@ def test_a_seed_keeps_its_assembly_mode() -> None:
         np.testing.assert_allclose(answer.pose, nearest, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("has_starts", [False, True])
+@pytest.mark.parametrize("name", ["stewart", "delta", "servo_hexapod", "hexaglide", "reachy_mini"])
+def test_blocks_of_rows_answer_as_newton_row_by_row_and_as_single_rows(
+    name: str, has_starts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Within reach, at ends of ranges and where legs do not meet; in the same assemblies, though these may be near."""
+    mechanism, rng, n = pf.load(name), np.random.default_rng(4), 40 if INTERPRETED else 1500
+    values, units = home_values(mechanism), actuator_units(mechanism)
+    values = values + rng.uniform(-0.25, 0.25, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(values))) * units
+    values[:20] += rng.uniform(-0.5, 0.5, values[:20].shape) * units
+
+    def answers(machine: pf.Mechanism) -> tuple[pf.Solution | None, pf.Solution]:
+        start = pf.solve_fk(machine, np.roll(values, 20, axis=0)) if has_starts else None
+        return start, pf.solve_fk(machine, values, start=start)
+
+    start, found = answers(mechanism)
+    for row in range(0, n, n // 10):
+        alone = pf.solve_fk(mechanism, values[row], start=None if start is None else start[row])
+        assert (alone.status, alone.residual) == (found.status[row], found.residual[row])
+        np.testing.assert_array_equal(alone.pose, found.pose[row])
+    monkeypatch.setattr("pfabrik.platform.single.places_of_rods", lambda model: None)
+    _, one_by_one = answers(dataclasses.replace(mechanism, name="row by row"))
+    np.testing.assert_array_equal(found.status, one_by_one.status)
+    assert_same_pose(mechanism, found.pose, one_by_one.pose, 1e-9)
+    reached = found.status == Status.REACHED
+    assert reached.sum() > n / 4 and not np.array_equal(found.pose, one_by_one.pose), "no rows were answered in blocks"
+    assert (found.residual[reached] <= 1e-11 * mechanism.characteristic_length).all()
+
+
 def assembled_anywhere(mechanism: pf.Mechanism, n: int) -> tuple[pf.Solution, np.ndarray]:
     """Configurations in whatever working modes random actuator values have; and a turn for each angle among these."""
     turns = np.array([2.0 * np.pi * (drive.kind == "angle") for drive in mechanism.drives])

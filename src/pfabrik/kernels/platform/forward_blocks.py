@@ -24,17 +24,17 @@ from .equations import owner_of
 from .forward import ASSEMBLED, CONTRACTION, FAR_STEP, NEARLY_ASSEMBLED, open_starts, put_deviations
 from .search_records import Starts
 
-LANES = 32
+COLUMNS = 32
 """Rows of a block: what is in work fits the first-level cache."""
 
 MOST_STEPS = 10
 """Most Newton steps; three to six are usual."""
 
 # Rows of the table, after those of a pose, whose position is that of the joints' centre: a step; the largest residual,
-# that before, and the longest step that contracts; how far a column is. Then those of each rod: its line, its moment
-# about the reference point, its length times what lacks of it; its base end and its length.
-VX, VY, VZ, WX, WY, WZ, WORST, PREVIOUS, LONGEST, PHASE, RODS = range(12, 23)
-DX, DY, DZ, MX, MY, MZ, LACKS, BASE_X, BASE_Y, BASE_Z, LENGTH, OF_ROD = range(12)
+# that before, and the longest step that contracts; its state. Then those of each rod: its line, its moment
+# about the reference point, its length times its error; its base end and its length.
+VX, VY, VZ, WX, WY, WZ, WORST, PREVIOUS, LONGEST, STATE, RODS = range(12, 23)
+DX, DY, DZ, MX, MY, MZ, ERROR, BASE_X, BASE_Y, BASE_Z, LENGTH, OF_ROD = range(12)
 FAILED, GOING, DONE = 0.0, 1.0, 2.0
 
 SINES = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8))
@@ -63,7 +63,7 @@ def fill_block(
         S[PX, i], S[PY, i], S[PZ, i] = move(pose, centre)
         for j in range(9):
             S[XX + j, i] = pose[j // 3, j % 3]
-        S[WORST, i], S[PREVIOUS, i], S[LONGEST, i], S[PHASE, i] = 0.0, math.inf, math.inf, GOING
+        S[WORST, i], S[PREVIOUS, i], S[LONGEST, i], S[STATE, i] = 0.0, math.inf, math.inf, GOING
         for k in range(legs.shape[0]):
             q[k], S[RODS + OF_ROD * places[k] + LENGTH, i] = 0.0, legs[k]["length"]
         for a in range(table.driven.shape[0]):
@@ -84,17 +84,17 @@ def fill_block(
 
 @routine
 def fill_rod(point: Vec, centre: Vec, n: int, S: Floats, rod: Floats) -> None:
-    """Fill the equation of a rod at the poses of a block, times its length, and raise WORST to what lacks."""
+    """Fill the equation of a rod at the poses of a block, times its length, and raise WORST to its error."""
     arm = sub(point, centre)
     for i in range(n):
         x, y, z = (S[XX, i], S[XY, i], S[XZ, i]), (S[YX, i], S[YY, i], S[YZ, i]), (S[ZX, i], S[ZY, i], S[ZZ, i])
         foot = rod[BASE_X, i], rod[BASE_Y, i], rod[BASE_Z, i]
         line = add(products(arm, (x, y, z)), sub((S[PX, i], S[PY, i], S[PZ, i]), foot))
         moment, length = cross(products(point, (x, y, z)), line), math.sqrt(dot(line, line))
-        lacks, worst = rod[LENGTH, i] - length, S[WORST, i]
-        rod[DX, i], rod[DY, i], rod[DZ, i], rod[LACKS, i] = line[0], line[1], line[2], length * lacks
+        error, worst = rod[LENGTH, i] - length, S[WORST, i]
+        rod[DX, i], rod[DY, i], rod[DZ, i], rod[ERROR, i] = line[0], line[1], line[2], length * error
         rod[MX, i], rod[MY, i], rod[MZ, i] = moment[0], moment[1], moment[2]
-        size = abs(lacks) if abs(lacks) < math.inf else math.inf
+        size = abs(error) if abs(error) < math.inf else math.inf
         S[WORST, i] = size if size > worst else worst
 
 
@@ -103,10 +103,10 @@ def note_assembled(n: int, S: Floats) -> int:
     """Note which columns are assembled; the number of those that go on."""
     n_going = 0
     for i in range(n):
-        worst, phase = S[WORST, i], S[PHASE, i]
+        worst, state = S[WORST, i], S[STATE, i]
         is_done = (worst <= ASSEMBLED) | ((worst <= NEARLY_ASSEMBLED) & (worst > 0.5 * S[PREVIOUS, i]))
-        S[PHASE, i] = DONE if (phase == GOING) & is_done else phase
-        n_going += 1 if (phase == GOING) & (not is_done) else 0
+        S[STATE, i] = DONE if (state == GOING) & is_done else state
+        n_going += 1 if (state == GOING) & (not is_done) else 0
     return n_going
 
 
@@ -143,14 +143,14 @@ def solve_steps(n: int, S: Floats) -> None:
     for i in range(n):
         u, v, w = three(A + MX, i, S), three(B + MX, i, S), three(C + MX, i, S)
         by = dual(three(A, i, S), three(B, i, S), three(C, i, S))
-        shift = combined((S[A + LACKS, i], S[B + LACKS, i], S[C + LACKS, i]), by)
+        shift = combined((S[A + ERROR, i], S[B + ERROR, i], S[C + ERROR, i]), by)
         x, y, z = combined((u[0], v[0], w[0]), by), combined((u[1], v[1], w[1]), by), combined((u[2], v[2], w[2]), by)
         d, e, f = three(D, i, S), three(E, i, S), three(F, i, S)
         g = sub(three(D + MX, i, S), products(d, (x, y, z)))
         h = sub(three(E + MX, i, S), products(e, (x, y, z)))
         k = sub(three(F + MX, i, S), products(f, (x, y, z)))
-        lacks = sub((S[D + LACKS, i], S[E + LACKS, i], S[F + LACKS, i]), products(shift, (d, e, f)))
-        turn = combined(lacks, dual(g, h, k))
+        errors = sub((S[D + ERROR, i], S[E + ERROR, i], S[F + ERROR, i]), products(shift, (d, e, f)))
+        turn = combined(errors, dual(g, h, k))
         shift = sub(shift, combined(turn, (x, y, z)))
         S[VX, i], S[VY, i], S[VZ, i] = shift[0], shift[1], shift[2]
         S[WX, i], S[WY, i], S[WZ, i] = turn[0], turn[1], turn[2]
@@ -174,13 +174,13 @@ def take_steps(centre: Vec, n: int, S: Floats) -> None:
     """Take the steps of columns that go on; where steps do not contract, or are too long, a column fails."""
     for i in range(n):
         a, b, c = (S[XX, i], S[YX, i], S[ZX, i]), (S[XY, i], S[YY, i], S[ZY, i]), (S[XZ, i], S[YZ, i], S[ZZ, i])
-        v, w, worst, phase = three(VX, i, S), three(WX, i, S), S[WORST, i], S[PHASE, i]
+        v, w, worst, state = three(VX, i, S), three(WX, i, S), S[WORST, i], S[STATE, i]
         size = math.sqrt(dot(v, v) + dot(w, w))
         v = add(v, cross(w, combined(centre, (a, b, c))))
         is_short = (abs(v[0]) <= FAR_STEP) & (abs(v[1]) <= FAR_STEP) & (abs(v[2]) <= FAR_STEP)
         is_short = is_short & (abs(w[0]) <= FAR_STEP) & (abs(w[1]) <= FAR_STEP) & (abs(w[2]) <= FAR_STEP)
-        moves = (phase == GOING) & is_short & ((size <= S[LONGEST, i]) | (worst <= NEARLY_ASSEMBLED))
-        S[PHASE, i] = phase if moves | (phase == DONE) else FAILED
+        moves = (state == GOING) & is_short & ((size <= S[LONGEST, i]) | (worst <= NEARLY_ASSEMBLED))
+        S[STATE, i] = state if moves | (state == DONE) else FAILED
         S[PREVIOUS, i], S[LONGEST, i], S[WORST, i] = worst, CONTRACTION * size, (0.0 if moves else worst)
         S[PX, i] += v[0] if moves else 0.0
         S[PY, i] += v[1] if moves else 0.0
@@ -214,10 +214,10 @@ def assemble_in_blocks(
     """
     table, starts, n_left, n_rows = open_table(machine), open_starts(starts_address), 0, values.shape[0]
     length, centre = table.task[0]["length"], vec(table.task[0]["centre"])
-    S, leg_values = np.empty((RODS + 6 * OF_ROD, LANES)), np.zeros((6, N_VALUES))
+    S, leg_values = np.empty((RODS + 6 * OF_ROD, COLUMNS)), np.zeros((6, N_VALUES))
     found, actuators = np.empty(n_rows, np.int64), np.empty((n_rows, values.shape[1]))
-    for first in range(0, n_rows, LANES):
-        n = min(LANES, n_rows - first)
+    for first in range(0, n_rows, COLUMNS):
+        n = min(COLUMNS, n_rows - first)
         for row in range(first, first + n):
             put_deviations(table, values[row], deviations[row])
         fill_block(table, places, deviations[first : first + n], starts, first, S, leg_values, Starts(poses, q, sides))
@@ -230,7 +230,7 @@ def assemble_in_blocks(
             solve_steps(n, S)
             take_steps(centre, n, S)
         for i in range(n):
-            pose, status[first + i] = poses[first + i], REACHED if S[PHASE, i] == DONE else PENDING
+            pose, status[first + i] = poses[first + i], REACHED if S[STATE, i] == DONE else PENDING
             for j in range(3):
                 arm = dot(three(XX + 3 * j, i, S), centre)
                 pose[j, 0], pose[j, 1], pose[j, 2] = three(XX + 3 * j, i, S)
