@@ -51,8 +51,7 @@ def responses_of(solution: Solution, maps: Maps, purpose: str) -> Responses:
     path, shift = tree_of(mechanism).paths[mechanism.end_effector_body], np.eye(6, 3)
     openings = np.einsum("lj,ik->lijk", graph_of(mechanism).of_joints, shift).reshape(-1, 3 * len(path))
     rates = first.geometry(openings, np.zeros((len(first.actuated), openings.shape[1])))
-    twists = (first.twists @ rates)[:, :r].reshape(-1, r, len(path), 3) + np.multiply.outer(path, shift[:r]).swapaxes(
-        0, 1
-    )
-    twists[:, 3:] /= mechanism.characteristic_length
-    return Responses(places, np.swapaxes(twists, 1, 2), of_joints(mechanism, first.open)[:, :, :3], first.is_singular)
+    twists = np.swapaxes((first.twists @ rates)[:, :r].reshape(-1, r, len(path), 3), 1, 2)
+    twists = twists + np.multiply.outer(path, shift[:r])
+    twists[:, :, 3:] /= mechanism.characteristic_length
+    return Responses(places, twists, of_joints(mechanism, first.open)[:, :, :3], first.is_singular)
