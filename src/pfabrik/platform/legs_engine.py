@@ -36,7 +36,7 @@ from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
 from .rows_one_by_one import Answers, answer_phases, request_from
-from .single import Assembly, SingleTarget, assembly_of, new_scratch
+from .single import LegsAssembly, SingleTarget, assembly_of, new_scratch
 from .table import table_handle
 from .unreached import answer_unreached
 
@@ -56,7 +56,7 @@ class LegsEngine(Engine):
         self.bounds_steps = self._searches
 
     @cached_property
-    def _assembly(self) -> Assembly:
+    def _assembly(self) -> LegsAssembly:
         return assembly_of(self._model)
 
     @cached_property

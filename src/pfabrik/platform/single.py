@@ -112,7 +112,7 @@ class AssemblyOutputs(NamedTuple):
     sides: Floats  # (n, legs)
 
 
-class Assembly:
+class LegsAssembly:
     """Forward kinematics of a machine from starts, for one row or many, prepared likewise."""
 
     def __init__(self, model: Model) -> None:
@@ -152,9 +152,9 @@ class Assembly:
 
 
 @derived
-def assembly_of(model: Model) -> Assembly:
+def assembly_of(model: Model) -> LegsAssembly:
     """Assembly of a machine."""
-    return Assembly(model)
+    return LegsAssembly(model)
 
 
 @derived
