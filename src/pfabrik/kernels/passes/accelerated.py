@@ -17,7 +17,7 @@ from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
 from .fit import revise_target
 from .half_spaces import (
     PLATFORM,
-    HalfSpaces,
+    LeastStep,
     add_branch,
     add_ranges,
     begin_programme,
@@ -56,7 +56,7 @@ CLOSING = 12
 
 
 @routine
-def add_chain(plan: Plan, c: int, config: Configuration, settings: Settings, spaces: HalfSpaces) -> float:
+def add_chain(plan: Plan, c: int, config: Configuration, settings: Settings, spaces: LeastStep) -> float:
     """Add what the branches of a chain ask for, and the ranges of its trunk; the largest excess."""
     gap, trunk = 0.0, plan.chains[c]["trunk"]
     for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
@@ -67,7 +67,7 @@ def add_chain(plan: Plan, c: int, config: Configuration, settings: Settings, spa
 
 
 @routine
-def move_trunk(plan: Plan, trunk: int, config: Configuration, spaces: HalfSpaces, share: float) -> None:
+def move_trunk(plan: Plan, trunk: int, config: Configuration, spaces: LeastStep, share: float) -> None:
     """Move the joints of a trunk by a share of the step, within their ranges; carriers do not follow yet."""
     programme = spaces.programme[0]
     for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
@@ -82,7 +82,7 @@ def reach_from_start(
     c: int,
     config: Configuration,
     settings: Settings,
-    spaces: HalfSpaces,
+    spaces: LeastStep,
     margin: float,
     patience: int,
     near: bool,
@@ -150,7 +150,7 @@ def start_trunk(plan: Plan, trunk: int, config: Configuration, start: int, insid
 
 @routine
 def reach_with_trunk(
-    plan: Plan, c: int, config: Configuration, settings: Settings, spaces: HalfSpaces
+    plan: Plan, c: int, config: Configuration, settings: Settings, spaces: LeastStep
 ) -> tuple[float, int]:
     """Passes of a chain with a trunk, from other starts too where one is caught; the excess left, and how many."""
     trunk = plan.chains[c]["trunk"]
@@ -179,7 +179,7 @@ def reach_ends(plan: Plan, config: Configuration, settings: Settings) -> tuple[f
 
 
 @routine
-def reach_pose(plan: Plan, config: Configuration, settings: Settings, spaces: HalfSpaces) -> tuple[float, int]:
+def reach_pose(plan: Plan, config: Configuration, settings: Settings, spaces: LeastStep) -> tuple[float, int]:
     """Passes of all chains towards the present pose; the largest gap of an end, and the most passes of a chain."""
     passes = 1
     for c in range(plan.chains.shape[0]):
@@ -194,7 +194,7 @@ def reach_pose(plan: Plan, config: Configuration, settings: Settings, spaces: Ha
 
 @routine
 def pull_back(
-    config: Configuration, target: Floats, settings: Settings, spaces: HalfSpaces, pull: float, length: float
+    config: Configuration, target: Floats, settings: Settings, spaces: LeastStep, pull: float, length: float
 ) -> float:
     """Set x to the target's way back to what was asked for; the distance [length]."""
     x, far = spaces.x, 0.0
@@ -215,7 +215,7 @@ def pull_back(
 
 
 @routine
-def move_all(plan: Plan, config: Configuration, settings: Settings, spaces: HalfSpaces, share: float) -> None:
+def move_all(plan: Plan, config: Configuration, settings: Settings, spaces: LeastStep, share: float) -> None:
     """Move the target and all trunks by a share of the step."""
     if settings.free & TURNS:
         turn_pose(config.pose, scale(share * plan.length / settings.lever, vec(spaces.x[3:6])))
@@ -230,7 +230,7 @@ def move_all(plan: Plan, config: Configuration, settings: Settings, spaces: Half
 
 @routine
 def settle(
-    plan: Plan, config: Configuration, target: Floats, settings: Settings, spaces: HalfSpaces
+    plan: Plan, config: Configuration, target: Floats, settings: Settings, spaces: LeastStep
 ) -> tuple[float, int]:
     """Move the target, and all trunks, to where all chains reach it, as near as it can be; the gap and the rounds.
 
@@ -269,16 +269,14 @@ def settle(
 
 
 @routine
-def distance_from(
-    config: Configuration, target: Floats, settings: Settings, spaces: HalfSpaces, length: float
-) -> float:
+def distance_from(config: Configuration, target: Floats, settings: Settings, spaces: LeastStep, length: float) -> float:
     """Distance of the pose from what was asked for [L], turns as they count beside it."""
     return pull_back(config, target, settings, spaces, 0.0, length)
 
 
 @routine
 def project_by_half_spaces(
-    plan: Plan, config: Configuration, target: Floats, seeds: Seeds, row: int, settings: Settings, spaces: HalfSpaces
+    plan: Plan, config: Configuration, target: Floats, seeds: Seeds, row: int, settings: Settings, spaces: LeastStep
 ) -> tuple[float, int, int]:
     """Move a target that is not reached to a nearest pose that is; the largest gap, passes and rounds.
 

@@ -49,7 +49,7 @@ PROGRAMME = np.dtype(
 )
 
 
-class HalfSpaces(NamedTuple):
+class LeastStep(NamedTuple):
     """Half-spaces G x + h <= 0 and the step into them, with the scratch memory of one thread.
 
     The unknowns are the platform's motion, if it is free, then trunk joints [L or rad], then a slack.
@@ -65,14 +65,14 @@ class HalfSpaces(NamedTuple):
 
 
 @allocator
-def new_half_spaces(plan: Plan) -> HalfSpaces:
+def new_half_spaces(plan: Plan) -> LeastStep:
     """Allocate for all branches and trunk joints at once."""
     joints, branches = plan.trunk_joints.shape[0], plan.branches.shape[0]
     n = PLATFORM + joints
     problem = new_qp(n + 1, 9 * branches + plan.cones.shape[0] + 2 * joints)
     for i in range(n + 1):
         problem.factor[i, i] = 1.0
-    return HalfSpaces(
+    return LeastStep(
         problem,
         np.zeros(n),
         np.zeros(1, PROGRAMME),
@@ -84,7 +84,7 @@ def new_half_spaces(plan: Plan) -> HalfSpaces:
 
 
 @routine
-def begin_programme(spaces: HalfSpaces, n: int, trunk_column: int, free: int) -> None:
+def begin_programme(spaces: LeastStep, n: int, trunk_column: int, free: int) -> None:
     """Begin with no half-space, for n unknowns."""
     programme = spaces.programme[0]
     programme["n_rows"] = programme["n_equations"] = 0
@@ -95,7 +95,7 @@ def begin_programme(spaces: HalfSpaces, n: int, trunk_column: int, free: int) ->
 
 @routine
 def add_half_space(
-    plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, excess: float, g: Vec, w: Vec
+    plan: Plan, b: int, config: Configuration, spaces: LeastStep, excess: float, g: Vec, w: Vec
 ) -> float:
     """Add the half-space e + g . dt + w . dphi <= 0 of a branch; how far it is exceeded.
 
@@ -109,14 +109,14 @@ def add_half_space(
 
 
 @routine
-def add_equation(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, error: float, g: Vec, w: Vec) -> float:
+def add_equation(plan: Plan, b: int, config: Configuration, spaces: LeastStep, error: float, g: Vec, w: Vec) -> float:
     """Add the equation e + g . dt + w . dphi = 0 of a branch; how far it is off, or 0 if no motion answers."""
     fill_row(plan, b, config, spaces, g, w)
     return abs(error) if keep_row(spaces, error / plan.length, True) else 0.0
 
 
 @routine
-def fill_row(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, g: Vec, w: Vec) -> None:
+def fill_row(plan: Plan, b: int, config: Configuration, spaces: LeastStep, g: Vec, w: Vec) -> None:
     """Fill the next row with the rates g . dt + w . dphi of all unknowns [L]."""
     programme, branch = spaces.programme[0], plan.branches[b]
     row = spaces.problem.G[programme["n_rows"]]
@@ -139,7 +139,7 @@ def fill_row(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, g: V
 
 
 @routine
-def keep_row(spaces: HalfSpaces, excess: float, is_equation: bool) -> bool:
+def keep_row(spaces: LeastStep, excess: float, is_equation: bool) -> bool:
     """Count the row that has been filled, exceeded by so much [L]; False if no motion answers it.
 
     Equations come first: an equation changes places with the first half-space.
@@ -160,7 +160,7 @@ def keep_row(spaces: HalfSpaces, excess: float, is_equation: bool) -> bool:
 
 
 @routine
-def add_ranges(plan: Plan, first: int, last: int, config: Configuration, spaces: HalfSpaces) -> None:
+def add_ranges(plan: Plan, first: int, last: int, config: Configuration, spaces: LeastStep) -> None:
     """Add the ranges of trunk joints."""
     programme, rows = spaces.programme[0], spaces.problem.G
     for j in range(first, last):
@@ -174,7 +174,7 @@ def add_ranges(plan: Plan, first: int, last: int, config: Configuration, spaces:
 
 
 @routine
-def add_branch(plan: Plan, b: int, config: Configuration, settings: Settings, spaces: HalfSpaces) -> float:
+def add_branch(plan: Plan, b: int, config: Configuration, settings: Settings, spaces: LeastStep) -> float:
     """Add the limits of a branch; the largest excess of what motions answer [length]."""
     branch = plan.branches[b]
     parts, t = branch["last"] - branch["first"], move(config.pose, vec(branch["end"]))
@@ -190,7 +190,7 @@ def add_branch(plan: Plan, b: int, config: Configuration, settings: Settings, sp
 
 
 @routine
-def add_planes(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, parts: int) -> float:
+def add_planes(plan: Plan, b: int, config: Configuration, spaces: LeastStep, parts: int) -> float:
     """Add equations: the end in the plane of the hinges, and the platform's hinge parallel to them."""
     branch, gap, zero = plan.branches[b], 0.0, (0.0, 0.0, 0.0)
     if branch["planar"] == 0:
@@ -209,7 +209,7 @@ def add_planes(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces, pa
 
 
 @routine
-def add_strut(plan: Plan, b: int, config: Configuration, spaces: HalfSpaces) -> float:
+def add_strut(plan: Plan, b: int, config: Configuration, spaces: LeastStep) -> float:
     """Add the limits of a strut: its stroke, its hinge's range, a plane of the platform, cones at both ends."""
     branch, gap, zero = plan.branches[b], 0.0, (0.0, 0.0, 0.0)
     carrier, node = config.carriers[branch["carrier"]], plan.nodes[branch["last"]]
@@ -258,7 +258,7 @@ def cone_excess(axis: Vec, c: float, s: float, d: Vec) -> tuple[float, Vec]:
 
 
 @routine
-def add_end(plan: Plan, b: int, config: Configuration, settings: Settings, spaces: HalfSpaces) -> float:
+def add_end(plan: Plan, b: int, config: Configuration, settings: Settings, spaces: LeastStep) -> float:
     """Add the half-space beyond the nearest end of a branch of several parts, square to what it misses its target by.
 
     A branch that reaches is probed beyond its target, where it was missed last, if limits that are kept count.
@@ -296,7 +296,7 @@ def dot_of(a: Floats, b: Floats, n: int) -> float:
 
 
 @routine
-def least_step(spaces: HalfSpaces) -> None:
+def least_step(spaces: LeastStep) -> None:
     """Move x by the least step into all half-spaces: min |x - x_0|^2 / 2 + s^2 / 2 with G x + h <= s / STIFF.
 
     The slack s misses all of them alike where they contradict; equations have none.

@@ -6,7 +6,7 @@ from ...arrays import Floats
 from .._jit import routine
 from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import PATIENT, reach_from_start
-from .half_spaces import HalfSpaces
+from .half_spaces import LeastStep
 from .moving_frames import move_carriers
 from .plan import Configuration, Plan, Settings
 
@@ -28,7 +28,7 @@ def move_trunk(
     settings: Settings,
     margin: float,
     config: Configuration,
-    spaces: HalfSpaces,
+    spaces: LeastStep,
 ) -> None:
     """Move trunks (n_trunk_joints,), deviations from home, until their branches reach the target, if they can.
 

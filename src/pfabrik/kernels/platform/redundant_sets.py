@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..legs.records import Table
-from ..passes.half_spaces import HalfSpaces, new_half_spaces
+from ..passes.half_spaces import LeastStep, new_half_spaces
 from ..passes.move_trunks import move_trunk
 from ..passes.plan import Configuration, Plan, Settings, new_configuration
 from ..vectors import copy_table, sub, turn
@@ -67,7 +67,7 @@ class TrunkScratch(NamedTuple):
     """Scratch memory of one thread, for trunks."""
 
     config: Configuration
-    half_spaces: HalfSpaces
+    half_spaces: LeastStep
     pose: Floats  # (4, 4) [length]
     values: Floats  # (n_trunk_joints,)
 
