@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +143,14 @@ def test_no_start_of_slsqp_comes_nearer_in_many_tries() -> None:
     distances = distances_from(targets, answers)
     for k in np.flatnonzero(np.asarray(answers.status) == pf.Status.PROJECTED):
         assert distances[k] <= own.nearest(targets[k], 200) + 1e-7
+
+
+@pytest.mark.parametrize("method", ["paper", "accelerated", "centroid"])
+def test_passes_keep_links_apart(method: str) -> None:
+    machine, options = struts(20.0, clearance=2), replace(getattr(pf.passes.Options, method)(), hold=None)
+    targets, least = around(machine, COUNT, 0.3, 0.8), 2.0 - 1e-9 * machine.characteristic_length
+    free, kept = (pf.passes.solve(each, targets, options) for each in (machine.with_clearance(None), machine))
+    assert np.min(pf.clearance(free).distance) < least <= np.min(pf.clearance(kept).distance)
 
 
 @pytest.mark.parametrize("machine", [struts(16.0, clearance=2), thick_hexaglide()], ids=["struts", "rails"])

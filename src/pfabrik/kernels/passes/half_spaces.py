@@ -55,7 +55,7 @@ class LeastStep(NamedTuple):
     The unknowns are the platform's motion, if it is free, then trunk joints [L or rad], then a slack.
     """
 
-    problem: QP  # H is the identity; rows G, and h [L], the margin included
+    problem: QP  # H is the identity, g zero; rows G, and h [L], the margin included
     x: Floats  # (n,): the step [L]
     programme: Records  # (1,): PROGRAMME
     normals: Floats  # (n_branches, 3): which way each branch's end was missed last; zero if it was not
@@ -303,9 +303,8 @@ def least_step(spaces: LeastStep) -> None:
     """
     problem, x, programme = spaces.problem, spaces.x, spaces.programme[0]
     n = programme["n_unknowns"]
-    for i in range(n):
-        problem.g[i] = -x[i]
-    problem.g[n] = 0.0
+    for c in range(programme["n_rows"]):
+        problem.h[c] += dot_of(problem.G[c], x, n)
     solve_with_equations(problem, n + 1, programme["n_equations"], programme["n_rows"])
     for i in range(n):
-        x[i] = problem.x[i]
+        x[i] += problem.x[i]
