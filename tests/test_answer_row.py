@@ -23,17 +23,19 @@ from pfabrik.tolerances import TOLERANCES
 MACHINES = ("stewart", "delta", "servo_hexapod", "orthoglide", "agile_eye")
 
 
-def answered(name: str, targets: np.ndarray, effort: int) -> tuple[T.Tables, T.AnswerScratch, PoseSolutions, list[int]]:
+def answered(
+    name: str, targets: np.ndarray, effort: int, most_steps: int = 0, counted: str = "steps"
+) -> tuple[T.Tables, T.AnswerScratch, PoseSolutions, list[int]]:
     """Answers from home to targets one by one, and the steps that each took."""
     tables = tables_of(model_of(pf.load(name)), Options())
     scratch, question = T.new_answer_scratch(tables), T.Question(np.zeros(1, T.QUESTION))
-    question.asked[0] = 0, T.BY_LEGS, T.EXACTLY, 0, 0, 0, UNBOUNDED, UNBOUNDED, effort, 0.0
+    question.asked[0] = 0, T.BY_LEGS, T.EXACTLY, 0, 0, 0, UNBOUNDED, UNBOUNDED, effort, most_steps, 0.0
     handles = [Handle(each) for each in (tables, scratch, question)]
     answers, steps = new_solutions(len(targets), len(tables.legs.legs), len(tables.legs.driven)), []
     for row in range(len(targets)):
         own = PoseSolutions(*(array[row : row + 1] for array in answers))
         answer_rows(*(each.address for each in handles), targets[row : row + 1], *tables.home, *own)
-        steps.append(int(scratch.nearest.effort["steps"][0]))
+        steps.append(int(scratch.nearest.search.effort[counted][0]))
     return tables, scratch, answers, steps
 
 
@@ -56,6 +58,14 @@ def test_no_search_begins_once_the_effort_is_spent(name: str) -> None:
         assert (cut.measures[found, 3] <= TOLERANCES.limit).all()
         assert (cut.distances >= whole.distances - 1e-9).all()
     assert np.array_equal(answered(name, targets, max(steps) + 1)[2].poses, whole.poses)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("most", [1, 7, 64])
+def test_no_more_configurations_are_linearised_than_given(name: str, most: int) -> None:
+    *_, answers, linearised = answered(name, far(name, 6), UNBOUNDED, most, "linearised")
+    assert 0 < max(linearised) <= most
+    assert np.isin(answers.status, (REACHED, PROJECTED)).all()
 
 
 @pytest.mark.parametrize("name", MACHINES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import Any
 
 import numpy as np
@@ -164,6 +165,34 @@ def test_the_papers_settings_end_within_its_tolerance_with_the_loops_closed(name
     assert_feasible(mechanism, answer)
     assert (answer.position_error <= 1e-2).mean() > 0.95
     assert np.median(answer.iterations) <= 100
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "servo_hexapod", "five_bar", "hexaglide"])
+def test_a_certified_answer_asked_again_is_the_answer_but_with_other_tolerances(name: str) -> None:
+    mechanism = pf.load(name)
+    targets = oracles.targets_about(mechanism, np.random.default_rng(3), 12, 0.9, 0.2)
+    answer = next(a for a in pf.solve_ik(mechanism, targets) if a.status is pf.Status.PROJECTED and a.certified)
+    target = answer._request.targets[0]
+    again = pf.solve_ik(mechanism, target, start=answer)
+    assert again.certified
+    assert again.status is pf.Status.PROJECTED
+    assert np.array_equal(again.q, answer.q)
+    wide = pf.Options(tolerance=2.0 * answer.position_error, rotation_tolerance=0.1)
+    assert pf.solve_ik(mechanism, target, start=answer, options=wide).status is pf.Status.REACHED
+
+
+def test_batches_asked_again_do_not_keep_all_answers_before_them() -> None:
+    mechanism = pf.load("stewart")
+    targets = oracles.targets_about(mechanism, np.random.default_rng(3), 12, 0.6, 0.4)
+    first = answer = pf.solve_ik(mechanism, targets, options=pf.Options(hold=None))
+    assert 0 < np.count_nonzero(first.status == pf.Status.PROJECTED) < len(targets)
+    kept = weakref.ref(first._configurations)
+    for _ in range(40):
+        answer = pf.solve_ik(mechanism, targets, start=answer, options=pf.Options(hold=None))
+    q = first.q.copy()
+    del first
+    assert kept() is None
+    np.testing.assert_allclose(answer.q, q, rtol=0, atol=1e-12)
 
 
 def test_rotations_are_accepted_up_to_the_stated_deviation() -> None:

@@ -61,6 +61,21 @@ def test_contradicting_limits_have_no_solution() -> None:
     assert solved(np.eye(2), np.zeros(2), G, np.array([1.0, -1.0]))[0]  # x <= -1 and x >= -1
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_multipliers_of_a_contradiction_prove_it(seed: int) -> None:
+    """Farkas: a sum of limits that no x enters, and that is exceeded."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 7))
+    G = rng.normal(size=(n + 6, n))
+    G[0] = -rng.uniform(0.1, 1.0, 3) @ G[1:4]
+    h = rng.uniform(0.1, 1.0, n + 6)
+    is_solved, _, multipliers = solved(np.eye(n), rng.normal(size=n), G, h)
+    assert not is_solved
+    assert multipliers.min() >= 0.0
+    assert np.abs(G.T @ multipliers).max() <= 1e-6 * multipliers.sum()  # gradients so near count as dependent
+    assert h @ multipliers > 0.0
+
+
 def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
     x, multipliers = np.zeros(2), np.zeros(0)
     none = np.zeros((0, 2)), np.zeros(0)

@@ -10,7 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from oracles import targets_about
 from pfabrik import Options, Status
+from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
@@ -165,3 +167,40 @@ def test_a_copy_is_prepared_anew_and_shares_nothing() -> None:
         assert twin.status is Status.INVALID and twin.options == solver.options
         assert twin.ik(higher) is Status.REACHED
         assert solver.pose[2, 3] == pytest.approx(190.0) and twin.pose[2, 3] == pytest.approx(200.0)
+
+
+@pytest.mark.parametrize("name", pf.catalog())
+def test_bounded_searches_are_feasible_and_say_whether_they_were_cut(name: str) -> None:
+    mechanism = pf.load(name)
+    targets = targets_about(mechanism, np.random.default_rng(4), 4, 0.9, 0.7)
+    if not engine_of(mechanism).bounds_steps:
+        with pytest.raises(InvalidArgument, match="most_steps"):
+            pf.solve_ik(mechanism, targets, options=Options(most_steps=64))
+        return
+    whole = pf.solve_ik(mechanism, targets)
+    assert np.all(whole.is_complete)
+    for most_steps in (1, 8, 64):
+        answer = pf.solve_ik(mechanism, targets, options=Options(most_steps=most_steps))
+        assert np.array_equal(answer.status, whole.status)
+        assert np.all(pf.closure_residual(answer) <= 1e-9 * mechanism.characteristic_length)
+        assert np.all(answer.limit_excess <= 1e-9)
+        is_projected = answer.status == Status.PROJECTED
+        assert np.all(answer.iterations[is_projected] <= most_steps)
+        assert np.all(answer.is_complete[~is_projected | answer.certified])
+    solver = pf.Solver(mechanism, most_steps=1)
+    assert solver.options.most_steps == 1
+    solver.ik(targets[0])
+    assert np.array_equal(solver.pose, pf.solve_ik(mechanism, targets[0], options=solver.options).pose)
+
+
+def test_where_no_step_is_left_the_start_answers() -> None:
+    mechanism = pf.load("stewart")
+    start = pf.solve_ik(mechanism, (0, 0, 10) + mechanism.home_pose[:3, 3])
+    far = mechanism.home_pose.copy()
+    far[:3, :3] = Rotation.from_rotvec((1.5, 0.0, 0.0)).as_matrix()
+    answer = pf.solve_ik(mechanism, far, start=start, options=Options(most_steps=1))
+    assert answer.status is Status.PROJECTED
+    assert not answer.is_complete
+    assert answer.held is None
+    np.testing.assert_array_equal(answer.pose, start.pose)
+    np.testing.assert_array_equal(answer.actuators, start.actuators)
