@@ -24,7 +24,9 @@ LONGEST_STEP = 1.0
 """Longest step of a freedom [rad or L]."""
 
 HOPE, NEAR, HOPEFUL = 30.0, 0.01, 1e-3
-"""Times its predicted reduction that a step may promise, and objective below which no descent is without hope"""
+"""A descent is without hope where this many times the reduction that a step predicts does not lead to what another one
+found. Objective [L^2] from which, and damping up to which, that says something: near a border the pull is weak, and
+damped steps are short."""
 
 SWEEPS = 12
 """Most times that freedoms are fixed at their bounds and released in one step."""
@@ -51,6 +53,10 @@ it; and value that counts as zero [L^2]."""
 
 RESTORING, RESTORED = 8, 1e-10
 """Most steps that restore the held components after a step, and error that they may have [L or rad]."""
+
+LOOSE, LOOSEST = 1e-3, 1e-4
+"""Error of held components after a step, as a share of the reduction that it predicts, and the most [L or rad]: with
+multipliers of order one it does not decide whether the objective falls."""
 
 
 @routine
@@ -103,10 +109,11 @@ def descend_chain(
             break
         copy_chain_state(state, best)
         move_chain(chain, state, s)
-        trial, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING, True)
+        close = max(closeness, min(LOOSE * predicted, LOOSEST))
+        trial, _ = reach_target(chain, target, objective, state, s, close, RESTORING, True)
         actual = value - trial
         enough = max(SUFFICIENT * predicted, 0.0) if predicted > FINE * value else -CONVERGED * value
-        is_kept = largest(s.gradient.errors, held) <= RESTORED and actual >= enough
+        is_kept = largest(s.gradient.errors, held) <= max(RESTORED, close) and actual >= enough
         if is_kept:
             value = trial
             if abs(actual - predicted) < EXACT * predicted:
@@ -118,6 +125,8 @@ def descend_chain(
     if not is_kept:
         copy_chain_state(best, state)
         measure_pose(chain, target, objective, state, s)
+    if largest(s.gradient.errors, held) > RESTORED:
+        value, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING, True)
     return value
 
 
