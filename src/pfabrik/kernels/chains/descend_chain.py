@@ -23,11 +23,6 @@ MOST_STEPS = 200
 LONGEST_STEP = 1.0
 """Longest step of a freedom [rad or L]."""
 
-HOPE, NEAR, HOPEFUL = 30.0, 0.01, 1e-3
-"""A descent is without hope where this many times the reduction that a step predicts does not lead to what another one
-found. Objective [L^2] from which, and damping up to which, that says something: near a border the pull is weak, and
-damped steps are short."""
-
 SWEEPS = 12
 """Most times that freedoms are fixed at their bounds and released in one step."""
 
@@ -61,12 +56,11 @@ multipliers of order one it does not decide whether the objective falls."""
 
 @routine
 def descend_chain(
-    chain: SerialChain, target: Floats, objective: PoseObjective, least: float, s: ChainScratch, closeness: float
+    chain: SerialChain, target: Floats, objective: PoseObjective, s: ChainScratch, closeness: float
 ) -> float:
     """Descend from `s.state` to a local minimum, left there with its pose in `s.X`; the objective, or infinity.
 
-    It is infinite where the held components cannot be met from here. A descent ends early where it would not end
-    nearer than at `least`, which another one has found.
+    It is infinite where the held components cannot be met from here.
     """
     state, best = s.state, s.best
     value, held = reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING, False)
@@ -105,8 +99,6 @@ def descend_chain(
                 s.multipliers[k] = s.wanted[k]
             damping = max(10.0 * damping, FIRST_DAMPING)
             continue
-        if value > NEAR and value - HOPE * predicted > least and damping <= HOPEFUL:
-            break
         copy_chain_state(state, best)
         move_chain(chain, state, s)
         close = max(closeness, min(LOOSE * predicted, LOOSEST))

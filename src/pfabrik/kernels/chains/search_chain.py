@@ -212,9 +212,8 @@ def search_for(tables: ChainTables, aim: int, around: bool, n_seeds: int, agreem
             if seed < 0:
                 break
             load_seed(tables, seed, s)
-        before = effort["steps"]
-        least = tally["least"]
-        value = descend_chain(tables.chain, s.target, objective, 0.5 * least * least, s, CLOSENESS)
+        before, least = effort["steps"], tally["least"]
+        value = descend_chain(tables.chain, s.target, objective, s, CLOSENESS)
         distance = pull_nearer(tables.chain, objective, math.sqrt(2.0 * value), s)
         note_attempt(aim, seed, effort["steps"] - before, distance, effort, s.log)
         if distance < math.inf and distance <= (1.0 + SAME) * least and count_ending(distance, tally):
@@ -242,8 +241,8 @@ def pull_nearer(chain: SerialChain, objective: PoseObjective, distance: float, s
         if distance <= CLOSENESS or not pull(chain, s.target, objective, distance, s):
             break
         copy_chain_state(s.state, s.unpulled)
-        descend_chain(chain, s.pulled, objective, math.inf, s, CLOSENESS)
-        nearer = math.sqrt(2.0 * descend_chain(chain, s.target, objective, math.inf, s, CLOSENESS))
+        descend_chain(chain, s.pulled, objective, s, CLOSENESS)
+        nearer = math.sqrt(2.0 * descend_chain(chain, s.target, objective, s, CLOSENESS))
         if not nearer < (1.0 - SAME) * distance:
             copy_chain_state(s.unpulled, s.state)
             break
