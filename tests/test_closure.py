@@ -9,6 +9,8 @@ import pfabrik as pf
 from machines import MACHINES
 from pfabrik.answers.active_limits import active_limits
 from pfabrik.closure.close import HELD, close, platform_poses
+from pfabrik.closure.multistart import random_feasible
+from pfabrik.closure.reaches import reaches_of
 from pfabrik.description.paths import independent_paths
 from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns, displacements, gaps, stepped
@@ -142,3 +144,14 @@ def test_configurations_that_are_not_finite_end_the_search_without_harm() -> Non
     found = close(model_of(mechanism).closure, q, np.repeat(mechanism.home_pose[None], 2, axis=0))
     assert found.gap[1] <= 1e-13
     assert not found.gap[0] <= 1.0
+
+
+@pytest.mark.parametrize("name", ["stewart", "hexaglide", "tricept", "panda"])
+def test_what_a_machine_takes_is_never_called_beyond_its_reach(name: str) -> None:
+    closure = model_of(pf.load(name)).path_closure
+    poses = random_feasible(closure)[1]
+    poses[:, :3, 3] /= closure.mechanism.characteristic_length
+    for path in reaches_of(closure.loops):
+        last = poses[:, :3, 3] - poses[:, :3, :3] @ path[3:6]
+        assert (np.linalg.norm(last - path[:3], axis=1) <= path[6]).all()
+        assert path[6] < 5.0

@@ -55,12 +55,15 @@ from .reach_target import (
     errors,
     excess_of,
     gap_of,
+    is_beyond_reach,
     is_feasible,
     is_flipped,
     measure,
+    measure_nearby,
     pose_platform,
     reach,
     start_at,
+    take_nearby,
 )
 
 LARGEST_NUMBER = 1.7976931348623157e308
@@ -74,6 +77,10 @@ MOST_STEPS = 200
 
 FEWEST = 4
 """Fewest steps for which a search is tried."""
+
+NEAR = 2
+"""Random feasible configurations, the nearest to a target out of reach, that searches start from, too: on a machine of
+two arms more answers come nearer so than random closings on the target would bring."""
 
 LONG_CHAIN_STEPS = 20
 """Steps that bring a start of a long chain within its limits."""
@@ -155,13 +162,19 @@ def search_by(
     else has an end, so is the start.
     """
     tally, start, holds = scratch.tally[0], scratch.start, tables.holds[aim] != HOLD_NOTHING
+    n_near = min(NEAR, scratch.distances.shape[0]) if n_seeds > 0 and is_beyond_reach(tables, scratch.pose) else 0
+    last = n_starts + max(n_seeds, 0) + n_near
     clear_tally(tally)
-    for number in range(n_starts + n_seeds + 1):
-        is_last, seed = number == n_starts + n_seeds, number - n_starts
-        if tally["agreements"] >= AGREEMENTS or (is_last and (tally["least"] < math.inf or not holds or steps == 0)):
+    if n_near > 0:
+        measure_nearby(tables, scratch)
+    for number in range(n_starts + n_seeds + n_near + 1):
+        is_last, seed = number == last, number - n_starts
+        if tally["agreements"] >= AGREEMENTS or (is_last and (tally["least"] < math.inf or not holds)):
             break
         begin = AT_START if is_last or number == 0 else (AT_END if seed < 0 else seed + 1)
-        if begin > 0:
+        if begin > n_seeds:
+            start_at(tables, tables.nearby[take_nearby(scratch)], scratch.begin, start)
+        elif begin > 0:
             start_at(tables, tables.seeds[seed], scratch.begin, start)
         else:
             copy_closed(scratch.begin if begin == AT_START else scratch.reached, start)
@@ -206,10 +219,10 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
     count = min(n_starts + n_seeds, machine["descents"])
     steps, distance, aim = min(MOST_STEPS, machine["descent_steps"] // count), math.inf, -1
     steps = steps if steps >= FEWEST else 0
+    n_seeds = n_seeds if count == n_starts + n_seeds else 0
     if count < n_starts or steps == 0:
         choose_start(tables, scratch, n_starts)
-        n_starts = 1
-    n_seeds = n_seeds if count == n_starts + n_seeds else 0
+        n_starts, n_seeds = 1, -1
     while distance == math.inf and aim < last and steps > 0:
         aim += 1
         distance = search_by(tables, scratch, aim, n_starts, n_seeds, steps, answer)
@@ -223,7 +236,7 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
         hold, weights = tables.holds[aim], tables.weights
         position, rotation = errors(tables.task[0], scratch.begin.poses[0], scratch.target[0], scratch.turn)
         if is_too_far(distance, weights[aim], hold, position, rotation):
-            released = search_by(tables, scratch, last, n_starts, 0, steps, scratch.nearest)
+            released = search_by(tables, scratch, last, n_starts, min(n_seeds, 0), steps, scratch.nearest)
             if released == math.inf:
                 measure(tables, scratch, scratch.begin)
                 copy_closed(scratch.begin, scratch.nearest)

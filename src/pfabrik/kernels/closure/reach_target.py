@@ -265,25 +265,36 @@ def start_at(tables: JointTables, coordinates: Floats, rest: Closed, start: Clos
 
 
 @routine
+def measure_nearby(tables: JointTables, scratch: JointScratch) -> None:
+    """Fill the distances of the random feasible configurations from the target."""
+    for i in range(scratch.distances.shape[0]):
+        position, rotation = errors(tables.task[0], tables.nearby_poses[i], scratch.target[0], scratch.turn)
+        scratch.distances[i] = math.hypot(position, rotation)
+
+
+@routine
+def take_nearby(scratch: JointScratch) -> int:
+    """The nearest of the random feasible configurations that is not taken yet."""
+    distances, place = scratch.distances, 0
+    for i in range(distances.shape[0]):
+        place = i if distances[i] < distances[place] else place
+    distances[place] = math.inf
+    return place
+
+
+@routine
 def search_from_nearby(tables: JointTables, scratch: JointScratch, is_whole: bool) -> None:
     """Reach the target from the random feasible configurations whose end effectors are nearest to it."""
-    machine, distances, best = tables.machine[0], scratch.distances, scratch.reached
-    for i in range(distances.shape[0]):
-        position, rotation = errors(tables.task[0], tables.nearby_poses[i], scratch.target[0], scratch.turn)
-        distances[i] = math.hypot(position, rotation)
-    for _ in range(min(machine["nearby"], distances.shape[0])):
+    machine, best, start, trial = tables.machine[0], scratch.reached, scratch.start, scratch.trial
+    measure_nearby(tables, scratch)
+    for _ in range(min(machine["nearby"], scratch.distances.shape[0])):
         if is_feasible(tables, best):
             break
-        place = 0
-        for i in range(distances.shape[0]):
-            place = i if distances[i] < distances[place] else place
-        distances[place] = math.inf
-        start_at(tables, tables.nearby[place], best, scratch.start)
+        place = take_nearby(scratch)
+        start_at(tables, tables.nearby[place], best, start)
         complete(tables.task[0], scratch.target[0], tables.nearby_poses[place], scratch.wished)
-        close_below(
-            tables, scratch, scratch.start, scratch.wished, is_whole, int(machine["search_steps"]), scratch.trial
-        )
-        put_better(tables, scratch.trial, best)
+        close_below(tables, scratch, start, scratch.wished, is_whole, int(machine["search_steps"]), trial)
+        put_better(tables, trial, best)
 
 
 @routine
@@ -308,7 +319,12 @@ def put_better_legs(tables: JointTables, scratch: JointScratch, trial: Closed, b
 
 @routine
 def search_from_random(
-    tables: JointTables, scratch: JointScratch, pose: Floats, is_whole: bool, is_pose_fixed: bool, best: Closed
+    tables: JointTables,
+    scratch: JointScratch,
+    pose: Floats,
+    is_whole: bool,
+    is_pose_fixed: bool,
+    best: Closed,
 ) -> None:
     """Reach a pose from random starts; if all of it is given, leg by leg.
 
@@ -318,10 +334,10 @@ def search_from_random(
     for group in range(scratch.agreements.shape[0]):
         scratch.agreements[group] = 0.0
     for k in range(machine["random"]):
-        most = 0.0
+        agreed = 0.0
         for group in range(scratch.agreements.shape[0]):
-            most = max(most, scratch.agreements[group])
-        if is_feasible(tables, best) or most >= AGREEMENTS:
+            agreed = max(agreed, scratch.agreements[group])
+        if is_feasible(tables, best) or agreed >= AGREEMENTS:
             break
         start_at(tables, tables.random[k], best, start)
         for j in range(group_of.shape[0]):
