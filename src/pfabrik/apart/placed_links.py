@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..closure.configurations import Configurations
 from ..derived import derived
-from ..description.links import bodies_of_centre, links_of
+from ..description.links import ends_on, links_of
 from ..description.mechanism import Mechanism
 from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..motion.displacements import centres, displacements
@@ -94,14 +94,8 @@ class PlacedLinks:
 @derived
 def bodies_of_links(mechanism: Mechanism) -> Ints:
     """The bodies that both ends of every link are on, (shapes, 2): BASE, PLATFORM, or 0 for any other."""
-    numbers = {mechanism.base: BASE}
-    if not mechanism.end_effector_is_joint:
-        numbers[mechanism.end_effector] = PLATFORM
-    found = []
-    for shape, joints in zip(mechanism.shapes, links_of(mechanism).joints, strict=True):
-        ends = [bodies_of_centre(mechanism.joint(name)) for name in joints] or [(shape.body,)] * 2
-        found.append([min(numbers.get(body, 0) for body in end) for end in ends])
-    return np.array(found, np.int64)
+    platform = {} if mechanism.end_effector_is_joint else {mechanism.end_effector: PLATFORM}
+    return np.minimum(ends_on(mechanism, {mechanism.base: BASE} | platform), 0)
 
 
 def placed_at(mechanism: Mechanism, configurations: Configurations) -> PlacedLinks:

@@ -6,10 +6,12 @@ import numpy as np
 
 from ..apart.link_distances import pair_names
 from ..arrays import Ints
+from ..closure.links_on_paths import link_limits
 from ..derived import derived
-from ..description.links import links_of
-from ..kernels.certify.link_rows import CellLinks, new_cell_links, no_cell_links
-from ..kernels.clearance.solids import CAPSULE, KIND, ROUND
+from ..description.links import NOWHERE, links_of
+from ..kernels.certify.link_rows import CellLinks, new_cell_links
+from ..kernels.clearance.link_records import NO_LINKS
+from ..kernels.clearance.solids import CAPSULE, KIND
 from ..model import Model
 from ..platform.links_of_legs import bodies_of_link_ends
 
@@ -20,8 +22,7 @@ def bounded_pairs(model: Model) -> Ints:
     base, the platform, cranks or carriages."""
     if model.mechanism.clearance is None:
         return np.zeros(0, np.int64)
-    links = links_of(model.mechanism)
-    is_known = np.array([None not in ends for ends in bodies_of_link_ends(model)])
+    links, is_known = links_of(model.mechanism), (bodies_of_link_ends(model) != NOWHERE).all(axis=1)
     is_known &= links.sizes[:, KIND] == CAPSULE
     return np.flatnonzero(is_known[links.pairs].all(axis=1))
 
@@ -30,17 +31,9 @@ def cell_links(model: Model) -> CellLinks:
     """The links of these pairs, in L, with scratch memory."""
     pairs = bounded_pairs(model)
     if not len(pairs):
-        return no_cell_links()
-    links, length = links_of(model.mechanism), model.length
-    shapes, numbers = np.unique(links.pairs[pairs], return_inverse=True)
-    bodies, clearance = bodies_of_link_ends(model), model.mechanism.clearance or 0.0
-    return new_cell_links(
-        links.sizes[shapes, ROUND] / length,
-        links.places[shapes, :2] / length,
-        np.array([bodies[shape] for shape in shapes], np.int64),
-        numbers.reshape(-1, 2).astype(np.int64),
-        clearance / length,
-    )
+        return new_cell_links(NO_LINKS)
+    limits = link_limits(model.mechanism, bodies_of_link_ends(model), 0.0)
+    return new_cell_links(limits._replace(pairs=limits.pairs[pairs]))
 
 
 def links_without_bounds(model: Model) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from ..kernels.certify.link_rows import no_cell_links
+from ..kernels.certify.link_rows import new_cell_links
 from ..kernels.certify.pose_cells import BALL, BOX, CYLINDER, ROTATION_VECTOR, STEPS, TILT, CellParameters
 from ..kernels.certify.prove import ENCLOSE, prove
 from ..kernels.certify.subdivision import (
@@ -18,6 +18,7 @@ from ..kernels.certify.subdivision import (
     Subdivision,
     new_subdivision,
 )
+from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.handle import Handle
 from ..model import Model
 from ..platform.table import kernel_table, table_handle
@@ -137,7 +138,7 @@ class Enclosing:
         table = self._model.legs
         sides = table.home_sides[0].copy()
         work = new_subdivision(
-            kernel_table(table), self._parameters, sides, no_cell_links(), (0, 0, 1), n_shares=len(cells)
+            kernel_table(table), self._parameters, sides, new_cell_links(NO_LINKS), (0, 0, 1), n_shares=len(cells)
         )
         work = work._replace(stack=cells)
         work.counters[N_STACK] = len(cells)

@@ -1,4 +1,4 @@
-"""The links that searches in joint coordinates keep apart."""
+"""The links of a mechanism as kernels take them, and those that searches in joint coordinates keep apart."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from ..arrays import Ints
 from ..derived import derived
-from ..description.links import bodies_of_ends, links_of, scaled_sizes
+from ..description.graph import steps_from_base
+from ..description.links import ends_on, links_of, scaled_sizes
 from ..description.mechanism import Mechanism
 from ..kernels.clearance.link_records import BASE, NO_LINKS, LinkLimits
 from ..kernels.closure import loops as K
@@ -19,15 +20,21 @@ def links_on_paths(mechanism: Mechanism) -> tuple[LinkLimits, K.Loops]:
     """The links of a mechanism with a clearance, and the ways from the base to their bodies; none without."""
     if mechanism.clearance is None:
         return NO_LINKS, ways_to(mechanism, ())
-    ends = bodies_of_ends(mechanism)
-    bodies = list(dict.fromkeys(body for each in ends for body in each if body != mechanism.base))
-    numbers = {body: number for number, body in enumerate(bodies)} | {mechanism.base: BASE}
-    limits = link_limits(mechanism, np.array([[numbers[body] for body in each] for each in ends]))
-    return limits, ways_to(mechanism, bodies)
+    steps = steps_from_base(mechanism)
+    bodies = sorted(set(steps) - {mechanism.base}, key=lambda body: steps[body])
+    on = ends_on(mechanism, {mechanism.base: BASE} | {body: number for number, body in enumerate(bodies)})
+    used = np.unique(on[on >= 0])
+    on[on >= 0] = np.searchsorted(used, on[on >= 0])
+    return link_limits(mechanism, on), ways_to(mechanism, [bodies[k] for k in used])
 
 
-def link_limits(mechanism: Mechanism, bodies: Ints) -> LinkLimits:
-    """The links of a mechanism with a clearance, in L, that move with bodies of these numbers, (s, 2)."""
+def link_limits(mechanism: Mechanism, bodies: Ints, least: float = TOLERANCES.apart) -> LinkLimits:
+    """The links of a mechanism with a clearance, in L, that move with bodies of these numbers, (s, 2).
+
+    Parameters
+    ----------
+    least : the clearance kept where the mechanism's own is less [L].
+    """
     from ..kernels.clearance.solids import CAPSULE
 
     links, length = links_of(mechanism), mechanism.characteristic_length
@@ -35,5 +42,5 @@ def link_limits(mechanism: Mechanism, bodies: Ints) -> LinkLimits:
     is_capsule = sizes[:, 0] == CAPSULE
     places[:, 0] /= length
     places[is_capsule, 1] /= length
-    least = np.array([max((mechanism.clearance or 0.0) / length, TOLERANCES.apart)])
-    return NO_LINKS._replace(sizes=sizes, home=places, bodies=bodies, pairs=links.pairs.copy(), least=least)
+    clearance = np.array([max((mechanism.clearance or 0.0) / length, least)])
+    return NO_LINKS._replace(sizes=sizes, home=places, bodies=bodies, pairs=links.pairs.copy(), least=clearance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from ..errors import Fault, InvalidMechanism
 from ..meshes import MeshHull, UnusableMesh, hull_of, middle_of, sizes_of
 from ..tolerances import TOLERANCES
 from .body_shapes import Shape
-from .graph import steps_from_base, welded
+from .graph import welded
 from .joints import Joint
 from .shape_faults import joints_with_centre, sliding_along
 from .structure import Structure
@@ -107,21 +107,23 @@ def bodies_of_centre(joint: Joint) -> tuple[str, ...]:
     return joint.connects[:1] if joint.type in ("prismatic", "cylindrical") else joint.connects
 
 
-def bodies_of_ends(mechanism: Structure) -> list[tuple[str, str]]:
-    """The bodies that both ends of every shape move with: twice the same, but for capsules between two joints.
+NOWHERE = 2**31
+"""The number of a body that has none."""
 
-    Of the two bodies of a joint the one nearer to the base, by the number of joints between.
+
+def ends_on(mechanism: Structure, numbers: Mapping[str, int]) -> Ints:
+    """The numbers of the bodies that both ends of every shape move with, (shapes, 2); NOWHERE for bodies without one.
+
+    They are twice the same, but for capsules between two joints: an end moves with any body that the joint's centre is
+    a point of, here that of the least number.
     """
-    steps = steps_from_base(mechanism)
-
-    def nearest(name: str) -> str:
-        return min(bodies_of_centre(mechanism.joint(name)), key=lambda body: steps[body])
-
     ends = (_joints_of(mechanism, shape) for shape in mechanism.shapes)
-    return [
-        (nearest(each[0]), nearest(each[1])) if each else (shape.body, shape.body)
+    on = [
+        [bodies_of_centre(mechanism.joint(name)) for name in each] or [(shape.body,)] * 2
         for shape, each in zip(mechanism.shapes, ends, strict=True)
     ]
+    found = [[min(numbers.get(body, NOWHERE) for body in end) for end in each] for each in on]
+    return np.array(found, np.int64).reshape(-1, 2)
 
 
 def _put(shape: Shape, ends: list[Any], sizes: Floats, place: Floats) -> None:

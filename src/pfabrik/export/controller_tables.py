@@ -11,7 +11,8 @@ from ..arrays import Records
 from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..kernels.clearance.convex import MOST_CORNERS, new_polytope
-from ..kernels.clearance.solids import CAPSULE, KIND
+from ..kernels.clearance.link_records import NO_LINKS
+from ..kernels.clearance.solids import KIND, WIDTH
 from ..kernels.controller.assembled import Assembling
 from ..kernels.controller.joints_in_series import Series
 from ..kernels.controller.links_on_bodies import LinksOnBodies
@@ -142,30 +143,20 @@ def _aimed(machine: Machine, legs: Records) -> Records:
 
 def _links_on_bodies(machine: Machine, parts: Sequence[str]) -> LinksOnBodies:
     links, length = machine.links_kept(parts), machine.mechanism.characteristic_length
-    memory = new_polytope(MOST_CORNERS if links is not None and links.has_solids else 0), np.zeros((2, 3))
-    if links is None:
-        none = np.zeros((0, 4), np.int64), np.zeros((0, 7)), np.zeros((0, 5)), np.zeros((0, 4, 3))
-        pairs = np.zeros((0, 2), np.int64)
-        return LinksOnBodies(*none, pairs, pairs, np.zeros(1), np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), *memory)
-    sizes, places = (np.array([solid[k] for solid in links.solids], float) for k in (0, 1))
-    sizes[:, 1:] /= length
-    places[:, 0] /= length
-    places[sizes[:, KIND] == CAPSULE, 1] /= length
-    motions = [(each.on, each.kind, each.leg, each.place) for each in links.motions]
-    numbers = [(each.sense, *each.axis, *np.asarray(each.point) / length) for each in links.motions]
-    bodies = np.array([solid.bodies for solid in links.solids], np.int64)
-    pairs = np.array([pair[:2] for pair in links.pairs], np.int64)
+    motions, limits = ([], NO_LINKS) if links is None else (links.motions, links.limits)
+    numbers = [(each.sense, *each.axis, *np.asarray(each.point) / length) for each in motions]
     return LinksOnBodies(
-        np.array(motions, np.int64).reshape(-1, 4),
+        np.array([(each.on, each.kind, each.leg, each.place) for each in motions], np.int64).reshape(-1, 4),
         np.array(numbers, float).reshape(-1, 7),
-        sizes[:, :5],
-        places,
-        bodies,
-        pairs,
-        np.array([links.clearance / length]),
-        np.zeros((2 + len(motions), 4, 4)),
-        np.zeros_like(places),
-        *memory,
+        limits.sizes[:, :WIDTH],
+        limits.home,
+        limits.bodies,
+        limits.pairs,
+        limits.least,
+        np.zeros((2 + len(motions) if links is not None else 0, 4, 4)),
+        np.zeros_like(limits.home),
+        new_polytope(MOST_CORNERS if limits.sizes[limits.pairs, KIND].any() else 0),
+        np.zeros((2, 3)),
     )
 
 

@@ -5,44 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..arrays import Floats
+import numpy as np
+
+from ..closure.links_on_paths import link_limits
 from ..description.links import links_of
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
+from ..kernels.clearance.link_records import LinkLimits
 from ..kernels.clearance.solids import BOX, CAPSULE, DISC, KIND
 from ..kernels.legs import records as K
-from .moved_bodies import Motion, MovedBodies
-
-
-class ExportedSolid(NamedTuple):
-    """A solid on one body, or a capsule between points of two.
-
-    Attributes
-    ----------
-    sizes, place : at home, as in `kernels.clearance.solids` [length].
-    bodies : the numbers of the bodies of its first point and of its second.
-    """
-
-    sizes: Floats
-    place: Floats
-    bodies: tuple[int, int]
+from .moved_bodies import BASE, Motion, MovedBodies
 
 
 class ExportedLinks(NamedTuple):
-    """The pairs of links that stay apart.
+    """The links of a machine, and the pairs that stay apart.
 
     Attributes
     ----------
-    clearance : the least distance of a pair [length].
-    pairs : the places of two solids each, and the names of their bodies.
-    has_solids : True if some are no capsules.
+    limits : in L; `bodies` are those of the motions, as `MovedBodies` numbers them.
+    names : of the bodies of each pair.
     """
 
-    clearance: float
     motions: list[Motion]
-    solids: list[ExportedSolid]
-    pairs: list[tuple[int, int, tuple[str, str]]]
-    has_solids: bool
+    limits: LinkLimits
+    names: list[tuple[str, str]]
 
 
 def exported_links(mechanism: Mechanism) -> ExportedLinks | None:
@@ -55,17 +41,15 @@ def exported_links(mechanism: Mechanism) -> ExportedLinks | None:
     if mechanism.clearance is None:
         return None
     links, bodies = links_of(mechanism), MovedBodies(mechanism)
-    used = sorted(set(links.pairs.ravel().tolist()))
-    places = {solid: place for place, solid in enumerate(used)}
+    used = np.unique(links.pairs).tolist()
     reasons = [reason for solid in used for reason in _faults(mechanism, solid, bodies)]
     if reasons:
         raise UnsupportedMechanism(mechanism.name, reasons, "exported with its clearance")
-    solids = [
-        ExportedSolid(links.sizes[solid], links.places[solid], _bodies_of(mechanism, solid, bodies)) for solid in used
-    ]
-    names = [shape.body for shape in mechanism.shapes]
-    pairs = [(places[i], places[j], (names[i], names[j])) for i, j in links.pairs.tolist()]
-    return ExportedLinks(mechanism.clearance, bodies.motions, solids, pairs, links.n_capsules < len(pairs))
+    ends = np.full((len(links.sizes), 2), BASE)
+    for solid in used:
+        ends[solid] = _bodies_of(mechanism, solid, bodies)
+    names = [(mechanism.shapes[i].body, mechanism.shapes[j].body) for i, j in links.pairs.tolist()]
+    return ExportedLinks(bodies.motions, link_limits(mechanism, ends, 0.0), names)
 
 
 WHAT_TO_DO = "or name its pairs in `ignore`, or export without the part 'limits'"

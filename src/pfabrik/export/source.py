@@ -92,11 +92,12 @@ def _machine_h(machine: Machine, tables: ControllerTables, parts: Sequence[str],
     counts |= {"PFK_RATES": 6 if path is None else len(path.coordinates)} if "rates" in parts else {}
     counts |= {} if tables.projecting is None else {"PFK_STARTS": len(tables.projecting.tables.plan.seeds.poses)}
     links = machine.links_kept(parts)
-    counts |= {} if links is None else {"PFK_PAIRS": len(links.pairs)}
+    counts |= {} if links is None else {"PFK_PAIRS": len(links.names)}
     constants = f"enum {{ {', '.join(f'{name} = {count}' for name, count in counts.items())} }};\n"
     if links is None:
         return constants
-    return f"#define PFK_CLEARANCE {literal(links.clearance)} /* least distance between links [length] */\n{constants}"
+    clearance = literal(machine.mechanism.clearance or 0.0)
+    return f"#define PFK_CLEARANCE {clearance} /* least distance between links [length] */\n{constants}"
 
 
 def _tables(
@@ -126,7 +127,7 @@ def _tables(
     if "limits" in parts:
         yield from words("limit", [f"beyond a limit: joint {joint}, {bound}" for joint, bound in machine.limits])
     if (links := machine.links_kept(parts)) is not None:
-        yield from words("pair", [f"links too near: {' and '.join(names)}" for *_, names in links.pairs])
+        yield from words("pair", [f"links too near: {' and '.join(names)}" for names in links.names])
     joints = [", ".join(leg.joints) for leg in machine.legs]
     yield from words("leg", [f"does not reach, or does not close: the leg of {each}" for each in joints])
 
@@ -199,8 +200,8 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
             lines.append(f"{place:<9} {joint:<21} {bound} {at:.10g} {unit if is_length else 'rad'}")
     if (links := machine.links_kept(parts)) is not None:
         lines += ["", "pair      links that are at least this far apart"]
-        least = f"{links.clearance:.10g} {unit}"
-        lines += [f"{place:<9} {' and '.join(names):<33} {least}" for place, (*_, names) in enumerate(links.pairs, 1)]
+        least = f"{mechanism.clearance:.10g} {unit}"
+        lines += [f"{place:<9} {' and '.join(names):<33} {least}" for place, names in enumerate(links.names, 1)]
     elif mechanism.clearance is not None:
         lines += ["", "Links may be too near: the clearance of the machine is kept where limits are."]
     lines += ["", "leg       joints"]

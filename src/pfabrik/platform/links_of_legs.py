@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
+from ..arrays import Ints
 from ..closure.links_on_paths import link_limits
 from ..decomposition.leg_forms import Rod
 from ..derived import derived
 from ..description.graph import welded
-from ..description.links import bodies_of_centre, links_of
+from ..description.links import NOWHERE, ends_on, links_of
 from ..kernels.clearance.link_records import BASE, NO_LINKS, PLATFORM, LinkLimits
 from ..kernels.legs import records as K
 from ..model import Model
@@ -18,45 +17,27 @@ from ..model import Model
 
 def keeps_links(model: Model) -> bool:
     """True if searches in the platform's pose keep all links apart; else those in joint coordinates do."""
-    return model.mechanism.clearance is None or _bodies(model) is not None
+    return model.mechanism.clearance is None or bool((bodies_of_link_ends(model) != NOWHERE).all())
 
 
 @derived
 def links_of_legs(model: Model) -> LinkLimits:
     """The links of a machine of legs whose places follow from poses and proximal joints; none without a clearance."""
-    bodies = None if model.mechanism.clearance is None else _bodies(model)
-    return NO_LINKS if bodies is None else link_limits(model.mechanism, np.array(bodies, np.int64))
+    if model.mechanism.clearance is None or not keeps_links(model):
+        return NO_LINKS
+    return link_limits(model.mechanism, bodies_of_link_ends(model))
 
 
 @derived
-def _bodies(model: Model) -> list[tuple[int, int]] | None:
-    """The numbers of the bodies that both ends of every link move with; None where some have none."""
-    found = [
-        (first, second) for first, second in bodies_of_link_ends(model) if first is not None and second is not None
-    ]
-    return found if len(found) == len(bodies_of_link_ends(model)) else None
-
-
-@derived
-def bodies_of_link_ends(model: Model) -> list[tuple[int | None, int | None]]:
-    """The numbers of the bodies that both ends of every link move with; None for bodies that have none."""
-    mechanism = model.mechanism
-    links, numbers = links_of(mechanism), dict(_numbers(model))
+def bodies_of_link_ends(model: Model) -> Ints:
+    """The numbers of the bodies that both ends of every link move with, (s, 2); NOWHERE for bodies that have none."""
+    mechanism, numbers = model.mechanism, dict(_numbers(model))
     rigid = welded([joint for joint in mechanism.joints if joint.is_rigid], mechanism.base)
-
-    def of_body(body: str) -> int | None:
-        return numbers.get(rigid.get(body, body))
-
-    def of_joint(name: str) -> int | None:
-        if name == mechanism.end_effector and mechanism.end_effector_is_joint:
-            return PLATFORM
-        known = [number for body in bodies_of_centre(mechanism.joint(name)) if (number := of_body(body)) is not None]
-        return known[0] if known else None
-
-    ends = []
-    for shape, joints in zip(mechanism.shapes, links.joints, strict=True):
-        first, second = map(of_joint, joints) if joints else (of_body(shape.body), of_body(shape.body))
-        ends.append((first, second))
+    bodies = {body: numbers[rigid.get(body, body)] for body in mechanism.bodies if rigid.get(body, body) in numbers}
+    ends = ends_on(mechanism, bodies)
+    for shape, joints in enumerate(links_of(mechanism).joints):
+        if mechanism.end_effector_is_joint and mechanism.end_effector in joints:
+            ends[shape, joints.index(mechanism.end_effector)] = PLATFORM
     return ends
 
 

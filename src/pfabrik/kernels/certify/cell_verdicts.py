@@ -56,7 +56,7 @@ def unproved_row(table: Table, work: Subdivision, cell: Floats) -> int:
     proved, worst, least_margin, proved_margin = int(cell[PROVED_LEGS]), -1, math.inf, measures[PROVED_MARGIN]
     is_round = work.parameters.kinds[0] == TILT or work.parameters.kinds[1] != BOX
     n_legs, n_leg_rows, has_ends = table.legs.shape[0], first_link_row(table), False
-    for k in range(n_legs + work.links.pairs.shape[0]):
+    for k in range(n_legs + work.links.limits.pairs.shape[0]):
         bit = 1 << min(k, MOST_BITS)
         if (k < n_legs and table.legs[k]["proximal"] == SHARED) or (k < MOST_BITS and proved & bit != 0):
             continue

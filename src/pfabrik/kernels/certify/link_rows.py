@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from .._jit import routine
-from ..clearance.link_records import BASE, PLATFORM
+from ..clearance.link_records import BASE, PLATFORM, LinkLimits
 from ..clearance.segments import between_segments
+from ..clearance.solids import ROUND
 from ..legs.records import Table
 from ..vectors import Vec, along, dot, norm, scale, sub, vec
 from .affine_forms import ABOVE, AWAY, BELOW, BOUNDS, CENTRE, ERROR, least, put_along, put_difference, put_fixed
@@ -32,41 +33,31 @@ UNSEEN = 0.05
 
 
 class CellLinks(NamedTuple):
-    """Links, all of them capsules or spheres, that are to be kept apart."""
+    """Links that are to be kept apart, those of pairs all capsules or spheres."""
 
-    radii: Floats  # (s,) [L]
-    home: Floats  # (s, 2, 3): ends of their axes at home [L]; of a sphere twice its centre
-    bodies: Ints  # (s, 2): the body of each end: BASE, PLATFORM, or the leg on whose crank or carriage it is
-    pairs: Ints  # (k, 2): two links each
-    clearance: Floats  # (1,) [L]
+    limits: LinkLimits  # on BASE, PLATFORM, or the leg on whose crank or carriage an end is; others are in no pair
     ends: Floats  # (s, 2, 8, 3): the ends over a cell; scratch
     gaps: Floats  # (4, 8, 3): differences of the ends of two links; scratch
 
 
-def new_cell_links(radii: Floats, home: Floats, bodies: Ints, pairs: Ints, clearance: float) -> CellLinks:
+def new_cell_links(limits: LinkLimits) -> CellLinks:
     """Links with scratch memory of their own."""
-    ends = np.zeros((len(radii), 2, BOUNDS + 1, 3))
-    gaps = np.zeros((ROWS_A_PAIR, BOUNDS + 1, 3))
-    return CellLinks(radii, home, bodies, pairs, np.array([clearance]), ends, gaps)
-
-
-def no_cell_links() -> CellLinks:
-    """Links of a machine without a clearance."""
-    return new_cell_links(np.zeros(0), np.zeros((0, 2, 3)), np.zeros((0, 2), np.int64), np.zeros((0, 2), np.int64), 0.0)
+    ends = np.zeros((len(limits.sizes), 2, BOUNDS + 1, 3))
+    return CellLinks(limits, ends, np.zeros((ROWS_A_PAIR, BOUNDS + 1, 3)))
 
 
 @routine
 def put_link_ends(table: Table, sides: Floats, uncertain: float, n: int, rows: LimitRows, links: CellLinks) -> None:
     """Fill the ends of all links over the cell in `rows`."""
     reference = vec(table.task[0]["reference"])
-    for i in range(links.bodies.shape[0]):
+    for i in range(links.limits.bodies.shape[0]):
         for e in range(2):
-            at, body, end = vec(links.home[i, e]), links.bodies[i, e], links.ends[i, e]
+            at, body, end = vec(links.limits.home[i, e]), links.limits.bodies[i, e], links.ends[i, e]
             if body == PLATFORM:
                 put_platform_point(sub(at, reference), reference, rows.cell, n, uncertain, end)
             elif body == BASE:
                 put_fixed(at, uncertain, n, end)
-            else:
+            elif body < table.legs.shape[0]:
                 put_end(table.legs[body], reference, rows.cell, n, 4.0 * uncertain, rows.bounds.end)
                 put_rod(table.legs[body], sides[body], n, 2.0 * uncertain, rows.bounds)
                 put_proximal_point(table.legs[body], at, n, 3.0 * uncertain, rows.bounds, end)
@@ -82,15 +73,15 @@ def put_pair(
     over the cell, in their linear parts: the direction whose bound is best (Gilbert's algorithm for the point of a
     convex set that is nearest to zero).
     """
-    first, second = links.ends[links.pairs[pair, 0]], links.ends[links.pairs[pair, 1]]
+    limits, i, j = links.limits, links.limits.pairs[pair, 0], links.limits.pairs[pair, 1]
+    first, second = links.ends[i], links.ends[j]
     p, q, x, y = vec(first[0, CENTRE]), vec(first[1, CENTRE]), vec(second[0, CENTRE]), vec(second[1, CENTRE])
     s, t = between_segments(p, q, x, y)
     nearest = sub(along(x, t, sub(y, x)), along(p, s, sub(q, p)))
-    apart = links.radii[links.pairs[pair, 0]] + links.radii[links.pairs[pair, 1]] + links.clearance[0]
+    apart = limits.sizes[i, ROUND] + limits.sizes[j, ROUND] + limits.least[0]
     for k in range(ROWS_A_PAIR):
         put_difference(second[k % 2], first[k // 2], n, links.gaps[k])
-        one, other = links.bodies[links.pairs[pair, 0], k // 2], links.bodies[links.pairs[pair, 1], k % 2]
-        if one == PLATFORM and other == PLATFORM:
+        if limits.bodies[i, k // 2] == PLATFORM and limits.bodies[j, k % 2] == PLATFORM:
             put_bounds_of_turned(rows.cell, uncertain, links.gaps[k])
     best, first_row = unit(nearest), first_link_row(table) + ROWS_A_PAIR * pair
     put_rows_along(links.gaps, best, apart, n, first_row, rows)

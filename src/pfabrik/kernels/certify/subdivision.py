@@ -8,11 +8,12 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import opener
+from ..clearance.link_records import NO_LINKS
 from ..legs.open_table import SAMPLE
 from ..legs.records import SHARED, Table
 from .leg_bounds import new_bounds
 from .limit_rows import LimitRows
-from .link_rows import ROWS_A_PAIR, CellLinks, no_cell_links
+from .link_rows import ROWS_A_PAIR, CellLinks, new_cell_links
 from .pose_cells import N_PARAMETERS, CellParameters, new_cell
 
 # Counters: cells on the stack, proved, left open, looked at; the limit that a pose breaks; cells to look at, at most.
@@ -79,7 +80,7 @@ def new_subdivision(
         np.full(N_MEASURES, np.inf),
         np.zeros(N_PARAMETERS),
         np.zeros((3, N_COLUMNS)),
-        new_rows(table, len(links.pairs)),
+        new_rows(table, len(links.limits.pairs)),
         links,
     )
 
@@ -91,5 +92,5 @@ def no_parameters() -> CellParameters:
     )
 
 
-open_subdivision = opener(new_subdivision(SAMPLE, no_parameters(), np.zeros(1), no_cell_links(), (1, 1, 1), 1))
+open_subdivision = opener(new_subdivision(SAMPLE, no_parameters(), np.zeros(1), new_cell_links(NO_LINKS), (1, 1, 1), 1))
 """The subdivision at the address of a `Handle`."""

@@ -25,7 +25,7 @@ ROUNDING = 4e-16
 # Most corners of the polytope around the origin; between two rims some hundred are needed.
 MOST_CORNERS = 256
 # Depth below which a new corner is none, and error of the depth, relative to the size of the polytope.
-FLAT, CLOSE = 1e-13, 1e-12
+FLAT, CLOSE = 1e-14, 1e-13
 
 
 class Polytope(NamedTuple):
