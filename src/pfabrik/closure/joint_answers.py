@@ -16,6 +16,7 @@ from ..kernels.closure.joint_tables import ASKED, MACHINE, Answered, JointTables
 from ..kernels.closure.loops import LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs.records import TASK
+from ..kernels.projecting import CONTINUATION_STEPS
 from ..kernels.rows import OPEN, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
@@ -142,7 +143,7 @@ def _prepared(
         "has_seeds": with_seeds,
         "closing_steps": steps_within(closure, R.MOST_CLOSING),
         "search_steps": steps_within(closure, R.STEPS),
-        "continuation_steps": steps_per_continuation_step(closure, R.MOST_CLOSING, R.CONTINUATION_STEPS),
+        "continuation_steps": steps_per_continuation_step(closure, R.MOST_CLOSING, CONTINUATION_STEPS),
         "nearby": starts_within(closure, R.NEARBY, R.STEPS),
         "random": starts_within(closure, R.STARTS, R.STEPS),
         "descents": max(1, steps // A_DESCENT),

@@ -21,6 +21,10 @@ component [L per rad, or rad per L]: a rotation about the middle of a machine mo
 SAME_DISTANCE = 1e-7
 """Relative difference of distances below which two searches agree."""
 
+CONTINUATION_STEPS, LONGEST_STEP = 8, 0.25
+"""Steps on the way to a target in the working mode of the start, and the longest single one that keeps it: a longer one
+may jump over a singularity [L or rad]."""
+
 TALLY = np.dtype(
     [
         ("least", "f8"),  # least distance [L]

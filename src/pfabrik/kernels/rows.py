@@ -20,6 +20,8 @@ CERTAIN = 4
 # Columns of Rows.counters, and of Rows.measures.
 ITERATIONS, ROUNDS, HOLD, N_COUNTERS = 0, 1, 2, 3
 POSITION_ERROR, ROTATION_ERROR, RESIDUAL, LIMIT_EXCESS, ACTUATOR_ERROR = 0, 1, 2, 3, 4
+# Upper bound of position errors: finite, however far the target.
+LARGEST_NUMBER = 1.7976931348623157e308
 
 
 class Rows(NamedTuple):

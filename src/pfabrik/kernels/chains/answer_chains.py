@@ -17,6 +17,7 @@ from ..rows import (
     HOLD_ORIENTATION,
     HOLD_POSITION,
     ITERATIONS,
+    LARGEST_NUMBER,
     LIMIT_EXCESS,
     PENDING,
     POSITION_ERROR,
@@ -30,9 +31,6 @@ from .chain_records import ChainTables
 from .chain_state import ChainScratch, open_chain, open_chain_scratch, open_question, open_tables
 from .search_chain import project, reach
 from .walk_chain import copy_chain_state, excess_of, load_chain, store_chain, walk_chain
-
-LARGEST_NUMBER = 1.7976931348623157e308
-"""Upper bound of position errors: finite, however far the target."""
 
 
 @search

@@ -10,6 +10,9 @@ from ..closure.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..legs.complete_poses import turn_pose
 from ..platform.answer_row import errors
 from ..projecting import (
+    CONTINUATION_STEPS,
+    LONGEST_STEP,
+    SAME_DISTANCE,
     brings_nearer,
     clear_tally,
     count_ending,
@@ -36,16 +39,9 @@ STEPS = 30
 NEARER = 0.25
 """The start goes before a seed that is not nearer than this share of its squared distance."""
 
-CONTINUATION_STEPS, LONGEST_STEP = 8, 0.25
-"""Steps on the way to a target in the working mode of the start, and the longest single one that keeps it: a longer one
-may jump over a singularity [L or rad]."""
-
 PULLED_FROM, PULLS = 100.0, 12
 """Ratio to the least distance up to which a descent's end may become the nearest by way of a target farther out, and
 most times that this is done."""
-
-SAME = 1e-7
-"""Relative difference of distances that count as equal."""
 
 BENT = 0.25
 """How far towards a seed a start is bent, as a share of the way."""
@@ -216,7 +212,7 @@ def search_for(tables: ChainTables, aim: int, around: bool, n_seeds: int, agreem
         value = descend_chain(tables.chain, s.target, objective, s, CLOSENESS)
         distance = pull_nearer(tables.chain, objective, math.sqrt(2.0 * value), s)
         note_attempt(aim, seed, effort["steps"] - before, distance, effort, s.log)
-        if distance < math.inf and distance <= (1.0 + SAME) * least and count_ending(distance, tally):
+        if distance < math.inf and distance <= (1.0 + SAME_DISTANCE) * least and count_ending(distance, tally):
             walk_chain(tables.chain, s.state, s)
             keep_nearest(s)
         if is_agreed(tally, agreements) or tally["least"] <= CLOSENESS or is_spent(effort):
@@ -243,7 +239,7 @@ def pull_nearer(chain: SerialChain, objective: PoseObjective, distance: float, s
         copy_chain_state(s.state, s.unpulled)
         descend_chain(chain, s.pulled, objective, s, CLOSENESS)
         nearer = math.sqrt(2.0 * descend_chain(chain, s.target, objective, s, CLOSENESS))
-        if not nearer < (1.0 - SAME) * distance:
+        if not nearer < (1.0 - SAME_DISTANCE) * distance:
             copy_chain_state(s.unpulled, s.state)
             break
         distance = nearer

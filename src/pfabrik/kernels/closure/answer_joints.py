@@ -20,6 +20,7 @@ from ..rows import (
     HOLD_POSITION,
     INVALID,
     ITERATIONS,
+    LARGEST_NUMBER,
     LIMIT_EXCESS,
     OPEN,
     POSITION_ERROR,
@@ -65,9 +66,6 @@ from .reach_target import (
     start_at,
     take_nearby,
 )
-
-LARGEST_NUMBER = 1.7976931348623157e308
-"""Upper bound of position errors: finite, however far the target."""
 
 AGREEMENTS = 7.0
 """Searches that must end at the nearest configuration found before the multistart stops."""

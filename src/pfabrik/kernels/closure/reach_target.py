@@ -7,6 +7,7 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..legs.complete_poses import tilt_to, turn_pose
+from ..projecting import CONTINUATION_STEPS, LONGEST_STEP
 from ..quaternions import difference, turn_about_z, yaw_difference
 from ..vectors import copy_row, copy_table, norm, scale, vec
 from .close import close_row
@@ -14,12 +15,6 @@ from .joint_tables import EXPECTED, REACH, STEP, JointScratch, JointTables
 from .loops import BASE_AXES, Closed, ClosureProblem
 from .path_kinematics import end_path, load_row, store_row, walk_path
 from .pose_objective import turn_of_tilt
-
-CONTINUATION_STEPS = 8
-"""Steps of a continuation of the platform from the pose of the start to the target, if one step fails."""
-
-LONGEST_STEP = 0.25
-"""Longest single step that keeps the working mode: a longer one may jump over a singularity [L or rad]."""
 
 STRANGE = 0.1
 """Largest change of components that the task leaves out, beyond which a step is replaced by continuation [L or rad]."""

@@ -36,6 +36,7 @@ from ..rows import (
     HOLD,
     HOLD_NOTHING,
     ITERATIONS,
+    LARGEST_NUMBER,
     LIMIT_EXCESS,
     PENDING,
     POSITION_ERROR,
@@ -54,9 +55,6 @@ from .linearise import linearise
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
 from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
-
-LARGEST_NUMBER = 1.7976931348623157e308
-"""Upper bound of position errors: finite, however far the target."""
 
 HOLDABLE = 1e-3
 """Largest phase 1 distance from which a search with the held part held is started [L or rad]."""
