@@ -13,8 +13,9 @@ from .simplices import NOTHING
 from .solids import CAPSULE, DISC, KIND, ROUND, Solid, middle_of, reach_of
 
 # Distances relative to the size of coordinates up to which two cores touch, so that their direction is rounding; and up
-# to which they may touch if one has a rim.
-TOUCHING, NEAR = 1e-14, 1e-8
+# to which they may touch if one has a rim: there the polytope says how far they are apart, too little by a share of it
+# beside a sharp edge. Searches keep links farther apart than that.
+TOUCHING, NEAR = 1e-14, 1e-7
 
 
 @search
