@@ -157,7 +157,8 @@ def timed(solve: Callable[[], Array], runs: int = 3) -> tuple[float, Array]:
 def own(mechanism: pf.Mechanism, targets: Array, most: float, in_space: bool) -> Iterator[tuple[str, float, float]]:
     """The library, and its parts alone: name, share reached [%], and time a target [s]."""
     poses, n, count = pf.pose(targets), len(mechanism.joints), len(targets)
-    engine, home, closing = ChainEngine(model_of(mechanism)), np.zeros((count, n)), question_of(True, False, last=BY_LEGS, seeds=0)
+    engine, home = ChainEngine(model_of(mechanism)), np.zeros((count, n))
+    closing = question_of(True, False, last=BY_LEGS, seeds=0)
     pf.solve_ik(mechanism, targets[:2])
     fabrik_all(home[:1].copy(), targets[:1], most, 1, 0.0)
     seconds, q = timed(lambda: pf.solve_ik(mechanism, targets).q)

@@ -49,10 +49,6 @@ it; and value that counts as zero [L^2]."""
 RESTORING, RESTORED = 8, 1e-10
 """Most steps that restore the held components after a step, and error that they may have [L or rad]."""
 
-LOOSE, LOOSEST = 1e-3, 1e-4
-"""Error of held components after a step, as a share of the reduction that it predicts, and the most [L or rad]: with
-multipliers of order one it does not decide whether the objective falls."""
-
 
 @routine
 def descend_chain(
@@ -101,11 +97,10 @@ def descend_chain(
             continue
         copy_chain_state(state, best)
         move_chain(chain, state, s)
-        close = max(closeness, min(LOOSE * predicted, LOOSEST))
-        trial, _ = reach_target(chain, target, objective, state, s, close, RESTORING, True)
+        trial, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING, True)
         actual = value - trial
         enough = max(SUFFICIENT * predicted, 0.0) if predicted > FINE * value else -CONVERGED * value
-        is_kept = largest(s.gradient.errors, held) <= max(RESTORED, close) and actual >= enough
+        is_kept = largest(s.gradient.errors, held) <= RESTORED and actual >= enough
         if is_kept:
             value = trial
             if abs(actual - predicted) < EXACT * predicted:
@@ -117,8 +112,6 @@ def descend_chain(
     if not is_kept:
         copy_chain_state(best, state)
         measure_pose(chain, target, objective, state, s)
-    if largest(s.gradient.errors, held) > RESTORED:
-        value, _ = reach_target(chain, target, objective, state, s, closeness, RESTORING, True)
     return value
 
 
