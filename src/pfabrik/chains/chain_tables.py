@@ -40,7 +40,7 @@ def question_of(
 ) -> Handle[Question]:
     """What is asked of all rows: BY_LEGS to reach targets only, else the nearest, from so many seeds at most."""
     asked = np.zeros(1, QUESTION)
-    asked[0] = False, BY_LEGS, last, has_start, keeps_mode, nearby, seeds, UNBOUNDED, UNBOUNDED, 0.0
+    asked[0] = False, BY_LEGS, last, has_start, keeps_mode, nearby, seeds, UNBOUNDED, UNBOUNDED, 0, 0.0
     return Handle(Question(asked))
 
 
