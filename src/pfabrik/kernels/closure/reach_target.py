@@ -52,19 +52,19 @@ def copy_closed(source: Closed, to: Closed) -> None:
 
 @routine
 def gap_of(closed: Closed) -> float:
-    """Largest gap of a configuration [L or rad]."""
+    """Largest gap of a configuration [L or rad]; infinite if one is not a number."""
     gap = 0.0
     for group in range(closed.gaps.shape[1]):
-        gap = max(gap, closed.gaps[0, group])
+        gap = max(gap, closed.gaps[0, group]) if closed.gaps[0, group] < math.inf else math.inf
     return gap
 
 
 @routine
 def excess_of(closed: Closed) -> float:
-    """Largest excess of a configuration over a limit [L or rad]."""
+    """Largest excess of a configuration over a limit [L or rad]; infinite if one is not a number."""
     excess = 0.0
     for group in range(closed.excesses.shape[1]):
-        excess = max(excess, closed.excesses[0, group])
+        excess = max(excess, closed.excesses[0, group]) if closed.excesses[0, group] < math.inf else math.inf
     return excess
 
 
