@@ -261,6 +261,8 @@ def close_row(
     least = least_damping(layout)
     undamped, keeps_yaw = problem.undamped == 1, problem.frame == HALF_WAY and problem.platform[5] == LOCKED
     copy_state(trial, best)
+    for group in range(closed.gaps.shape[1]):  # where no configuration is a number, none is measured
+        closed.gaps[row, group] = math.inf
     cost, factor, step = math.inf, 1.0, math.inf
     longest_step = 0.99 * LONGEST_STEP if problem.stays == 1 else math.inf
     iterations, phase = 0, TRY
