@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..batch import put
 from ..derived import derived
-from ..kernels.closure.joint_tables import ANSWER, EXPECTED, NEAREST, REACH, STEP, Question
+from ..kernels.closure.joint_tables import ANSWER, EXPECTED, NEAREST, REACH, STEP, JointQuestion
 from ..kernels.handle import Handle
 from ..kernels.rows import (
     FAILED,
@@ -58,7 +58,9 @@ class ClosureEngine(Engine):
         question = question_of(ANSWER, keep_mode, start is not None)
         return self._answer(targets, start_coordinates(self.model, start), options, question)
 
-    def _answer(self, targets: Floats, begin: Floats, options: Options, question: Handle[Question]) -> Configurations:
+    def _answer(
+        self, targets: Floats, begin: Floats, options: Options, question: Handle[JointQuestion]
+    ) -> Configurations:
         """What is asked of targets, from joint coordinates (n, columns), or (1, columns) for all.
 
         Loops that are on no path to the end effector are measured too; answers are FAILED where these are open.

@@ -11,8 +11,8 @@ from ..arrays import Floats, Ints, Records
 from ..batch import take
 from ..derived import derived, is_derived
 from ..description.home_mobility import column_moves
-from ..kernels.closure import reach_target as R
-from ..kernels.closure.joint_tables import ASKED, MACHINE, Answered, JointTables, Question, new_joint_scratch
+from ..kernels.closure import close_on_target as R
+from ..kernels.closure.joint_tables import ASKED, MACHINE, Answered, JointQuestion, JointTables, new_joint_scratch
 from ..kernels.closure.loops import LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs.records import TASK
@@ -39,7 +39,7 @@ ROWS_A_BLOCK = 16
 
 
 def answer_rows(
-    model: Model, targets: Floats, begin: Floats, options: Options, question: Handle[Question], rows: Rows
+    model: Model, targets: Floats, begin: Floats, options: Options, question: Handle[JointQuestion], rows: Rows
 ) -> Floats:
     """Answer targets (n, 4, 4) from joint coordinates (n, columns), or (1, columns) for all, in `rows`; those found.
 
@@ -68,7 +68,7 @@ def answer_rows(
 def _answer_block(
     tables: Handle[JointTables],
     scratch: Scratch[JointScratch],
-    question: Handle[Question],
+    question: Handle[JointQuestion],
     targets: Floats,
     begin: Floats,
     answers: Answered,
@@ -83,7 +83,7 @@ def _answer_block(
 
 
 def logged(
-    model: Model, target: Floats, begin: Floats, options: Options, question: Handle[Question]
+    model: Model, target: Floats, begin: Floats, options: Options, question: Handle[JointQuestion]
 ) -> tuple[Records, Ints]:
     """The log of a search for a target (1, 4, 4), and what each of its projections holds."""
     from ..kernels.closure.answer_joints import answer_joints
@@ -99,11 +99,11 @@ def logged(
 @lru_cache(maxsize=64)
 def question_of(
     verb: int, keeps_mode: bool = False, has_start: bool = False, leg_by_leg: bool = False
-) -> Handle[Question]:
+) -> Handle[JointQuestion]:
     """What is asked of targets."""
     asked = np.zeros(1, ASKED)
     asked[0] = verb, keeps_mode, has_start, leg_by_leg
-    return Handle(Question(asked))
+    return Handle(JointQuestion(asked))
 
 
 def prepared(model: Model, options: Options, with_seeds: bool) -> tuple[Handle[JointTables], Scratch[JointScratch]]:

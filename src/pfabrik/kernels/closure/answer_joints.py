@@ -30,25 +30,7 @@ from ..rows import (
     ROTATION_ERROR,
 )
 from ..vectors import copy_table
-from .descend import nearest_of
-from .joint_tables import (
-    ANSWER,
-    ASKED,
-    AT_END,
-    AT_START,
-    EXPECTED,
-    MACHINE,
-    NEAREST,
-    TO_CLOSE,
-    Answered,
-    JointScratch,
-    JointTables,
-    Question,
-    new_joint_scratch,
-)
-from .loops import BASE_AXES, LOCKED, SIGHT, Closed, Objective, PoseObjective
-from .path_kinematics import LAYOUT, LOOPS
-from .reach_target import (
+from .close_on_target import (
     MOST_CLOSING,
     close_legs,
     complete,
@@ -66,6 +48,24 @@ from .reach_target import (
     start_at,
     take_nearby,
 )
+from .descend import nearest_of
+from .joint_tables import (
+    ANSWER,
+    ASKED,
+    AT_END,
+    AT_START,
+    EXPECTED,
+    MACHINE,
+    NEAREST,
+    TO_CLOSE,
+    Answered,
+    JointQuestion,
+    JointScratch,
+    JointTables,
+    new_joint_scratch,
+)
+from .loops import BASE_AXES, LOCKED, SIGHT, Closed, Objective, PoseObjective
+from .path_kinematics import LAYOUT, LOOPS
 
 AGREEMENTS = 7.0
 """Searches that must end at the nearest configuration found before the multistart stops."""
@@ -94,7 +94,7 @@ def _sample() -> JointTables:
 
 _TABLES = _sample()
 open_tables, open_scratch = opener(_TABLES), opener(new_joint_scratch(_TABLES, NO_LINKS, LOOPS))
-open_question = opener(Question(np.zeros(1, ASKED)))
+open_question = opener(JointQuestion(np.zeros(1, ASKED)))
 
 
 @routine
@@ -355,7 +355,7 @@ def answer_joints(
 
     Parameters
     ----------
-    tables_address, scratch_address, question_address : of `JointTables`, `JointScratch` and `Question`.
+    tables_address, scratch_address, question_address : of `JointTables`, `JointScratch` and `JointQuestion`.
     status : (n,); rows that are not OPEN are left.
 
     Returns

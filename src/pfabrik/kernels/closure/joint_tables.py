@@ -58,7 +58,7 @@ MACHINE = np.dtype(
 """What is known of a machine, beside its loops."""
 
 
-class Question(NamedTuple):
+class JointQuestion(NamedTuple):
     """What is asked of targets."""
 
     asked: Records  # (1,): ASKED

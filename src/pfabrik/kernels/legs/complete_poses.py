@@ -82,13 +82,14 @@ def tilt_to(target: Floats, share: float, pose: Floats) -> bool:
 
 @routine
 def is_pose(target: Floats) -> bool:
-    """True if the matrix (4, 4) is finite, with a proper rotation and last row 0 0 0 1, to NOT_A_ROTATION."""
-    deviation, size = abs(target[3, 3] - 1.0), 0.0
+    """True if the matrix (4, 4) is finite, with a proper rotation and last row 0 0 0 1, each to NOT_A_ROTATION."""
+    deviation, size = abs(target[3, 3] - 1.0), target[3, 3]
     for i in range(3):
-        deviation += abs(target[3, i])
-        size += target[i, 3]
+        deviation = max(deviation, abs(target[3, i]))
+        size += target[3, i] + target[i, 3]  # no number if one of them is none
         for j in range(i, 3):
-            deviation += abs(gram(target, i, j))
+            deviation = max(deviation, abs(gram(target, i, j)))
+            size += gram(target, i, j)
     x, y, z = column(target, 0), column(target, 1), column(target, 2)
     return deviation <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0 and abs(size) < math.inf
 
