@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,37 +78,36 @@ class LegsEngine(Engine):
         Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
         `nearby` by a search around the start alone.
         """
-        answered = partial(self._by_stages, options=options, keep_mode=keep_mode)
-        answers = answered(targets, start, nearby=nearby)
+        answers = self._by_stages(targets, start, options, keep_mode, nearby)
         if options.most_steps or not keep_mode or not self._table.has_sides:
             return answers
         status = answers.rows.status
         is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
         if isinstance(answers, LegAnswers) and answers.q_proximal is None and not is_missed:
             return answers
-        answers = self._in_mode(answers, targets, start, answered)
+        answers = self._in_mode(answers, targets, start, options)
         for is_folded, begin in starts_beside(self._model, start):
-            others = self._in_mode(answered(targets, begin, nearby=nearby), targets, begin, answered)
+            others = self._by_stages(targets, begin, options, keep_mode, nearby)
+            others = self._in_mode(others, targets, begin, options)
             better = np.flatnonzero(is_folded & self._is_nearer(others.rows, answers.rows, options))
             if len(better):
                 answers = answers.with_rows(better, others.at(better))
         return answers
 
     def _in_mode(
-        self,
-        answers: Configurations,
-        targets: Floats,
-        start: Configurations | None,
-        answered: Callable[..., Configurations],
+        self, answers: Configurations, targets: Floats, start: Configurations | None, options: Options
     ) -> Configurations:
         """As `keep.kept`."""
         if isinstance(answers, LegAnswers) and (answers.sides * self._sides_of(start) >= 0.0).all():
             return answers
-        begin = home_answer(self._model) if start is None else start
-        return kept(self._model, answers, targets, begin, partial(answered, nearby=True))
+
+        def answer(target: Floats, begin: Configurations) -> Configurations:
+            return self._by_stages(target, begin, options, True, True)
+
+        return kept(self._model, answers, targets, home_answer(self._model) if start is None else start, answer)
 
     def _by_stages(
-        self, targets: Floats, start: Configurations | None, *, options: Options, keep_mode: bool, nearby: bool
+        self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool, nearby: bool
     ) -> Configurations:
         """Answer targets by closed forms; then what these leave, in other modes, by searches, in joint coordinates.
 
