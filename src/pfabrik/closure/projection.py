@@ -6,15 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Mask
+from ..arrays import Floats, Ints
 from ..derived import derived
 from ..description.task import Weights
 from ..kernels.closure.loops import LOCKED
-from ..kernels.projecting import HOLD_COST, SAME
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
 from ..motion.closure import Closure
 from ..tolerances import TOLERANCES
-from .close import Closing
 from .descend import limit_multipliers
 
 
@@ -40,26 +38,6 @@ class ProjectionMode(NamedTuple):
         position, rotation = closure.task.errors(poses, targets)
         turning = np.sqrt(max((weight for weight in self.weights[3:] if weight != LOCKED), default=0.0))
         return np.asarray(np.hypot(position / closure.mechanism.characteristic_length, turning * rotation))
-
-    def is_too_far(self, closure: Closure, distances: Floats, starts: Floats, targets: Floats) -> Mask:
-        """Mask of answers that are farther from their targets than holding a part of these may cost, (n,).
-
-        That is d > d0 + e0, where d and d0 are the distances of the answer and of the start (n, 4, 4) in components
-        that are not held, and e0 is the error of the start in those that are.
-        """
-        position, rotation = closure.task.errors(starts, targets)
-        position = position / closure.mechanism.characteristic_length
-        held_error = rotation if self.hold == HOLD_ORIENTATION else position
-        allowed = self.distances(closure, starts, targets) + HOLD_COST * held_error
-        return np.asarray((distances < np.inf) & (distances > (1.0 + SAME) * allowed))
-
-
-class Projected(NamedTuple):
-    """Projected configurations, their distances from the targets (inf if there is none), and what they hold."""
-
-    closing: Closing
-    distances: Floats
-    holds: Ints
 
 
 @derived
