@@ -17,7 +17,7 @@ from .closure.close import measure_configurations
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
 from .errors import InvalidArgument, UnknownName
-from .kernels.rows import REACHED
+from .kernels.rows import ACTUATOR_ERROR, PROJECTED, REACHED
 from .model import model_of
 from .options import Options, checked_options
 from .poses import as_floats
@@ -71,6 +71,9 @@ def solve_fk(
     starts = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(is_valid))
     clipped = np.clip(values[is_valid], -HORIZON, HORIZON)
     solutions = forward(clipped, starts, options.actuator_tolerance)
+    rows, beyond = solutions.rows, np.abs(clipped - values[is_valid]).max(axis=1)
+    rows.status[(beyond > 0.0) & (rows.status == REACHED)] = PROJECTED
+    rows.measures[:, ACTUATOR_ERROR] = np.maximum(rows.measures[:, ACTUATOR_ERROR], beyond)
     return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
 
 

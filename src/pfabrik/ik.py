@@ -19,7 +19,7 @@ from .closure.parasitic import has_parasitic_motion
 from .description.mechanism import Mechanism
 from .engine import engine_of, knows_all_modes
 from .errors import InvalidArgument
-from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, PROJECTED, REACHED, Rows
+from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, ITERATIONS, PROJECTED, REACHED, RESIDUAL, Rows
 from .model import model_of
 from .options import Options, checked_options
 from .targets import Target, as_targets, refuse_invalid
@@ -66,6 +66,10 @@ def solve_by(
     keep_mode, engine = keeps_mode(options, begin), choose_engine(mechanism)
     if options.most_steps and not engine.bounds_steps:
         raise InvalidArgument("options.most_steps", repr(options.most_steps), "None, as legs have no closed form")
+    if options.most_steps and begin is not None and not _is_feasible(mechanism, begin):
+        raise InvalidArgument(
+            "start", "none that is feasible", "loops closed, limits kept: with most_steps it may answer"
+        )
     solutions = engine.answer(targets, begin, options, keep_mode=keep_mode)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
@@ -104,6 +108,12 @@ def _reach_missed(
         if len(reached):
             solutions = solutions.with_rows(rows[reached], found.at(reached))
     return solutions
+
+
+def _is_feasible(mechanism: Mechanism, start: Configurations) -> bool:
+    """True if all starts are closed and keep their limits, by their measures."""
+    is_closed = start.rows.measures[:, RESIDUAL] <= TOLERANCES.position * mechanism.characteristic_length
+    return bool((is_closed & start.is_within_limits).all())
 
 
 def _is_certified(start: Configurations, request: PoseRequest, targets: Floats, options: Options) -> bool:
@@ -145,9 +155,13 @@ def _prefer_start(
     ]
     if not rows:
         return solutions
+    places = np.array(rows)
+    if options.most_steps:  # what the search took is told, not what it took the start
+        start = start.at(places if len(start) > 1 else 0 * places)
+        start.rows.counters[:, ITERATIONS] = solutions.rows.counters[places, ITERATIONS]
+        return solutions.with_rows(places, start)
     if len(rows) == len(start) == len(solutions):
         return start
-    places = np.array(rows)
     return solutions.with_rows(places, start.at(places if len(start) > 1 else 0 * places))
 
 

@@ -154,7 +154,6 @@ class Answer:
         is_cut = np.zeros(len(self._rows.status), bool)
         if most_steps is not None:
             is_cut = (self._rows.status == Status.PROJECTED) & ~self._rows.certain
-            is_cut &= self._rows.counters[:, ITERATIONS] >= most_steps
         return cast("bool | NDArray[np.bool_]", self._shaped(~is_cut))
 
     @property

@@ -49,7 +49,7 @@ class Solution(Answer):
     certified : True if there is a proof that no feasible pose of the same orientation is nearer, in any working mode,
         (...,). REACHED answers are certified, and most projected ones of machines whose legs are struts, or rods on
         cranks and carriages, if the platform does not rotate or its orientation is held. False if only searches say so.
-    is_complete : False if `Options.most_steps` ended the search for a projected answer before its time, (...,).
+    is_complete : False for a projection without a certificate where `Options.most_steps` bounded the search, (...,).
     iterations, rounds : passes over the chains, and revisions of the target, (...,).
     active_limits : limits that block a projected answer from its target, the largest multiplier first, or that another
         answer exceeds; for a batch, one tuple per row, in row order. Limits on which a projected answer lies, but whose

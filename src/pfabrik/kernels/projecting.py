@@ -98,6 +98,13 @@ def is_agreed(tally: Record, agreements: int) -> bool:
 
 
 @routine
+def begin_effort(most: int, bound: int, effort: Record) -> None:
+    """Begin to count what a row costs: `most` steps, and no more than `bound` linearisations."""
+    effort["steps"], effort["searches"], effort["most"] = 0, 0, most
+    effort["linearised"], effort["bound"], effort["is_cut"] = 0, bound, 0
+
+
+@routine
 def count_effort(steps: int, effort: Record) -> None:
     """Count a search."""
     effort["steps"] += steps

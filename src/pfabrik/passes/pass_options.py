@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..checks import require_choice, require_count
+from ..errors import InvalidArgument
 from ..options import Options
 
 
@@ -28,6 +29,9 @@ class PassOptions(Options):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.most_steps is not None:
+            found, expected = repr(self.most_steps), "None: passes are bounded by max_iterations and max_rounds"
+            raise InvalidArgument("options.most_steps", found, expected)
         require_choice("options.method", self.method, ("plain", "accelerated", "centroid"))
         for name in ("max_iterations", "max_rounds"):
             require_count(f"options.{name}", getattr(self, name))

@@ -49,7 +49,7 @@ def _led(model: Model, target: Floats, start: Configurations, sides: Floats, ans
         last = trial if is_kept[0] else last
         return np.asarray(is_kept)
 
-    if continued(1, advance)[0] < 1.0:
+    if last.rows.status[0] <= PROJECTED and continued(1, advance)[0] < 1.0:
         measures = last.rows.measures
         measures[:, POSITION_ERROR], measures[:, ROTATION_ERROR] = model.task.errors(last.rows.poses, target)
         last.rows.status[:], last.rows.counters[:, HOLD] = PROJECTED, HOLD_NOTHING

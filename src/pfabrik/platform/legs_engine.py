@@ -163,6 +163,7 @@ class LegsEngine(Engine):
             unsolved, fallback = unsolved[~is_kept], fallback.at(np.flatnonzero(~is_kept))
         if not len(unsolved) or len(unsolved) == len(rows.status):
             return fallback if len(unsolved) else by_legs
+        put(rows, unsolved, fallback.rows)  # no pose is left unset, for coordinates that are computed for all rows
         sides = sides_at(self._model, fallback)
         return by_legs.with_rows(unsolved, LegAnswers(fallback.rows, fallback.coordinates, sides))
 

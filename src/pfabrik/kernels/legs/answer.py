@@ -81,6 +81,7 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
         if leg["orients"] == 1:
             q, margin = orienting_coordinate(leg, legs[k + 1], frame, q)
         margin = min(margin, place_leg(legs, k, owner, q, sides[k], frames, values, lines))
+        margin = margin if margin > -math.inf else -math.inf  # no number, where squares overflow, is singular
         singularity_margin = min(singularity_margin, margin)
         margin_of_rows = min(margin_of_rows, margin) if leg["has_rows"] == 1 else margin_of_rows
     return singularity_margin, margin_of_rows

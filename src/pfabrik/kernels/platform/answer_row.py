@@ -10,7 +10,7 @@ from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides
 from ..legs.complete_poses import read_target
 from ..legs.records import Table
-from ..projecting import UNBOUNDED, brings_nearer, is_too_far
+from ..projecting import UNBOUNDED, begin_effort, brings_nearer, is_too_far
 from ..rows import (
     CERTAIN,
     HOLD,
@@ -446,8 +446,7 @@ def answer_row(
         in `counters` the steps of its search and what is held; q is NaN where closed forms answer.
     """
     effort, most = scratch.nearest.search.effort[0], question["most_steps"]
-    effort["steps"], effort["searches"], effort["most"], effort["linearised"] = 0, 0, question["effort"], 0
-    effort["bound"], effort["is_cut"] = most if most > 0 else UNBOUNDED, 0
+    begin_effort(question["effort"], most if most > 0 else UNBOUNDED, effort)
     put_start(start, answer)
     put_start(start, scratch.other)
     status = answer_by_phases(tables, scratch, start, target, question, answer)

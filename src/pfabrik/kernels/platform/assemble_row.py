@@ -6,6 +6,7 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
+from ..projecting import UNBOUNDED, begin_effort
 from ..rows import (
     ACTUATOR_ERROR,
     EXCEEDED,
@@ -207,6 +208,7 @@ def assemble_row(
     keeps_mode = question["keeps_mode"] == 1 and machine["is_over_determined"] == 0
     status, measures = answer.status[0], answer.measures
     load_own(start.poses[0], tables.legs.task[0]["length"], own[0])
+    begin_effort(question["effort"], UNBOUNDED, scratch.nearest.search.effort[0])
     put_start(start, answer)
     put_start(start, scratch.other)
     copy_row(values[0], answer.actuators[0])
