@@ -456,6 +456,17 @@ def test_limits_that_hold_alike_are_named_as_the_description_lists_them(away: fl
     assert all(limit.bound == "max" for limit in limits)
 
 
+@pytest.mark.parametrize("name", pf.catalog())
+def test_however_far_a_target_is_no_answer_is_no_number(name: str) -> None:
+    mechanism = pf.load(name)
+    for away in (1e155, 1e200, 1e308):
+        target = mechanism.home_pose.copy()
+        target[int(np.argmax(task_of(mechanism).axes)), 3] = away
+        answer = pf.solve_ik(mechanism, target)
+        assert np.isfinite(answer.actuators).all() and np.isfinite(answer.pose).all()
+        assert answer.status is Status.PROJECTED or not any(task_of(mechanism).axes)
+
+
 @pytest.mark.parametrize("away", [1e160, 1e300])
 def test_however_far_a_target_is_no_square_of_it_overflows(away: float) -> None:
     answer = pf.solve_ik(closure.five_bar_with_tool(), (away, 0, 10))

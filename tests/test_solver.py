@@ -204,3 +204,20 @@ def test_where_no_step_is_left_the_start_answers() -> None:
     assert answer.held is None
     np.testing.assert_array_equal(answer.pose, start.pose)
     np.testing.assert_array_equal(answer.actuators, start.actuators)
+
+
+def test_a_bounded_search_bounds_no_later_call() -> None:
+    mechanism = pf.load("stewart")
+    values = 1.5 * np.asarray(pf.solve_ik(mechanism, mechanism.home_pose).actuators)
+    before = pf.solve_fk(mechanism, values)
+    pf.Solver(mechanism, most_steps=1).ik(mechanism.home_pose @ pf.pose((300.0, 0.0, 0.0)))
+    after = pf.solve_fk(mechanism, values)
+    assert after.status == before.status == Status.PROJECTED
+    np.testing.assert_array_equal(after.actuators, before.actuators)
+
+
+def test_a_bounded_search_starts_where_it_may_end() -> None:
+    mechanism = pf.load("stewart")
+    q = pf.solve_ik(mechanism, mechanism.home_pose).q + 0.3
+    with pytest.raises(InvalidArgument, match="feasible"):
+        pf.solve_ik(mechanism, mechanism.home_pose, start=q, options=Options(most_steps=8))
