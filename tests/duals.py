@@ -91,6 +91,7 @@ def _root(x: Any) -> Dual:
 
 
 _FUNCTIONS = SimpleNamespace(
+    inf=math.inf,
     pi=math.pi,
     sqrt=_root,
     atan2=_arctangent,

@@ -12,7 +12,7 @@ from .._jit import allocator, flattened, routine
 from ..linear import solve_spd
 from ..quaternions import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
-from ..vectors import copy_row, cross, dot, move, norm, put, scale, vec, wrap_into
+from ..vectors import copy_row, cross, dot, move, norm, put, scale, vec, where, wrap_into
 from .complete_poses import read_target, set_yaw, turn_pose
 from .endings import LEAST_MARGIN
 from .frames import new_frames, orienting_coordinate, q_redundant_of, redundant_slope, set_frames
@@ -81,7 +81,7 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
         if leg["orients"] == 1:
             q, margin = orienting_coordinate(leg, legs[k + 1], frame, q)
         margin = min(margin, place_leg(legs, k, owner, q, sides[k], frames, values, lines))
-        margin = margin if margin > -math.inf else -math.inf  # no number, where squares overflow, is singular
+        margin = where(margin > -math.inf, margin, -math.inf)  # no number, where squares overflow, is singular
         singularity_margin = min(singularity_margin, margin)
         margin_of_rows = min(margin_of_rows, margin) if leg["has_rows"] == 1 else margin_of_rows
     return singularity_margin, margin_of_rows
