@@ -144,10 +144,8 @@ def _prefer_start(
         return solutions
     is_same = np.logical_and.reduce(request.targets == start_request.targets, axis=(1, 2))
     is_same &= (start.rows.status == PROJECTED) & (solutions.rows.status != REACHED)
-    lever, slack = (
-        options.rotation_length or mechanism.rotation_length,
-        TOLERANCES.position * mechanism.characteristic_length,
-    )
+    lever = options.rotation_length or mechanism.rotation_length
+    slack = TOLERANCES.position * mechanism.characteristic_length
     rows = [
         row
         for row in is_same.nonzero()[0].tolist()

@@ -95,7 +95,7 @@ class ChainEngine(Engine):
         follows: bool = False,
         scratch: Handle[ChainScratch] | None = None,
     ) -> tuple[int, Configurations]:
-        """How many targets (n, 4, 4) are not reached from joint coordinates (n or 1, columns), and all answers."""
+        """Answer targets (n, 4, 4) from joint coordinates (n or 1, columns); the number not reached, and the answers."""
         model, n = self.model, len(targets)
         rows, coordinates, tables = new_rows(model, n), np.empty((n, starts.shape[1])), tables_of(model, options)
         used = scratch or scratch_of_chain(model)

@@ -38,7 +38,7 @@ before the others are left out, one more for each that ended farther away before
 def question_of(
     has_start: bool, keeps_mode: bool, *, nearby: bool = False, last: int = NEAREST, seeds: int = UNBOUNDED
 ) -> Handle[Question]:
-    """What is asked of all rows: BY_LEGS to reach targets only, else the nearest, from so many seeds at most."""
+    """The question of all rows: BY_LEGS to reach targets only, else the nearest, from so many seeds at most."""
     asked = np.zeros(1, QUESTION)
     asked[0] = False, BY_LEGS, last, has_start, keeps_mode, nearby, seeds, UNBOUNDED, UNBOUNDED, 0, 0.0
     return Handle(Question(asked))

@@ -61,7 +61,7 @@ class ClosureEngine(Engine):
     def _answer(
         self, targets: Floats, begin: Floats, options: Options, question: Handle[JointQuestion]
     ) -> Configurations:
-        """What is asked of targets, from joint coordinates (n, columns), or (1, columns) for all.
+        """Answer targets by the kernel, from joint coordinates (n, columns), or (1, columns) for all.
 
         Loops that are on no path to the end effector are measured too; answers are FAILED where these are open.
         """

@@ -40,7 +40,7 @@ def inverse_map(model: Model, q: Floats) -> Floats:
 
 
 def singularities(model: Model, q: Floats) -> Singularity:
-    """How near coordinates q, (n, c), are to singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples."""
+    """Distances of coordinates q, (n, c), from singularities: arrays (n,) and (n, 6) or (n, 3), and n tuples."""
     found = rates(model, q, MEASURES)
     return singularity_of(found.measures, found.lost, found.gained)
 
@@ -60,7 +60,7 @@ def is_at_dead_point(model: Model, q: Floats) -> bool:
 
 
 class JointRates:
-    """What joints do at configurations, to first order, where actuators move, the geometry changes, or loads act.
+    """Rates of joints at configurations: by actuators, by the geometry, and under loads.
 
     By orthonormal joint rates, lengths in L; twists are [velocity of the reference point; angular velocity], and
     wrenches [force times L; moment about the reference point].
@@ -144,7 +144,7 @@ class JointRates:
 
 
 def rates(model: Model, q: Floats, asks: int, like: Model | None = None) -> FirstOrder:
-    """What is asked of coordinates q, (n, c), lengths in L; NaN where q is.
+    """Run the kernel at coordinates q, (n, c), lengths in L; NaN where q is.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def logged(
 def question_of(
     verb: int, keeps_mode: bool = False, has_start: bool = False, leg_by_leg: bool = False
 ) -> Handle[JointQuestion]:
-    """What is asked of targets."""
+    """The question of all targets."""
     asked = np.zeros(1, ASKED)
     asked[0] = verb, keeps_mode, has_start, leg_by_leg
     return Handle(JointQuestion(asked))

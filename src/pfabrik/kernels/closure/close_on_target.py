@@ -51,21 +51,24 @@ def copy_closed(source: Closed, to: Closed) -> None:
 
 
 @routine
+def largest_of(measures: Floats) -> float:
+    """Largest of the measures (1, groups) of a configuration, at least 0; infinite if one is not a number."""
+    largest = 0.0
+    for group in range(measures.shape[1]):
+        largest = max(largest, measures[0, group]) if measures[0, group] < math.inf else math.inf
+    return largest
+
+
+@routine
 def gap_of(closed: Closed) -> float:
-    """Largest gap of a configuration [L or rad]; infinite if one is not a number."""
-    gap = 0.0
-    for group in range(closed.gaps.shape[1]):
-        gap = max(gap, closed.gaps[0, group]) if closed.gaps[0, group] < math.inf else math.inf
-    return gap
+    """Largest gap of a configuration [L or rad]."""
+    return largest_of(closed.gaps)
 
 
 @routine
 def excess_of(closed: Closed) -> float:
-    """Largest excess of a configuration over a limit [L or rad]; infinite if one is not a number."""
-    excess = 0.0
-    for group in range(closed.excesses.shape[1]):
-        excess = max(excess, closed.excesses[0, group]) if closed.excesses[0, group] < math.inf else math.inf
-    return excess
+    """Largest excess of a configuration over a limit [L or rad]."""
+    return largest_of(closed.excesses)
 
 
 @routine
