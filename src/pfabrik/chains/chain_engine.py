@@ -95,7 +95,7 @@ class ChainEngine(Engine):
         follows: bool = False,
         scratch: Handle[ChainScratch] | None = None,
     ) -> tuple[int, Configurations]:
-        """Answer targets (n, 4, 4) from joint coordinates (n or 1, columns); the number not reached, and the answers."""
+        """Answer targets (n, 4, 4) from joint coordinates (n or 1, columns); how many are not reached, and all."""
         model, n = self.model, len(targets)
         rows, coordinates, tables = new_rows(model, n), np.empty((n, starts.shape[1])), tables_of(model, options)
         used = scratch or scratch_of_chain(model)

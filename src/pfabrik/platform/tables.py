@@ -128,7 +128,7 @@ def question_of(
     most_steps: int,
     tolerance: float,
 ) -> Handle[T.Question]:
-    """The question of all rows, searches being bounded by the machine's own settings, and by `most_steps` unless that is 0."""
+    """The question of all rows; the machine's settings bound its searches, and `most_steps` unless that is 0."""
     bounds, asked = (UNBOUNDED, UNBOUNDED, UNBOUNDED, most_steps), np.zeros(1, T.QUESTION)
     asked[0] = assembles, first, last, has_start, keeps_mode, is_nearby, *bounds, tolerance
     return Handle(T.Question(asked))
