@@ -9,8 +9,7 @@ import numpy as np
 
 import pfabrik as pf
 
-from ..description.graph import next_joints, steps_from_base
-from ..description.graph_faults import leaves
+from ..description.graph import leaves, next_joints, steps_from_base
 from ..description.home_mobility import ends_of_default_axes, universal_axes
 from ..description.rod_lengths import odd_rods, uneven_rods, with_lengths
 from ..description.symmetry import crossed_rounds, near_copies

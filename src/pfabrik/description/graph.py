@@ -7,8 +7,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import chain
@@ -145,7 +145,7 @@ def components(edges: Sequence[Edge], *cut: str) -> list[list[Edge]]:
         found = sorted({group_of[body] for body in inner if body in group_of})
         target = found[0] if found else number
         groups[target] = [*chain.from_iterable(groups.pop(old) for old in found), number]
-        for member in groups[target]:
+        for member in groups[target] if len(found) > 1 else [number]:
             group_of.update({body: target for body in edges[member].bodies if body not in cut})
     return [[edges[member] for member in sorted(groups[number])] for number in sorted(groups)]
 
@@ -214,3 +214,33 @@ def cone_line(mechanism: Structure, joint: Joint) -> tuple[Joint, Joint]:
     if joint.cone is None:
         raise InvalidArgument("joint", f"'{joint.name}', which has no cone", "a joint with a cone")
     return joint, next_joints(mechanism.joints, joint, opposite(joint))[0]
+
+
+def joints_with_centre(mechanism: Structure, body: str) -> list[Joint]:
+    """The joints of a body that have a centre."""
+    return [joint for joint in mechanism.joints if body in joint.connects and joint.at is not None]
+
+
+def sliding_along(mechanism: Structure, body: str) -> set[str]:
+    """A body, and those that prismatic or fixed joints connect with it, the base left out."""
+    found, grown = {body}, True
+    while grown:
+        passed = (joint for joint in mechanism.joints if joint.type in PASSED_THROUGH and joint.at is None)
+        around = {each for joint in passed if found.intersection(joint.connects) for each in joint.connects}
+        grown = not around - {mechanism.base} <= found
+        found |= around - {mechanism.base}
+    return found
+
+
+def leaves(mechanism: Structure) -> Iterator[tuple[int, Joint, str]]:
+    """Bodies that one joint alone connects, as a finger of a gripper, with that joint and its index.
+
+    Not the base, nor the end effector, nor what hangs on an end effector that is a joint: that is the tool.
+    """
+    counts = Counter(body for joint in mechanism.joints for body in joint.connects)
+    for index, joint in enumerate(mechanism.joints):
+        if joint.name == mechanism.end_effector and mechanism.end_effector not in counts:
+            continue
+        for body in joint.connects:
+            if counts[body] == 1 and body not in (mechanism.base, mechanism.end_effector):
+                yield index, joint, body

@@ -14,9 +14,8 @@ from ..errors import Fault, InvalidMechanism
 from ..meshes import MeshHull, UnusableMesh, hull_of, middle_of, sizes_of
 from ..tolerances import TOLERANCES
 from .body_shapes import Shape
-from .graph import welded
+from .graph import joints_with_centre, sliding_along, welded
 from .joints import Joint
-from .shape_faults import joints_with_centre, sliding_along
 from .structure import Structure
 
 MOST_PAIRS = 500

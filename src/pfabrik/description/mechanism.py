@@ -16,13 +16,14 @@ from ..frozen import FrozenMapping
 from .body_shapes import Shape
 from .coercion import items, numbers
 from .faults import find_faults, in_order, joint_index, merged
-from .form_faults import joint_faults, shown
+from .form_faults import shown
 from .home_mobility import end_effector_freedom, is_held, unclear_conditions
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import faults_of_legs, faults_of_shapes, leg_shapes, legs_name, placed_joints
 from .legs import Leg, as_legs
 from .mechanism_html import mechanism_html
+from .rules import joint_faults
 from .structure import Structure, as_pairs
 
 __all__ = [

@@ -47,7 +47,7 @@ class Structure:
         set_fields(self, joints=items(self.joints), reference_point=numbers(self.reference_point))
         set_fields(self, shapes=items(self.shapes), ignore=as_pairs(self.ignore), clearance=numbers(self.clearance))
         set_fields(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
-        tip = self._end_effector_joint()
+        tip = self.end_effector_joint
         if tip is not None and cast(Any, self.reference_point) is None:
             set_fields(self, reference_point=tip.at)
         if cast(Any, self.task) is None:
@@ -138,7 +138,7 @@ class Structure:
     @cached_property
     def whole_task(self) -> tuple[str, ...]:
         """All that a target can set: the position of the reference point and, for a body, its rotation."""
-        return WHOLE_TASK if self._end_effector_joint() is None else WHOLE_TASK[:3]
+        return WHOLE_TASK if self.end_effector_joint is None else WHOLE_TASK[:3]
 
     @cached_property
     def home_pose(self) -> Floats:
@@ -222,7 +222,8 @@ class Structure:
             first, second = second, first
         return first, second
 
-    def _end_effector_joint(self) -> Joint | None:
+    @property
+    def end_effector_joint(self) -> Joint | None:
         """The joint that the end effector is named after, whatever else may be wrong with the description."""
         joints = self.joints if isinstance(self.joints, tuple) else ()
         return next((each for each in joints if isinstance(each, Joint) and each.name == self.end_effector), None)

@@ -19,7 +19,7 @@ from ..description.chains import ChainJoint, read_chain
 from ..description.coercion import numbers
 from ..description.copies import Copy, Pattern, Patterns, count_of, read_copies
 from ..description.faults import in_order, joint_index, merged
-from ..description.form_faults import is_name, joint_faults, key_faults, name_faults, number_faults, shown
+from ..description.form_faults import is_name, key_faults, name_faults, number_faults, shown
 from ..description.joints import Cone, Joint, set_fields
 from ..description.leg_joints import (
     LegJoint,
@@ -31,6 +31,7 @@ from ..description.leg_joints import (
 )
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
 from ..description.mechanism import Mechanism
+from ..description.rules import joint_faults
 from ..description.structure import Structure
 from ..errors import Fault, InvalidMechanism, near_miss
 from .dimensions import dimension_values, with_numbers

@@ -1,0 +1,305 @@
+"""What a mechanism as a whole may not be: its head, its names and its graph, and where its joints are at home."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from string import digits
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import Fault, near_miss
+from ..tolerances import TOLERANCES
+from .enclosing import enclosing_radius
+from .form_faults import (
+    angle_text,
+    coordinate_text,
+    is_name,
+    is_pair_of_names,
+    is_point,
+    name_faults,
+    number_faults,
+    range_text,
+    shown,
+)
+from .graph import components, edges_of, leaves, next_joints, opposite
+from .joint_types import TASK_COORDINATES, TASK_TURNS, WHOLE_TASK
+from .joints import Cone, Joint
+from .rules import Rule, faults_by, kind_of, wrong
+from .structure import Structure
+
+SMALLEST_LENGTH = 1e-9
+"""Smallest characteristic length accepted: below it, a unit is wrong or joints are meant to coincide."""
+
+FARTHEST = 1e6
+"""How far from the origin joints may be, in sizes of the machine: coordinates of 16 digits then tell places apart to
+1e-10 of it, and loops close to 1e-9."""
+
+MISSPELT = 0.8
+"""Likeness from which the name of a body that one joint alone connects is taken for another one, misspelt: that of two
+names of five letters which differ in one."""
+
+
+class _Names(NamedTuple):
+    """The names in a mechanism.
+
+    Attributes
+    ----------
+    joints : the joints that have a name, by it.
+    owners : of each coordinate of a joint with several the name of the joint, by that of the coordinate.
+    bodies : how many joints mention each.
+    """
+
+    joints: dict[str, Joint]
+    owners: dict[str, str]
+    bodies: Counter[str]
+
+    def type_of(self, name: str) -> str | None:
+        """The type of a joint, None where none has the name."""
+        return self.joints[name].type if name in self.joints else None
+
+
+def _names_of(mechanism: Structure) -> _Names:
+    joints = {joint.name: joint for joint in mechanism.joints if is_name(joint.name)}
+    kinds = {name: kind for name, joint in joints.items() if (kind := kind_of(joint)) is not None}
+    several = {name: len(kind.coordinates) for name, kind in kinds.items() if len(kind.coordinates) > 1}
+    owners = {f"{name}[{place}]": name for name, count in several.items() for place in range(count)}
+    pairs = [joint.connects for joint in mechanism.joints if is_pair_of_names(joint.connects)]
+    return _Names(joints, owners, Counter(body for pair in pairs for body in pair))
+
+
+def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
+    """Faults of what targets set: at least one coordinate, none twice, and of the rotation all, the tilt or the yaw."""
+    expected = f"some of {', '.join(TASK_COORDINATES)}"
+    if not isinstance(task, tuple) or not task:
+        yield Fault("task", shown(task), expected)
+        return
+    for each in task:
+        if each not in TASK_COORDINATES:
+            yield Fault("task", f"{shown(each)}{near_miss(each, TASK_COORDINATES)}", expected)
+    if len(set(map(str, task))) < len(task):
+        yield Fault("task", shown(list(task)), f"{expected}, none of them twice")
+    turns = list(dict.fromkeys(each for each in map(str, task) if each in TASK_TURNS))
+    if len(turns) > 1:
+        expected = "one of the two: tilt and yaw are parts of the rotation, together all of it"
+        yield Fault("task", f"both {turns[0]} and {turns[1]}", expected)
+    if turns and mechanism.whole_task == WHOLE_TASK[:3]:
+        yield Fault("task", turns[0], "some of x, y, z: the end effector is a joint, of which only the position counts")
+
+
+def _is_moved(mechanism: Structure) -> bool:
+    """True if the end effector is a body other than the base."""
+    pairs = (joint.connects for joint in mechanism.joints if isinstance(joint.connects, tuple))
+    return mechanism.end_effector != mechanism.base and any(mechanism.end_effector in pair for pair in pairs)
+
+
+OF_POINTS = (
+    wrong("reference_point", lambda v, m: m.end_effector_joint is not None and v != m.end_effector_joint.at,
+          "nothing: it is the centre of the joint '{0.end_effector}'"),
+    wrong("reference_point", lambda v, m: v is None and m.end_effector_joint is None and _is_moved(m),
+          "three numbers, the point of the end effector that targets place"),
+    Rule("reference_point?", lambda place, v, m: number_faults(place, v, 3) if m.end_effector_joint is None else ()),
+)  # fmt: skip
+"""Of a mechanism: its reference point is that of a body, or a joint."""
+
+OF_ENDS = (
+    wrong("base", lambda v, m, n: v not in n.bodies and f"'{v}', which no joint connects{near_miss(v, n.bodies)}",
+          "a body that a joint connects"),
+    wrong("end_effector", lambda v, m, n: v == m.base and f"'{v}', which is the base", "a body that moves, or a joint"),
+    wrong("end_effector",
+          lambda v, m, n: v in n.bodies and v in n.joints and f"'{v}', which names both a body and a joint",
+          "a name that only one has"),
+    wrong("end_effector",
+          lambda v, m, n: n.type_of(v) in ("prismatic", "cylindrical") and f"'{v}', a {n.type_of(v)} joint",
+          "a joint whose centre is the same point of both its bodies"),
+    wrong("end_effector",
+          lambda v, m, n: v not in n.bodies and v not in n.joints and len(n.joints) == len(m.joints)
+          and f"'{v}', neither a body nor a joint{near_miss(v, [*n.bodies, *n.joints])}",
+          "a body or a joint"),
+)  # fmt: skip
+"""Of a mechanism whose joints connect bodies, and of its names."""
+
+
+def head_faults(mechanism: Structure) -> Iterator[Fault]:
+    """All faults of what describes a mechanism beside its joints and shapes."""
+    for field in ("name", "base", "end_effector"):
+        yield from name_faults(field, getattr(mechanism, field))
+    yield from name_faults("units.length", mechanism.length_unit)
+    if mechanism.angle_unit not in ("deg", "rad"):
+        yield Fault("units.angle", shown(mechanism.angle_unit), "'deg' or 'rad'")
+    yield from _task_faults(mechanism.task, mechanism)
+
+
+def graph_faults(mechanism: Structure) -> Iterator[Fault]:
+    """All faults of how the joints, the base and the end effector refer to each other.
+
+    Where a name could not be read, whatever depends on it is left out: a fault is reported once, where it is.
+    """
+    yield from faults_by(OF_POINTS, "", mechanism)
+    names = _names_of(mechanism)
+    has_names = all(is_name(joint.name) for joint in mechanism.joints)
+    has_bodies = all(is_pair_of_names(joint.connects) for joint in mechanism.joints)
+    yield from _duplicate_faults(mechanism, names)
+    if all(joint.actuated is False for joint in mechanism.joints):
+        yield Fault("joint", "no actuated joint", "at least one joint with `actuated = true`, or `*` in a chain")
+    for index, joint in enumerate(mechanism.joints if has_names else ()):
+        if joint.type == "prismatic" and is_pair_of_names(joint.along) and len({*(joint.along or ())}) == 2:
+            yield from _along_faults(f"joint[{index}].along", joint, names.joints)
+    if has_bodies and is_name(mechanism.base) and is_name(mechanism.end_effector):
+        ends = [*faults_by(OF_ENDS, "", mechanism, names), *_leaf_faults(mechanism, names)]
+        yield from ends or _connection_faults(mechanism)
+        yield from _cone_faults(mechanism) if has_names else ()
+
+
+def _duplicate_faults(mechanism: Structure, names: _Names) -> Iterator[Fault]:
+    seen: set[str] = set()
+    for index, joint in enumerate(mechanism.joints):
+        place, expected = f"joint[{index}].name", "a name of its own"
+        if not is_name(joint.name):
+            continue
+        if joint.name in seen:
+            yield Fault(place, f"'{joint.name}', the name of an earlier joint", expected)
+        if joint.name in names.owners:
+            owner = names.owners[joint.name]
+            yield Fault(place, f"'{joint.name}', the name of a coordinate of joint '{owner}'", expected)
+        seen.add(joint.name)
+
+
+def _along_faults(place: str, joint: Joint, joints: dict[str, Joint]) -> Iterator[Fault]:
+    """Faults of the two joints that a prismatic one runs along, of all that have a name."""
+    faults = []
+    for name in joint.along or ():
+        if name == joint.name:
+            faults.append(Fault(place, f"'{name}', the joint itself", "two other joints"))
+        elif name not in joints:
+            hint = near_miss(name, [other for other in joints if other != joint.name])
+            faults.append(Fault(place, f"'{name}': no such joint{hint}", "the names of two joints"))
+        elif joints[name].at is None and joints[name].type == "prismatic":
+            faults.append(Fault(place, f"'{name}', a joint without a centre", "joints with a centre"))
+    yield from faults
+    sides = [joint.connects, *(joints[name].connects for name in joint.along or () if not faults)]
+    if faults or not all(map(is_pair_of_names, sides)):
+        return
+    (first, second), one, other = sides
+    if not ((first in one and second in other) or (first in other and second in one)):
+        found = f"{shown(joint.along)}, not one on each side of the joint"
+        yield Fault(place, found, f"one joint of '{first}' and one joint of '{second}'")
+
+
+def _leaf_faults(mechanism: Structure, names: _Names) -> Iterator[Fault]:
+    """Faults of bodies that one joint alone connects, and whose name is like that of another.
+
+    Not one that differs in a number at its end, nor one on the same body as the leaf: left and right are alike.
+    """
+    for index, joint, body in leaves(mechanism):
+        (beside,) = {*joint.connects} - {body}
+        together = {each for other in mechanism.joints if beside in other.connects for each in other.connects}
+        bodies = dict.fromkeys([mechanism.end_effector, *names.bodies])
+        others = [each for each in bodies if each not in together and each.rstrip(digits) != body.rstrip(digits)]
+        meant = near_miss(body, others, MISSPELT)
+        if meant:
+            found = f"'{body}', which no other joint connects{meant}"
+            yield Fault(f"joint[{index}].connects", found, "the name of a body, or one that is less like it")
+
+
+def _connection_faults(mechanism: Structure) -> Iterator[Fault]:
+    """Parts of the graph with no connection to the base; the end effector's is named as such."""
+    for part in components(edges_of(mechanism.joints)):
+        bodies = {body for edge in part for body in edge.bodies}
+        if mechanism.base in bodies:
+            continue
+        if mechanism.end_effector in bodies | {edge.joint.name for edge in part if is_name(edge.joint.name)}:
+            found = f"'{mechanism.end_effector}', to which no joints lead from the base '{mechanism.base}'"
+            yield Fault("end_effector", found, "an end effector connected to the base")
+        else:
+            index = mechanism.joints.index(part[0].joint)
+            names = ", ".join(f"'{body}'" for body in sorted(bodies))
+            yield Fault(f"joint[{index}].connects", f"{names}, apart from the rest", "bodies connected to the base")
+
+
+def _cone_faults(mechanism: Structure) -> Iterator[Fault]:
+    for index, joint in enumerate(mechanism.joints):
+        kind, cone = kind_of(joint), joint.cone
+        if cone is None or kind is None or not kind.coned or getattr(cone, "fixed_to", None) not in joint.connects:
+            continue
+        body = opposite(joint)
+        ends = [f"'{each.name}'" for each in next_joints(mechanism.joints, joint, body)]
+        if len(ends) != 1:
+            several = f"several joints ({', '.join(ends)})" if ends else "no other joint"
+            found = f"'{body}', which leads to {several}, on the other side"
+            yield Fault(f"joint[{index}].cone", found, "one next joint, so that the limited line is defined")
+
+
+def home_faults(mechanism: Structure, sound: dict[str, Joint]) -> Iterator[Fault]:
+    """All faults of the home configuration that can be seen in the joints that have no other fault.
+
+    Parameters
+    ----------
+    sound : the joints without a fault of their own, by name; only they are looked at.
+    """
+    radius = enclosing_radius([joint.at for joint in sound.values() if joint.at is not None])
+    if 0.0 < radius < SMALLEST_LENGTH:
+        yield Fault("joint", f"joint centres within {radius:.3g} of each other", f"at least {SMALLEST_LENGTH:g}")
+        return
+    if len(sound) == len(mechanism.joints) and is_point(mechanism.reference_point):
+        yield from _distance_faults(mechanism)
+    has_bodies = all(is_pair_of_names(each.connects) for each in mechanism.joints)
+    are_sound = {id(joint) for joint in sound.values()}
+    for index, joint in enumerate(mechanism.joints):
+        if id(joint) in are_sound:
+            yield from _stroke_faults(f"joint[{index}]", joint, sound, radius or 1.0)
+            if joint.cone is not None and has_bodies:
+                ends = next_joints(mechanism.joints, joint, opposite(joint))
+                if len(ends) == 1 and id(ends[0]) in are_sound:
+                    yield from _angle_faults(f"joint[{index}].cone", joint, joint.cone, ends[0])
+
+
+def _distance_faults(mechanism: Structure) -> Iterator[Fault]:
+    """The place that is farthest from the origin, where that is too far for the size of the machine."""
+    places = {f"joint[{index}].at": joint.at for index, joint in enumerate(mechanism.joints) if joint.at is not None}
+    places["reference_point"] = mechanism.reference_point
+    place, farthest = max(places.items(), key=lambda item: math.hypot(*item[1]))
+    distance = math.hypot(*farthest) / mechanism.characteristic_length
+    if distance > FARTHEST:
+        found = f"{shown(farthest)}, {distance:.3g} times the size of the machine from the origin"
+        expected = f"at most {FARTHEST:g} times, so that coordinates tell its places apart: move the origin"
+        yield Fault(place, found, expected)
+
+
+def _stroke_faults(place: str, joint: Joint, sound: dict[str, Joint], scale: float) -> Iterator[Fault]:
+    """Home outside the joint's range; two joints at one place, which leave `along` without a direction."""
+    home: Any = joint.home
+    if joint.along is not None:
+        ends = [sound[name].at for name in joint.along if name in sound]
+        if len(ends) < 2 or not all(map(is_point, ends)):
+            return
+        home = math.dist(*(end or () for end in ends))
+        if home <= TOLERANCES.home_slack * scale:
+            yield Fault(f"{place}.along", "two joints at the same place", "two joints at some distance")
+            return
+    kind = kind_of(joint)
+    if joint.range is None or kind is None:
+        return
+    one = len(kind.coordinates) == 1
+    ranges: Any = (joint.range,) if one else joint.range
+    values = (home,) if one else home
+    for number, (value, bounds, coordinate) in enumerate(zip(values, ranges, kind.coordinates, strict=True)):
+        slack = TOLERANCES.home_slack * (scale if coordinate == "length" else 1.0)
+        if not bounds[0] - slack <= value <= bounds[1] + slack:
+            where = f"{place}.range" if one else f"{place}.range[{number}]"
+            expected = f"a range that contains home, {coordinate_text(value, coordinate)}"
+            yield Fault(where, range_text(bounds, coordinate), expected)
+
+
+def _angle_faults(place: str, joint: Joint, cone: Cone, end: Joint) -> Iterator[Fault]:
+    """Home outside the joint's cone, or no line to measure."""
+    axis, line = np.asarray(cone.axis), np.asarray(end.at) - np.asarray(joint.at)
+    if not line.any():
+        yield Fault(place, f"'{end.name}' at the same place", "a next joint at some distance")
+        return
+    angle = math.atan2(float(np.linalg.norm(np.cross(axis, line))), float(axis @ line))
+    if angle > cone.half_angle + TOLERANCES.home_slack:
+        expected = f"at least the angle at home to '{end.name}', {angle_text(angle)}"
+        yield Fault(f"{place}.half_angle", angle_text(cone.half_angle), expected)
