@@ -592,7 +592,7 @@ def test_too_few_actuators_and_parts_that_nothing_holds_are_said() -> None:
 WRONG = {
     "solution: found Mechanism": lambda m, s: pf.forces(m, [0, 0, 1]),
     "wrench: found shape (4,)": lambda m, s: pf.forces(s, [0, 0, 1, 2]),
-    "wrench: found numbers that are not finite": lambda m, s: pf.forces(s, [0, 0, np.nan]),
+    "wrench: found a number that is not finite": lambda m, s: pf.forces(s, [0, 0, np.nan]),
     "wrench: found str of dtype": lambda m, s: pf.forces(s, "down"),
     "wrench: found a batch of (2,)": lambda m, s: pf.forces(pf.solve_ik(m, [[0, 0, 190]] * 3), [[0, 0, 1]] * 2),
     "at: found shape (2,)": lambda m, s: pf.forces(s, [0, 0, 1], at=[0, 0]),
@@ -600,7 +600,7 @@ WRONG = {
     "did you mean 'platform'": lambda m, s: pf.forces(s, loads={"platfrom": (1.0, [0, 0, 0])}),
     "loads['platform']: found a mass of -1.0": lambda m, s: pf.forces(s, loads={"platform": (-1.0, [0, 0, 0])}),
     "loads['platform']: found 5": lambda m, s: pf.forces(s, loads={"platform": 5}),
-    "loads['platform']: found a point of shape (2,)": lambda m, s: pf.forces(s, loads={"platform": (5, [0, 0])}),
+    "loads['platform'][1]: found shape (2,)": lambda m, s: pf.forces(s, loads={"platform": (5, [0, 0])}),
     "gravity: found shape ()": lambda m, s: pf.forces(s, [0, 0, 1], gravity=9.81),
     "limits: found -5": lambda m, s: pf.wrench_capacity(s, -5.0),
     "limits: found array([5., 1.]); expected a positive number": lambda m, s: pf.wrench_capacity(s, (5.0, 1.0)),

@@ -67,7 +67,7 @@ TABLE: list[Case] = [
     (partial(pf.solve_fk, STEWART, BY_NAME | {"BL1": "long"}), r"actuators\['BL1'\]: found str"),
     (partial(pf.solve_fk, STEWART, BY_NAME | {"BL1": NAN}), "not finite"),
     *((partial(pf.configuration, STEWART, q), told) for q, told in (
-      ([0.0], r"found shape \(1,\); expected shape \(\.\.\., 36"), (0.0, r"found shape \(\)"),
+      ([0.0], r"found shape \(1,\); expected .* shape \(\.\.\., 36"), (0.0, r"found shape \(\)"),
       ("home", "q: found str"), ([NAN] * 36, "a number that is not finite"))),
     *((partial(pf.solve_ik, STEWART, HOME, start=q), told) for q, told in (
       ([0.0], r"start: found shape \(1,\)"), (0.0, r"start: found shape \(\)"),

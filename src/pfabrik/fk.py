@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
+from .arguments import as_floats
 from .arrays import Floats
 from .closure.assemble import forward_answers
 from .closure.close import measure_configurations
@@ -20,7 +21,6 @@ from .errors import InvalidArgument, UnknownName
 from .kernels.rows import ACTUATOR_ERROR, PROJECTED, REACHED
 from .model import model_of
 from .options import Options, checked_options
-from .poses import as_floats
 from .tolerances import TOLERANCES
 
 Actuators: TypeAlias = ArrayLike | Mapping[str, ArrayLike]

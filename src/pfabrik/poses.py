@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import array, as_floats
 from .arrays import Floats, Mask
 from .errors import InvalidArgument
 from .rotations import UNTURNED, from_quaternion, from_rotvec, from_rpy, nearest_rotations
@@ -25,7 +26,7 @@ class SupportsMatrix(Protocol):
 
 def pose(
     xyz: ArrayLike,
-    *misplaced: object,
+    *,
     rpy: ArrayLike | None = None,
     rotvec: ArrayLike | None = None,
     quat_xyzw: ArrayLike | None = None,
@@ -54,16 +55,14 @@ def pose(
     given = [name for name, value in rotations.items() if value is not None]
     if len(given) > 1:
         raise InvalidArgument("pose", " and ".join(given), "at most one rotation")
-    if misplaced:
-        raise InvalidArgument("xyz", f"{1 + len(misplaced)} arguments", "one position: pose([x, y, z], rpy=...)")
     if not isinstance(degrees, bool | np.bool_):
         raise InvalidArgument("degrees", reprlib.repr(degrees), "True or False")
-    positions = _numbers("xyz", xyz, (3,))
+    positions = array("xyz", xyz, "... 3")
     turned = np.eye(3)
     for name in given:
         value = rotations[name]
         value = value.as_matrix() if isinstance(value, SupportsMatrix) else value
-        numbers = _numbers(name, value, {"rotation": (3, 3), "rpy": (3,), "rotvec": (3,)}.get(name, (4,)))
+        numbers = array(name, value, {"rotation": "... 3 3", "rpy": "... 3", "rotvec": "... 3"}.get(name, "... 4"))
         in_degrees = degrees and name in ("rpy", "rotvec")
         most = np.abs(numbers).max(initial=0.0) if name in ("rpy", "rotvec") and not degrees else 0.0
         if most > 2.0 * np.pi:
@@ -78,37 +77,6 @@ def pose(
     T_base_platform = np.zeros((*shape, 4, 4))
     T_base_platform[..., :3, :3], T_base_platform[..., :3, 3], T_base_platform[..., 3, 3] = turned, positions, 1.0
     return T_base_platform
-
-
-def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
-    array = as_floats(name, value, f"finite numbers of shape {_batch(shape)}")
-    if array.shape[-len(shape) :] != shape:
-        raise InvalidArgument(name, f"shape {array.shape}", f"shape {_batch(shape)}")
-    if not np.isfinite(array).all():
-        raise InvalidArgument(name, "a number that is not finite", "finite numbers")
-    return array
-
-
-def _batch(shape: tuple[int, ...]) -> str:
-    return f"(..., {', '.join(map(str, shape))})"
-
-
-def as_floats(name: str, value: Any, expected: str) -> Floats:
-    """`value` as an array of float64; InvalidArgument for text, ragged nests, complex, boolean and masked values."""
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise InvalidArgument(name, "an array with masked values", expected)
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise InvalidArgument(name, "a ragged nest of sequences", expected) from error
-    if array.dtype.kind not in "iuf":
-        raise InvalidArgument(name, f"{type(value).__name__} of dtype {array.dtype}", expected)
-    if array.dtype is DOUBLE and array.flags.carray:
-        return array
-    return np.array(array, np.float64, order="C")  # the one memory layout that kernels are compiled for
-
-
-DOUBLE = np.dtype(np.float64)
 
 
 def _from_quaternion(name: str, value: Floats) -> Floats:
@@ -153,15 +121,15 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
         target = target.as_matrix()
         if np.shape(target)[-2:] != (4, 4):
             raise InvalidArgument("target", f"a rotation of shape {np.shape(target)}", _EXPECTED)
-    array = as_floats("target", target, _EXPECTED)
-    if array.shape[-2:] == (4, 4):
-        return array.reshape(-1, 4, 4), array.shape[:-2]
-    if array.ndim and array.shape[-1] == 3:
-        positions = array.reshape(-1, 3)
+    given = as_floats("target", target, _EXPECTED)
+    if given.shape[-2:] == (4, 4):
+        return given.reshape(-1, 4, 4), given.shape[:-2]
+    if given.ndim and given.shape[-1] == 3:
+        positions = given.reshape(-1, 3)
         poses = np.zeros((len(positions), 4, 4))
         poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = UNTURNED, positions, 1.0
-        return poses, array.shape[:-1]
-    raise InvalidArgument("target", f"shape {array.shape}", _EXPECTED)
+        return poses, given.shape[:-1]
+    raise InvalidArgument("target", f"shape {given.shape}", _EXPECTED)
 
 
 def are_poses(targets: Floats) -> Mask:

@@ -12,6 +12,7 @@ from .answers.differential import forward_jacobian
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
+from .arguments import DOUBLE
 from .arrays import Floats
 from .closure.configurations import new_rows
 from .description.mechanism import Mechanism, checked_mechanism
@@ -23,7 +24,6 @@ from .ik import keeps_mode, solve_ik
 from .model import model_of
 from .motion.tilt_axis import along_tilt, tilt_axis
 from .options import Options, checked_options
-from .poses import DOUBLE
 from .targets import Target
 
 

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import DOUBLE, any_values, array
 from .arrays import Floats, Ints
 from .description.mechanism import Mechanism, checked_mechanism
 from .description.task import task_of
@@ -17,7 +18,7 @@ from .motion.displacements import columns
 from .motion.joint_path import path_of
 from .motion.tilt_axis import along_tilt
 from .options import Options
-from .poses import DOUBLE, SupportsMatrix, as_floats, as_poses, what_is_wrong
+from .poses import SupportsMatrix, as_poses, what_is_wrong
 
 Target: TypeAlias = ArrayLike | SupportsMatrix | Mapping[str, ArrayLike]
 """Poses (..., 4, 4), positions (..., 3), a SciPy RigidTransform, or joint name -> coordinates."""
@@ -73,12 +74,9 @@ def _joint_values(mechanism: Mechanism, name: str, given: Any) -> Floats:
     joints = {joint.name for joint in mechanism.joints}
     span = columns(mechanism)[name] if name in joints else slice(0, 1)
     n = span.stop - span.start
-    expected = f"finite coordinates of shape (..., {n})" if n > 1 else "finite coordinates of shape (...)"
-    values = as_floats(f"target['{name}']", given, expected)
-    values = values if n > 1 else values[..., None]
-    if values.shape[-1:] != (n,):
-        raise InvalidArgument(f"target['{name}']", f"shape {values.shape}", expected)
-    return values
+    shape, what = f"... {n}" if n > 1 else "...", "finite coordinates"
+    values = array(f"target['{name}']", given, shape, what, holds=any_values)  # rows may be marked
+    return values if n > 1 else values[..., None]
 
 
 def refuse_invalid(targets: Floats, shape: tuple[int, ...], status: Ints, options: Options) -> None:

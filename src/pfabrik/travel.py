@@ -14,6 +14,7 @@ from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.words import DEAD_POINT, NO_FREEDOM, STRETCHED, has_freedom, short_names
+from .arguments import array
 from .arrays import Floats, Mask
 from .closure.first_order import are_stretched, is_at_dead_point
 from .description.mechanism import Mechanism
@@ -26,7 +27,6 @@ from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, task_remark
 from .motion.singularities import assembly_signs
 from .motion.tilt_axis import tilt_axis
-from .poses import as_floats
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
 
@@ -195,7 +195,7 @@ def travel(
     default = along is None and about is None
     lines = _lines(mechanism, along, default)
     axes = _axes(mechanism, solution, about, default)
-    centre = solution.pose[:3, 3] if pivot is None else _vector("pivot", pivot)
+    centre = solution.pose[:3, 3] if pivot is None else array("pivot", pivot, "3")
     search = _TravelSearch(solution, lines, axes, centre)
     distances = search.run()
     ends = Solution(mechanism, search.farthest, (len(distances),))
@@ -261,15 +261,11 @@ def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, def
 
 def _directions(name: str, given: ArrayLike) -> Floats:
     """Unit vectors (n, 3)."""
-    expected = "finite directions of shape (n, 3) or (3,) that are not zero"
-    array = as_floats(name, given, expected)
-    if array.ndim not in (1, 2) or array.shape[-1] != 3:
-        raise InvalidArgument(name, f"shape {array.shape}", expected)
-    vectors = array.reshape(-1, 3)
+    vectors = array(name, given, "n 3 | 3", "finite directions", " that are not zero").reshape(-1, 3)
     sizes = np.abs(vectors).max(axis=1, initial=0.0)  # however long, no square is too large to be represented
-    bad = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
-    if len(bad):
-        raise InvalidArgument(name, f"{vectors[bad[0]].tolist()}", expected, rows=bad[:5].tolist())
+    zero = np.flatnonzero(sizes == 0.0)
+    if len(zero):
+        raise InvalidArgument(name, "[0, 0, 0]", "directions that are not zero", rows=zero[:5].tolist())
     vectors = vectors / sizes[:, None]
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
 
@@ -279,13 +275,6 @@ def _require_task(mechanism: Mechanism, name: str, vectors: Floats, bad: Mask) -
     if len(rows):
         expected = f"directions within the task, {' '.join(mechanism.task)}: what it leaves out follows by itself"
         raise InvalidArgument(name, f"{vectors[rows[0]].tolist()}", expected, rows=rows[:5].tolist())
-
-
-def _vector(name: str, given: ArrayLike) -> Floats:
-    vector = as_floats(name, given, "a finite point of shape (3,)")
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InvalidArgument(name, f"{np.asarray(given).tolist()}", "a finite point of shape (3,)")
-    return vector
 
 
 class _TravelSearch:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start
+from ..arguments import as_floats
 from ..arrays import Floats, shaped
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
@@ -17,7 +18,6 @@ from ..fk import solve_fk
 from ..motion.determined import require_determined
 from ..motion.displacements import actuator_units
 from ..motion.joint_path import JointPath, joint_path
-from ..poses import as_floats
 from .drive_limits import HalfSpaces, image_of_box, preimage_of_box
 from .hull import Hull, feasible_hull
 from .inverses import inverses

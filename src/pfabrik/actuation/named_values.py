@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import array, is_not_negative
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
-from ..poses import as_floats
 from .task_path import Coordinates
 
 
@@ -22,23 +22,13 @@ def rows_of(names: Sequence[str], q: Any) -> tuple[Floats, tuple[int, ...]]:
 
 def vectors_of(name: str, given: Any, names: Sequence[str]) -> Floats:
     """Finite vectors (..., n), one number for each name."""
-    expected = f"finite values of shape (..., {len(names)}): {', '.join(names)}"
-    values = as_floats(name, given, expected)
-    if values.shape[-1:] != (len(names),):
-        raise InvalidArgument(name, f"shape {values.shape}", expected)
-    if not np.isfinite(values).all():
-        bad = np.flatnonzero(~np.isfinite(values.reshape(-1, len(names))).all(axis=1))[:5].tolist()
-        raise InvalidArgument(name, "a number that is not finite", expected, rows=bad if values.ndim > 1 else ())
-    return values
+    return array(name, given, f"... {len(names)}", "finite values", f": {', '.join(names)}")
 
 
 def per_actuator(names: Sequence[str], name: str, given: Any) -> Floats:
     """Values that are not negative, one for each actuator, (n_a,)."""
-    expected = f"numbers that are not negative, one or {len(names)}: {', '.join(names)}"
-    values = as_floats(name, given, expected)
-    if values.shape not in ((), (len(names),)) or not (np.isfinite(values) & (values >= 0.0)).all():
-        found = f"shape {values.shape}" if values.shape not in ((), (len(names),)) else str(values.tolist())
-        raise InvalidArgument(name, found, expected)
+    shape, note = f"() | {len(names)}", f": {', '.join(names)}"
+    values = array(name, given, shape, "numbers that are not negative", note, is_not_negative)
     return np.array(np.broadcast_to(values, (len(names),)))
 
 
@@ -58,16 +48,14 @@ def speeds_of(mechanism: Mechanism, given: Any) -> Floats:
 
 def box_of(coordinates: Coordinates, box: Any) -> tuple[Floats, Floats]:
     """Lowest and highest coordinates, (k,) each: of a box (2, k), or the joints' ranges."""
-    expected = (
-        f"lowest and highest {', '.join(coordinates.names)}: finite numbers of shape (2, {len(coordinates.names)})"
-    )
+    expected = f": lowest and highest {', '.join(coordinates.names)}"
     if box is None:
         low, high = coordinates.low, coordinates.high
         endless = [name for name, size in zip(coordinates.names, high - low, strict=True) if not np.isfinite(size)]
         if endless:
-            raise InvalidArgument("box", f"None, and no range of {', '.join(endless)}", expected)
+            raise InvalidArgument("box", f"None, and no range of {', '.join(endless)}", f"finite numbers{expected}")
         return low, high
-    values = as_floats("box", box, expected)
-    if values.shape != (2, len(coordinates.names)) or not np.isfinite(values).all() or (values[0] > values[1]).any():
-        raise InvalidArgument("box", str(values.tolist())[:80], expected)
+    values = array("box", box, f"2 {len(coordinates.names)}", note=expected)
+    if (values[0] > values[1]).any():
+        raise InvalidArgument("box", str(values.tolist())[:80], f"finite numbers{expected}")
     return values[0], values[1]

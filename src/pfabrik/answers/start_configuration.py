@@ -7,6 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array
 from ..arrays import Floats
 from ..closure.close import measure_configurations
 from ..closure.configurations import Configurations
@@ -16,7 +17,6 @@ from ..errors import InvalidArgument
 from ..kernels.rows import FAILED
 from ..model import model_of
 from ..motion.displacements import home_coordinates
-from ..poses import as_floats
 from .solution import Solution
 
 Start: TypeAlias = Solution | ArrayLike
@@ -49,13 +49,8 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
 def joint_vectors(mechanism: Mechanism, q: ArrayLike, name: str) -> tuple[Floats, tuple[int, ...]]:
     """Joint vectors as deviations from home, (n, nq), and the batch shape they came in."""
     home = home_coordinates(checked_mechanism(mechanism))
-    expected = f"shape (..., {len(home)}): all joint coordinates, or a Solution"
-    array = as_floats(name, q, expected)
-    if array.shape[-1:] != home.shape:
-        raise InvalidArgument(name, f"shape {array.shape}", expected)
-    if not np.isfinite(array).all():
-        raise InvalidArgument(name, "a number that is not finite", "finite joint coordinates")
-    return array.reshape(-1, len(home)) - home, array.shape[:-1]
+    given = array(name, q, f"... {len(home)}", "finite numbers", ": all joint coordinates, or a Solution")
+    return given.reshape(-1, len(home)) - home, given.shape[:-1]
 
 
 def _require_shape(start_shape: tuple[int, ...], shape: tuple[int, ...]) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..apart.on_the_way import least_on_the_way
+from ..arguments import array, is_not_infinite
 from ..arrays import Floats, Ints, Mask
 from ..checks import put_limits, require_positive
 from ..closure.configurations import Configurations
@@ -18,7 +19,7 @@ from ..description.task import task_of
 from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..motion.displacements import actuator_units
-from ..poses import as_floats, between
+from ..poses import between
 from ..tolerances import TOLERANCES
 from .active_limits import ActiveLimit
 from .answer_fields import PoseRequest
@@ -234,12 +235,10 @@ def pace_of(
 
 
 def _checked_times(times: ArrayLike | None, count: int) -> Floats:
-    expected = f"shape ({count},): when each target is to be there [s], NaN where not known, none before one before it"
-    checked = as_floats("times", times, expected).copy()
-    if checked.shape != (count,):
-        raise InvalidArgument("times", f"shape {checked.shape}", expected)
-    if np.isinf(checked).any() or (np.diff(checked[~np.isnan(checked)]) < 0.0).any():
-        raise InvalidArgument("times", "times that go back, or are infinite", expected)
+    note = ", when each target is to be there [s], NaN where not known"
+    checked = array("times", times, f"{count}", "times", note, is_not_infinite).copy()
+    if (np.diff(checked[~np.isnan(checked)]) < 0.0).any():
+        raise InvalidArgument("times", "times that go back", "times of which none is before one before it")
     return checked
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution
+from ..arguments import array, is_not_negative
 from ..arrays import Floats
+from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..extras import require
-from ..poses import as_floats
 from .calibration import Calibration
 from .linear_fit import RANK, LinearFit, decomposed
 from .measured_residuals import Fit, Residuals, residuals, slopes_of, whitened
@@ -194,10 +195,9 @@ def _priors(own: Parameters, priors: Any, measurements: Measurements) -> dict[st
     for name, given in priors.items():
         if name not in own.names:
             raise UnknownName("parameter", name, own.names)
-        pair = np.atleast_1d(as_floats("priors", given, "a deviation, or (value, deviation)"))
-        value, sigma = (own.values[own.names.index(name)], pair[0]) if len(pair) == 1 else (pair[0], pair[-1])
-        if len(pair) > 2 or not (np.isfinite(value) and 0.0 < sigma < np.inf):
-            raise InvalidArgument("priors", f"'{name}': {given!r}", "a positive deviation, or (value, deviation)")
+        pair = np.atleast_1d(array(f"priors['{name}']", given, "() | 2", note=": a deviation, or (value, deviation)"))
+        value = pair[0] if len(pair) == 2 else own.values[own.names.index(name)]
+        sigma = require_positive(f"deviation of priors['{name}']", float(pair[-1]))
         expected[name] = float(value), float(sigma)
     return expected
 
@@ -205,7 +205,4 @@ def _priors(own: Parameters, priors: Any, measurements: Measurements) -> dict[st
 def _weights(weights: ArrayLike | None, rows: int) -> Floats | None:
     if weights is None:
         return None
-    array = as_floats("weights", weights, f"shape ({rows},)")
-    if array.shape != (rows,) or not (np.isfinite(array) & (array >= 0.0)).all():
-        raise InvalidArgument("weights", f"shape {array.shape}", f"shape ({rows},): numbers from 0")
-    return array
+    return array("weights", weights, f"{rows}", "numbers from 0", holds=is_not_negative)

@@ -8,9 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import any_values, array, is_not_infinite
 from ..arrays import Floats, Ints
 from ..errors import InvalidArgument, UnknownName
-from ..poses import as_floats, is_rotation
+from ..poses import is_rotation
 
 Sigma: TypeAlias = float | Mapping[str, float] | None
 
@@ -55,25 +56,24 @@ class Measurements:
         sigma: Sigma = None,
         absolute_sigma: bool = True,
     ) -> None:
-        self.actuators = _rows("actuators", actuators, 1, None)
-        if not np.isfinite(self.actuators).all():
-            bad = np.flatnonzero(~np.isfinite(self.actuators).all(axis=1))[:5].tolist()
-            raise InvalidArgument("actuators", "a reading that is not finite", "finite readings", rows=bad)
+        self.actuators = array(
+            "actuators", actuators, "n n_a", "finite readings", ", a row for each configuration"
+        ).copy()
         n = self.rows = len(self.actuators)
+        if not n:
+            raise InvalidArgument("actuators", f"shape {self.actuators.shape}", "a row for each configuration")
         if pose is not None and (position is not None or orientation is not None):
             raise InvalidArgument("pose", "a pose beside a position or an orientation", "either")
         if pose is not None:
-            poses = _rows("pose", pose, 2, n)
-            if poses.shape[1:] != (4, 4):
-                raise InvalidArgument("pose", f"shape {poses.shape}", f"shape ({n}, 4, 4)")
+            poses = array("pose", pose, f"{n} 4 4", "poses, a row for each configuration,", holds=any_values)
             position, orientation = poses[:, :3, 3], poses[:, :3, :3]
-        self.position = None if position is None else _of_shape("position", position, (n, 3))
-        self.orientation = None if orientation is None else _of_shape("orientation", orientation, (n, 3, 3))
+        self.position = None if position is None else _measured("position", position, f"{n} 3")
+        self.orientation = None if orientation is None else _measured("orientation", orientation, f"{n} 3 3")
         if self.orientation is not None:
             _check_rotations(self.orientation)
-        self.height = None if height is None else _of_shape("height", height, (n,))
+        self.height = None if height is None else _measured("height", height, f"{n}")
         self.distances = _pairs(distances, self.actuators)
-        self.joints = {name: _of_shape(f"joints['{name}']", v, (n,)) for name, v in (joints or {}).items()}
+        self.joints = {name: _measured(f"joints['{name}']", v, f"{n}") for name, v in (joints or {}).items()}
         self.sigma = _sigmas(sigma)
         self.has_deviations = bool(self.sigma) and absolute_sigma
         if self.count == 0:
@@ -129,21 +129,8 @@ class Measurements:
                 raise UnknownName("coordinate", name, coordinates)
 
 
-def _rows(name: str, values: ArrayLike, more: int, n: int | None) -> Floats:
-    expected = f"shape ({'n' if n is None else n}, ...), a row for each configuration"
-    array = np.array(as_floats(name, values, expected), float)
-    if array.ndim != 1 + more or len(array) == 0 or (n is not None and len(array) != n):
-        raise InvalidArgument(name, f"shape {array.shape}", expected)
-    return array
-
-
-def _of_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    array = np.array(as_floats(name, values, f"shape {shape}"), float)
-    if array.shape != shape:
-        raise InvalidArgument(name, f"shape {array.shape}", f"shape {shape}")
-    if np.isinf(array).any():
-        raise InvalidArgument(name, "a value that is infinite", "finite values, or NaN for what was not measured")
-    return array
+def _measured(name: str, values: ArrayLike, shape: str) -> Floats:
+    return array(name, values, shape, "finite values", ", or NaN for what was not measured", is_not_infinite).copy()
 
 
 def _check_rotations(orientations: Floats) -> None:
@@ -156,19 +143,16 @@ def _check_rotations(orientations: Floats) -> None:
 def _pairs(distances: ArrayLike | None, actuators: Floats) -> Floats:
     if distances is None:
         return np.zeros((0, 3))
-    expected = "(row, row, distance), shape (d, 3)"
-    array = np.array(as_floats("distances", distances, expected), float)
-    if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
-        raise InvalidArgument("distances", f"shape {array.shape}" if array.ndim != 2 else "other values", expected)
-    rows, n = array[:, :2], len(actuators)
-    if (rows != rows.astype(int)).any() or (rows < 0).any() or (rows >= n).any() or (array[:, 2] <= 0.0).any():
+    given = array("distances", distances, "n 3", note=", (row, row, distance)").copy()
+    rows, n = given[:, :2], len(actuators)
+    if (rows != rows.astype(int)).any() or (rows < 0).any() or (rows >= n).any() or (given[:, 2] <= 0.0).any():
         raise InvalidArgument("distances", "a row that does not exist, or no distance", f"rows 0 to {n - 1}, above 0")
     first, second = rows.astype(int).T
     same = np.flatnonzero((actuators[first] == actuators[second]).all(axis=1))
     if len(same):
         found = f"a distance between rows {first[same[0]]} and {second[same[0]]}, a row or its readings twice"
         raise InvalidArgument("distances", found, "rows with different readings, which are apart")
-    return array
+    return given
 
 
 def _sigmas(sigma: Any) -> dict[str, float]:

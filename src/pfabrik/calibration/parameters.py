@@ -10,13 +10,13 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array
 from ..arrays import Floats
 from ..checks import names_of, require_choice
 from ..derived import derived
 from ..description.geometry import Geometry, geometry_of, with_geometry
 from ..description.mechanism import Joint, Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnknownName
-from ..poses import as_floats
 from ..rotations import from_rotvec
 from .parameter_kinds import KINDS, Candidates, tied
 from .shifts import Shift, ShiftedGeometry, with_own_axes
@@ -105,13 +105,8 @@ class Parameters:
 
     def checked(self, x: ArrayLike) -> Floats:
         """Values of all parameters, (p,)."""
-        expected = f"shape ({len(self)},): {', '.join(self.names[:8])}{', ...' if len(self) > 8 else ''}"
-        values = as_floats("x", x, expected)
-        if values.shape != (len(self),):
-            raise InvalidArgument("x", f"shape {values.shape}", expected)
-        if not np.isfinite(values).all():
-            raise InvalidArgument("x", "a value that is not finite", "finite values")
-        return values
+        note = f": {', '.join(self.names[:8])}{', ...' if len(self) > 8 else ''}"
+        return array("x", x, f"{len(self)}", "finite values", note)
 
     @property
     def like(self) -> Mechanism:

@@ -9,10 +9,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array, as_floats
 from ..arrays import Floats, Mask
 from ..checks import require_positive
 from ..errors import InvalidArgument
-from ..poses import as_floats
 from ..rotations import from_rotvec
 
 Shape = Literal["box", "cylinder", "ball"]
@@ -59,7 +59,7 @@ class PoseRegion:
         tilt : largest angle of the platform's z axis with that of home, in any direction [rad].
         yaw : turn about z before the tilt: an angle, or its two ends [rad].
         """
-        ends = np.stack([_vector("low", low), _vector("high", high)])
+        ends = np.stack([array("low", low, "3"), array("high", high, "3")])
         if (ends[0] > ends[1]).any():
             raise InvalidArgument(
                 "high", f"{ends[1].tolist()}", f"no coordinate below those of low, {ends[0].tolist()}"
@@ -79,7 +79,7 @@ class PoseRegion:
         """Positions in a cylinder along z, about its centre (3,) [length]; the orientations are as of `box`."""
         radius, height = require_positive("radius", radius), require_positive("height", height)
         half = np.array([radius, radius, 0.5 * height])
-        middle = _vector("centre", centre)
+        middle = array("centre", centre, "3")
         return _region(np.stack([middle - half, middle + half]), "cylinder", rotation, tilt, yaw)
 
     @staticmethod
@@ -92,7 +92,7 @@ class PoseRegion:
         yaw: ArrayLike = 0.0,
     ) -> PoseRegion:
         """Positions in a ball about its centre (3,) [length]; the orientations are as of `box`."""
-        middle, half = _vector("centre", centre), np.full(3, require_positive("radius", radius))
+        middle, half = array("centre", centre, "3"), np.full(3, require_positive("radius", radius))
         return _region(np.stack([middle - half, middle + half]), "ball", rotation, tilt, yaw)
 
     @property
@@ -107,10 +107,10 @@ class PoseRegion:
 
     def pose(self, parameters: ArrayLike) -> Floats:
         """The poses (..., 4, 4) of parameters (..., 6) [length, rad]."""
-        array = as_floats("parameters", parameters, "numbers of shape (..., 6)")
-        poses = np.zeros((*array.shape[:-1], 4, 4))
-        poses[..., :3, 3], poses[..., 3, 3] = array[..., :3], 1.0
-        turn = array[..., 3:].copy()
+        given = array("parameters", parameters, "... 6")
+        poses = np.zeros((*given.shape[:-1], 4, 4))
+        poses[..., :3, 3], poses[..., 3, 3] = given[..., :3], 1.0
+        turn = given[..., 3:].copy()
         if self.turning == "tilt":
             yaw = turn * (0.0, 0.0, 1.0)
             turn[..., 2] = 0.0
@@ -121,14 +121,14 @@ class PoseRegion:
 
     def contains(self, parameters: ArrayLike) -> bool | Mask:
         """True where parameters (..., 6) are in the region; bools (...)."""
-        array = as_floats("parameters", parameters, "numbers of shape (..., 6)")
-        inside = np.asarray(((array >= self.low) & (array <= self.high)).all(axis=-1))
-        away = array[..., :3] - self.middle[:3]
+        given = array("parameters", parameters, "... 6")
+        inside = np.asarray(((given >= self.low) & (given <= self.high)).all(axis=-1))
+        away = given[..., :3] - self.middle[:3]
         if self.shape != "box":
             away = away[..., :2] if self.shape == "cylinder" else away
             inside &= np.linalg.norm(away, axis=-1) <= self.half[0]
         if self.turning == "tilt":
-            inside &= np.hypot(array[..., 3], array[..., 4]) <= self.high[3]
+            inside &= np.hypot(given[..., 3], given[..., 4]) <= self.high[3]
         return inside if inside.ndim else bool(inside)
 
     def __repr__(self) -> str:
@@ -154,29 +154,22 @@ def _region(ends: Floats, shape: Shape, rotation: Any, tilt: Any, yaw: Any) -> P
     elif rotation is not None:
         turns = _ends("rotation", rotation, (3,))
     low, high = np.concatenate([ends, turns], axis=1)
-    for array in (low, high):
-        array.setflags(write=False)
+    for end in (low, high):
+        end.setflags(write=False)
     return PoseRegion(low, high, shape, turning)  # type: ignore[arg-type]
 
 
 def _ends(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
     """Ends (2, *shape) of angles; of a rotation, half sizes about zero are accepted too."""
-    expected = "an angle or its two ends, the smaller one first [rad]"
-    if shape:
-        expected = "half sizes, a number or (3,), or ends (2, 3), of angles up to pi [rad]"
-    array = as_floats(name, value, expected)
-    if shape and array.shape in ((), (3,)):
-        array = np.stack([-array, array]) if array.shape else np.stack([np.full(3, -array), np.full(3, array)])
-    elif not shape and array.shape == ():
-        array = np.stack([array, array])
-    if array.shape != (2, *shape) or not (np.abs(array) <= MOST_TURN).all() or (array[0] > array[1]).any():
-        raise InvalidArgument(name, f"{np.asarray(value).tolist()}", expected)
-    return array
+    note = ": half sizes or ends [rad]" if shape else ": an angle or its two ends [rad]"
+    given = array(name, value, "() | 3 | 2 3" if shape else "() | 2", "angles up to pi", note, _is_turn)
+    if given.shape != (2, *shape):
+        given = np.broadcast_to(given, shape)
+        given = np.stack([-given if shape else given, given])
+    if (given[0] > given[1]).any():
+        raise InvalidArgument(name, f"{given.tolist()}", "ends, the smaller one first [rad]")
+    return given
 
 
-def _vector(name: str, value: Any) -> Floats:
-    expected = "three finite numbers"
-    array = as_floats(name, value, expected)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InvalidArgument(name, f"{np.asarray(value).tolist()}", expected)
-    return array
+def _is_turn(angles: Floats) -> Mask:
+    return np.asarray(np.abs(angles) <= MOST_TURN)

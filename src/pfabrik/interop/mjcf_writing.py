@@ -9,11 +9,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array
 from ..arrays import Floats
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
 from ..files.units import metres_of
-from ..poses import as_floats
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
 from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit, vector
@@ -61,9 +60,7 @@ def to_mjcf(
         that is not known.
     """
     metres = metres_of(checked_mechanism(mechanism).length_unit)
-    pull = as_floats("gravity", gravity, "three numbers [m/s²]")
-    if pull.shape != (3,):
-        raise InvalidArgument("gravity", f"shape {pull.shape}", "three numbers [m/s²]")
+    pull = array("gravity", gravity, "3", note=" [m/s²]")
     weights = physics(mechanism, metres, masses)
     text = _text(mechanism, metres, weights, pull)
     if path is not None:

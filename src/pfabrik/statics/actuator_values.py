@@ -9,10 +9,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array, as_floats, is_positive
 from ..arrays import Floats
 from ..checks import require_positive
 from ..errors import InvalidArgument, UnknownName
-from ..poses import as_floats
 
 Bounds: TypeAlias = float | tuple[float, float] | ArrayLike | Mapping[str, float | tuple[float, float]]
 """Limits of actuators: a number for both ways, a pair (lowest, highest), or an array (n_a, 2), or either by name."""
@@ -25,10 +25,10 @@ def bounds_of(argument: str, given: Bounds, names: Sequence[str]) -> Floats:
     if isinstance(given, Mapping):
         by_name = checked_names(argument, given, names)
         return np.array([_pair(f"{argument}['{name}']", by_name[name]) for name in names])
-    array = as_floats(argument, given, f"{BOUND}, for all {len(names)} actuators or each")
-    if array.shape == (len(names), 2):
-        return np.array([_pair(f"{argument}[{place}]", row) for place, row in enumerate(array)])
-    return np.tile(_pair(argument, array), (len(names), 1))
+    values = as_floats(argument, given, f"{BOUND}, for all {len(names)} actuators or each")
+    if values.shape == (len(names), 2):
+        return np.array([_pair(f"{argument}[{place}]", row) for place, row in enumerate(values)])
+    return np.tile(_pair(argument, values), (len(names), 1))
 
 
 def checked_names(argument: str, given: Mapping[str, Any], names: Sequence[str]) -> Mapping[str, Any]:
@@ -56,10 +56,6 @@ def positive_values(argument: str, given: ArrayLike | Mapping[str, float], names
     if isinstance(given, Mapping):
         by_name = checked_names(argument, given, names)
         return np.array([require_positive(f"{argument}['{name}']", by_name[name]) for name in names])
-    expected = f"a positive number, one for each of {len(names)} actuators, or a mapping by name"
-    array = as_floats(argument, given, expected)
-    if array.shape not in ((), (len(names),)):
-        raise InvalidArgument(argument, f"shape {array.shape}", expected)
-    if not (np.isfinite(array) & (array > 0.0)).all():
-        raise InvalidArgument(argument, reprlib.repr(array.tolist()), expected)
-    return np.broadcast_to(array, len(names)).copy()
+    note = ", for all actuators or each, or a mapping by name"
+    values = array(argument, given, f"() | {len(names)}", "positive numbers", note, is_positive)
+    return np.broadcast_to(values, len(names)).copy()

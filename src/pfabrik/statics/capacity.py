@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..answers.solution import Solution, checked_solution
+from ..arguments import any_values, array
 from ..arrays import Floats, shaped
 from ..checks import require_choice
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..motion.displacements import actuator_units
-from ..poses import as_floats
 from ..tolerances import TOLERANCES
 from .actuator_values import Bounds, bounds_of
 from .first_order_maps import Maps, is_redundantly_actuated, maps_of, twist_units
@@ -79,9 +79,7 @@ class WrenchCapacity:
     def holds(self, load: ArrayLike) -> bool | NDArray[np.bool_]:
         """True where loads x, (..., d), can be held; batches go together as NumPy broadcasts."""
         dimension = self.normals.shape[-1]
-        x = as_floats("load", load, f"a {self.of}, (..., {dimension})")
-        if x.shape[-1:] != (dimension,):
-            raise InvalidArgument("load", f"shape {x.shape}", f"a {self.of}, (..., {dimension})")
+        x = array("load", load, f"... {dimension}", f"numbers, a {self.of}", holds=any_values)
         values = np.einsum("...hd,...d->...h", self.normals, x)
         sizes = np.abs(np.where(np.isfinite(self.offsets), self.offsets, 0.0))
         kept = (values <= self.offsets + TOLERANCES.rank * sizes.max(axis=-1, keepdims=True, initial=0.0)).all(axis=-1)
@@ -135,8 +133,8 @@ def wrench_capacity(
     radius, weakest = _ball(chosen if of == "moment" else scaled, offsets)
     reasons = maps.reasons[asked.places]
     is_unknown = has_reason(reasons)
-    for array in (chosen, offsets, radius, weakest):
-        array[is_unknown] = np.nan
+    for values in (chosen, offsets, radius, weakest):
+        values[is_unknown] = np.nan
     return WrenchCapacity(
         of,
         chosen.reshape(*asked.shape, *chosen.shape[1:]),

@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution
+from ..arguments import array
 from ..arrays import Floats, Ints
 from ..checks import require_mapping
 from ..description.graph import tree_of
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..motion.displacements import displacements
-from ..poses import as_floats
 
 BodyLoads: TypeAlias = Mapping[str, tuple[ArrayLike, ArrayLike]]
 """Body -> (mass, centre), (force, point) or (wrench, point): points of the body, at home, in base coordinates."""
 
-EXPECTED = "(..., 6), a force and a moment, or (..., 3), a force"
 OF_LOADS = "body -> (mass, centre), (force, point) or (wrench, point)"
 
 
@@ -51,9 +50,7 @@ def asked_of(solution: Solution, wrench: ArrayLike | None, at: ArrayLike | None)
     forces = _wrench("wrench", np.zeros(3) if wrench is None else wrench, mechanism.end_effector_is_joint)
     points = None
     if at is not None:
-        points = _finite("at", at, "a point, (..., 3)")
-        if points.shape[-1:] != (3,):
-            raise InvalidArgument("at", f"shape {points.shape}", "a point, (..., 3)")
+        points = array("at", at, "... 3", note=", a point")
         if mechanism.end_effector_is_joint:
             raise InvalidArgument("at", "a point", f"None: forces act on the centre of {mechanism.end_effector}")
     shapes = [solution.shape, forces.shape[:-1], *([] if points is None else [points.shape[:-1]])]
@@ -88,9 +85,7 @@ def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoa
     carried = tree.paths[mechanism.end_effector_body][:, None] * _scaled(wrenches, length)[:, None]
     for body, (load, point) in loads.items():
         acting = _load(body, load, gravity)
-        place = _finite(f"loads['{body}']", point, OF_LOADS)
-        if place.shape != (3,):
-            raise InvalidArgument(f"loads['{body}']", f"a point of shape {place.shape}", OF_LOADS)
+        place = array(f"loads['{body}'][1]", point, "3", note=f", the point of {OF_LOADS}")
         arms = bodies[body][:, :3, :3] @ place + bodies[body][:, :3, 3] - reference
         moments = acting[3:] + np.cross(arms, acting[:3])
         wrench = np.concatenate([np.broadcast_to(acting[:3], moments.shape), moments], axis=1)
@@ -112,40 +107,28 @@ def checked_loads(mechanism: Mechanism, loads: Any) -> BodyLoads:
 
 def checked_gravity(gravity: Any) -> Floats:
     """The acceleration of free fall, (3,)."""
-    found = _finite("gravity", gravity, "three numbers")
-    if found.shape != (3,):
-        raise InvalidArgument("gravity", f"shape {found.shape}", "three numbers")
-    return found
+    return array("gravity", gravity, "3")
 
 
 def _load(body: str, load: ArrayLike, gravity: Floats) -> Floats:
     """A mass, force or wrench on a body as a wrench, (6,)."""
-    found = _finite(f"loads['{body}']", load, OF_LOADS)
+    found = array(f"loads['{body}']", load, "() | 3 | 6", note=f", a mass, force or wrench, in {OF_LOADS}")
     if found.shape == ():
         if found < 0.0:
             raise InvalidArgument(f"loads['{body}']", f"a mass of {found}", "a mass that is not negative")
         found = found * gravity
-    if found.shape not in ((3,), (6,)):
-        raise InvalidArgument(f"loads['{body}']", f"shape {found.shape}", OF_LOADS)
     return np.concatenate([found, np.zeros(6 - len(found))])
 
 
 def _wrench(name: str, value: Any, is_at_joint: bool) -> Floats:
     """Wrenches (..., 6); a moment of zero beside forces alone."""
-    expected = "(..., 3), a force: the end effector is a joint" if is_at_joint else EXPECTED
-    wrench = _finite(name, value, expected)
-    if wrench.shape[-1:] not in ((3,),) if is_at_joint else wrench.shape[-1:] not in ((3,), (6,)):
-        raise InvalidArgument(name, f"shape {wrench.shape}", expected)
+    if is_at_joint:
+        wrench = array(name, value, "... 3", note=", a force: the end effector is a joint")
+    else:
+        wrench = array(name, value, "... 6 | ... 3", note=": a force and a moment, or a force")
     if wrench.shape[-1] == 6:
         return wrench
     return np.concatenate([wrench, np.zeros(wrench.shape)], axis=-1)
-
-
-def _finite(name: str, value: Any, expected: str) -> Floats:
-    array = as_floats(name, value, expected)
-    if not np.isfinite(array).all():
-        raise InvalidArgument(name, "numbers that are not finite", expected)
-    return array
 
 
 def _scaled(wrenches: Floats, length: float) -> Floats:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..answers.solution import Solution, checked_solution
+from ..arguments import as_floats
 from ..arrays import Floats, Mask, shaped
 from ..checks import require_names, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..motion.displacements import actuator_units, placed
 from ..motion.mobility import generic_of
-from ..poses import as_floats
 from ..tolerances import TOLERANCES
 from .actuator_values import positive_values
 from .first_order_maps import Maps, is_redundantly_actuated, maps_of, twist_units

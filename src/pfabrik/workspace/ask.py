@@ -11,6 +11,7 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start, joint_vectors, start_of
+from ..arguments import any_values, array
 from ..arrays import Floats
 from ..certify.enclosure import Enclosure, enclose
 from ..certify.provable import require_no_clearance
@@ -190,11 +191,7 @@ def _ends(space: Space, within: Mapping[str, tuple[float, float]] | None) -> tup
 
 
 def _pair(name: str, ends: Any) -> tuple[float, float]:
-    expected = "two numbers, the smaller one first"
-    try:
-        low, high = (float(end) for end in ends)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgument(name, repr(ends), expected) from None
+    low, high = array(name, ends, "2", "numbers", ", the smaller one first", any_values).tolist()
     if not low < high:
-        raise InvalidArgument(name, repr(ends), expected)
+        raise InvalidArgument(name, repr(ends), "two numbers, the smaller one first")
     return low, high

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array, is_positive
 from ..arrays import Floats
 from ..description.mechanism_html import card
 from ..errors import InvalidArgument, UnknownName
-from ..poses import as_floats
 
 if TYPE_CHECKING:
     from .region import Region
@@ -96,18 +96,17 @@ def _extents(region: Region, kind: Kind, proportions: ArrayLike | None) -> Float
     if proportions is None:
         return np.ones(d) if len(set(region.units)) == 1 else np.ptp(region.bounds, axis=0)
     n = {"sphere": 0, "box": d, "cylinder": 2}[kind]
-    expected = f"{n} positive numbers" if n else "None: a sphere has but one"
-    given = as_floats("proportions", proportions, expected)
-    if given.shape != (n,) or not (np.isfinite(given) & (given > 0.0)).all():
-        raise InvalidArgument("proportions", f"{np.asarray(proportions).tolist()}", expected)
+    if not n:
+        raise InvalidArgument("proportions", f"{proportions!r}", "None: a sphere has but one")
+    given = array("proportions", proportions, f"{n}", "positive numbers", holds=is_positive)
     return given[[0, 0, 1]] if kind == "cylinder" else given
 
 
 def _checked_centre(region: Region, centre: ArrayLike) -> Floats:
-    expected = f"a point of shape ({len(region.names)},) within reach: {', '.join(region.names)}"
-    point = as_floats("centre", centre, expected)
-    if point.shape != (len(region.names),) or not np.isfinite(point).all() or not region.contains(point):
-        raise InvalidArgument("centre", f"{np.asarray(centre).tolist()}", expected)
+    names = ", ".join(region.names)
+    point = array("centre", centre, f"{len(region.names)}", note=f" within reach: {names}")
+    if not region.contains(point):
+        raise InvalidArgument("centre", f"{point.tolist()}", f"a point within reach: {names}")
     return point
 
 

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array
 from ..arrays import Floats
 from ..certify.certificates import Certificate
 from ..certify.pose_region import PoseRegion
@@ -127,8 +128,8 @@ def _bisected(attempt: Any, step: float) -> tuple[float, Certificate]:
 
 def _first(mechanism: Mechanism, kind: Kind, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
     """The centre and the half sizes to begin with, (3,) each."""
-    middle = None if centre is None else _three("centre", centre)
-    shape = None if extents is None else _three("extents", extents)
+    middle = None if centre is None else array("centre", centre, "3")
+    shape = None if extents is None else array("extents", extents, "3")
     if shape is not None and not (shape >= 0.0).all():
         raise InvalidArgument("extents", f"{shape.tolist()}", "three numbers that are not negative")
     if kind == "ball" and shape is not None and np.ptp(shape) > 0.0:
@@ -156,13 +157,3 @@ def _first(mechanism: Mechanism, kind: Kind, centre: Any, extents: Any, certifie
     whole, half = mechanism.home_pose[:3, 3].copy(), np.zeros(3)
     whole[axes], half[axes] = found.centre, 0.5 * found.extents
     return whole, half
-
-
-def _three(name: str, value: Any) -> Floats:
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.zeros(0)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InvalidArgument(name, repr(value), "three finite numbers")
-    return array

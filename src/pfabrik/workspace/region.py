@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from ..poses import as_floats
 from .parts import Parts
 from .surface import BorderMesh, closeness
 from .verdicts import Limits, MapQuestion
@@ -33,8 +33,8 @@ class Region:
         self.vertices, self.faces, self.vertex_limit = mesh.vertices, mesh.faces, mesh.limits
         self.resolution = resolution
         self.limits: Limits = question.limits
-        for array in (*mesh, resolution):
-            array.setflags(write=False)
+        for each in (*mesh, resolution):
+            each.setflags(write=False)
 
     @cached_property
     def face_limit(self) -> Ints:
@@ -99,23 +99,17 @@ class Region:
 
         For one of several `components`, True where they are within it.
         """
-        array = self._points("points", points)
-        rows = array.reshape(-1, array.shape[-1])
+        given = self._points(points)
+        rows = given.reshape(-1, given.shape[-1])
         inside = self._parts.reached(self._question, rows)
         if self._part is not None:
             inside[inside] = self._parts.of(rows[inside]) == self._part
-        return inside.reshape(array.shape[:-1]) if array.ndim > 1 else bool(inside[0])
+        return inside.reshape(given.shape[:-1]) if given.ndim > 1 else bool(inside[0])
 
     def poses(self, points: ArrayLike) -> Floats:
         """The targets (..., 4, 4) in the base frame that points (..., d) stand for."""
-        array = self._points("points", points)
-        return self._question.space.poses(array.reshape(-1, array.shape[-1])).reshape(*array.shape[:-1], 4, 4)
+        given = self._points(points)
+        return self._question.space.poses(given.reshape(-1, given.shape[-1])).reshape(*given.shape[:-1], 4, 4)
 
-    def _points(self, name: str, points: ArrayLike) -> Floats:
-        expected = f"finite numbers of shape (..., {len(self.names)}): {', '.join(self.names)}"
-        array = as_floats(name, points, expected)
-        if array.shape[-1:] != (len(self.names),):
-            raise InvalidArgument(name, f"shape {array.shape}", expected)
-        if not np.isfinite(array).all():
-            raise InvalidArgument(name, "a number that is not finite", expected)
-        return array
+    def _points(self, points: ArrayLike) -> Floats:
+        return array("points", points, f"... {len(self.names)}", note=f": {', '.join(self.names)}")

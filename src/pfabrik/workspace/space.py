@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import array
 from ..arrays import Floats
 from ..checks import require_finite, require_mapping, require_names
 from ..description.mechanism import Mechanism
@@ -174,14 +175,9 @@ def _rotation(mechanism: Mechanism, orientation: Any, start: Floats) -> Floats:
         return np.ascontiguousarray(start[:3, :3])
     if isinstance(orientation, SupportsMatrix):
         orientation = orientation.as_matrix()
-    try:
-        matrix = np.array(orientation, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        matrix = np.zeros(0)
-    if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or not is_rotation(matrix):
-        raise InvalidArgument(
-            "orientation", repr(orientation), "a rotation: a matrix (3, 3), a SciPy Rotation, or 'any'"
-        )
+    matrix = array("orientation", orientation, "3 3", note=", a SciPy Rotation, or 'any'")
+    if not is_rotation(matrix):
+        raise InvalidArgument("orientation", "a matrix that is not a rotation", "R^T R = I and det R = 1")
     if not task_of(mechanism).rotations:
         raise InvalidArgument("orientation", "a rotation", "None: the task sets none, it follows from the mechanism")
     return matrix
