@@ -35,7 +35,7 @@ from pfabrik.cli.group import exit_code
 from pfabrik.cli.outputs import ignores_case, new_folder
 from pfabrik.cli.report import describe_modes
 from pfabrik.cli.stops import AGAIN
-from pfabrik.description.rod_lengths import uneven_rods
+from pfabrik.export.rod_lengths import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
 

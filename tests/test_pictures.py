@@ -17,7 +17,7 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
-from pfabrik.description.common_centre import common_centre
+from pfabrik.common_centre import common_centre
 from pfabrik.description.places import joint_places, joints_on, slider_place
 from pfabrik.drawn_parts import home_rail, order_around
 from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName

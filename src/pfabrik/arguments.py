@@ -43,9 +43,8 @@ def array(
     if not good.all():
         words = reprlib.repr(found.tolist()) if np.isfinite(found[~good]).all() else "a number that is not finite"
         n_free = found.ndim - sum(each not in ("...", "n") for each in core)
-        rows = np.argwhere(~good)[:, :n_free]
-        bad = np.unique(np.ravel_multi_index(tuple(rows.T), found.shape[:n_free])) if n_free > 0 else np.zeros(0, int)
-        raise InvalidArgument(name, words, expected, rows=bad[:5].tolist())
+        bad = np.flatnonzero(~good.reshape(*found.shape[:n_free], -1).all(axis=-1))
+        raise InvalidArgument(name, words, expected, rows=bad[:5].tolist() if n_free else ())
     return found
 
 

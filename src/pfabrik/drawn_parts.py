@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from .arrays import Floats
-from .description.common_centre import common_centre, is_around
+from .common_centre import common_centre, is_around
 from .description.mechanism import Joint, Mechanism
 from .description.places import Places, joint_places, joints_on, middle
 

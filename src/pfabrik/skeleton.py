@@ -9,7 +9,7 @@ import numpy as np
 from .answers.solution import Solution
 from .arrays import Floats
 from .clearance.solid_meshes import SolidMesh, solids_of
-from .description.common_centre import arc, common_centre
+from .common_centre import arc, common_centre
 from .description.mechanism import Joint, Mechanism
 from .description.places import Places, joint_places, middle
 from .drawn_parts import Part, Place, home_rail, parts_of

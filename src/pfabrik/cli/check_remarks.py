@@ -11,10 +11,10 @@ import pfabrik as pf
 
 from ..description.graph import leaves, next_joints, steps_from_base
 from ..description.home_mobility import ends_of_default_axes, universal_axes
-from ..description.rod_lengths import odd_rods, uneven_rods, with_lengths
-from ..description.symmetry import crossed_rounds, near_copies
+from ..export.rod_lengths import odd_rods, uneven_rods, with_lengths
 from ..motion.fitting_task import has_dependent_coordinates, task_remark
 from .info_report import NOT_COUNTED, counted_mobility, nearly_free, vector
+from .symmetry import crossed_rounds, near_copies
 
 FULL_TURN = 2.0 * math.pi
 

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..description.mechanism import Mechanism
-from ..description.rod_lengths import uneven_rods, with_lengths
 from ..errors import UnsupportedMechanism
 from ..tolerances import TOLERANCES
 from .fits import Thigh, Tower, angle_of, thighs_of, towers_of
 from .machine_data import Machine
+from .rod_lengths import uneven_rods, with_lengths
 from .wording import comment
 
 LETTERS = "abc"

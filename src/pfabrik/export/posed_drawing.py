@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..clearance.solid_meshes import solids_of
-from ..description.common_centre import common_centre
+from ..common_centre import common_centre
 from ..description.home_mobility import joint_screws
 from ..description.links import links_of
 from ..description.mechanism import Joint, Mechanism

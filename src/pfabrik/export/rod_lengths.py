@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
+from ..description.graph import welded
+from ..description.joints import Joint
+from ..description.structure import Structure
 from ..tolerances import TOLERANCES
-from .graph import welded
-from .joints import Joint
-from .structure import Structure
 
 ENDS = ("revolute", "universal", "spherical")
 SIDE_BY_SIDE = 0.3

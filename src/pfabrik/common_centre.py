@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Floats
-from ..derived import derived
-from ..tolerances import TOLERANCES
-from .joints import Joint
-from .mechanism import Mechanism
-from .places import joints_on
+from .arrays import Floats
+from .derived import derived
+from .description.joints import Joint
+from .description.mechanism import Mechanism
+from .description.places import joints_on
+from .tolerances import TOLERANCES
 
 
 @derived
