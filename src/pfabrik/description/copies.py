@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -232,8 +232,3 @@ def cos_sin(step: int, steps: int) -> tuple[float, float]:
     sine = 0.5 if 3 * rest == steps else math.sin(angle)
     turns = ((cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine))
     return turns[quarters % 4]
-
-
-def count_of(patterns: Sequence[Pattern]) -> int:
-    """Number of joints that the patterns stand for."""
-    return sum(pattern.count or 1 for pattern in patterns)

@@ -1,4 +1,4 @@
-"""From legs to their joints, and from faults of these joints back to what the description says of the legs."""
+"""The joints, links and names of legs."""
 
 from __future__ import annotations
 
@@ -15,16 +15,6 @@ from .form_faults import is_pair_of_names
 from .leg_maker import LegJoint, LegMaker
 from .leg_points import count_legs
 from .legs import Leg
-
-__all__ = [
-    "LegJoint",
-    "count_joints",
-    "faults_of_legs",
-    "faults_of_shapes",
-    "leg_shapes",
-    "legs_name",
-    "placed_joints",
-]
 
 
 def placed_joints(
@@ -60,27 +50,6 @@ def count_joints(leg: Leg) -> int:
     return count_legs(leg.base, leg.platform) * len(read_chain(leg.chain)) * turns
 
 
-def faults_of_legs(faults: Sequence[Fault], first: int, placed: Sequence[LegJoint]) -> list[Fault]:
-    """The faults of joints that stand for legs at the places of their description, each reported of one leg only.
-
-    Parameters
-    ----------
-    first : index of the first of these joints among all joints.
-    """
-    written: list[Fault] = []
-    reporter: dict[str, int] = {}
-    for fault in faults:
-        match = re.match(r"joint\[(\d+)\]\.?(\w*)", fault.place)
-        if match is None or int(match[1]) < first:
-            written.append(fault)
-            continue
-        part = placed[int(match[1]) - first]
-        place = part.places.get(match[2], f"{part.place}.{match[2]}".rstrip(".")) + fault.place[match.end() :]
-        if reporter.setdefault(place, part.leg) == part.leg:
-            written.append(Fault(place, f"{fault.found} (joint {part.joint.name})", fault.expected))
-    return written
-
-
 def leg_shapes(legs: Sequence[Leg], placed: Sequence[LegJoint]) -> list[tuple[Shape, str]]:
     """The capsules of legs with a thickness, between neighbouring joints with a centre, and where that is said."""
     shapes: list[tuple[Shape, str]] = []
@@ -95,32 +64,9 @@ def leg_shapes(legs: Sequence[Leg], placed: Sequence[LegJoint]) -> list[tuple[Sh
     return shapes
 
 
-def faults_of_shapes(faults: Sequence[Fault], places: Sequence[str]) -> list[Fault]:
-    """The faults of shapes at the places of their description, each reported of one copy.
-
-    Parameters
-    ----------
-    places : of each shape its table; of a leg's link that of the leg, whose thickness is then at fault.
-    """
-    written: list[Fault] = []
-    reporter: dict[str, int] = {}
-    for fault in faults:
-        match = re.match(r"body\[(\d+)\]", fault.place)
-        if match is not None and int(match[1]) < len(places):
-            table = places[int(match[1])]
-            place = table + (fault.place[match.end() :] if table.startswith("body") else ".thickness")
-            if place in reporter and (reporter[place] != int(match[1]) or table.startswith("leg")):
-                continue
-            reporter[place] = int(match[1])
-            fault = Fault(place, fault.found, fault.expected)
-        written.append(fault)
-    return written
-
-
-def legs_name(legs: Sequence[Leg], placed: Sequence[LegJoint]) -> str:
+def legs_name(legs: Sequence[Leg]) -> str:
     """What the field calls a machine of such legs: `6-UPS`, `2-UPS/1-U`."""
     kinds: Counter[str] = Counter()
-    for index, leg in enumerate(legs):
-        numbers_ = {part.leg for part in placed if part.place.startswith(f"leg[{index}].")}
-        kinds[re.sub(r"[^A-Z]", "", str(leg.chain))] += len(numbers_)
+    for leg in legs:
+        kinds[re.sub(r"[^A-Z]", "", str(leg.chain))] += count_joints(leg) // (len(read_chain(leg.chain)) or 1)
     return "/".join(f"{count}-{kind}" for kind, count in kinds.items())

@@ -15,15 +15,16 @@ from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, 
 from ..frozen import FrozenMapping
 from .body_shapes import Shape
 from .coercion import items, numbers
-from .faults import find_faults, in_order, joint_index, merged
+from .copies import Pattern
+from .expanded import expanded
+from .faults import find_faults, joint_index
 from .form_faults import shown
 from .home_mobility import end_effector_freedom, is_held, unclear_conditions
 from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
-from .leg_joints import faults_of_legs, faults_of_shapes, leg_shapes, legs_name, placed_joints
+from .leg_joints import legs_name
 from .legs import Leg, as_legs
 from .mechanism_html import mechanism_html
-from .rules import joint_faults
 from .structure import Structure, as_pairs
 
 __all__ = [
@@ -160,40 +161,20 @@ class Mechanism(Structure):
         InvalidMechanism : with every fault; places such as `leg[0].platform` are those of a file.
         InvalidArgument : neither a chain nor legs, or both.
         """
-        parts = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke}
-        others = {"thickness": thickness, "copies": copies, "by_letter": by_letter}
-        described = as_legs(legs, parts | others)
-        own = items(joints)
+        parts: dict[str, Any] = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke}
+        parts |= {"thickness": thickness, "copies": copies, "by_letter": by_letter}
+        described = as_legs(legs, parts)
+        own, own_shapes = items(joints), items(shapes)
         if not isinstance(own, tuple):
             raise InvalidArgument("joints", shown(own), "a list of joints")
-        tips = [joint.name for joint in own if isinstance(joint, Joint)]
-        placed, faults = placed_joints(described, base_body, end_effector, tips)
-        made = own + tuple(each.joint for each in placed)
-        own_shapes, of_legs = items(shapes), leg_shapes(described, placed)
-        if not isinstance(own_shapes, tuple):
+        if not isinstance(own_shapes, tuple) or not all(isinstance(each, Shape) for each in own_shapes):
             raise InvalidArgument("shapes", shown(own_shapes), "a list of Shape")
-        places = [*(f"body[{k}]" for k in range(len(own_shapes))), *(place for _, place in of_legs)]
-        if faults:
-            sound = ((index, joint) for index, joint in enumerate(made) if isinstance(joint, Joint))
-            alone = [fault for index, joint in sound for fault in joint_faults(f"joint[{index}]", joint)]
-            raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(own), placed)))
-        try:
-            return cls(
-                name=legs_name(described, placed) if name is None else name,
-                joints=made,
-                end_effector=end_effector,
-                reference_point=reference_point,
-                base=base_body,
-                length_unit=length_unit,
-                angle_unit=angle_unit,
-                task=task,
-                shapes=own_shapes + tuple(shape for shape, _ in of_legs),
-                ignore=ignore,
-                clearance=clearance,
-            )
-        except InvalidMechanism as error:
-            found = faults_of_legs(faults_of_shapes(error.faults, places), len(own), placed)
-            raise InvalidMechanism(in_order(found)) from None
+        head: dict[str, Any] = {"name": legs_name(described) if name is None else name, "end_effector": end_effector}
+        head |= {"reference_point": reference_point, "base": base_body, "task": task, "ignore": ignore}
+        head |= {"clearance": clearance, "length_unit": length_unit, "angle_unit": angle_unit}
+        if not all(isinstance(each, Joint) for each in own):
+            return cls(**head, joints=own)  # which names the one that is none
+        return expanded(cls, head, ([Pattern(each) for each in own], described, own_shapes))
 
     def _check(self) -> None:
         faults = find_faults(self)

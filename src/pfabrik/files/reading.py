@@ -9,29 +9,20 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 from ..description.body_shapes import Shape
 from ..description.chains import ChainJoint, read_chain
 from ..description.coercion import numbers
-from ..description.copies import Copy, Pattern, Patterns, count_of, read_copies
-from ..description.faults import in_order, joint_index, merged
-from ..description.form_faults import is_name, key_faults, name_faults, number_faults, shown
+from ..description.copies import Pattern, read_copies
+from ..description.expanded import Described, expanded
+from ..description.form_faults import key_faults, name_faults, number_faults, shown
 from ..description.joints import Cone, Joint, set_fields
-from ..description.leg_joints import (
-    LegJoint,
-    count_joints,
-    faults_of_legs,
-    faults_of_shapes,
-    leg_shapes,
-    placed_joints,
-)
+from ..description.leg_joints import count_joints
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
 from ..description.mechanism import Mechanism
-from ..description.rules import joint_faults
 from ..description.structure import Structure
 from ..errors import Fault, InvalidMechanism, near_miss
 from .dimensions import dimension_values, with_numbers
@@ -47,9 +38,6 @@ MOST_JOINTS = 1000
 """Most joints of one mechanism, copies included: far above any machine, low enough to be checked in seconds."""
 
 Table = dict[str, Any]
-
-Described = TypeVar("Described", bound=Structure)
-"""A mechanism, or its structure, which is not checked."""
 
 
 def read_mechanism(table: Table, folder: Path | None = None) -> Mechanism:
@@ -124,7 +112,16 @@ def _read(table: Table, kind: type[Described]) -> Described:
     patterns = [_pattern(each, f"joint[{index}]", unit, faults) for index, each in enumerate(tables["joint"])]
     legs = [_leg(each, f"leg[{index}]", unit, faults) for index, each in enumerate(tables["leg"])]
     shapes = [_shape(each, f"body[{index}]", faults) for index, each in enumerate(tables["body"])]
-    return _expanded(table, (patterns, legs, shapes), faults, kind)
+    in_legs = sum(map(count_joints, legs))
+    count = in_legs + sum(pattern.count or 1 for pattern in patterns)
+    if in_legs > MOST_JOINTS:
+        legs = []
+        faults.append(Fault("leg", f"legs with {in_legs} joints", f"at most {MOST_JOINTS}"))
+    elif count > MOST_JOINTS:
+        faults.append(Fault("joint", f"{count} joints with their copies", f"at most {MOST_JOINTS}"))
+    head = {"name": None, "end_effector": None} | {key: table[key] for key in DESCRIBED if key in table}
+    head |= {f"{key}_unit": value for key, value in _units(table).items() if key in UNIT_KEYS}
+    return expanded(kind, head, (patterns, legs, shapes), faults)
 
 
 def _head_faults(table: Table) -> Iterator[Fault]:
@@ -242,96 +239,3 @@ def _joint_fields(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
     if isinstance(cone, dict) and "half_angle" in cone:
         fields["cone"] = cone | {"half_angle": angle_in_radians(cone["half_angle"], angle_unit)}
     return fields
-
-
-def _expanded(
-    table: Table,
-    described: tuple[Sequence[Pattern], Sequence[Leg], Sequence[Shape]],
-    faults: list[Fault],
-    kind: type[Described],
-) -> Described:
-    """The mechanism of all copies and legs. If it is not clear what is copied, or where legs are, only faults of single
-    joints are searched for."""
-    patterns, legs, shapes = described
-    is_unclear = any(map(_hides_joints, faults))
-    base, end_effector = table.get("base", "base"), cast(str, table.get("end_effector"))
-    placed, leg_faults = _placed(base, end_effector, patterns, legs)
-    faults = merged(faults, leg_faults)
-    joints = (*patterns, *(Pattern(each.joint) for each in placed))
-    layout = Patterns(joints, base, end_effector)
-    if not is_unclear and not leg_faults:
-        misfits = faults_of_legs(list(_misfits(layout)), len(patterns), placed)
-        is_unclear, faults = bool(misfits), [*faults, *misfits]
-    if is_unclear or leg_faults:
-        alone = [fault for index, each in enumerate(joints) for fault in joint_faults(f"joint[{index}]", each.joint)]
-        raise InvalidMechanism(merged(faults, faults_of_legs(alone, len(patterns), placed)))
-    thick = [(copy, f"body[{index}]") for index, shape in enumerate(shapes) for copy in layout.copied_shapes(shape)]
-    return _built(table, layout, placed, [*thick, *leg_shapes(legs, placed)], faults, kind)
-
-
-def _placed(
-    base: Any, end_effector: Any, patterns: Sequence[Pattern], legs: Sequence[Leg]
-) -> tuple[list[LegJoint], list[Fault]]:
-    """The joints of all legs, and the faults of what they are made from."""
-    count = sum(map(count_joints, legs))
-    if count > MOST_JOINTS:
-        return [], [Fault("leg", f"legs with {count} joints", f"at most {MOST_JOINTS}")]
-    base, end_effector = (
-        name if is_name(name) else other for name, other in ((base, "base"), (end_effector, "platform"))
-    )
-    return placed_joints(legs, base, end_effector, [each.joint.name for each in patterns])
-
-
-def _misfits(layout: Patterns) -> Iterator[Fault]:
-    count = count_of(layout.patterns)
-    if count > MOST_JOINTS:
-        yield Fault("joint", f"{count} joints with their copies", f"at most {MOST_JOINTS}")
-    else:
-        yield from layout.faults()
-
-
-def _hides_joints(fault: Fault) -> bool:
-    """True if a fault leaves open which joints and bodies there are, or what their numbers mean."""
-    root = fault.place.partition(".")[0]
-    return root in ("base", "end_effector", "units", "joint", "leg") or ".copies" in fault.place
-
-
-def _built(
-    table: Table,
-    layout: Patterns,
-    placed: Sequence[LegJoint],
-    shapes: Sequence[tuple[Shape, str]],
-    faults: list[Fault],
-    kind: type[Described],
-) -> Described:
-    copies = layout.expanded()
-    head: Table = {"name": None, "joints": tuple(copy.joint for copy in copies)}
-    head |= {key: table[key] for key in DESCRIBED if key in table} | {"shapes": tuple(each for each, _ in shapes)}
-    head |= {f"{key}_unit": _units(table)[key] for key in UNIT_KEYS if key in _units(table)}
-    try:
-        with warnings.catch_warnings():
-            if faults:
-                warnings.simplefilter("ignore")
-            mechanism = kind(**head)
-    except InvalidMechanism as error:
-        n_joints = len(layout.patterns) - len(placed)
-        found = faults_of_shapes(_as_written(error.faults, layout, copies), [place for _, place in shapes])
-        faults = merged(faults, faults_of_legs(found, n_joints, placed))
-    if faults:
-        raise InvalidMechanism(in_order(faults))
-    return mechanism
-
-
-def _as_written(faults: Sequence[Fault], layout: Patterns, copies: Sequence[Copy]) -> list[Fault]:
-    """The faults of expanded joints at the places of their file, each place reported from one copy only."""
-    written: list[Fault] = []
-    reporter: dict[str, int] = {}
-    for fault in faults:
-        if joint_index(fault.place) < 0:
-            written.append(fault)
-            continue
-        copy = copies[joint_index(fault.place)]
-        place = f"joint[{copy.index}]{fault.place.partition(']')[2]}"
-        if reporter.setdefault(place, copy.number) == copy.number:
-            written.append(Fault(place, layout.as_written(fault.found, copy), layout.as_written(fault.expected, copy)))
-    return written
