@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 import pfabrik as pf
 from pfabrik import Cone, Joint, Leg, Mechanism
-from pfabrik.description.chains import read_chain
 from pfabrik.description.form_faults import MOST_FAULTS
+from pfabrik.description.legs import read_chain
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from pfabrik.files import dumps, loads
 from pfabrik.files.reading import MOST_JOINTS

@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import Fault, near_miss
 from .body_shapes import Shape
 from .coercion import numbers, unit_vector
-from .form_faults import direction_faults, is_name, is_pair_of_names, is_point, key_faults, shown
+from .form_faults import direction_faults, is_name, is_pair_of_names, is_point, shown, table_faults
 from .joints import Cone, Joint, Vector
 
 MOST_COPIES = 100
@@ -20,12 +20,11 @@ MOST_COPIES = 100
 
 def read_copies(place: str, copies: Any, faults: list[Fault]) -> tuple[int, Vector] | None:
     """Number and unit axis of what is said of copies, `count` and `axis`; None with faults, added to the list."""
-    keys = ("count", "axis")
+    found = list(table_faults(place, copies, ("count", "axis")))
     if not isinstance(copies, Mapping):
-        faults.append(Fault(place, shown(copies), f"a table: {', '.join(keys)}"))
+        faults += found
         return None
     count, axis = numbers(copies.get("count")), unit_vector(copies.get("axis"))
-    found = list(key_faults(place, copies, keys))
     if not isinstance(count, float) or not 1.0 <= count <= MOST_COPIES or count % 1.0 != 0.0:
         found.append(Fault(f"{place}.count", shown(count), f"a whole number from 1 to {MOST_COPIES}"))
     found += direction_faults(f"{place}.axis", axis)

@@ -12,8 +12,7 @@ from .body_shapes import Shape
 from .copies import Copy, Pattern, Patterns
 from .faults import merged
 from .form_faults import is_name
-from .leg_joints import leg_shapes, placed_joints
-from .leg_maker import LegJoint
+from .leg_joints import LegJoint, leg_shapes, placed_joints
 from .legs import Leg
 from .rules import joint_faults
 from .structure import Structure

@@ -102,6 +102,14 @@ def key_faults(
         yield Fault(place or "file", f"{len(unknown) - MOST_FAULTS} more faults", "none")
 
 
+def table_faults(place: str, value: Any, known: Sequence[str]) -> Iterator[Fault]:
+    """The faults of what should be a table with some keys."""
+    if isinstance(value, Mapping):
+        yield from key_faults(place, value, known)
+    else:
+        yield Fault(place, shown(value), f"a table: {', '.join(known)}")
+
+
 def _shown_key(key: object) -> str:
     return key if isinstance(key, str) and re.fullmatch(r"[\w-]{1,40}", key) else shown(key)
 

@@ -1,20 +1,268 @@
-"""The joints, links and names of legs."""
+"""The joints that legs stand for, the links between these, and the name that the field has for them."""
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, cast
 
-from ..errors import Fault
+from ..errors import Fault, near_miss
 from .body_shapes import Shape
-from .chains import read_chain
-from .copies import MOST_COPIES
-from .form_faults import is_pair_of_names
-from .leg_maker import LegJoint, LegMaker
-from .leg_points import count_legs
-from .legs import Leg
+from .copies import MOST_COPIES, read_copies, turned
+from .directions import EXPECTED, PLACEHOLDER, axis_pairs, directions
+from .form_faults import is_pair_of_names, shown, table_faults
+from .joints import Cone, Joint, Vector
+from .leg_points import Point, count_legs, leg_points
+from .legs import CONE_KEYS, JOINT_KEYS, Leg, chain_faults, read_chain
+from .rules import faults_by, form, wrong
+
+
+@dataclass(frozen=True)
+class LegJoint:
+    """One of the joints that legs stand for.
+
+    Attributes
+    ----------
+    leg : the number of its leg, from 1.
+    place, places : where the description says things of the joint, and of single fields of it.
+    """
+
+    joint: Joint
+    leg: int
+    place: str
+    places: Mapping[str, str]
+
+
+OF_LEGS = (
+    form("chain", chain_faults),
+    wrong("name", lambda v, _: not isinstance(v, str), "a text"),
+    wrong("connects?", lambda v, _: not is_pair_of_names(v), "the names of two bodies"),
+    wrong("by_letter", lambda v, _: not isinstance(v, Mapping), "what is said of joints, by their letters"),
+)
+
+
+class LegMaker:
+    """Makes the joints of one description of legs, and notes its faults."""
+
+    def __init__(self, leg: Leg, place: str, ends: tuple[str, str], faults: list[Fault]) -> None:
+        self.leg, self.place, self.ends, self.faults = leg, place, ends, faults
+        self.steps = read_chain(leg.chain)
+        faults += faults_by(OF_LEGS, place, leg)
+        self.points = leg_points(leg, self.steps, place, faults)
+        self.legs = len(self.points[0]) if self.points else 1
+        copies = None if leg.copies is None else read_copies(f"{place}.copies", leg.copies, faults)
+        self.turns, self.about = copies or (1, PLACEHOLDER)
+        self.count = self.legs * self.turns if self.steps else 0
+        self.centres = dict(zip((step.letter for step in self.steps if step.centred), self.points, strict=True))
+        self.said = self._said()
+        self.ranges = self._ranges()
+
+    def joints(self, number: int) -> Iterator[LegJoint]:
+        """The joints of all legs, of which the first has this number."""
+        patterns = [self._pattern(index) for index in range(len(self.steps))]
+        if self.leg.axis is not None and self.steps and not any(map(self._takes_axis, range(len(self.steps)))):
+            self.faults.append(Fault(f"{self.place}.axis", shown(self.leg.axis), "nothing: no joint needs it"))
+        for turn in range(self.turns):
+            for leg in range(self.legs):
+                for index, pattern in enumerate(patterns):
+                    placed = self._numbered(pattern[leg], index, number)
+                    yield dataclasses.replace(placed, joint=turned(placed.joint, self.about, turn, self.turns))
+                number += 1
+
+    def _said(self) -> dict[str, Mapping[str, Any]]:
+        """What is said of single joints, by letter, as far as it makes sense."""
+        letters = [step.letter for step in self.steps]
+        said: dict[str, Mapping[str, Any]] = {}
+        for letter, values in self.leg.by_letter.items() if isinstance(cast(Any, self.leg.by_letter), Mapping) else ():
+            where = f"{self.place}.{letter}"
+            if self.steps and letter not in letters:
+                expected = f"one of {', '.join(letters)}, the joints of '{self.leg.chain}'"
+                self.faults.append(Fault(where, "a joint that the chain does not have", expected))
+                continue
+            self.faults += table_faults(where, values, JOINT_KEYS)
+            if isinstance(values, Mapping):
+                said[letter] = values
+        self.faults += self._star_faults(said)
+        return said
+
+    def _star_faults(self, said: Mapping[str, Mapping[str, Any]]) -> Iterator[Fault]:
+        """What is said of actuators against the stars of the chain."""
+        for step in self.steps:
+            actuated = said.get(step.letter, {}).get("actuated")
+            where = f"{self.place}.{step.letter}.actuated"
+            if actuated is not None and not step.actuated:
+                yield Fault(where, shown(actuated), f"nothing: '{self.leg.chain}' has no `*` behind the joint")
+            elif actuated in (False, (False, False)):
+                yield Fault(where, shown(actuated), f"what is driven: '{self.leg.chain}' has a `*` behind the joint")
+
+    def _ranges(self) -> dict[str, tuple[Any, str]]:
+        """The range of each joint that has one, and where it is said."""
+        ranges = {
+            letter: (values["range"], f"{self.place}.{letter}.range")
+            for letter, values in self.said.items()
+            if values.get("range") is not None
+        }
+        if self.leg.stroke is None or not self.steps:
+            return ranges
+        place = f"{self.place}.stroke"
+        slides = [step.letter for step in self.steps if not step.centred]
+        if len(slides) != 1:
+            several = f"the ranges of single joints: {', '.join(f'{letter}.range' for letter in slides)}"
+            expected = several if slides else f"nothing: no joint of '{self.leg.chain}' is prismatic"
+            self.faults.append(Fault(place, shown(self.leg.stroke), expected))
+        elif slides[0] in ranges:
+            self.faults.append(Fault(place, f"both `stroke` and `{slides[0]}.range`", "one of them"))
+        else:
+            ranges[slides[0]] = (self.leg.stroke, place)
+        return ranges
+
+    def _pattern(self, index: int) -> list[LegJoint]:
+        """The joint at one place in the chain, once for each leg, with names that have no number yet."""
+        step = self.steps[index]
+        said = self.said.get(step.letter, {})
+        bodies = self._bodies(index)
+        limits, limits_place = self.ranges.get(step.letter, (None, ""))
+        places = dict.fromkeys(("type", "actuated", "connects"), f"{self.place}.chain")
+        places |= {"name": f"{self.place}.name", "range": limits_place}
+        if said.get("actuated") is not None:
+            places["actuated"] = f"{self.place}.{step.letter}.actuated"
+        fields: list[dict[str, Any]] = [{} for _ in range(self.legs)]
+        self._give_axes(index, said, fields, places)
+        cones = self._cones(index, said.get("cone"), bodies)
+        made = []
+        for leg in range(self.legs):
+            at = self.centres[step.letter][leg] if step.centred else Point(None, self.place)
+            joint = Joint(
+                step.letter,
+                step.type,
+                bodies,
+                at=at.at or (PLACEHOLDER if step.centred else None),
+                actuated=said.get("actuated", step.actuated) if step.actuated else False,
+                home=said.get("home", 0.0),
+                range=limits,
+                cone=cones[leg],
+                max_speed=said.get("max_speed"),
+                max_acceleration=said.get("max_acceleration"),
+                **fields[leg],
+            )
+            end = self._next_place(index, leg)
+            made.append(LegJoint(joint, leg, f"{self.place}.{step.letter}", places | {"at": at.place, "along": end}))
+        return made
+
+    def _next_place(self, index: int, leg: int) -> str:
+        """Where the point of the next joint is said."""
+        after = self.steps[index + 1 : index + 2]
+        return self.centres[after[0].letter][leg].place if after and after[0].centred else f"{self.place}.chain"
+
+    def _bodies(self, index: int) -> tuple[str, str]:
+        """The two bodies of a joint: those between joints A and B are called AB."""
+        letters = [step.letter for step in self.steps]
+        inner = [a + b for a, b in pairwise(letters)]
+        bodies = [self.ends[0], *inner, self.ends[1]]
+        return bodies[index], bodies[index + 1]
+
+    def _is_strut(self, index: int) -> bool:
+        """True if the joint is a prismatic one that runs along the line of its neighbours."""
+        own_axis = self.said.get(self.steps[index].letter, {}).get("axis")
+        around = self.steps[index - 1 : index] + self.steps[index + 1 : index + 2]
+        return not self.steps[index].centred and own_axis is None and [each.centred for each in around] == [True, True]
+
+    def _takes_axis(self, index: int) -> bool:
+        """True if the leg's own `axis` holds for the joint."""
+        step = self.steps[index]
+        one = step.type in ("revolute", "prismatic", "cylindrical")
+        return one and not self._is_strut(index) and self.said.get(step.letter, {}).get("axis") is None
+
+    def _give_axes(
+        self, index: int, said: Mapping[str, Any], fields: list[dict[str, Any]], places: dict[str, str]
+    ) -> None:
+        step = self.steps[index]
+        if said.get("axes") is not None:
+            pairs = axis_pairs(f"{self.place}.{step.letter}.axes", said["axes"], self._near(index), self.faults)
+            for leg, pair in enumerate(pairs):
+                fields[leg]["axes"] = pair
+        if self._is_strut(index):
+            for each in fields:
+                each["along"] = (self.steps[index - 1].letter, self.steps[index + 1].letter)
+            return
+        axis, place = said.get("axis"), f"{self.place}.{step.letter}.axis"
+        if self._takes_axis(index):
+            if self.leg.axis is None:
+                self.faults.append(Fault(place, f"nothing, for a {step.type} joint", EXPECTED))
+                axis = PLACEHOLDER
+            else:
+                axis, places["axis"] = self.leg.axis, f"{self.place}.axis"
+        if axis is not None:
+            found: list[Fault] = []
+            for leg, vector in enumerate(directions(places.get("axis", place), axis, self._near(index), found)):
+                fields[leg]["axis"] = vector
+            self.faults += [fault for fault in found if fault not in self.faults]
+
+    def _near(self, index: int) -> list[Vector | None]:
+        """For each leg the centre of the joint, or of the nearest one that has a centre."""
+        near = sorted(range(len(self.steps)), key=lambda other: abs(other - index))
+        found = next((self.centres[self.steps[each].letter] for each in near if self.steps[each].centred), None)
+        return [point.at for point in found] if found else [(0.0, 0.0, 0.0)] * self.legs
+
+    def _cones(self, index: int, cone: Any, bodies: tuple[str, str]) -> list[Cone | None]:
+        if cone is None:
+            return [None] * self.legs
+        place = f"{self.place}.{self.steps[index].letter}.cone"
+        self.faults += table_faults(place, cone, CONE_KEYS)
+        if not isinstance(cone, Mapping):
+            return [None] * self.legs
+        last = index == len(self.steps) - 1 and index > 0
+        fixed_to: Any = cone.get("fixed_to")
+        if fixed_to is not None and fixed_to not in bodies:
+            hint = near_miss(fixed_to, bodies) if isinstance(fixed_to, str) else ""
+            self.faults.append(Fault(f"{place}.fixed_to", f"{shown(fixed_to)}{hint}", " or ".join(map(shown, bodies))))
+        if fixed_to not in bodies:
+            fixed_to = bodies[1 if last else 0]
+        axes = self._cone_axes(index, cone.get("axis"), f"{place}.axis", outward=fixed_to != bodies[1])
+        half_angle: Any = cone.get("half_angle")
+        return [Cone(axis, half_angle, fixed_to) for axis in axes]
+
+    def _cone_axes(self, index: int, axis: Any, place: str, outward: bool) -> list[Vector]:
+        """The axes of a joint's cones; by default the lines to the next joint, outward or inward, at home."""
+        if axis is not None:
+            return directions(place, axis, self._near(index), self.faults)
+        others = self.steps[index + 1 :] if outward else self.steps[:index][::-1]
+        step = self.steps[index]
+        ends = next((self.centres[other.letter] for other in others if other.centred), None)
+        if not step.centred or ends is None:
+            if step.centred:
+                self.faults.append(Fault(place, "nothing, and no next joint that it could point at", EXPECTED))
+            return [PLACEHOLDER] * self.legs
+        lines = zip(self.centres[step.letter], ends, strict=True)
+        return [_line(start.at, end.at) for start, end in lines]
+
+    def _numbered(self, part: LegJoint, index: int, number: int) -> LegJoint:
+        """The joint with the number of its leg behind its name and those of the leg's own bodies."""
+
+        def name(own: str) -> str:
+            return f"{self.leg.name}{own}{number}"
+
+        joint = part.joint
+        first = self.ends[0] if index == 0 else name(joint.connects[0])
+        second = self.ends[1] if index == len(self.steps) - 1 else name(joint.connects[1])
+        along = joint.along and (name(joint.along[0]), name(joint.along[1]))
+        cone = joint.cone
+        if cone is not None:
+            fixed_to = first if cone.fixed_to == joint.connects[0] else second
+            cone = dataclasses.replace(cone, fixed_to=fixed_to)
+        changed = dataclasses.replace(joint, name=name(joint.name), connects=(first, second), along=along, cone=cone)
+        return dataclasses.replace(part, joint=changed, leg=number)
+
+
+def _line(start: Vector | None, end: Vector | None) -> Vector:
+    if start is None or end is None or start == end:
+        return PLACEHOLDER
+    x, y, z = (b - a for a, b in zip(start, end, strict=True))
+    return (x, y, z)
 
 
 def placed_joints(

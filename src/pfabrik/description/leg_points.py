@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import Fault
-from .chains import ChainJoint
 from .form_faults import number_faults, shown
 from .joints import Vector
-from .legs import Leg
+from .legs import ChainJoint, Leg
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..description.body_shapes import Shape
-from ..description.chains import ChainJoint, read_chain
 from ..description.coercion import numbers
 from ..description.copies import Pattern, read_copies
 from ..description.expanded import Described, expanded
 from ..description.form_faults import key_faults, name_faults, number_faults, shown
 from ..description.joints import Cone, Joint, set_fields
 from ..description.leg_joints import count_joints
-from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, Leg
+from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, ChainJoint, Leg, read_chain
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from ..errors import Fault, InvalidMechanism, near_miss
