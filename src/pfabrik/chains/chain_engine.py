@@ -19,6 +19,7 @@ from ..closure.configurations import Configurations, coordinates_for, joint_coor
 from ..closure.engine_contract import Engine, Prepared
 from ..closure.projection import ProjectionMode
 from ..closure.stretched import BentConfiguration
+from ..kernels.chains.constants import MET, MOST_BENT
 from ..kernels.handle import Handle
 from ..kernels.platform.tables import BY_LEGS, Question
 from ..kernels.rows import PROJECTED, REACHED, Rows
@@ -27,14 +28,11 @@ from ..model import Model
 from ..options import USUAL, Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
-from .chain_tables import MET, question_of, tables_of
+from .chain_tables import question_of, tables_of
 from .run_chains import ROWS_A_BLOCK, new_scratch, scratch_of_chain, walk
 
 if TYPE_CHECKING:
     from ..kernels.chains.chain_state import ChainScratch
-
-MOST_BENT = 100
-"""Coordinates up to which links that are stretched out on a path bend back: the check takes their cube."""
 
 ROWS_AHEAD = 256
 """Targets of a path that one call of the kernel follows."""

@@ -9,22 +9,11 @@ import numpy as np
 from ..arrays import Floats
 from ..derived import derived
 from ..kernels.chains.chain_records import SEEDS
+from ..kernels.chains.constants import ACROSS, INDEPENDENT, REACH_OF_SLIDES, WAVES
 from ..kernels.closure.loops import BALL, SLIDE
 from ..model import Model
 from .run_chains import NO_SCREWS, posed
 from .serial_chain import chain_of
-
-WAVES = 4
-"""Waves along the chain that a smooth configuration is the sum of."""
-
-INDEPENDENT = 3
-"""Every so many seeds have independent coordinates; the others are smooth, as long chains in use are."""
-
-REACH_OF_SLIDES = 1.0
-"""Displacement that stands for the range of a slide without one [L]."""
-
-ACROSS = 1e-3
-"""Sine of the angle from which two axes differ in direction."""
 
 
 class ChainSeeds(NamedTuple):

@@ -10,6 +10,7 @@ from ..closure.projection import projection_modes
 from ..derived import derived
 from ..description.home_mobility import column_moves
 from ..kernels.chains.chain_records import COLUMN, MACHINE, ChainTables
+from ..kernels.chains.constants import FEW, LONG, MET, SHORT
 from ..kernels.handle import Handle
 from ..kernels.platform.tables import BY_LEGS, NEAREST, QUESTION, Question
 from ..kernels.projecting import UNBOUNDED
@@ -20,18 +21,6 @@ from ..options import Options
 from ..tolerances import TOLERANCES
 from .chain_seeds import chain_seeds
 from .serial_chain import chain_of, stretched_length
-
-MET = 1e-10
-"""Error up to which what is held is met [L or rad]: a tenth of what counts as reached."""
-
-FEW = 12
-"""Most joints of a chain that has few: with narrow limits these have the most local minima."""
-
-SHORT = {"tries": 40, "descents": 60, "bends": 20, "agreements": 10}
-LONG = {"tries": 8, "descents": 15, "bends": 0, "agreements": 4}
-"""Of chains of few joints and of longer ones: seeds from which a target is tried, and from which descents to the
-nearest start; starts of descents around the start, beside itself; and descents that must end at the least distance
-before the others are left out, one more for each that ended farther away before."""
 
 
 @lru_cache(maxsize=16)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask
 from ..batch import put, take
 from ..derived import derived
+from ..kernels.closure.constants import ASSEMBLY_STARTS, LONGEST_SEARCH, NEAR_VALUES, NOISE, PROJECTIONS, SAME_GAP
+from ..kernels.constants import MOST_STEPS
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..motion.closure import Closure
 from ..motion.mobility import generic_of
@@ -18,28 +20,9 @@ from ..tolerances import TOLERANCES
 from .close import CLOSED, Closing, close, platform_poses
 from .configurations import Configurations
 from .continuation import continued
-from .descend import MOST_STEPS, nearest_actuators
+from .descend import nearest_actuators
 from .effort import descents_within
 from .random_starts import same_random_starts
-
-STARTS = 48
-"""Random starts, if nothing else assembles and there is no start whose mode is to be kept."""
-
-SAME = 1e-3
-"""Relative difference below which distances or gaps count as equal, as those of mirror images are."""
-
-NEAR = 1e-6
-"""Actuator error below which no other seed is tried [L or rad]."""
-
-NOISE = 1e-4
-"""Actuator error that noise alone causes in readings of more actuators than freedoms [L or rad]: readings that fit this
-well from a start contradict each other, and fit exactly nowhere else."""
-
-PROJECTIONS = 12
-"""Random starts of the search for the nearest feasible values, if no configuration has the target values."""
-
-LONGEST_SEARCH = 3.0
-"""Largest change of an actuator value, if the target values are too far for a search to converge [L or rad]."""
 
 
 def assemble(
@@ -81,13 +64,13 @@ def assemble(
     _project(closure, best, unsolved, begin, values[unsolved], has_start or stays)
     errors = np.abs(actuator_errors(closure, best.coordinates[unsolved], values[unsolved])).max(axis=1, initial=0.0)
     if stays:  # values that assemble after all do so in another mode
-        elsewhere = np.flatnonzero(errors <= NEAR)
+        elsewhere = np.flatnonzero(errors <= NEAR_VALUES)
         for on_the_way in (close(closure, *begin, max_iterations=0), last):
             on_the_way.gaps[:] = close(closure, on_the_way.coordinates, on_the_way.poses, max_iterations=0).gaps
             kept = elsewhere[on_the_way.feasible[elsewhere]]
             put(best, unsolved[kept], on_the_way, kept)
     elif has_start:
-        near = NOISE if is_over else NEAR
+        near = NOISE if is_over else NEAR_VALUES
         missed = unsolved[was_open & ((errors > near) | ~best.feasible[unsolved])]
         if len(missed):
             _assemble_elsewhere(closure, best, missed, poses[missed], values[missed])
@@ -154,10 +137,10 @@ def _from_random_starts(closure: Closure, coordinates: Floats, poses: Floats, va
     """The best of several random starts for each row: the least infeasible, of equals the nearest to its start."""
     best = _locked(closure, coordinates, poses, values)
     least, nearest = _infeasibility(best), _distances(closure, best.poses, poses)
-    for start in same_random_starts(closure, STARTS, len(values)):
+    for start in same_random_starts(closure, ASSEMBLY_STARTS, len(values)):
         trial = _locked(closure, *start, values)
         infeasibility, distances = _infeasibility(trial), _distances(closure, trial.poses, poses)
-        is_equal = np.abs(infeasibility - least) <= SAME * least
+        is_equal = np.abs(infeasibility - least) <= SAME_GAP * least
         better = np.flatnonzero(np.where(is_equal, distances < nearest, infeasibility < least))
         least[better], nearest[better] = infeasibility[better], distances[better]
         put(best, better, trial, better)
@@ -196,7 +179,7 @@ def _project(
     n, steps = descents_within(closure, 2 if has_start else 2 + PROJECTIONS, MOST_STEPS, int(np.count_nonzero(ranged)))
     random_ends = () if has_start else _newton_ends(closure, values)
     for coordinates, poses in islice(chain([newton_end, start], random_ends), n):
-        pending = np.flatnonzero(distances > NEAR)
+        pending = np.flatnonzero(distances > NEAR_VALUES)
         if not len(pending):
             break
         trial = nearest_actuators(closure, coordinates[pending], poses[pending], values[pending], steps)
@@ -222,7 +205,7 @@ def _put_nearer(
 ) -> None:
     """Put the rows of a trial that are feasible with actuators clearly nearer to the values, and their distances."""
     errors = np.linalg.norm(actuator_errors(closure, trial.coordinates, values[rows]), axis=1)
-    better = np.flatnonzero(trial.feasible & (errors < (1.0 - SAME) * distances[rows]))
+    better = np.flatnonzero(trial.feasible & (errors < (1.0 - SAME_GAP) * distances[rows]))
     distances[rows[better]] = errors[better]
     put(best, rows[better], trial, better)
 

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-
-SHORTEST_SHARE = 1.0 / 1024.0
-"""Shortest step, as a share of the way: where even that does not succeed, a singularity or a limit ends it."""
+from ..kernels.constants import SHORTEST_SHARE
 
 
 def continued(n: int, advance: Callable[[NDArray[np.intp], Floats], Mask], shortest: float = SHORTEST_SHARE) -> Floats:

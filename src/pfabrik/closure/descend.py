@@ -10,7 +10,8 @@ import numpy as np
 from ..arrays import Floats
 from ..batch import take
 from ..derived import derived
-from ..kernels.closure.loops import BASE_AXES, SIGHT, Closed, Objective, PoseObjective
+from ..kernels.closure.loops import BASE_AXES, Closed, Objective, PoseObjective
+from ..kernels.constants import MOST_STEPS, SIGHT
 from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..motion.closure import Closure
@@ -22,10 +23,6 @@ from .links_on_paths import links_on_paths
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism
     from ..kernels.closure.linearise_loops import DescentScratch
-
-
-MOST_STEPS = 200
-"""Most steps of a search, rejected ones included; most searches need a dozen."""
 
 
 def nearest_configurations(

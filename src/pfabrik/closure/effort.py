@@ -8,31 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kernels.closure.constants import A_DESCENT, CLOSING, CONTINUATION, DESCENDING, FEWEST, FEWEST_CLOSING, LIMIT_COST
 from ..motion.closure import Closure
-
-CLOSING = 5e9
-"""Operations of all random starts together: a closing step takes the sum over groups of the cubed number of
-coordinates. About a second; the bound matters from some 130 coordinates on."""
-
-CONTINUATION = 1e10
-"""Operations of a continuation to a target, and of each closing from the start of a search."""
-
-DESCENDING = 4e9
-"""Operations of all descents of one answer: a step takes several times the cube of the number of all coordinates."""
-
-LIMIT_COST = 4
-"""Cost of adding a limit to the active set, in squares of the number of coordinates."""
-
-ENOUGH = 20
-"""Steps that every closing may take: those that converge need ten to fifteen, however long the chain."""
-
-FEWEST, A_DESCENT = 4, 15
-"""Fewest steps for which a descent or a continuation step is tried; and the steps that most descents need."""
 
 
 def steps_within(closure: Closure, most: int) -> int:
     """Most steps of a closing."""
-    return min(most, max(ENOUGH, int(CONTINUATION / closure.cubes)))
+    return min(most, max(FEWEST_CLOSING, int(CONTINUATION / closure.cubes)))
 
 
 def starts_within(closure: Closure, most: int, steps: int) -> int:

@@ -11,12 +11,12 @@ from ..arrays import Floats, Ints, Records
 from ..batch import take
 from ..derived import derived, is_derived
 from ..description.home_mobility import column_moves
-from ..kernels.closure import close_on_target as R
+from ..kernels.closure.constants import A_DESCENT, MOST_CLOSING, NEARBY, STARTS, STEPS
 from ..kernels.closure.joint_tables import ASKED, MACHINE, Answered, JointQuestion, JointTables, new_joint_scratch
 from ..kernels.closure.loops import LOCKED
+from ..kernels.constants import CONTINUATION_STEPS
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs.records import TASK
-from ..kernels.projecting import CONTINUATION_STEPS
 from ..kernels.rows import OPEN, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
@@ -24,7 +24,7 @@ from ..options import Options
 from ..tolerances import TOLERANCES
 from .close import CLOSED, in_lengths, locking
 from .configurations import new_rows
-from .effort import A_DESCENT, descending_steps, starts_within, steps_per_continuation_step, steps_within
+from .effort import descending_steps, starts_within, steps_per_continuation_step, steps_within
 from .links_on_paths import links_on_paths
 from .multistart import random_feasible, seeds_of
 from .parasitic import asks_too_much, follows_task, has_parasitic_motion
@@ -128,7 +128,7 @@ def _prepared(
     seeds = np.reshape(seeds_of(closure) if with_seeds else (), (-1, len(scale)))
     projections = projection_modes(closure, hold, rotation_length)
     random, rng = [], np.random.default_rng(0)
-    for _ in range(R.STARTS):
+    for _ in range(STARTS):
         random.append(random_coordinates(closure, 1, rng))
     steps = descending_steps(closure)
     machine, asked = np.zeros(1, MACHINE), np.zeros(1, TASK)
@@ -138,14 +138,14 @@ def _prepared(
         "follows": follows,
         "varies": varies,
         "has_others": has_others,
-        "asks_all": has_others and (asks_too_much(closure) or (with_seeds and len(nearby) < R.NEARBY)),
+        "asks_all": has_others and (asks_too_much(closure) or (with_seeds and len(nearby) < NEARBY)),
         "is_point": mechanism.end_effector_is_joint,
         "has_seeds": with_seeds,
-        "closing_steps": steps_within(closure, R.MOST_CLOSING),
-        "search_steps": steps_within(closure, R.STEPS),
-        "continuation_steps": steps_per_continuation_step(closure, R.MOST_CLOSING, CONTINUATION_STEPS),
-        "nearby": starts_within(closure, R.NEARBY, R.STEPS),
-        "random": starts_within(closure, R.STARTS, R.STEPS),
+        "closing_steps": steps_within(closure, MOST_CLOSING),
+        "search_steps": steps_within(closure, STEPS),
+        "continuation_steps": steps_per_continuation_step(closure, MOST_CLOSING, CONTINUATION_STEPS),
+        "nearby": starts_within(closure, NEARBY, STEPS),
+        "random": starts_within(closure, STARTS, STEPS),
         "descents": max(1, steps // A_DESCENT),
         "descent_steps": steps,
         "closed": CLOSED,

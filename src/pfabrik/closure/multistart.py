@@ -6,21 +6,17 @@ import numpy as np
 
 from ..arrays import Floats
 from ..derived import derived
+from ..kernels.closure.constants import RANDOM_STARTS, RANDOM_STEPS, SEED_DISTANCE, SEED_TURN, SEEDS
 from ..kernels.closure.loops import BASE_AXES
+from ..kernels.constants import MOST_STEPS
 from ..motion.closure import Closure
 from ..poses import pose
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, close
-from .descend import MOST_STEPS, nearest_configurations
+from .descend import nearest_configurations
 from .effort import descents_within, starts_within
 from .parasitic import differences, follows_task, has_parasitic_motion
 from .random_starts import random_starts
-
-SEED_DISTANCE, SEED_TURN = 0.5, 0.5
-"""Distance [L] and rotation [rad] from home of the poses for which the first seeds are the nearest configurations."""
-
-SEEDS, RANDOM_STARTS, RANDOM_STEPS = 8, 128, 20
-"""Most seeds; random configurations that are closed to find them; about as many steps are spent on each."""
 
 
 @derived

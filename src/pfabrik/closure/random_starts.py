@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays import Floats
+from ..kernels.closure.constants import SPREAD
 from ..motion.closure import Closure
 from ..motion.displacements import columns
 from ..rotations import from_quaternion, random_quaternions, rotvec_from_quaternion
@@ -37,7 +38,3 @@ def random_coordinates(closure: Closure, n: int, rng: np.random.Generator) -> Fl
             coordinates[:, span] = rotvec_from_quaternion(random_quaternions(n, rng))
     coordinates[:, closure.idle] = 0.0
     return np.asarray(coordinates)
-
-
-SPREAD = 0.7
-"""Standard deviation of the platform's random positions about home, per coordinate [L]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..arrays import Floats
-from ..kernels.projecting import SAME
+from ..kernels.constants import SAME_DISTANCE
 from ..kernels.rows import PROJECTED, REACHED, Rows
 from ..model import Model
 from ..options import Options
@@ -63,4 +63,4 @@ class BentConfiguration:
         distance, bent_distance = (
             projection.distances(closure, answer.poses, target)[0] for answer in (rows, bent_rows)
         )
-        return bool(bent_distance < (1.0 - SAME) * distance)
+        return bool(bent_distance < (1.0 - SAME_DISTANCE) * distance)

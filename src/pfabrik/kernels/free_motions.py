@@ -8,20 +8,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ._jit import routine
+from .constants import EASE, IMPLIED, LOOSE, SHARED
 from .qp import QP, factorise, solve_qp
 from .sqp import Linearisation, new_linearisation
-
-DEPENDENT = 1e-6
-"""Largest entry left of an equation that follows from the others: descriptions are typed with as many digits."""
-
-LOOSE = 4.0
-"""Largest entry left of such an equation where equations are not met, in units of the gap."""
-
-EASE = 1e-6
-"""Weight of a squared step beside the squared excess that it is to lower: it is to make the step unique, no more."""
-
-SHARED = 0.01
-"""Factor for pivots of unknowns that legs have in common: they would couple the legs' equations."""
 
 
 class FreeMotions(NamedTuple):
@@ -76,13 +65,13 @@ def eliminate(rows: int, elimination: Elimination, reduced: FreeMotions, first: 
     for j in range(n):
         shift[j] = 0.0
         taken[j] = 0.0 if used[j] > 0 else 1.0
-    least, n_postponed = DEPENDENT, 0
+    least, n_postponed = IMPLIED, 0
     if implied > 0:
-        least, n_postponed = max(DEPENDENT, LOOSE * reduced.linear.totals[0]["gap"]), first
+        least, n_postponed = max(IMPLIED, LOOSE * reduced.linear.totals[0]["gap"]), first
     for turn in range(rows + n_postponed):
         row = turn if turn < first else turn - first if turn < first + n_postponed else turn - n_postponed
         if not first <= turn < first + n_postponed or rank <= min(row, first - implied - 1):
-            rank += solve_row(row, rank, rows, least if turn < first else DEPENDENT, elimination, reduced)
+            rank += solve_row(row, rank, rows, least if turn < first else IMPLIED, elimination, reduced)
     motions = 0
     for j in range(n):
         if taken[j] == 0.0:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from ..arrays import Floats
 from ._jit import routine
+from .constants import REGULARISATION
 from .qp import QP, apply_inverse, factorise, solve_qp
 from .sqp import Linearisation
-
-REGULARISATION = 1e-10
-"""Weight of the sum of squared multipliers in the objective: far below the squares of the limits' gradients."""
 
 
 @routine

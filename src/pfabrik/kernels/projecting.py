@@ -9,21 +9,8 @@ import numpy as np
 from ..arrays import Floats, Record, Records
 from ._jit import routine
 from .closure.loops import LOCKED
+from .constants import HOLD_COST, SAME_DISTANCE
 from .rows import HOLD_ORIENTATION
-
-SAME = 1e-7
-"""Relative decrease of the distance by which a later search must improve on an earlier one."""
-
-HOLD_COST = 1.0
-"""Most that a held component may add to the distance, per unit by which the start differs from the target in that
-component [L per rad, or rad per L]: a rotation about the middle of a machine moves no joint by more."""
-
-SAME_DISTANCE = 1e-7
-"""Relative difference of distances below which two searches agree."""
-
-CONTINUATION_STEPS, LONGEST_STEP = 8, 0.25
-"""Steps on the way to a target in the working mode of the start, and the longest single one that keeps it: a longer one
-may jump over a singularity [L or rad]."""
 
 TALLY = np.dtype(
     [
@@ -157,10 +144,10 @@ def is_too_far(distance: float, weights: Floats, hold: int, position: float, rot
     """
     held_error = rotation if hold == HOLD_ORIENTATION else position
     allowed = weighted_distance(weights, position, rotation) + HOLD_COST * held_error
-    return distance < math.inf and distance > (1.0 + SAME) * allowed
+    return distance < math.inf and distance > (1.0 + SAME_DISTANCE) * allowed
 
 
 @routine
 def brings_nearer(distance: float, weights: Floats, position: float, rotation: float) -> bool:
     """True if an answer that holds nothing is no farther from its target than the start, whose errors are given."""
-    return distance <= (1.0 + SAME) * weighted_distance(weights, position, rotation)
+    return distance <= (1.0 + SAME_DISTANCE) * weighted_distance(weights, position, rotation)

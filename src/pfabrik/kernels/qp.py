@@ -13,10 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ._jit import allocator, routine
-
-# Violation up to which a limit counts as kept; violation that may remain when no more limit can be made active; share
-# of a gradient's square, orthogonal to the active gradients, below which it counts as dependent on them.
-KEPT, ROUNDED, DEPENDENT = 1e-14, 1e-9, 1e-12
+from .constants import DEPENDENT, KEPT, ROUNDED
 
 
 class QP(NamedTuple):

@@ -22,54 +22,27 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Record, Records
 from ._jit import routine
+from .constants import (
+    CLOSED,
+    CONVERGING,
+    EXACT,
+    FINE,
+    FIRST_DAMPING,
+    GOOD,
+    LARGE_DAMPING,
+    LAST,
+    LEAST_DAMPING,
+    LEAST_WEIGHT,
+    LONGEST_STEP,
+    MOST_DAMPING,
+    NEARLY_CLOSED,
+    NEXT,
+    OPEN,
+    ROUNDING,
+    SOLVABLE,
+    SUFFICIENT,
+)
 from .qp import QP, factorise, solve_qp
-
-LONGEST_STEP, FIRST_DAMPING = 0.4, 0.1
-"""Longest step of any unknown [rad or L], beyond which the quadratic model is not trusted; and the initial damping, as
-a share of what would make the first step that long."""
-
-REACH = 1.0
-"""Limits farther away than this are left out of a programme [rad or L]: no step comes near them."""
-
-CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
-"""Gaps and excesses of a feasible configuration, and of one that no step improves [rad or L]: overconstrained loops
-close only as exactly as their description. The second is a tenth of the tolerance of solutions."""
-
-OPEN = 0.01
-"""Violation to which a step is corrected, as a share of its predicted reduction: a rejected step, and on joint
-coordinates every step, for there a step may end where loops no longer close."""
-
-FINE, ROUNDING = 1e-11, 1e-13
-"""Shares of the objective: a step with a predicted reduction below the first need not reduce the merit, but may raise
-it by no more than the second, or than it costs to close what counts as closed: rounding hides anything finer."""
-
-LAST, NEXT, CONVERGING = 1e-18, 1e-20, 1e-2
-"""Predicted reductions that end a descent, as shares of the objective: of the last step, whose length is then a
-billionth of the distance; of the step that would follow. And, for fine steps, as a share of the prediction before: if
-it is more, the steps are rounding."""
-
-PROBE = 1e-6
-"""Step of the differences that give the Hessian along each motion [rad or L]."""
-
-RESTORING, CORRECTIONS = 8, 1
-"""Most steps to restore feasibility; and to correct the violation of a rejected step."""
-
-LEAST_WEIGHT = 1.0
-"""Least weight of the violation in the merit, in units of the gradient: if the objective has no gradient along an
-equation, its multiplier does not say how much violation is acceptable."""
-
-SUFFICIENT, GOOD, EXACT = 1e-4, 0.5, 0.1
-"""Actual reduction as a share of the predicted: least of an accepted step, and least of one that lowers the damping;
-and largest relative difference of the two for which a full step lowers it much."""
-
-LEAST_DAMPING, LARGE_DAMPING = 0.01, 0.1
-"""Damping, in units of curvature: least after a rejected step; largest that an exact step divides by 100, not 10."""
-
-SOLVABLE = 1e-8
-"""Least damping, in units of curvature, for a programme that rounding keeps from its solution."""
-
-MOST_DAMPING = 1e8
-"""Damping, in units of curvature, that ends a search: no step, however short, is accepted."""
 
 TOTALS = np.dtype(
     [

@@ -11,17 +11,16 @@ from ..closure.projection import ProjectionMode, projection_modes
 from ..derived import derived
 from ..description.home_mobility import column_joints
 from ..kernels.closure.loops import BASE_AXES
+from ..kernels.constants import MOST_STEPS
+from ..kernels.platform.constants import AGREEMENTS_OF_VALUES
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .links_of_legs import links_of_legs
-from .nearest_pose import AGREEMENTS_OF_VALUES, NearestPose, Objective, no_starts
+from .nearest_pose import NearestPose, Objective, no_starts
 from .seeds import seeds_of
-
-MOST_STEPS = 200
-"""Steps of a search, rejected ones included; most need a dozen."""
 
 OF_VALUES: Objective = (0.0,) * 6, {"frame": BASE_AXES, "steps": MOST_STEPS, "agreements": AGREEMENTS_OF_VALUES}
 """The objective of actuators nearest to values; the pose does not count."""

@@ -16,6 +16,13 @@ from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
+from ..kernels.platform.constants import (
+    AGREEMENTS,
+    AGREEMENTS_OF_MANY,
+    AGREEMENTS_OF_RAILS,
+    AGREEMENTS_OF_STRUTS,
+    AGREEMENTS_OF_VALUES,
+)
 from ..kernels.platform.search_records import SETTINGS, MultistartPlan, PoseSolutions, Starts, new_solutions
 from ..kernels.threads import in_blocks
 from ..model import Model
@@ -27,20 +34,6 @@ from .table import OF_POINTING, search_table
 
 if TYPE_CHECKING:
     from ..kernels.platform.nearest import NearestScratch
-
-AGREEMENTS, AGREEMENTS_OF_STRUTS, AGREEMENTS_OF_VALUES = 4, 3, 8
-"""Searches that must end at the nearest configuration, and one more for each that ends elsewhere.
-
-Fewer on struts that leave the platform all its freedoms: they have one solution each. More where actuators have target
-values: a platform nearly has them in many poses."""
-
-AGREEMENTS_OF_RAILS = 6
-"""Agreements where rods on carriages leave the platform all its freedoms: a search may take a rod to its other side,
-where it ends at the limit of another leg. With 4, 14 of 1,200 targets have a nearer pose; with 6, three."""
-
-AGREEMENTS_OF_MANY = 8
-"""Agreements with implicit joints, or where task and legs leave some of the pose open: there are many more
-configurations."""
 
 ROWS_A_BLOCK = 16
 

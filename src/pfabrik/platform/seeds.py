@@ -14,6 +14,22 @@ from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
+from ..kernels.platform.constants import (
+    BEYOND,
+    DRAW_STEPS,
+    DRAWS,
+    FARTHEST_ROTATION,
+    JOINT_PLACES,
+    MANY_BEYOND,
+    MANY_SEEDS,
+    Q_WEIGHT,
+    RADIUS,
+    RADIUS_BEYOND,
+    RARE_BONUS,
+    ROTATION_WEIGHT,
+    SEEDS,
+    SEEDS_PER_MODE,
+)
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import REACHED
 from ..model import Model
@@ -23,33 +39,6 @@ from .carriages import proximal_coordinates
 from .nearest_pose import NearestPose, home_start, no_starts
 from .rotation import constraints_at, keeps_rotation
 from .table import table_handle
-
-SEEDS, MANY_SEEDS = 16, 32
-"""Seeds at most, and with implicit joints, or pivots with two solutions: there are many more configurations."""
-
-BEYOND, MANY_BEYOND = 8, 16
-"""Seeds farther away, where components of the workspace beyond the base may be, likewise."""
-
-DRAWS, DRAW_STEPS = 240, 30
-"""Random poses that either kind is chosen from, and the steps of the search that makes each feasible."""
-
-RADIUS, RADIUS_BEYOND, FARTHEST_ROTATION = 1.0, 2.5, 1.5
-"""How far from home random poses are, and those beyond the base [L]: the mirror image of a component is twice as far
-away as the base. And how far they are turned [rad]."""
-
-ROTATION_WEIGHT = 0.2
-"""Weight of a squared rotation beside a squared distance, in the distance between seeds [L^2]."""
-
-Q_WEIGHT = 0.02
-"""Weight of the squared sine of half the difference between coordinates of proximal joints, likewise [L^2]."""
-
-SEEDS_PER_MODE, RARE_BONUS = 4, 0.2
-"""Seeds of one working mode that are enough, and the distance added to configurations of a mode with fewer [L^2]: a
-mode may have a small component of its own."""
-
-
-JOINT_PLACES = 12
-"""Places of an implicit joint, evenly over its range, from which it is solved for: a hinge has few solutions."""
 
 DECIMALS = 6
 """Decimals of the places of legs [L]: aligned ones differ by rounding."""

@@ -6,7 +6,7 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine, search
-from ..closure.loops import SIGHT
+from ..constants import SIGHT
 from ..legs.complete_poses import is_pose, orthonormalise
 from ..platform.answer_row import errors
 from ..platform.tables import BY_LEGS

@@ -22,10 +22,7 @@ from ..closure.pose_objective import turn_of_tilt, yaw_gradient
 from ..linear import solve_spd
 from .chain_records import SerialChain
 from .chain_state import ChainScratch
-
-HELD_WEIGHT = 100.0
-"""Weight of the squares of held components in the Hessian, relative to the largest force: it changes nothing but the
-definiteness of the Hessian, which counts along held components alone."""
+from .constants import HELD_WEIGHT
 
 SMALL_TURN = 1e-3
 """Angle below which series replace the second derivative of a rotation's angle [rad]."""

@@ -7,47 +7,35 @@ import math
 from ...arrays import Floats
 from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..constants import MOST_STEPS
 from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
 from ..quaternions import difference
 from ..vectors import copy_table, norm, vec
 from .chain_records import SerialChain
 from .chain_state import ChainScratch
+from .constants import (
+    CONVERGED,
+    EXACT,
+    FINE,
+    FIRST_DAMPING,
+    GOOD,
+    LEAST_DAMPING,
+    LEAST_PIVOT,
+    LONGEST_STEP,
+    MOST_DAMPING,
+    NOTHING,
+    ON_BOUND,
+    PULL,
+    PULLED_TURN,
+    RESTORED,
+    RESTORING,
+    SUFFICIENT,
+    SWEEPS,
+)
 from .curvature import fill_curvature, model_change, plan_newton_step
 from .reach_target import largest, measure_pose, reach_target
 from .walk_chain import copy_chain_state, move_chain
-
-MOST_STEPS = 200
-"""Most steps of a descent, those that are not taken included; most need a dozen."""
-
-LONGEST_STEP = 1.0
-"""Longest step of a freedom [rad or L]."""
-
-SWEEPS = 12
-"""Most times that freedoms are fixed at their bounds and released in one step."""
-
-PULL, PULLED_TURN = 0.1, 0.5
-"""Distance to which a target that is nearer is pulled outwards [L], and the most that this may turn it [rad]."""
-
-ON_BOUND = 1e-12
-"""Distance from a bound at which a freedom counts as on it [rad or L]."""
-
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-10, 1e4
-"""Damping of the Hessian, relative to the square of the longest screw."""
-
-LEAST_PIVOT = 1e-12
-"""Pivot of a Hessian that counts as positive, relative to the same."""
-
-SUFFICIENT, GOOD, EXACT = 0.1, 0.6, 0.1
-"""Share of its predicted reduction by which a step must reduce the objective; share from which damping falls; and
-relative error of the prediction below which it falls fast."""
-
-CONVERGED, FINE, NOTHING = 1e-14, 1e-12, 1e-26
-"""Change of the objective, relative to it, that ends a descent, and below which rounding hides how much a step reduces
-it; and value that counts as zero [L^2]."""
-
-RESTORING, RESTORED = 8, 1e-10
-"""Most steps that restore the held components after a step, and error that they may have [L or rad]."""
 
 
 @routine

@@ -15,23 +15,8 @@ from ..closure.pose_objective import pose_gradient
 from ..linear import solve_spd
 from .chain_records import SerialChain
 from .chain_state import ChainScratch, ChainState
+from .constants import LONGEST_STEP, PATIENCE, PROGRESS, REACH_DAMPING, REACH_SWEEPS
 from .walk_chain import bound_steps, copy_chain_state, move_chain, walk_chain
-
-LONGEST_STEP = 1.0
-"""Longest step of a freedom [rad or L]: beyond it the linear model says nothing."""
-
-SWEEPS = 5
-"""Most times that freedoms are set to their bounds in one step."""
-
-LEAST_DAMPING = 1e-12
-"""Damping of the system, relative to the sum of its diagonal, which does not depend on the axes: the least keeps it
-definite where components do not vary."""
-
-ENOUGH = 0.9
-"""Ratio of squared errors that a step must reach to count as progress."""
-
-PATIENCE = 4
-"""Steps in a row without progress that end an attempt."""
 
 
 @routine
@@ -72,10 +57,10 @@ def reach_target(
         move_chain(chain, state, s)
         distance, _ = measure_pose(chain, target, objective, state, s)
         moved = squares(errors, held)
-        idle = 0 if moved < ENOUGH * value else idle + 1
+        idle = 0 if moved < PROGRESS * value else idle + 1
         if moved < value:
             value = moved
-            damping = max(0.1 * damping, LEAST_DAMPING)
+            damping = max(0.1 * damping, REACH_DAMPING)
             continue
         copy_chain_state(s.saved, state)
         distance, _ = measure_pose(chain, target, objective, state, s)
@@ -114,9 +99,9 @@ def plan_least_step(chain: SerialChain, s: ChainScratch, held: int, damping: flo
         if s.fixed[d] == 1:
             step[d] = 0.0
             fix_step(s, d, held, turns)
-    for sweep in range(SWEEPS):
+    for sweep in range(REACH_SWEEPS):
         fill_system(s, held, turns)
-        add_damping(s.A, held, damping + LEAST_DAMPING)
+        add_damping(s.A, held, damping + REACH_DAMPING)
         solve_spd(s.A, held, 0.0)
         x = y = z = u = v = w = 0.0
         for i in range(held):

@@ -7,47 +7,19 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
+from ..constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE
 from ..legs.complete_poses import turn_pose
 from ..platform.answer_row import errors
-from ..projecting import (
-    CONTINUATION_STEPS,
-    LONGEST_STEP,
-    SAME_DISTANCE,
-    brings_nearer,
-    clear_tally,
-    count_ending,
-    is_agreed,
-    is_spent,
-    is_too_far,
-    note_attempt,
-)
+from ..projecting import brings_nearer, clear_tally, count_ending, is_agreed, is_spent, is_too_far, note_attempt
 from ..quaternions import difference
 from ..rows import HOLD_NOTHING
 from ..vectors import copy_table
 from .chain_records import ChainTables, SerialChain
 from .chain_state import ChainScratch
+from .constants import BENT, CLOSENESS, DESCENTS_NEARBY, NEARER, NEARLY, PULLED_FROM, PULLS, STEPS
 from .descend_chain import descend_chain, pull
 from .reach_target import largest, reach_target
 from .walk_chain import copy_chain_state, load_chain, walk_chain
-
-CLOSENESS = 1e-12
-"""Error of held components that ends a search [L or rad]."""
-
-STEPS = 30
-"""Most steps of an attempt to reach a target; those that converge need ten."""
-
-NEARER = 0.25
-"""The start goes before a seed that is not nearer than this share of its squared distance."""
-
-PULLED_FROM, PULLS = 100.0, 12
-"""Ratio to the least distance up to which a descent's end may become the nearest by way of a target farther out, and
-most times that this is done."""
-
-BENT = 0.25
-"""How far towards a seed a start is bent, as a share of the way."""
-
-NEARLY, DESCENTS_NEARBY = 1e-2, 120
-"""Distance below which a target out of reach of a short chain is tried from more seeds [L], and how many these are."""
 
 
 @routine
@@ -77,7 +49,7 @@ def reach(tables: ChainTables, question: Record, s: ChainScratch) -> float:
     least = reach_from(tables, objective, -1, s)
     keep_nearest(s)
     position, rotation = distances(tables, s.start_X, s)
-    is_near = least <= tables.machine[0]["met"] and math.hypot(position, rotation) <= LONGEST_STEP
+    is_near = least <= tables.machine[0]["met"] and math.hypot(position, rotation) <= LONGEST_IN_MODE
     if is_near or is_beyond(tables, s):
         return least
     error = math.inf

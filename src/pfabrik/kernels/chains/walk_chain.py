@@ -10,15 +10,7 @@ from ..closure.loops import BALL, SLIDE
 from ..quaternions import logarithm, rotate_by, turn_ball
 from .chain_records import SerialChain
 from .chain_state import ChainScratch, ChainState
-
-NEAR_CONE = 0.3
-"""Distance from a cone within which the freedoms of its joint are turned into those along and across it [rad]."""
-
-ALONG = 1e-9
-"""Sine below which a line is straight along its cone's axis, and no direction leads in or out."""
-
-CORRECTIONS = 8
-"""Most steps of Newton's method that bring two turns back onto their cone."""
+from .constants import ALONG, CORRECTIONS, NEAR_CONE
 
 
 @inlined

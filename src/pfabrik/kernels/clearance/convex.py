@@ -15,17 +15,9 @@ import numpy as np
 from ...arrays import Floats, Ints
 from .._jit import allocator, routine
 from ..vectors import Vec, along, cross, dot, flatten, norm, put, scale, sub, vec
+from .constants import CLOSE, FLAT, MOST_SIMPLICES, MOST_STALLED, ROUNDING
 from .simplices import NOTHING, Weights, combined, nearest_weights, with_corner
 from .solids import DISC, KIND, Solid, farthest_in, middle_of, square_to
-
-# Most simplices, of two polyhedra some ten are needed, beside a rim some thirty; and most that are no nearer.
-MOST_SIMPLICES, MOST_STALLED = 100, 8
-# Rounding of a coordinate, relative to its size: a gap as small as this says nothing.
-ROUNDING = 4e-16
-# Most corners of the polytope around the origin; between two rims some hundred are needed.
-MOST_CORNERS = 256
-# Depth below which a new corner is none, and error of the depth, relative to the size of the polytope.
-FLAT, CLOSE = 1e-14, 1e-13
 
 
 class Polytope(NamedTuple):

@@ -7,15 +7,11 @@ import math
 from ...arrays import Floats, Ints
 from .._jit import routine, search
 from ..vectors import Vec, along, norm, put, scale, sub, vec
-from .convex import MOST_CORNERS, Polytope, nearest_points, new_polytope, way_out
+from .constants import MOST_CORNERS, NEAR, TOUCHING
+from .convex import Polytope, nearest_points, new_polytope, way_out
 from .segments import between_axes, capsule_points, square_to_axes
 from .simplices import NOTHING
 from .solids import CAPSULE, DISC, KIND, ROUND, Solid, middle_of, reach_of
-
-# Distances relative to the size of coordinates up to which two cores touch, so that their direction is rounding; and up
-# to which they may touch if one has a rim: there the polytope says how far they are apart, too little by a share of it
-# beside a sharp edge. Searches keep links farther apart than that.
-TOUCHING, NEAR = 1e-14, 1e-7
 
 
 @search

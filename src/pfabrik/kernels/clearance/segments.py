@@ -7,10 +7,8 @@ import math
 from ...arrays import Floats
 from .._jit import inlined, routine
 from ..vectors import Vec, along, cross, dot, norm, put, scale, sub, vec
+from .constants import PARALLEL
 from .solids import Solid, square_to
-
-# Sine of the angle below which two axes count as parallel where they touch.
-PARALLEL = 1e-9
 
 
 @inlined

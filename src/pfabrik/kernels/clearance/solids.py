@@ -16,13 +16,11 @@ from typing import TypeAlias
 from ...arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, flatten, norm, scale, sub, vec
+from .constants import ALONG_AXIS
 
 CAPSULE, BOX, DISC, HULL = 0, 1, 2, 3
 KIND, ROUND, A, B, C, WIDTH = 0, 1, 2, 3, 4, 5
 REACH, VERTICES = B, 5
-
-# Sine of the angle to the axis of a disc below which a direction counts as along it.
-ALONG_AXIS = 1e-14
 
 # Its row of sizes, and its place.
 Solid: TypeAlias = tuple[Floats, Floats]

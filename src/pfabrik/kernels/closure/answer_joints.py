@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Record
 from .._jit import opener, routine, search
 from ..clearance.link_records import NO_LINKS
+from ..constants import MOST_STEPS, SIGHT
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise
 from ..legs.records import TASK
 from ..projecting import brings_nearer, clear_tally, count_ending, is_too_far, weighted_distance
@@ -31,7 +32,6 @@ from ..rows import (
 )
 from ..vectors import copy_table
 from .close_on_target import (
-    MOST_CLOSING,
     close_legs,
     complete,
     copy_closed,
@@ -48,6 +48,7 @@ from .close_on_target import (
     start_at,
     take_nearby,
 )
+from .constants import AGREEMENTS, FEWEST, LONG_CHAIN_STEPS, MOST_CLOSING, NEAR
 from .descend import nearest_of
 from .joint_tables import (
     ANSWER,
@@ -64,24 +65,8 @@ from .joint_tables import (
     JointTables,
     new_joint_scratch,
 )
-from .loops import BASE_AXES, LOCKED, SIGHT, Closed, Objective, PoseObjective
+from .loops import BASE_AXES, LOCKED, Closed, Objective, PoseObjective
 from .path_kinematics import LAYOUT, LOOPS
-
-AGREEMENTS = 7.0
-"""Searches that must end at the nearest configuration found before the multistart stops."""
-
-MOST_STEPS = 200
-"""Most steps of a search, rejected ones included; most searches need a dozen."""
-
-FEWEST = 4
-"""Fewest steps for which a search is tried."""
-
-NEAR = 2
-"""Random feasible configurations, the nearest to a target out of reach, that searches start from, too: on a machine of
-two arms more answers come nearer so than random closings on the target would bring."""
-
-LONG_CHAIN_STEPS = 20
-"""Steps that bring a start of a long chain within its limits."""
 
 
 def _sample() -> JointTables:
@@ -160,7 +145,9 @@ def search_by(
     else has an end, so is the start.
     """
     tally, start, holds = scratch.tally[0], scratch.start, tables.holds[aim] != HOLD_NOTHING
-    n_near = min(NEAR, scratch.distances.shape[0]) if n_seeds > 0 and is_beyond_reach(tables, scratch.pose) else 0
+    n_near = (
+        min(NEAR, scratch.distances.shape[0]) if n_seeds > 0 and is_beyond_reach(tables, scratch.pose) else 0
+    )
     last = n_starts + max(n_seeds, 0) + n_near
     clear_tally(tally)
     if n_near > 0:

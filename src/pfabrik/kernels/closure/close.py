@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 from ...arrays import Floats
 from .._jit import inlined, opener, routine, search
+from ..constants import CONTRACTION, NEWTON_STEP
 from ..quaternions import exponential, turn_about_z, turn_ball, yaw_of
+from .constants import DAMPING, FEW, LEAST_DAMPING, MOST_DAMPING
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .normal_equations import (
     add_cones,
@@ -39,26 +41,8 @@ from .path_kinematics import (
     store_row,
 )
 
-LONGEST_STEP = 0.5
-"""Longest step of any coordinate [rad or L]: beyond it the linear model says nothing."""
-
 # Purpose of the next evaluation of the equations: of a trial step, of the best after a rejected step, of the end.
 TRY, RETURN, MEASURE = 0, 1, 2
-
-DAMPING = 0.01
-"""Damping at the start, relative to the sum of squares."""
-
-LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
-"""Damping of the normal equations, whose entries are of order one: the least stops idle motions (a rod's own spin)
-without slowing convergence; the most ends a search in which no step reduces the cost."""
-
-CONTRACTION = 0.5
-"""Newton's method is in the assembly mode of its start if each step is at most this share of the one before, and none
-is shortened: the start is then in the ball around the solution in which there is no other (Newton and Kantorovich)."""
-
-FEW = 100
-"""Coordinates of one group up to which the least damping exceeds the rounding errors of the factor. These grow with the
-cube of the number of coordinates, as six equations leave all but six pivots to damping."""
 
 
 class ClosingScratch(NamedTuple):
@@ -198,7 +182,7 @@ def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
     """Apply the step, shortened if it turns too far or slides farther than the largest gap; its largest component."""
     gap = 1.0
     for group in range(len(layout.sizes)):
-        gap = max(gap, eq.gaps[group] / LONGEST_STEP)
+        gap = max(gap, eq.gaps[group] / NEWTON_STEP)
     longest = 0.0
     for i in range(6):
         longest = max(longest, abs(eq.twist[i]) / (gap if i < 3 else 1.0))
@@ -208,7 +192,7 @@ def move(loops: Loops, layout: Layout, eq: Equations, state: State) -> float:
             if layout.slots[j + i] >= 0:
                 part = abs(eq.Y[loops.group_of[j], layout.slots[j + i], 6])
                 longest = max(longest, part / (gap if loops.kinds[k] == SLIDE else 1.0))
-    scale = min(1.0, LONGEST_STEP / longest) if longest > 0.0 else 1.0
+    scale = min(1.0, NEWTON_STEP / longest) if longest > 0.0 else 1.0
     for k in range(len(loops.kinds)):
         j = loops.columns[k]
         Y = eq.Y[loops.group_of[j]]
@@ -264,7 +248,7 @@ def close_row(
     for group in range(closed.gaps.shape[1]):  # where no configuration is a number, none is measured
         closed.gaps[row, group] = math.inf
     cost, factor, step = math.inf, 1.0, math.inf
-    longest_step = 0.99 * LONGEST_STEP if problem.stays == 1 else math.inf
+    longest_step = 0.99 * NEWTON_STEP if problem.stays == 1 else math.inf
     iterations, phase = 0, TRY
     while True:
         clear(layout, eq)

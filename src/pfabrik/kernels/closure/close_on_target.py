@@ -6,37 +6,16 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
+from ..constants import CLOSED, CONTINUATION_STEPS, LONGEST_IN_MODE
 from ..legs.complete_poses import tilt_to, turn_pose
-from ..projecting import CONTINUATION_STEPS, LONGEST_STEP
 from ..quaternions import difference, turn_about_z, yaw_difference
 from ..vectors import copy_row, copy_table, norm, scale, vec
 from .close import close_row
+from .constants import BRANCH_AGREEMENTS, MOST_CLOSING, SAME_GAP, STEPS, STRANGE
 from .joint_tables import EXPECTED, REACH, STEP, JointScratch, JointTables
 from .loops import BASE_AXES, Closed, ClosureProblem
 from .path_kinematics import end_path, load_row, store_row, walk_path
 from .pose_objective import turn_of_tilt
-
-STRANGE = 0.1
-"""Largest change of components that the task leaves out, beyond which a step is replaced by continuation [L or rad]."""
-
-STARTS = 80
-"""Random starts of legs that are not closed from the given start: a leg has a handful of branches."""
-
-AGREEMENTS, SAME = 16.0, 1e-3
-"""Starts that must end at the least gap or excess found before a leg is given up, and the relative difference below
-which two count as equal. A branch found half as often has then been found too, but for one time in 600."""
-
-NEARBY = 64
-"""Random feasible configurations that are tried before random starts, the nearest to the target first."""
-
-STEPS = 30
-"""Most steps from each of these; those that converge need fewer."""
-
-CLOSENESS = 1e-13
-"""Largest gap and excess that ends the closing of loops [L or rad]."""
-
-MOST_CLOSING = 100
-"""Most steps that close loops: most closings need a dozen."""
 
 
 @routine
@@ -100,9 +79,7 @@ def close_legs(
 ) -> None:
     """Close the legs of a start, within limits or without, below a platform held at a pose; or measure them."""
     closing, machine = scratch.closing, tables.machine[0]
-    problem = ClosureProblem(
-        held, frame, scratch.no_centres, limits, machine["inside"], 1 - limits, 0, 0, CLOSENESS, most
-    )
+    problem = ClosureProblem(held, frame, scratch.no_centres, limits, machine["inside"], 1 - limits, 0, 0, CLOSED, most)
     for j in range(tables.moves.shape[0]):
         to.coordinates[0, j] = start.coordinates[0, j] * (tables.moves[j] if most > 0 else 1.0)
     copy_table(pose, to.poses[0])
@@ -302,9 +279,9 @@ def put_better_legs(tables: JointTables, scratch: JointScratch, trial: Closed, b
     for group in range(agreements.shape[0]):
         off = max(trial.gaps[0, group], trial.excesses[0, group])
         least = max(best.gaps[0, group], best.excesses[0, group])
-        if off < (1.0 - SAME) * least:
+        if off < (1.0 - SAME_GAP) * least:
             agreements[group] = 1.0
-        elif off <= (1.0 + SAME) * least and off < math.inf:
+        elif off <= (1.0 + SAME_GAP) * least and off < math.inf:
             agreements[group] += 1.0
         if min(off, least) <= limit:
             agreements[group] = 0.0
@@ -335,7 +312,7 @@ def search_from_random(
         agreed = 0.0
         for group in range(scratch.agreements.shape[0]):
             agreed = max(agreed, scratch.agreements[group])
-        if is_feasible(tables, best) or agreed >= AGREEMENTS:
+        if is_feasible(tables, best) or agreed >= BRANCH_AGREEMENTS:
             break
         start_at(tables, tables.random[k], best, start)
         for j in range(group_of.shape[0]):
@@ -384,7 +361,7 @@ def reach(tables: JointTables, scratch: JointScratch, question: Record) -> bool:
     if is_step or is_beyond:
         return is_completed and is_feasible(tables, best)
     position, rotation = errors(task, begin.poses[0], pose, scratch.turn)
-    is_long = question["keeps_mode"] == 1 and math.hypot(position, rotation) > LONGEST_STEP
+    is_long = question["keeps_mode"] == 1 and math.hypot(position, rotation) > LONGEST_IN_MODE
     if is_long or not is_feasible(tables, best):
         continue_to(tables, scratch, pose, is_fixed, 1, scratch.trial)
         put_better(tables, scratch.trial, best)

@@ -11,15 +11,11 @@ import math
 from ...arrays import Floats
 from .._jit import routine, search
 from ..clearance.link_limits import pair_excess
+from ..constants import CLOSED, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import limit_multipliers
 from ..quaternions import turn_ball
 from ..sqp import (
-    CLOSED,
-    LONGEST_STEP,
-    NEARLY_CLOSED,
-    PROBE,
-    RESTORING,
     allowed_violation,
     begin_descent,
     is_closed,

@@ -72,9 +72,6 @@ class ClosureProblem(NamedTuple):
 
 LOCKED = 1e12
 
-SIGHT = 1e6
-"""Largest distance of a target from home [L]: farther ones in the same direction have the same nearest pose."""
-
 
 class Closed(NamedTuple):
     """Starts and results of closing loops, row by row."""

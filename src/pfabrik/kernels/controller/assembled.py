@@ -9,10 +9,9 @@ from ...arrays import Floats, Ints
 from .._jit import routine
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose
 from ..legs.records import Table
+from ..platform.constants import ASSEMBLED, NEARLY_ASSEMBLED
 from ..platform.equations import evaluate_legs
 from ..platform.forward import (
-    ASSEMBLED,
-    NEARLY_ASSEMBLED,
     NewtonScratch,
     assemble_from_others,
     assemble_from_own,

@@ -6,17 +6,10 @@ from typing import NamedTuple
 
 from ...arrays import Floats
 from .._jit import routine
-from ..legs.answer import (
-    KEPT,
-    NEARLY_CLOSED,
-    Completion,
-    complete_pose,
-    deviation,
-    place_legs,
-    put_rows,
-)
+from ..constants import NEARLY_CLOSED
+from ..legs.answer import Completion, complete_pose, deviation, place_legs, put_rows
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose, read_target, tilt_to, turn_pose
-from ..legs.endings import LEAST_MARGIN
+from ..legs.constants import KEPT, LEAST_MARGIN
 from ..legs.frames import set_frames
 from ..legs.records import Table
 from ..platform.equations import has_proximal, length_row

@@ -9,30 +9,19 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import allocator, flattened, routine
+from ..constants import CLOSED, NEARLY_CLOSED, NEWTON_STEP
 from ..linear import solve_spd
 from ..quaternions import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..vectors import copy_row, cross, dot, move, norm, put, scale, vec, where, wrap_into
 from .complete_poses import read_target, set_yaw, turn_pose
-from .endings import LEAST_MARGIN
+from .constants import DAMPING, KEPT, LEAST_MARGIN, MOST_STEPS, MOST_STEPS_IMPLICIT
 from .frames import new_frames, orienting_coordinate, q_redundant_of, redundant_slope, set_frames
 from .kinds import leg_rows, leg_slopes, place_leg
 from .open_table import open_table
 from .pivots import any_across
 from .records import N_VALUES, SHARED, Table
 from .rods import solve_proximal
-
-# Largest constraint of a completed pose, and of one that the task sets whole [L or rad]: solutions close to 1e-9, and
-# the closure residual of a loop may be a few times its constraint.
-CLOSED, NEARLY_CLOSED = 1e-13, 1e-10
-# Newton steps that complete a pose: one to five are usual; implicit joints need more near their singularities.
-MOST_STEPS, MOST_STEPS_IMPLICIT = 8, 16
-# Added to the diagonal of the normal equations, as a share of the largest entry: undetermined unknowns then stay put.
-DAMPING = 1e-12
-# Longest step [L or rad] for which the linearisation is trusted.
-LONGEST_STEP = 0.5
-# Excess up to which a limit counts as kept [L or rad].
-KEPT = 1e-9
 
 
 class Completion(NamedTuple):
@@ -190,7 +179,7 @@ def newton_step(table: Table, scratch: Completion) -> float:
     step = max(norm(vec(twist[:3])), norm(vec(twist[3:])))
     for i in range(unset, n):
         step = max(step, abs(normal[i, n]))
-    share = min(1.0, LONGEST_STEP / step)
+    share = min(1.0, NEWTON_STEP / step)
     for i in range(3):
         pose[i, 3] += share * twist[i]
     yaw = yaw_of(pose) if task["rotations"] == 1 else 0.0

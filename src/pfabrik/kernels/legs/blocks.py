@@ -8,9 +8,9 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
+from ..constants import CLOSED, NEARLY_CLOSED
 from ..rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL
 from ..vectors import ON_BOUND, Vec, add, along, copy_row, cross, dot, scale, sub, vec, wrap
-from .answer import CLOSED, KEPT, NEARLY_CLOSED
 from .columns import (
     AX,
     AY,
@@ -45,8 +45,7 @@ from .columns import (
     project_on_base_direction,
     project_on_platform_direction,
 )
-from .complete_poses import ROUNDED
-from .endings import LEAST_MARGIN
+from .constants import KEPT, LEAST_MARGIN, ROUNDED
 from .open_table import open_table
 from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
 

@@ -7,7 +7,8 @@ import math
 from ...arrays import Floats, Record
 from .._jit import inlined, routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
-from .complete_poses import NOT_A_ROTATION, ROUNDED, orthonormalise
+from .complete_poses import orthonormalise
+from .constants import NOT_A_ROTATION, ROUNDED
 from .records import CRANK
 
 # Few enough for the first-level cache, many enough to amortise what is read once a block.

@@ -8,10 +8,8 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..quaternions import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec
-from .endings import LEAST_MARGIN, turned
-
-# Largest deviation from an orthonormal matrix that a target may have, and the smallest that is corrected.
-NOT_A_ROTATION, ROUNDED = 1e-6, 1e-14
+from .constants import LEAST_MARGIN, NOT_A_ROTATION, ROUNDED
+from .endings import turned
 
 
 @routine

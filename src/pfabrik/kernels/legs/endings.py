@@ -12,9 +12,6 @@ from ...arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, along, angle_between, cross, dot, scale, where
 
-# Sine of the angle to a dead point, or to aligned hinges, below which a solution loses half of its digits.
-LEAST_MARGIN = 1e-6
-
 
 @routine
 def turned(v: Vec, axis: Vec, cosine: float, sine: float) -> Vec:

@@ -8,17 +8,15 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
+from ..constants import NEARLY_CLOSED
 from ..quaternions import difference, turn_about_z, yaw_difference
 from ..vectors import angle_between, copy_row, scale, vec
-from .answer import KEPT, NEARLY_CLOSED, complete_pose, deviation, new_completion, put_rows
+from .answer import complete_pose, deviation, new_completion, put_rows
 from .complete_poses import put_pose, read_target, tilt_to, turn_pose
+from .constants import KEPT, MORE_PARTS, PARTS
 from .endings import pointing_error
 from .open_table import open_table
 from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, SLIDE
-
-PARTS, MORE_PARTS = 4, 16
-"""Steps of the continuation from the start to a target, tried where a pose completed in one step is not feasible. The
-larger number is tried where the smaller did not close, and with implicit joints, which turn fast near singularities."""
 
 
 @routine

@@ -14,6 +14,30 @@ from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..quaternions import difference
 from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
+from .constants import (
+    CAME_BACK,
+    CHEAP,
+    CLOSING,
+    FARTHEST,
+    HASTY,
+    INSIDE,
+    LONGEST,
+    LONGEST_OF_ALL,
+    LOST,
+    LOST_ROUNDS,
+    MARGINS,
+    OPEN,
+    PASSES,
+    PATIENT,
+    PULL,
+    PULLED,
+    SETTLED,
+    SHRINK,
+    TAKEN_OFF,
+    VARIED,
+    WEAKER,
+    WINDOW,
+)
 from .fit import revise_target
 from .half_spaces import (
     PLATFORM,
@@ -27,32 +51,6 @@ from .half_spaces import (
 from .meet import reach_end
 from .moving_frames import load_seed, move_carriers
 from .plan import TRANSLATES, TURNS, Configuration, Plan, Seeds, Settings
-
-# Passes of a trunk from one start; how many in a row may fail to leave this share of the excess, first and, where no
-# start succeeds, again.
-PASSES, HASTY, PATIENT, TAKEN_OFF = 16, 2, 5, 0.7
-# Trunks aim this far inside limits [L], tour by tour, less by this factor from pass to pass, so that passes end; the
-# last tours find what is too small to have an inside.
-MARGINS, SHRINK = (0.04, 0.04, 0.0, 0.0), 0.6
-# A trunk has come back where the next step is a smaller share of its distance from its start.
-CAME_BACK = 1e-3
-# Longest steps for which half-spaces are trusted: of a trunk towards a target, of a target with all trunks [rad or L].
-LONGEST, LONGEST_OF_ALL = 0.8, 0.4
-# Other starts of a trunk, tour by tour: this share of each joint's range from either end; where a range is open, so far
-# from home [rad or L]. Of more than so many joints the last rest.
-INSIDE, OPEN, VARIED = (0.15, 0.15, 0.15, 0.35), 0.5, 3
-# Targets are pulled back by this share of their distance, or by so much [L]; less where steps turn back.
-PULL, FARTHEST, WEAKER = 0.5, 0.3, 0.5
-# Steps of trunks cost less than the target's by the square of this.
-CHEAP = 5.0
-# Limits that are kept by less than this [L] count for the target's step; it settles below this share of its distance.
-WINDOW, SETTLED = 0.5, 1e-3
-# A descent is lost where its excess stays above this [L] and does not fall to this share in so many rounds.
-LOST, LOST_ROUNDS = 1e-3, 10
-# Rounds after which a target that does not settle is pulled no more.
-PULLED = 120
-# Rounds that close what a settled target leaves open; then chains' ends agree on their centroid.
-CLOSING = 12
 
 
 @routine

@@ -6,14 +6,9 @@ from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..linear import solve_spd
 from ..vectors import Vec, add, along, cross, dot, move, norm, scale, sub, turn, vec
+from .constants import FIT_DAMPING, FIT_STEPS, LARGEST_TURN, TURN_DAMPING
 from .moving_frames import move_carriers
 from .plan import TRANSLATES, TURNS, Configuration, Plan, Settings
-
-# Two Gauss-Newton steps fit a trunk well enough for one pass; damped where a joint moves no branch joint.
-FIT_STEPS, FIT_DAMPING = 2, 1e-12
-# A platform turns by one such step a round: at most so far [rad], and damped for points on a line, whose turn about it
-# is free.
-LARGEST_TURN, TURN_DAMPING = 0.5, 1e-9
 
 
 @routine

@@ -20,17 +20,11 @@ from ...arrays import Floats, Records
 from .._jit import allocator, routine
 from ..qp import QP, new_qp, solve_with_equations
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
+from .constants import NO_LENGTH, NO_RATE, NO_SIDE, PROBE, STIFF
 from .meet import base_of, is_two_part, reach_end
 from .plan import CARRIER_CONE, PLATFORM_CONE, TRANSLATES, TURNS, Configuration, Plan, Settings
-from .restrict import NO_LENGTH, NO_SIDE, any_normal, hinge_angle
+from .restrict import any_normal, hinge_angle
 
-# What it costs to miss half-spaces by a length beside the same step: those that contradict each other are missed alike,
-# those that do not by a millionth of the step.
-STIFF = 1e3
-# A branch of several parts that reaches is probed by this share of the window beyond its target.
-PROBE = 0.2
-# A half-space that no motion answers: its rates are below this.
-NO_RATE = 1e-6
 # Unknowns of the platform: its translation, and its turn times L.
 PLATFORM = 6
 

@@ -7,13 +7,10 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec
+from .constants import BRACKETS, GOLDEN, NO_LENGTH, SECTIONS
 from .passes import reach_backward, reach_forward
 from .plan import Configuration, Plan, Settings
-from .restrict import NO_LENGTH, clamp_stroke
-
-# The nearest end of two parts is bracketed by so many steps over the range of the inner one, then by golden sections,
-# each of which leaves this share of the bracket: to a billionth of the range, for the least may be at a kink.
-BRACKETS, SECTIONS, GOLDEN = 12, 40, 0.6180339887498949
+from .restrict import clamp_stroke
 
 
 @routine

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from .._jit import routine
 from ..vectors import along, dot, move, norm, put, sub, turn, vec
+from .constants import CONTENT, NO_LENGTH, OBLIQUE
 from .fit import fit_trunk
 from .moving_frames import move_carriers
 from .plan import Configuration, Plan, Settings
-from .restrict import NO_LENGTH, clamp_stroke, restrict_step, restrict_step_inward
-
-# A branch whose wish for its first node is nearer than this to where the node is, is content: rounding [L].
-CONTENT = 1e-12
-# A rail that leaves the plane of its branch by more than this sine moves the plane along.
-OBLIQUE = 1e-6
+from .restrict import clamp_stroke, restrict_step, restrict_step_inward
 
 
 @routine

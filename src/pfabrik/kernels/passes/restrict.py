@@ -23,20 +23,8 @@ from ..vectors import (
     wrap,
     wrap_into,
 )
+from .constants import LEAST_SHARE, NO_LENGTH, NO_SIDE, SWEEPS, UNMOVED, WELL_INSIDE
 from .plan import CARRIER_CONE, PLATFORM_CONE, Plan
-
-# Below this a vector has no direction; far under any length of a machine, far over the smallest normal number.
-NO_LENGTH = 1e-150
-# A vector within this angle of a cone's axis, or of its opposite, has no direction across it but rounding.
-NO_SIDE = 1e-12
-# By so much more than a cone's cosine, a vector is inside whatever its angle is rounded to.
-WELL_INSIDE = 1e-9
-# A clamp to a cone keeps at least this share of the length, so that the direction survives.
-LEAST_SHARE = 1e-3
-# Several restrictions on one step are met in turn; so many sweeps settle all but pathological cones.
-SWEEPS = 3
-# Sweeps over the restrictions end when one turns the step by no more than rounding, as a share of its length.
-UNMOVED = 1e-15
 
 
 @routine

@@ -26,6 +26,7 @@ from ..rows import (
 )
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode
+from .constants import NEARLY
 from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
 from .redundant_sets import search_sets, step_trunks
 from .search_records import PlatformObjective, PoseSolutions, Starts
@@ -39,9 +40,6 @@ from .tables import (
     Start,
     Tables,
 )
-
-NEARLY = 1e-4
-"""Distance below which a projection is close enough to its target to try to reach it exactly [L]."""
 
 FARTHEST_TURN = 1e9
 """Largest angle that is counted in turns [rad]: the number of turns is then a number of 32 bits, too."""

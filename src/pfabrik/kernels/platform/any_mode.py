@@ -5,7 +5,6 @@ from __future__ import annotations
 from ...arrays import Floats, Ints
 from .._jit import routine
 from ..legs.answer import (
-    KEPT,
     Completion,
     complete_pose,
     cone_cosine,
@@ -16,19 +15,14 @@ from ..legs.answer import (
     write_answer,
 )
 from ..legs.complete_poses import read_target
-from ..legs.endings import LEAST_MARGIN
+from ..legs.constants import KEPT, LEAST_MARGIN
 from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
 from ..legs.records import Table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
+from .constants import HALF_DIGITS, MOST_CHOICES
 from .equations import owner_of
-
-NEARLY = 1e-6
-"""Tolerance of closure and limits for legs at dead points, where closed forms lose half of their digits [rad or L]."""
-
-MOST_CHOICES = 8
-"""Most legs with two sides of which all combinations are tried, if the legs complete the pose together."""
 
 
 @routine
@@ -54,13 +48,13 @@ def note_misfits(table: Table, values: Floats, rows: Floats, misfits: Floats) ->
 
 @routine
 def is_singular(table: Table, sides: Floats, scratch: Completion) -> bool:
-    """True if legs on these sides reach a pose to within `NEARLY`, one of them at a dead point."""
+    """True if legs on these sides reach a pose to within `HALF_DIGITS`, one of them at a dead point."""
     set_frames(scratch.pose, table.task[0], scratch.frames)
     singularity_margin, _ = place_legs(table.legs, scratch.frames, sides, scratch.values, scratch.lines)
-    if singularity_margin > LEAST_MARGIN * LEAST_MARGIN or singularity_margin < -NEARLY * NEARLY:
+    if singularity_margin > LEAST_MARGIN * LEAST_MARGIN or singularity_margin < -HALF_DIGITS * HALF_DIGITS:
         return False
     residual = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
-    return bool(residual <= NEARLY and excess_of(table.limited, table.cones, scratch.values) <= NEARLY)
+    return bool(residual <= HALF_DIGITS and excess_of(table.limited, table.cones, scratch.values) <= HALF_DIGITS)
 
 
 @routine

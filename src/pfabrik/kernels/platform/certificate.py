@@ -49,6 +49,7 @@ from ..legs.records import (
 from ..projecting import is_over
 from ..sqp import note_multipliers, sum_of_multipliers
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
+from .constants import BALANCED, CONTRADICTING, FARTHEST, NEARER
 from .descend_pose import take_step
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
 from .lagrangian import put_limited_gradient
@@ -57,20 +58,8 @@ from .linearise import linearise
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 
-CONTRADICTING = 1e-6
-"""Least excess that proves a contradiction, in units of the sum of its multipliers [L or rad]."""
-
-FARTHEST = 1e2
-"""How far from a contradiction positions are thought to be [L]: as far as targets are sought."""
-
-NEARER = 1e-7
-"""Relative error of the squared distance up to which the end of a search counts as nearest."""
-
 Terms: TypeAlias = tuple[float, float, float, float, float, float, float, int, int]
 """V, A and B of a hinge; m, b, lean and twist of a slide; the hinge, and the slide, -1 for none."""
-
-BALANCED = 1e-7
-"""Largest imbalance of the multipliers, as a share of the distance, and largest slack of an active limit [rad or L]."""
 
 
 @routine

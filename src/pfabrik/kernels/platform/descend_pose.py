@@ -10,16 +10,11 @@ import math
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
+from ..constants import CLOSED, CORRECTIONS, LARGE_DAMPING, LONGEST_STEP, NEARLY_CLOSED, RESTORING
 from ..free_motions import FreeMotions, put_step, restoring_step
 from ..legs.records import Table
 from ..projecting import is_over
 from ..sqp import (
-    CLOSED,
-    CORRECTIONS,
-    LARGE_DAMPING,
-    LONGEST_STEP,
-    NEARLY_CLOSED,
-    RESTORING,
     allowed_violation,
     begin_descent,
     is_closed,
@@ -33,35 +28,24 @@ from ..sqp import (
     violation,
 )
 from ..vectors import wrap
+from .constants import (
+    ARRIVED,
+    HOPELESS,
+    MISSES,
+    NEAR,
+    NEAR_INCUMBENT,
+    NEARBY,
+    PLATFORM_SCALE,
+    PROXIMAL_SCALE,
+    SHORT,
+    STEPS_AWAY,
+    STUCK,
+)
 from .equations import PlatformState, close_rods
 from .lagrangian import lagrangian_hessian
 from .linearise import linearise
-from .search import NEAR, NEARBY, STEPS_AWAY, SearchScratch, copy_platform_state, move, set_platform_users
+from .search import SearchScratch, copy_platform_state, move, set_platform_users
 from .search_records import PlatformObjective
-
-HOPELESS = 8.0
-"""A search is given up if its distance to the incumbent's objective exceeds the last predicted reduction by this
-factor, unless damping kept the step short."""
-
-ARRIVED = 1e-12
-"""Distance from the target that counts as none [L]."""
-
-PROXIMAL_SCALE, PLATFORM_SCALE = 0.6, 0.5
-"""Weights in the length of a step: of proximal coordinates, which `close_rods` corrects afterwards; and of the platform
-if it has the only unknowns, for squared rod lengths are then quadratic in its position."""
-
-STUCK = 0.2
-"""Largest share of a gap that a restoration step leaves: at a double root Newton's method leaves a quarter."""
-
-SHORT = 1e-6
-"""Predicted reduction, as a share of the objective, after which the Hessian is reused: it changed by a thousandth."""
-
-NEAR_INCUMBENT = 0.01
-"""Distance from the incumbent below which a search is taken to end there [rad or L]."""
-
-MISSES = 4
-"""Rejected infeasible steps after which equations are solved for the platform too: near a dead point, a proximal joint
-depends so steeply on the platform that the linearisation holds for a small part of the remaining way only."""
 
 
 @routine

@@ -48,9 +48,7 @@ from ..legs.rods import (
     twist_rate,
 )
 from ..vectors import Vec, along, cross, dot, move, norm, scale, sub, turn, vec, wrap
-
-# Least singularity margin for which a joint is moved to its closed-form solution.
-FAR_FROM_DEAD_POINT = 1e-2
+from .constants import FAR_FROM_DEAD_POINT
 
 
 class PlatformState(NamedTuple):

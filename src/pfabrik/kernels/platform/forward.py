@@ -14,8 +14,10 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record
 from .._jit import kernel, opener, routine
-from ..legs.answer import KEPT, deviation, excess_of, largest_entry
+from ..constants import CONTRACTION, NEWTON_STEP, SHORTEST_SHARE
+from ..legs.answer import deviation, excess_of, largest_entry
 from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
+from ..legs.constants import KEPT
 from ..legs.endings import turned
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, Table
@@ -24,6 +26,7 @@ from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, scale, sub, turn, vec, wrap
 from ..vectors import move as moved
+from .constants import ASSEMBLED, FARTHEST_VALUE, FORWARD_STEPS, NEARLY_ASSEMBLED, ON_THE_WAY
 from .equations import (
     LegEvaluation,
     PlatformState,
@@ -38,30 +41,6 @@ from .search import copy_platform_state, move
 from .search_records import Starts
 from .spheres import Spheres, new_spheres, put_spheres, set_spheres
 from .starts import place_proximal, put_sides
-
-ASSEMBLED, NEARLY_ASSEMBLED = 1e-13, 1e-11
-"""Largest residual of an assembled configuration, and of one that no step improves [L or rad]: with more actuators than
-freedoms, or redundant constraints, equations agree only as exactly as the description."""
-
-STEPS = 24
-"""Most Newton steps."""
-
-ON_THE_WAY = 1e-5
-"""Largest residual of a configuration that a continuation goes on from [L or rad]."""
-
-CONTRACTION = 0.5
-"""Newton's method stays in the assembly mode of its start if each step is at most this share of the one before: its
-start is then in the ball around the solution in which there is no other (Newton and Kantorovich)."""
-
-SHORTEST_SHARE = 1.0 / 1024.0
-"""Shortest step of a continuation, as a share of the way. Where even that does not contract, a parallel singularity
-ends the assembly mode."""
-
-SIGHT = 1e3
-"""Largest deviation from home that is solved for [L or rad]: beyond, nearby values differ by less than rounding."""
-
-FAR_STEP = 0.5
-"""Longest step of Newton's method [L or rad]."""
 
 
 class NewtonScratch(NamedTuple):
@@ -277,7 +256,7 @@ def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) 
     place_drivers(table, scratch)
     if has_spheres(scratch):
         set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
-    for iteration in range(STEPS):
+    for iteration in range(FORWARD_STEPS):
         worst = put_residuals(table, scratch)
         if not worst < math.inf or worst <= assembled or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * previous):
             return worst
@@ -307,7 +286,7 @@ def take_step(table: Table, scratch: NewtonScratch) -> bool:
     """
     pose, step, middle = scratch.state.pose, scratch.step, middle_of(scratch.state.pose, table.task[0])
     put(step, add(vec(step), cross(vec(step[3:]), middle)))
-    share = min(1.0, FAR_STEP / max(longest(step, step.shape[0]), FAR_STEP))
+    share = min(1.0, NEWTON_STEP / max(longest(step, step.shape[0]), NEWTON_STEP))
     move(table, step, share, scratch.state)
     shift = sub(middle, middle_of(pose, table.task[0]))
     for i in range(3):
@@ -391,7 +370,7 @@ def put_deviations(table: Table, values: Floats, deviations: Floats) -> None:
         deviation = (values[driven["column"]] - driven["home"]) / driven["unit"]
         if driven["turns"] == 1 and driven["hi"] - driven["lo"] == math.inf:
             deviation -= 2.0 * math.pi * math.floor(deviation / (2.0 * math.pi))
-        deviations[driven["column"]] = min(max(deviation, -SIGHT), SIGHT)
+        deviations[driven["column"]] = min(max(deviation, -FARTHEST_VALUE), FARTHEST_VALUE)
 
 
 @routine

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import inlined, kernel, routine
+from ..constants import CONTRACTION, NEWTON_STEP
 from ..legs.blocks import answer_blocks
 from ..legs.columns import PX, PY, PZ, XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ
 from ..legs.open_table import open_table
@@ -20,15 +21,13 @@ from ..legs.records import COSINE, N_VALUES, Q_PROXIMAL, SINE, Table
 from ..legs.rods import base_end_of
 from ..rows import PENDING, REACHED, RESIDUAL
 from ..vectors import Vec, add, along, copy_row, cross, dot, move, scale, sub, vec
+from .constants import ASSEMBLED, BLOCK_STEPS, NEARLY_ASSEMBLED
 from .equations import owner_of
-from .forward import ASSEMBLED, CONTRACTION, FAR_STEP, NEARLY_ASSEMBLED, open_starts, put_deviations
+from .forward import open_starts, put_deviations
 from .search_records import Starts
 
 COLUMNS = 32
 """Rows of a block: what is in work fits the first-level cache."""
-
-MOST_STEPS = 10
-"""Most Newton steps; three to six are usual."""
 
 # Rows of the table, after those of a pose, whose position is that of the joints' centre: a step; the largest residual,
 # that before, and the longest step that contracts; its state. Then those of each rod: its line, its moment
@@ -177,8 +176,8 @@ def take_steps(centre: Vec, n: int, S: Floats) -> None:
         v, w, worst, state = three(VX, i, S), three(WX, i, S), S[WORST, i], S[STATE, i]
         size = math.sqrt(dot(v, v) + dot(w, w))
         v = add(v, cross(w, combined(centre, (a, b, c))))
-        is_short = (abs(v[0]) <= FAR_STEP) & (abs(v[1]) <= FAR_STEP) & (abs(v[2]) <= FAR_STEP)
-        is_short = is_short & (abs(w[0]) <= FAR_STEP) & (abs(w[1]) <= FAR_STEP) & (abs(w[2]) <= FAR_STEP)
+        is_short = (abs(v[0]) <= NEWTON_STEP) & (abs(v[1]) <= NEWTON_STEP) & (abs(v[2]) <= NEWTON_STEP)
+        is_short = is_short & (abs(w[0]) <= NEWTON_STEP) & (abs(w[1]) <= NEWTON_STEP) & (abs(w[2]) <= NEWTON_STEP)
         moves = (state == GOING) & is_short & ((size <= S[LONGEST, i]) | (worst <= NEARLY_ASSEMBLED))
         S[STATE, i] = state if moves | (state == DONE) else FAILED
         S[PREVIOUS, i], S[LONGEST, i], S[WORST, i] = worst, CONTRACTION * size, (0.0 if moves else worst)
@@ -221,7 +220,7 @@ def assemble_in_blocks(
         for row in range(first, first + n):
             put_deviations(table, values[row], deviations[row])
         fill_block(table, places, deviations[first : first + n], starts, first, S, leg_values, Starts(poses, q, sides))
-        for _step in range(MOST_STEPS):
+        for _step in range(BLOCK_STEPS):
             for k in range(6):
                 rod = RODS + OF_ROD * places[k]
                 fill_rod(vec(table.legs[k]["platform_end_point"]), centre, n, S, S[rod : rod + OF_ROD])

@@ -10,14 +10,12 @@ from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
 from ..legs.records import Table
 from ..vectors import dot, vec
+from .constants import NEAR_LINKS
 from .equations import PlatformState, evaluate_legs, put_slopes
 from .leg_links import add_pair_slope, place_links
 from .limits import cone_slope, coordinate_slope, dead_point_slope
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
-
-NEAR_LINKS = 0.1
-"""Pairs of links that are farther than this beyond the clearance are left out of a programme [L]."""
 
 
 @routine

@@ -48,6 +48,7 @@ from ..rows import (
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global, is_held_nowhere
+from .constants import EASING, HOLDABLE
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .leg_links import place_links
@@ -55,13 +56,6 @@ from .linearise import linearise
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
 from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
-
-HOLDABLE = 1e-3
-"""Largest phase 1 distance from which a search with the held part held is started [L or rad]."""
-
-
-EASING = 4
-"""Most steps from the own start to where a proof is sought that nothing can be held."""
 
 
 class NearestScratch(NamedTuple):

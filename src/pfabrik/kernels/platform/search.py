@@ -20,13 +20,10 @@ from ..projecting import EFFORT, UNBOUNDED
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
+from .constants import NEAR
 from .equations import LegEvaluation, PlatformState, count_unknowns, new_leg_evaluation, new_platform_state
 from .limits import coordinate_slope, is_multiturn
 from .search_records import PlatformObjective
-
-NEAR, NEARBY, STEPS_AWAY = 0.3, 0.02, 3.0
-"""Limits farther away than the first are left out of a programme [rad or L]. As steps shrink, so does this distance: to
-the third number times the last step, but not below the second."""
 
 
 class SearchScratch(NamedTuple):

@@ -11,10 +11,6 @@ from ..clearance.link_records import LinkLimits
 from ..closure.loops import PoseObjective
 from ..rows import N_COUNTERS, PENDING
 
-STRETCHED = 1e-4
-"""Difference of the two solutions of a proximal joint below which it is at a dead point, and keeps its side [L or rad].
-"""
-
 
 class PlatformObjective(NamedTuple):
     """Objective of a search: the pose of the platform, or the values of actuators."""

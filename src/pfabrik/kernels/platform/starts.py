@@ -6,8 +6,9 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, SIGHT, TARGET_AXES, PoseObjective
+from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import pose_gradient
+from ..constants import SIGHT
 from ..legs.complete_poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.frames import ZERO, orienting_coordinate, q_redundant_of, set_frames
 from ..legs.kinds import place_frame
@@ -15,17 +16,10 @@ from ..legs.records import CRANK, Q_PROXIMAL, Table
 from ..legs.rods import solve_proximal
 from ..quaternions import yaw_of
 from ..vectors import Vec, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec, wrap
+from .constants import AROUND, BENT, STRETCHED
 from .equations import LegEvaluation, PlatformState, has_proximal, redundant_side
 from .search import SearchScratch
-from .search_records import STRETCHED, Along, Starts
-
-BENT = 1e-2
-"""Displacement of a proximal joint from its dead point where a search starts [L or rad]."""
-
-AROUND = 2.5
-"""Distance from home beyond which seeds are taken along to a target [L], if carriages can displace the whole machine.
-Seeds are about as far apart; if all lie on one side of a target, their searches may agree on a pose that is not the
-nearest."""
+from .search_records import Along, Starts
 
 
 @routine
