@@ -87,11 +87,12 @@ FEW = 12
 """Most joints of a chain that has few: with narrow limits these have the most local minima."""
 
 SHORT = {"tries": 40, "descents": 60, "bends": 20, "agreements": 10}
+"""Of chains of few joints: seeds from which a target is tried, and from which descents to the nearest start; starts of
+descents around the start, beside itself; and descents that must end at the least distance before the others are left
+out, one more for each that ended farther away before."""
 
 LONG = {"tries": 8, "descents": 15, "bends": 0, "agreements": 4}
-"""Of chains of few joints and of longer ones: seeds from which a target is tried, and from which descents to the
-nearest start; starts of descents around the start, beside itself; and descents that must end at the least distance
-before the others are left out, one more for each that ended farther away before."""
+"""The same of longer chains, whose steps cost more and whose limits leave them fewer local minima."""
 
 WAVES = 4
 """Waves along the chain that a smooth configuration is the sum of."""
