@@ -9,12 +9,14 @@ import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import InvalidArgument, UnknownName
 
 if TYPE_CHECKING:
     from .arrays import Floats
+
+Kind = TypeVar("Kind")
 
 
 def require_positive(name: str, value: Any) -> float:
@@ -42,11 +44,25 @@ def require_finite(name: str, value: Any) -> float:
     return float(value)
 
 
-def require_count(name: str, value: Any) -> int:
-    """An integer from 1 to a million; InvalidArgument for anything else."""
-    if isinstance(value, bool) or not (isinstance(value, Integral) and 1 <= int(value) <= 1_000_000):
-        raise InvalidArgument(name, reprlib.repr(value), "an integer from 1 to 1000000")
+def require_count(name: str, value: Any, least: int = 1, most: int = 1_000_000) -> int:
+    """An integer between two; InvalidArgument for anything else."""
+    if isinstance(value, bool) or not (isinstance(value, Integral) and least <= int(value) <= most):
+        raise InvalidArgument(name, reprlib.repr(value), f"a whole number, at least {least} and at most {most}")
     return int(value)
+
+
+def require_angle(name: str, value: Any) -> float:
+    """An angle from 0 to pi [rad]; InvalidArgument for anything else."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 <= float(value) <= math.pi:
+        raise InvalidArgument(name, reprlib.repr(value), "an angle from 0 to pi [rad]")
+    return float(value)
+
+
+def require_type(name: str, value: Any, kind: type[Kind], expected: str) -> Kind:
+    """What is of a type; InvalidArgument for anything else."""
+    if not isinstance(value, kind):
+        raise InvalidArgument(name, type(value).__name__, expected)
+    return value
 
 
 def require_path(name: str, value: Any) -> Path:

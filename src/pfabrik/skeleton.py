@@ -8,6 +8,7 @@ import numpy as np
 
 from .answers.solution import Solution
 from .arrays import Floats
+from .checks import require_type
 from .clearance.solid_meshes import SolidMesh, solids_of
 from .common_centre import arc, common_centre
 from .description.mechanism import Joint, Mechanism
@@ -112,14 +113,12 @@ def checked_shown(shown: object) -> tuple[Mechanism, Solution | None]:
     """The mechanism, and the answer if it is one."""
     if isinstance(shown, Mechanism):
         return shown, None
-    expected = "a Mechanism, or one Solution of it"
-    if not isinstance(shown, Solution):
-        raise InvalidArgument("shown", type(shown).__name__, expected)
-    if shown.shape != ():
-        raise InvalidArgument("shown", f"a batch of shape {shown.shape}", "one answer, such as solution[0]")
-    if not np.isfinite(shown.pose).all():
-        raise InvalidArgument("shown", "an answer that is INVALID", expected)
-    return shown.mechanism, shown
+    solution = require_type("shown", shown, Solution, "a Mechanism, or one Solution of it")
+    if solution.shape != ():
+        raise InvalidArgument("shown", f"a batch of shape {solution.shape}", "one answer, such as solution[0]")
+    if not np.isfinite(solution.pose).all():
+        raise InvalidArgument("shown", "an answer that is INVALID", "a Mechanism, or one Solution of it")
+    return solution.mechanism, solution
 
 
 LINES = ("bar", "arc", "barrel", "plate")

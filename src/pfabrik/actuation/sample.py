@@ -9,6 +9,7 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
+from ..checks import require_count
 from ..errors import InvalidArgument
 from ..interop.mjcf_qpos import mjcf_qpos
 from .named_values import box_of
@@ -43,8 +44,7 @@ def sample_feasible(placer: Placer, n: int, seed: int, box: Any) -> Sample:
     ------
     InvalidArgument : hardly any are.
     """
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise InvalidArgument("n", repr(n), "a number of configurations, at least 1")
+    require_count("n", n, most=100_000_000)
     low, high = box_of(placer.coordinates, box)
     random = np.random.default_rng(seed)
     kept = np.empty((0, len(low)))

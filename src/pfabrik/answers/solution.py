@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidArgument
+from ..checks import require_type
 from ..kernels.rows import REACHED
 from .answer_fields import Answer
 from .solution_html import answer_html
@@ -135,9 +135,7 @@ class Solution(Answer):
 
 def checked_solution(solution: Any) -> Solution:
     """The argument, if it is a Solution; raises InvalidArgument otherwise."""
-    if not isinstance(solution, Solution):
-        raise InvalidArgument("solution", type(solution).__name__, "a Solution, as `solve_ik` returns")
-    return solution
+    return require_type("solution", solution, Solution, "a Solution, as `solve_ik` returns")
 
 
 def _plain_status(status: Any) -> Any:

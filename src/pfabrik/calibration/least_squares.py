@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..answers.solution import Solution
 from ..arguments import array, is_not_negative
 from ..arrays import Floats
-from ..checks import require_positive
+from ..checks import require_mapping, require_positive, require_type
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..extras import require
@@ -61,8 +61,7 @@ def calibrate(
     MissingLibrary : SciPy is not installed.
     """
     checked_mechanism(mechanism)
-    if not isinstance(measurements, Measurements):
-        raise InvalidArgument("measurements", type(measurements).__name__, "Measurements")
+    require_type("measurements", measurements, Measurements, "Measurements")
     own = free if isinstance(free, Parameters) else parameters(mechanism, free, ties=ties)
     if own.mechanism != mechanism:
         raise InvalidArgument("free", "parameters of another machine", f"parameters of '{mechanism.name}'")
@@ -185,10 +184,7 @@ def _check_sigma(measurements: Measurements) -> None:
 
 
 def _priors(own: Parameters, priors: Any, measurements: Measurements) -> dict[str, tuple[float, float]]:
-    if priors is None:
-        return {}
-    if not isinstance(priors, Mapping):
-        raise InvalidArgument("priors", type(priors).__name__, "name -> standard deviation, or (value, deviation)")
+    priors = require_mapping("priors", priors, "name -> standard deviation, or (value, deviation)")
     if priors and not measurements.has_deviations:
         raise InvalidArgument("priors", "priors beside measurements without sigma", "sigma: how good each is")
     expected: dict[str, tuple[float, float]] = {}

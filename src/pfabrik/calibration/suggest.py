@@ -7,6 +7,7 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
+from ..checks import require_choice, require_count
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument
@@ -50,10 +51,8 @@ def suggested(
     known : what is known from the measurements so far.
     criterion, seed : as of `Calibration.suggest`.
     """
-    if not isinstance(n, int | np.integer) or not 0 < n <= CANDIDATES // 2:
-        raise InvalidArgument("n", repr(n), f"a whole number from 1 to {CANDIDATES // 2}")
-    if criterion not in CRITERIA:
-        raise InvalidArgument("criterion", repr(criterion), " or ".join(CRITERIA))
+    require_count("n", n, most=CANDIDATES // 2)
+    require_choice("criterion", criterion, CRITERIA)
     solution = _feasible(mechanism, seed)
     actuators = solution.actuators / parameters.factors_at(values)
     if len(actuators) < n:

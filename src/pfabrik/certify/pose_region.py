@@ -9,9 +9,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import array, as_floats
+from ..arguments import array
 from ..arrays import Floats, Mask
-from ..checks import require_positive
+from ..checks import require_angle, require_positive
 from ..errors import InvalidArgument
 from ..rotations import from_rotvec
 
@@ -146,9 +146,7 @@ def _region(ends: Floats, shape: Shape, rotation: Any, tilt: Any, yaw: Any) -> P
         raise InvalidArgument("tilt", f"{tilt!r}", "None with a rotation: orientations are either a box or a cone")
     turns, turning = np.zeros((2, 3)), "rotation vector"
     if tilt is not None or np.any(yaw):
-        turning, size = "tilt", 0.0 if tilt is None else as_floats("tilt", tilt, "an angle from 0 to pi [rad]")
-        if np.shape(size) != () or not 0.0 <= size <= math.pi:
-            raise InvalidArgument("tilt", f"{tilt!r}", "an angle from 0 to pi [rad]")
+        turning, size = "tilt", 0.0 if tilt is None else require_angle("tilt", tilt)
         turns[:, :2] = [[-size, -size], [size, size]]
         turns[:, 2] = _ends("yaw", yaw, ())
     elif rotation is not None:

@@ -11,7 +11,7 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
-from ..checks import require_finite, require_names
+from ..checks import require_count, require_finite, require_names, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument, UnsupportedMechanism
@@ -247,15 +247,11 @@ def _with_limits_of(mechanism: Mechanism, limits: Any) -> Mechanism:
 
 def _checked(tolerance: Any, budget: Any, uncertain: Any) -> tuple[float, int, float]:
     """The gap, the budget and the uncertainty, checked."""
-    gap = math.inf if tolerance is None else require_finite("tolerance", tolerance)
-    if not gap > 0.0:
-        raise InvalidArgument("tolerance", f"{tolerance!r}", "a positive number, or None")
-    if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or not 1 <= budget <= 10**8:
-        raise InvalidArgument("budget", f"{budget!r}", "a number of cells, from 1 to 100 million")
+    gap = math.inf if tolerance is None else require_positive("tolerance", tolerance)
     radius = require_finite("uncertain", uncertain)
     if radius < 0.0:
         raise InvalidArgument("uncertain", f"{uncertain!r}", "a length that is not negative")
-    return gap, int(budget), radius
+    return gap, require_count("budget", budget, most=10**8), radius
 
 
 def _steps(mechanism: Mechanism, track: Any) -> Floats:

@@ -16,6 +16,7 @@ from .leg_joints import LegJoint, leg_shapes, placed_joints
 from .legs import Leg
 from .rules import joint_faults
 from .structure import Structure
+from .whole_rules import head_faults
 
 Described = TypeVar("Described", bound=Structure)
 """A mechanism, or its structure, which is not checked."""
@@ -47,8 +48,8 @@ def expanded(
     placed, of_legs = placed_joints(legs, start, end, [each.joint.name for each in patterns])
     layout = Patterns((*patterns, *(Pattern(each.joint) for each in placed)), base, end_effector)
     single = [Copy(index, 0, each.joint) for index, each in enumerate(layout.patterns)]
+    faults = merged(faults, [*head_faults(Structure(joints=(), **head)), *of_legs])
     is_unclear = bool(of_legs) or any(map(_hides_joints, faults))
-    faults = merged(faults, of_legs)
     if not is_unclear and layout.copied_joints():
         misfits = list(_as_written(list(layout.faults()), layout, single, placed, ()))
         is_unclear, faults = bool(misfits), [*faults, *misfits]

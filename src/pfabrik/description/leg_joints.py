@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any
 
 from ..errors import Fault, near_miss
 from .body_shapes import Shape
@@ -41,7 +41,6 @@ OF_LEGS = (
     form("chain", chain_faults),
     wrong("name", lambda v, _: not isinstance(v, str), "a text"),
     wrong("connects?", lambda v, _: not is_pair_of_names(v), "the names of two bodies"),
-    wrong("by_letter", lambda v, _: not isinstance(v, Mapping), "what is said of joints, by their letters"),
 )
 
 
@@ -77,7 +76,11 @@ class LegMaker:
         """What is said of single joints, by letter, as far as it makes sense."""
         letters = [step.letter for step in self.steps]
         said: dict[str, Mapping[str, Any]] = {}
-        for letter, values in self.leg.by_letter.items() if isinstance(cast(Any, self.leg.by_letter), Mapping) else ():
+        by_letter: Any = self.leg.by_letter
+        if not isinstance(by_letter, Mapping):
+            self.faults.append(Fault(self.place, shown(by_letter), "what is said of joints, by their letters"))
+            return said
+        for letter, values in by_letter.items():
             where = f"{self.place}.{letter}"
             if self.steps and letter not in letters:
                 expected = f"one of {', '.join(letters)}, the joints of '{self.leg.chain}'"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from ..checks import require_mapping
+from ..checks import require_mapping, require_type
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
 from ..frozen import FrozenMapping
 from .body_shapes import Shape
@@ -295,9 +295,7 @@ class Mechanism(Structure):
 
 def checked_mechanism(mechanism: Any) -> Mechanism:
     """What was passed as a mechanism; InvalidArgument where it is none."""
-    if not isinstance(mechanism, Mechanism):
-        raise InvalidArgument("mechanism", type(mechanism).__name__, "a Mechanism, as `load` returns")
-    return mechanism
+    return require_type("mechanism", mechanism, Mechanism, "a Mechanism, as `load` returns")
 
 
 def told_apart(other: Mechanism, mechanism: Mechanism) -> str:

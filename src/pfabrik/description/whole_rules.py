@@ -27,7 +27,7 @@ from .form_faults import (
 from .graph import components, edges_of, leaves, next_joints, opposite
 from .joint_types import TASK_COORDINATES, TASK_TURNS, WHOLE_TASK
 from .joints import Cone, Joint
-from .rules import Rule, faults_by, kind_of, wrong
+from .rules import faults_by, kind_of, wrong
 from .structure import Structure
 
 SMALLEST_LENGTH = 1e-9
@@ -100,7 +100,6 @@ OF_POINTS = (
           "nothing: it is the centre of the joint '{0.end_effector}'"),
     wrong("reference_point", lambda v, m: v is None and m.end_effector_joint is None and _is_moved(m),
           "three numbers, the point of the end effector that targets place"),
-    Rule("reference_point?", lambda place, v, m: number_faults(place, v, 3) if m.end_effector_joint is None else ()),
 )  # fmt: skip
 """Of a mechanism: its reference point is that of a body, or a joint."""
 
@@ -130,6 +129,9 @@ def head_faults(mechanism: Structure) -> Iterator[Fault]:
     if mechanism.angle_unit not in ("deg", "rad"):
         yield Fault("units.angle", shown(mechanism.angle_unit), "'deg' or 'rad'")
     yield from _task_faults(mechanism.task, mechanism)
+    point: Any = mechanism.reference_point
+    if mechanism.end_effector_joint is None and point is not None:
+        yield from number_faults("reference_point", point, 3)
 
 
 def graph_faults(mechanism: Structure) -> Iterator[Fault]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Literal, TypeAlias, get_args
 
-from ..checks import require_names, require_path
+from ..checks import require_choice, require_names, require_path
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..motion.fitting_task import leaves_a_choice
@@ -21,7 +21,7 @@ from .wording import Precision
 
 Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest"]
 PARTS: tuple[Part, ...] = get_args(Part)
-NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
+_NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
 
 def export_c(
@@ -80,14 +80,12 @@ def c_source(
 ) -> str:
     """The text that `export_c` writes; `file` is the name in the command that compiles its self-test."""
     checked_mechanism(mechanism)
-    if not isinstance(precision, str) or precision not in get_args(Precision):
-        raise InvalidArgument("precision", repr(precision), "'double' or 'float'")
+    require_choice("precision", precision, get_args(Precision))
     if parts is not None and not set(PARTS) >= set(require_names("parts", parts)) > set():
         raise InvalidArgument("parts", repr(parts), f"some of {', '.join(map(repr, PARTS))}")
     if parts is not None and "nearest" in parts and not {"ik", "limits"} <= set(parts):
         raise InvalidArgument("parts", repr(parts), "'ik' and 'limits' too, for 'nearest' is made of them")
-    if not isinstance(name, str) or not NAME.fullmatch(name):
-        raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")
+    require_identifier(name)
     machine = Machine(mechanism)
     if parts is None:
         parts = [part for part in PARTS if part != "nearest" or not machine.why_no_nearest]
@@ -105,3 +103,9 @@ def c_source(
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     path = None if joints is None else fitting_path(mechanism, joints)
     return source(machine, name, precision, parts, path, quote(file))
+
+
+def require_identifier(name: object) -> None:
+    """InvalidArgument for what cannot begin the names of functions and files."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")

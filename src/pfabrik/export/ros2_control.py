@@ -10,10 +10,9 @@ from pathlib import Path
 
 from ..checks import require_path
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
 from ..motion.joint_path import JointPath
 from ..whole_files import whole_path
-from .export_c import NAME, c_source
+from .export_c import c_source, require_identifier
 from .machine_data import Machine
 from .named_joints import fitting_path
 from .wording import comment, literal
@@ -71,8 +70,7 @@ def prefix_of(folder: Path, name: str | None) -> str:
 def ros2_control_texts(mechanism: Mechanism, joints: str | Sequence[str], name: str) -> dict[str, str]:
     """The files of the package by their place in its folder."""
     checked_mechanism(mechanism)
-    if not isinstance(name, str) or not NAME.fullmatch(name):
-        raise InvalidArgument("name", repr(name), "lower-case letters, digits and underscores, a letter first")
+    require_identifier(name)
     Machine(mechanism)  # its legs have closed forms
     path = fitting_path(mechanism, joints)
     words, templates = _words(mechanism, path, name), resources.files(__package__).joinpath("ros2_package")

@@ -7,9 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
-from ..checks import require_names
+from ..checks import require_choice, require_names
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
 from ..whole_files import whole_path
 from .tensor_machine import TensorMachine
 from .tensor_steps import steps_of
@@ -57,8 +56,7 @@ def export_tensors(
 def tensor_source(mechanism: Mechanism, *, backend: Backend = "numpy", joints: str | Sequence[str] = TASK) -> str:
     """The text that `export_tensors` writes."""
     checked_mechanism(mechanism)
-    if not isinstance(backend, str) or backend not in BACKENDS:
-        raise InvalidArgument("backend", repr(backend), ", ".join(map(repr, BACKENDS)))
+    require_choice("backend", backend, BACKENDS)
     names = require_names("joints", [joints] if isinstance(joints, str) else joints)
     machine = TensorMachine(mechanism, None if tuple(names) == (TASK,) else names)
     return tensor_text(machine, backend, steps_of(machine))

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..description.body_shapes import Shape
-from ..description.coercion import numbers
 from ..description.copies import Pattern, read_copies
 from ..description.expanded import Described, expanded
-from ..description.form_faults import key_faults, name_faults, number_faults, shown
+from ..description.form_faults import key_faults, shown
 from ..description.joints import Cone, Joint, set_fields
 from ..description.leg_joints import count_joints
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, ChainJoint, Leg, read_chain
@@ -127,17 +126,10 @@ def _head_faults(table: Table) -> Iterator[Fault]:
     yield from key_faults("", table, HEAD_KEYS, lambda key: near_miss(key, HEAD_KEYS))
     if type(table.get("schema")) is not int or table["schema"] != 1:
         yield Fault("schema", shown(table.get("schema")), "1")
-    for key, default in (("name", None), ("base", "base"), ("end_effector", None)):
-        yield from name_faults(key, table.get(key, default))
-    if "reference_point" in table:
-        yield from number_faults("reference_point", numbers(table["reference_point"]), 3)
-    units = table.get("units", {})
-    if isinstance(units, dict):
-        yield from _unknown_keys("units", units, UNIT_KEYS)
-        if units.get("angle", "deg") not in ("deg", "rad"):
-            yield Fault("units.angle", shown(units["angle"]), "'deg' or 'rad'")
+    if isinstance(table.get("units", {}), dict):
+        yield from _unknown_keys("units", _units(table), UNIT_KEYS)
     else:
-        yield Fault("units", shown(units), f"a table: {', '.join(UNIT_KEYS)}")
+        yield Fault("units", shown(table["units"]), f"a table: {', '.join(UNIT_KEYS)}")
 
 
 def _unknown_keys(place: str, table: Table, known: Sequence[str]) -> Iterator[Fault]:
@@ -154,7 +146,7 @@ def _units(table: Table) -> Table:
     return table["units"] if isinstance(table.get("units"), dict) else {}
 
 
-def _tables(table: Table, kind: str, faults: list[Fault]) -> list[Any]:
+def _tables(table: Table, kind: str, faults: list[Fault]) -> list[Table]:
     """The [[joint]], [[leg]] or [[body]] tables of a file."""
     tables = table.get(kind, [])
     if not isinstance(tables, list):
@@ -163,14 +155,13 @@ def _tables(table: Table, kind: str, faults: list[Fault]) -> list[Any]:
     if len(tables) > MOST_JOINTS:
         noun = "joints" if kind == "joint" else f"[[{kind}]] tables"
         raise InvalidMechanism([*faults, Fault(kind, f"{len(tables)} {noun}", f"at most {MOST_JOINTS}")])
-    return tables
+    others = [(index, each) for index, each in enumerate(tables) if not isinstance(each, dict)]
+    faults += [Fault(f"{kind}[{index}]", shown(each), f"a [[{kind}]] table") for index, each in others]
+    return [each if isinstance(each, dict) else {} for each in tables]
 
 
-def _pattern(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Pattern:
+def _pattern(table: Table, place: str, angle_unit: str, faults: list[Fault]) -> Pattern:
     """The joint that a table describes, with its copies, as far as it can be read."""
-    if not isinstance(table, dict):
-        faults.append(Fault(place, shown(table), "a [[joint]] table"))
-        table = {}
     faults += _unknown_keys(place, table, (*_JOINT_FIELDS, "copies"))
     values: dict[str, Any] = {"name": None, "type": None, "connects": None}
     given = {key: table[key] for key in _JOINT_FIELDS if key in table}
@@ -192,21 +183,15 @@ def _cone(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Cone 
     return Cone(cast(Any, table.get("axis")), half_angle, cast(Any, table.get("fixed_to")))
 
 
-def _shape(table: Any, place: str, faults: list[Fault]) -> Shape:
+def _shape(table: Table, place: str, faults: list[Fault]) -> Shape:
     """The shape that a table describes, as far as it can be read."""
-    if not isinstance(table, dict):
-        faults.append(Fault(place, shown(table), "a [[body]] table"))
-        table = {}
     faults += _unknown_keys(place, table, SHAPE_KEYS)
     values = {key: table[key] for key in SHAPE_KEYS[2:] if key in table}
     return Shape(cast(Any, table.get("name")), table.get("shape", "capsule"), **values)
 
 
-def _leg(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
+def _leg(table: Table, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
     """The legs that a table describes, as far as it can be read."""
-    if not isinstance(table, dict):
-        faults.append(Fault(place, shown(table), "a [[leg]] table"))
-        return Leg("")
     letters = sorted(key for key in table if re.fullmatch("[A-Z]", key))
     steps = {step.letter: step for step in read_chain(table.get("chain"))}
     leg_fields = {key: value for key, value in table.items() if key not in letters}

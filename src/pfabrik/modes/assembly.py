@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Mask
+from ..checks import require_count
 from ..closure.close import Closing, close, platform_poses
 from ..closure.random_starts import random_starts
 from ..description.mechanism import Mechanism
@@ -17,7 +18,7 @@ from ..motion.closure import Closure
 from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES
 from .fingerprints import pose_marks
-from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes, as_count
+from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
     if shape != () or not np.isfinite(values).all():
         found = f"batch shape {shape}" if shape else "a value that is not finite"
         raise InvalidArgument("actuators", found, f"one set of {len(mechanism.actuator_names)} finite values")
-    most_starts = as_count("most_starts", most_starts, 1)
+    most_starts = require_count("most_starts", most_starts)
     search = _Search(model_of(mechanism).closure, values)
     while search.starts < most_starts and not search.is_done:
         search.add_starts(BATCH)

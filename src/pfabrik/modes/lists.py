@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from numbers import Integral
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +12,9 @@ from numpy.typing import NDArray
 from ..answers.aligned_text import plain
 from ..answers.solution import Solution
 from ..arrays import Floats
-from ..description.form_faults import shown
 from ..description.mechanism_html import card
 from ..description.readouts import Readout, readouts
-from ..errors import InvalidArgument, counted
+from ..errors import counted
 from ..tolerances import TOLERANCES
 
 BATCH = 512
@@ -37,13 +35,6 @@ SHOWN = 24
 ALONG = 1e-3
 """Step that tests whether a solution is one of a continuum [L or rad]: large enough to distinguish it from a double
 root, too small to reach another solution."""
-
-
-def as_count(name: str, value: Any, least: int) -> int:
-    """A whole number, checked."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
-        raise InvalidArgument(name, shown(value), f"a whole number, at least {least}")
-    return int(value)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
+from ..checks import require_count
 from ..closure.close import CLOSED, close
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
@@ -19,7 +20,7 @@ from ..model import model_of
 from ..poses import are_poses, made_exact, what_is_wrong
 from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed
-from .lists import BATCH, Modes, as_count
+from .lists import BATCH, Modes
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40
     InvalidArgument : a batch of targets, or a target that is no pose.
     """
     pose = _as_pose(mechanism, target)
-    most_starts, most = as_count("most_starts", most_starts, 1), as_count("most", most, 0)
+    most_starts, most = require_count("most_starts", most_starts), require_count("most", most, 0)
     search = BranchSearch(model_of(mechanism).closure, pose)
     while search.starts < most_starts and not search.is_done:
         search.add_starts(BATCH)

@@ -9,7 +9,7 @@ import numpy as np
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats
-from ..checks import put_limits, require_positive
+from ..checks import put_limits, require_positive, require_type
 from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
 from ..errors import InvalidArgument
@@ -55,8 +55,7 @@ def time_path(
         spline leaves a range, by the number of the step; one that does not move; no limit at all; more than ten million
         samples.
     """
-    if not isinstance(track, Track):
-        raise InvalidArgument("track", f"a {type(track).__name__}", "a Track: what pfabrik.track returns")
+    require_type("track", track, Track, "a Track, as `track` returns")
     mechanism = track.mechanism
     speeds = limits_of(mechanism, "speed", speed)
     accelerations = limits_of(mechanism, "acceleration", acceleration)

@@ -12,7 +12,7 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats, Mask
-from ..checks import require_method
+from ..checks import require_method, require_type
 from ..description.plane import plane_of
 from ..description.readouts import Readout, readouts
 from ..drawing import SMALL, new_figure
@@ -84,8 +84,7 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
 
 def checked_track(track: Track) -> NDArray[np.intp]:
     """The steps of a track that have a configuration."""
-    if not isinstance(track, Track):
-        raise InvalidArgument("track", type(track).__name__, "a Track, as `track` returns")
+    require_type("track", track, Track, "a Track, as `track` returns")
     known = np.flatnonzero(np.isfinite(track.pose).all(axis=(1, 2)))
     if not len(known):
         raise InvalidArgument("track", "no step that has a configuration", "at least one")

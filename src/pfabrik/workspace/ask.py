@@ -15,7 +15,7 @@ from ..arguments import any_values, array
 from ..arrays import Floats
 from ..certify.enclosure import Enclosure, enclose
 from ..certify.provable import require_no_clearance
-from ..checks import require_mapping, require_positive
+from ..checks import require_angle, require_mapping, require_positive
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..description.task import task_of
@@ -164,10 +164,9 @@ def _turns(space: Space, tilt: float | None) -> Floats:
     """Rotations (k, 3, 3) by all of which each pose must be within reach."""
     if tilt is None:
         return np.eye(3)[None]
-    if isinstance(tilt, bool) or not isinstance(tilt, int | float | np.number) or not 0.0 <= tilt <= math.pi:
-        raise InvalidArgument("tilt", repr(tilt), "an angle from 0 to pi [rad]")
+    angle = require_angle("tilt", tilt)
     _require_turning(space, "tilt", "tilt")
-    return tilts_up_to(float(tilt))
+    return tilts_up_to(angle)
 
 
 def _require_turning(space: Space, argument: str, kind: Literal["rotation", "tilt"] = "rotation") -> None:

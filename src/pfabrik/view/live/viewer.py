@@ -12,7 +12,7 @@ from typing import Any
 
 from ...answers.solution import Solution, checked_solution
 from ...arrays import Floats
-from ...checks import require_ending
+from ...checks import require_count, require_ending
 from ...description.mechanism import Mechanism
 from ...errors import InvalidArgument, PfabrikError
 from ...extras import require
@@ -55,8 +55,7 @@ def view(shown: Mechanism | Solution | str | os.PathLike[str], *, port: int = PO
     MissingLibrary : viser is not installed.
     """
     require("the viewer", "viser", "view")
-    if isinstance(port, bool) or not isinstance(port, int) or not 0 < port < 65536:
-        raise InvalidArgument("port", repr(port), "a number from 1 to 65535")
+    require_count("port", port, most=65535)
     return Viewer(shown, port, host)
 
 
