@@ -47,7 +47,7 @@ def require_finite(name: str, value: Any) -> float:
 def require_count(name: str, value: Any, least: int = 1, most: int = 1_000_000) -> int:
     """An integer between two; InvalidArgument for anything else."""
     if isinstance(value, bool) or not (isinstance(value, Integral) and least <= int(value) <= most):
-        raise InvalidArgument(name, reprlib.repr(value), f"a whole number, at least {least} and at most {most}")
+        raise InvalidArgument(name, reprlib.repr(value), f"a whole number from {least} to {most}")
     return int(value)
 
 

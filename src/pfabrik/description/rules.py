@@ -97,9 +97,10 @@ def is_pair(value: Any) -> bool:
     return isinstance(value, tuple) and len(value) == 2
 
 
-def directions_faults(place: str, axes: Any) -> Iterator[Fault]:
-    for index, axis in enumerate(axes):
-        yield from direction_faults(f"{place}[{index}]", axis)
+def each_of(place: str, values: Any, faults: Callable[..., Iterable[Fault]], *arguments: Any) -> Iterator[Fault]:
+    """The faults of each of several values."""
+    for index, value in enumerate(values):
+        yield from faults(f"{place}[{index}]", value, *arguments)
 
 
 def sine(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
@@ -153,7 +154,7 @@ OF_JOINTS = (
     form("at?", number_faults, 3),
     form("axis?", direction_faults),
     wrong("axes?", lambda v, j, k: not is_pair(v), "two directions of three numbers each"),
-    form("axes?", directions_faults),
+    form("axes?", each_of, direction_faults),
     wrong("axes?", lambda v, j, k: sine(*v) <= TOLERANCES.alignment and "two parallel axes",
           "axes of two different directions"),
     wrong("along?", lambda v, j, k: not is_pair_of_names(v), "the names of two joints"),

@@ -12,7 +12,7 @@ from ..tolerances import TOLERANCES
 from .body_shapes import SHAPE_FIELDS, SHAPE_KINDS, Shape
 from .form_faults import choice_faults, direction_faults, is_pair_of_names, number_faults, shown
 from .graph import joints_with_centre, sliding_along
-from .rules import Rule, directions_faults, faults_by, form, is_pair, wrong
+from .rules import Rule, each_of, faults_by, form, is_pair, wrong
 from .structure import Structure
 
 MOST_SHAPES = 300
@@ -41,11 +41,6 @@ def _field_rules(field: str) -> Iterator[Rule]:
     yield wrong(f"{field}?", lambda v, s, needed, known: field not in known, f"nothing: a {{0.kind}} has no {field}")
 
 
-def _ends_faults(place: str, ends: Any) -> Iterator[Fault]:
-    for index, end in enumerate(ends):
-        yield from number_faults(f"{place}[{index}]", end, 3)
-
-
 def _mesh_faults(place: str, shape: Shape) -> Iterator[Fault]:
     try:
         hull_of(str(shape.file))
@@ -64,10 +59,10 @@ OF_SHAPES = (
     wrong("file?", lambda v, *_: not isinstance(v, str) or not v or "\0" in v, _WORDS["file"]),
     wrong("between?", lambda v, *_: not is_pair_of_names(v) or v[0] == v[1], "the names of two joints"),
     wrong("ends?", lambda v, *_: not is_pair(v), "two points"),
-    form("ends?", _ends_faults),
+    form("ends?", each_of, number_faults, 3),
     wrong("ends?", lambda v, s, *_: s.between is not None and "both `between` and `ends`", "one of them"),
     wrong("axes?", lambda v, *_: not is_pair(v), "two directions"),
-    form("axes?", directions_faults),
+    form("axes?", each_of, direction_faults),
     wrong("axes?", lambda v, *_: abs(sum(a * b for a, b in zip(*v, strict=True))) > SQUARE,
           "two directions square to each other"),
 )  # fmt: skip

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from string import digits
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -42,34 +42,6 @@ MISSPELT = 0.8
 names of five letters which differ in one."""
 
 
-class _Names(NamedTuple):
-    """The names in a mechanism.
-
-    Attributes
-    ----------
-    joints : the joints that have a name, by it.
-    owners : of each coordinate of a joint with several the name of the joint, by that of the coordinate.
-    bodies : how many joints mention each.
-    """
-
-    joints: dict[str, Joint]
-    owners: dict[str, str]
-    bodies: Counter[str]
-
-    def type_of(self, name: str) -> str | None:
-        """The type of a joint, None where none has the name."""
-        return self.joints[name].type if name in self.joints else None
-
-
-def _names_of(mechanism: Structure) -> _Names:
-    joints = {joint.name: joint for joint in mechanism.joints if is_name(joint.name)}
-    kinds = {name: kind for name, joint in joints.items() if (kind := kind_of(joint)) is not None}
-    several = {name: len(kind.coordinates) for name, kind in kinds.items() if len(kind.coordinates) > 1}
-    owners = {f"{name}[{place}]": name for name, count in several.items() for place in range(count)}
-    pairs = [joint.connects for joint in mechanism.joints if is_pair_of_names(joint.connects)]
-    return _Names(joints, owners, Counter(body for pair in pairs for body in pair))
-
-
 def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
     """Faults of what targets set: at least one coordinate, none twice, and of the rotation all, the tilt or the yaw."""
     expected = f"some of {', '.join(TASK_COORDINATES)}"
@@ -89,36 +61,29 @@ def _task_faults(task: Any, mechanism: Structure) -> Iterator[Fault]:
         yield Fault("task", turns[0], "some of x, y, z: the end effector is a joint, of which only the position counts")
 
 
-def _is_moved(mechanism: Structure) -> bool:
-    """True if the end effector is a body other than the base."""
-    pairs = (joint.connects for joint in mechanism.joints if isinstance(joint.connects, tuple))
-    return mechanism.end_effector != mechanism.base and any(mechanism.end_effector in pair for pair in pairs)
-
-
 OF_POINTS = (
-    wrong("reference_point", lambda v, m: m.end_effector_joint is not None and v != m.end_effector_joint.at,
+    wrong("reference_point", lambda v, m, *_: m.end_effector_joint is not None and v != m.end_effector_joint.at,
           "nothing: it is the centre of the joint '{0.end_effector}'"),
-    wrong("reference_point", lambda v, m: v is None and m.end_effector_joint is None and _is_moved(m),
+    wrong("reference_point", lambda v, m, joints, bodies: v is None and m.end_effector_joint is None
+          and is_name(m.end_effector) and m.end_effector != m.base and m.end_effector in bodies,
           "three numbers, the point of the end effector that targets place"),
 )  # fmt: skip
-"""Of a mechanism: its reference point is that of a body, or a joint."""
+"""Of a mechanism, its joints by name, and how many of them mention each body."""
 
 OF_ENDS = (
-    wrong("base", lambda v, m, n: v not in n.bodies and f"'{v}', which no joint connects{near_miss(v, n.bodies)}",
-          "a body that a joint connects"),
-    wrong("end_effector", lambda v, m, n: v == m.base and f"'{v}', which is the base", "a body that moves, or a joint"),
-    wrong("end_effector",
-          lambda v, m, n: v in n.bodies and v in n.joints and f"'{v}', which names both a body and a joint",
-          "a name that only one has"),
-    wrong("end_effector",
-          lambda v, m, n: n.type_of(v) in ("prismatic", "cylindrical") and f"'{v}', a {n.type_of(v)} joint",
+    wrong("base", lambda v, m, joints, bodies: v not in bodies
+          and f"'{v}', which no joint connects{near_miss(v, bodies)}", "a body that a joint connects"),
+    wrong("end_effector", lambda v, m, *_: v == m.base and f"'{v}', which is the base",
+          "a body that moves, or a joint"),
+    wrong("end_effector", lambda v, m, joints, bodies: v in bodies and v in joints
+          and f"'{v}', which names both a body and a joint", "a name that only one has"),
+    wrong("end_effector", lambda v, m, joints, bodies: v in joints
+          and joints[v].type in ("prismatic", "cylindrical") and f"'{v}', a {joints[v].type} joint",
           "a joint whose centre is the same point of both its bodies"),
-    wrong("end_effector",
-          lambda v, m, n: v not in n.bodies and v not in n.joints and len(n.joints) == len(m.joints)
-          and f"'{v}', neither a body nor a joint{near_miss(v, [*n.bodies, *n.joints])}",
-          "a body or a joint"),
+    wrong("end_effector", lambda v, m, joints, bodies: v not in {*bodies, *joints} and len(joints) == len(m.joints)
+          and f"'{v}', neither a body nor a joint{near_miss(v, [*bodies, *joints])}", "a body or a joint"),
 )  # fmt: skip
-"""Of a mechanism whose joints connect bodies, and of its names."""
+"""Of the same, where joints connect bodies."""
 
 
 def head_faults(mechanism: Structure) -> Iterator[Fault]:
@@ -139,23 +104,28 @@ def graph_faults(mechanism: Structure) -> Iterator[Fault]:
 
     Where a name could not be read, whatever depends on it is left out: a fault is reported once, where it is.
     """
-    yield from faults_by(OF_POINTS, "", mechanism)
-    names = _names_of(mechanism)
+    joints = {joint.name: joint for joint in mechanism.joints if is_name(joint.name)}
+    pairs = [joint.connects for joint in mechanism.joints if is_pair_of_names(joint.connects)]
+    bodies = Counter(body for pair in pairs for body in pair)
+    yield from faults_by(OF_POINTS, "", mechanism, joints, bodies)
     has_names = all(is_name(joint.name) for joint in mechanism.joints)
-    has_bodies = all(is_pair_of_names(joint.connects) for joint in mechanism.joints)
-    yield from _duplicate_faults(mechanism, names)
+    has_bodies = len(pairs) == len(mechanism.joints)
+    yield from _duplicate_faults(mechanism, joints)
     if all(joint.actuated is False for joint in mechanism.joints):
         yield Fault("joint", "no actuated joint", "at least one joint with `actuated = true`, or `*` in a chain")
     for index, joint in enumerate(mechanism.joints if has_names else ()):
         if joint.type == "prismatic" and is_pair_of_names(joint.along) and len({*(joint.along or ())}) == 2:
-            yield from _along_faults(f"joint[{index}].along", joint, names.joints)
+            yield from _along_faults(f"joint[{index}].along", joint, joints)
     if has_bodies and is_name(mechanism.base) and is_name(mechanism.end_effector):
-        ends = [*faults_by(OF_ENDS, "", mechanism, names), *_leaf_faults(mechanism, names)]
+        ends = [*faults_by(OF_ENDS, "", mechanism, joints, bodies), *_leaf_faults(mechanism, bodies)]
         yield from ends or _connection_faults(mechanism)
         yield from _cone_faults(mechanism) if has_names else ()
 
 
-def _duplicate_faults(mechanism: Structure, names: _Names) -> Iterator[Fault]:
+def _duplicate_faults(mechanism: Structure, joints: dict[str, Joint]) -> Iterator[Fault]:
+    """Faults of joints that are called as another one, or as a coordinate of one with several."""
+    kinds = {name: kind for name, joint in joints.items() if (kind := kind_of(joint)) is not None}
+    owners = {f"{name}[{place}]": name for name, kind in kinds.items() for place in range(len(kind.coordinates))}
     seen: set[str] = set()
     for index, joint in enumerate(mechanism.joints):
         place, expected = f"joint[{index}].name", "a name of its own"
@@ -163,8 +133,8 @@ def _duplicate_faults(mechanism: Structure, names: _Names) -> Iterator[Fault]:
             continue
         if joint.name in seen:
             yield Fault(place, f"'{joint.name}', the name of an earlier joint", expected)
-        if joint.name in names.owners:
-            owner = names.owners[joint.name]
+        owner = owners.get(joint.name)
+        if owner is not None and len(kinds[owner].coordinates) > 1:
             yield Fault(place, f"'{joint.name}', the name of a coordinate of joint '{owner}'", expected)
         seen.add(joint.name)
 
@@ -190,7 +160,7 @@ def _along_faults(place: str, joint: Joint, joints: dict[str, Joint]) -> Iterato
         yield Fault(place, found, f"one joint of '{first}' and one joint of '{second}'")
 
 
-def _leaf_faults(mechanism: Structure, names: _Names) -> Iterator[Fault]:
+def _leaf_faults(mechanism: Structure, bodies: Counter[str]) -> Iterator[Fault]:
     """Faults of bodies that one joint alone connects, and whose name is like that of another.
 
     Not one that differs in a number at its end, nor one on the same body as the leaf: left and right are alike.
@@ -198,8 +168,8 @@ def _leaf_faults(mechanism: Structure, names: _Names) -> Iterator[Fault]:
     for index, joint, body in leaves(mechanism):
         (beside,) = {*joint.connects} - {body}
         together = {each for other in mechanism.joints if beside in other.connects for each in other.connects}
-        bodies = dict.fromkeys([mechanism.end_effector, *names.bodies])
-        others = [each for each in bodies if each not in together and each.rstrip(digits) != body.rstrip(digits)]
+        known = dict.fromkeys([mechanism.end_effector, *bodies])
+        others = [each for each in known if each not in together and each.rstrip(digits) != body.rstrip(digits)]
         meant = near_miss(body, others, MISSPELT)
         if meant:
             found = f"'{body}', which no other joint connects{meant}"
