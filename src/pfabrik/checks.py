@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import os
 import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -89,6 +89,21 @@ def require_names(name: str, value: Any) -> tuple[str, ...]:
     return names
 
 
+def require_known(kind: str, names: Iterable[Any], known: Collection[str]) -> None:
+    """UnknownName for the first of some names that is not known; of any type."""
+    for name in names:
+        if not isinstance(name, str) or name not in known:
+            raise UnknownName(kind, name, known)
+
+
+def require_each(argument: str, given: Mapping[Any, Any], names: Sequence[str]) -> None:
+    """UnknownName or InvalidArgument where values by name are not one for each actuator."""
+    require_known("actuator", given, names)
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise InvalidArgument(argument, f"no value of {', '.join(missing)}", f"one for each of {', '.join(names)}")
+
+
 def names_of(name: str, value: Any) -> tuple[str, ...]:
     """Names, as a tuple: one text, or several in a list."""
     return (value,) if isinstance(value, str) else require_names(name, value)
@@ -134,9 +149,8 @@ def put_limits(limits: Floats, argument: str, given: float | Mapping[str, float]
     InvalidArgument : a limit that is no positive number.
     """
     if isinstance(given, Mapping):
+        require_known("actuator", given, names)
         for name, limit in given.items():
-            if name not in names:
-                raise UnknownName("actuator", name, names)
             limits[names.index(name)] = require_positive(f"{argument}['{name}']", limit)
     elif given is not None:
         limits[:] = require_positive(argument, given)

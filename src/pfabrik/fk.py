@@ -13,11 +13,12 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .arguments import as_floats
 from .arrays import Floats
+from .checks import require_each
 from .closure.assemble import forward_answers
 from .closure.close import measure_configurations
 from .description.mechanism import Mechanism, checked_mechanism
 from .engine import engine_of
-from .errors import InvalidArgument, UnknownName
+from .errors import InvalidArgument
 from .kernels.rows import ACTUATOR_ERROR, PROJECTED, REACHED
 from .model import model_of
 from .options import Options, checked_options
@@ -99,12 +100,7 @@ def as_values(mechanism: Mechanism, actuators: Actuators) -> tuple[Floats, tuple
 
 def _by_name(names: Sequence[str], actuators: Mapping[str, ArrayLike]) -> Floats:
     """Actuated values (..., n_a) from a mapping that has every actuator, with shapes that broadcast."""
-    for name in actuators:
-        if name not in names:
-            raise UnknownName("actuator", name, names)
-    missing = [name for name in names if name not in actuators]
-    if missing:
-        raise InvalidArgument("actuators", f"no value of {', '.join(missing)}", f"one for each of {', '.join(names)}")
+    require_each("actuators", actuators, names)
     values = [as_floats(f"actuators['{name}']", actuators[name], "values of shape (...)") for name in names]
     try:
         return np.stack(np.broadcast_arrays(*values), axis=-1)

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from ..answers.solution import Solution
 from ..arguments import array, is_not_negative
 from ..arrays import Floats
-from ..checks import require_mapping, require_positive, require_type
+from ..checks import require_known, require_mapping, require_positive, require_type
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 from ..extras import require
 from .calibration import Calibration
 from .linear_fit import RANK, LinearFit, decomposed
@@ -188,9 +188,8 @@ def _priors(own: Parameters, priors: Any, measurements: Measurements) -> dict[st
     if priors and not measurements.has_deviations:
         raise InvalidArgument("priors", "priors beside measurements without sigma", "sigma: how good each is")
     expected: dict[str, tuple[float, float]] = {}
+    require_known("parameter", priors, own.names)
     for name, given in priors.items():
-        if name not in own.names:
-            raise UnknownName("parameter", name, own.names)
         pair = np.atleast_1d(array(f"priors['{name}']", given, "() | 2", note=": a deviation, or (value, deviation)"))
         value = pair[0] if len(pair) == 2 else own.values[own.names.index(name)]
         sigma = require_positive(f"deviation of priors['{name}']", float(pair[-1]))

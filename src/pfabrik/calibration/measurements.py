@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import any_values, array, is_not_infinite
 from ..arrays import Floats, Ints
-from ..errors import InvalidArgument, UnknownName
+from ..checks import require_known
+from ..errors import InvalidArgument
 from ..poses import is_rotation
 
 Sigma: TypeAlias = float | Mapping[str, float] | None
@@ -124,9 +125,7 @@ class Measurements:
         if self.actuators.shape[1] != len(actuators):
             expected = f"{len(actuators)} a row: {', '.join(actuators)}"
             raise InvalidArgument("measurements", f"{self.actuators.shape[1]} actuators a row", expected)
-        for name in self.joints:
-            if name not in coordinates:
-                raise UnknownName("coordinate", name, coordinates)
+        require_known("coordinate", self.joints, coordinates)
 
 
 def _measured(name: str, values: ArrayLike, shape: str) -> Floats:
@@ -160,9 +159,8 @@ def _sigmas(sigma: Any) -> dict[str, float]:
     if sigma is None:
         return {}
     given = dict(sigma) if isinstance(sigma, Mapping) else dict.fromkeys(QUANTITIES, sigma)
+    require_known("quantity", given, QUANTITIES)
     for name, value in given.items():
-        if name not in QUANTITIES:
-            raise UnknownName("quantity", str(name), QUANTITIES)
         if not isinstance(value, int | float | np.floating) or not 0.0 < value < np.inf:
             raise InvalidArgument("sigma", f"{name} {value!r}", "positive numbers")
     return {name: float(value) for name, value in given.items()}

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import array, as_floats, is_positive
 from ..arrays import Floats
-from ..checks import require_positive
-from ..errors import InvalidArgument, UnknownName
+from ..checks import require_each, require_positive
+from ..errors import InvalidArgument
 
 Bounds: TypeAlias = float | tuple[float, float] | ArrayLike | Mapping[str, float | tuple[float, float]]
 """Limits of actuators: a number for both ways, a pair (lowest, highest), or an array (n_a, 2), or either by name."""
@@ -23,23 +23,12 @@ BOUND = "a positive number, or (lowest, highest)"
 def bounds_of(argument: str, given: Bounds, names: Sequence[str]) -> Floats:
     """The lowest and the highest value of each actuator, (n_a, 2); infinite where there is none."""
     if isinstance(given, Mapping):
-        by_name = checked_names(argument, given, names)
-        return np.array([_pair(f"{argument}['{name}']", by_name[name]) for name in names])
+        require_each(argument, given, names)
+        return np.array([_pair(f"{argument}['{name}']", given[name]) for name in names])
     values = as_floats(argument, given, f"{BOUND}, for all {len(names)} actuators or each")
     if values.shape == (len(names), 2):
         return np.array([_pair(f"{argument}[{place}]", row) for place, row in enumerate(values)])
     return np.tile(_pair(argument, values), (len(names), 1))
-
-
-def checked_names(argument: str, given: Mapping[str, Any], names: Sequence[str]) -> Mapping[str, Any]:
-    """Values by name, one for every actuator."""
-    for name in given:
-        if name not in names:
-            raise UnknownName("actuator", name, names)
-    missing = [name for name in names if name not in given]
-    if missing:
-        raise InvalidArgument(argument, f"nothing for {', '.join(missing)}", "a value for every actuator")
-    return given
 
 
 def _pair(argument: str, given: Any) -> tuple[float, float]:
@@ -54,8 +43,8 @@ def _pair(argument: str, given: Any) -> tuple[float, float]:
 def positive_values(argument: str, given: ArrayLike | Mapping[str, float], names: Sequence[str]) -> Floats:
     """A positive number for each actuator, (n_a,), of one for all, an array (n_a,), or a mapping by name."""
     if isinstance(given, Mapping):
-        by_name = checked_names(argument, given, names)
-        return np.array([require_positive(f"{argument}['{name}']", by_name[name]) for name in names])
+        require_each(argument, given, names)
+        return np.array([require_positive(f"{argument}['{name}']", given[name]) for name in names])
     note = ", for all actuators or each, or a mapping by name"
     values = array(argument, given, f"() | {len(names)}", "positive numbers", note, is_positive)
     return np.broadcast_to(values, len(names)).copy()

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from ..answers.solution import Solution
 from ..arguments import array
 from ..arrays import Floats, Ints
-from ..checks import require_mapping
+from ..checks import require_known, require_mapping
 from ..description.graph import tree_of
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 from ..motion.displacements import displacements
 
 BodyLoads: TypeAlias = Mapping[str, tuple[ArrayLike, ArrayLike]]
@@ -97,9 +97,8 @@ def checked_loads(mechanism: Mechanism, loads: Any) -> BodyLoads:
     """Loads by body; the errors of `forces` for what is none."""
     given = require_mapping("loads", loads, OF_LOADS)
     known = tuple(body for body in mechanism.bodies if body != mechanism.base)
+    require_known("body that moves", given, known)
     for body, load in given.items():
-        if body not in known:
-            raise UnknownName("body that moves", body, known)
         if not isinstance(load, tuple | list) or len(load) != 2:
             raise InvalidArgument(f"loads['{body}']", reprlib.repr(load), OF_LOADS)
     return given

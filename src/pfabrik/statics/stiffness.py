@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..answers.solution import Solution, checked_solution
 from ..arguments import as_floats
 from ..arrays import Floats, Mask, shaped
-from ..checks import require_names, require_positive
+from ..checks import require_known, require_names, require_positive
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 from ..motion.displacements import actuator_units, placed
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
@@ -117,9 +117,7 @@ def _of_rods(mechanism: Mechanism, given: float | Mapping[str, float] | None) ->
         raise InvalidArgument("rods", "a stiffness", f"None: '{mechanism.name}' has no link between two passive joints")
     if not isinstance(given, Mapping):
         return np.full(len(names), require_positive("rods", given))
-    for name in given:
-        if name not in names:
-            raise UnknownName("rod", name, names)
+    require_known("rod", given, names)
     return np.array([require_positive(f"rods['{name}']", given[name]) if name in given else 0.0 for name in names])
 
 
@@ -127,11 +125,9 @@ def _slack(solution: Solution, cables: Sequence[str], forces: Forces | ArrayLike
     """1 for actuators that are slack cables, 0 for all others, NaN where that is not known, (n, n_a)."""
     names = solution.mechanism.actuator_names
     slack = np.zeros((len(solution._rows.poses), len(names)))
-    places = []
-    for cable in require_names("cables", cables):
-        if cable not in names:
-            raise UnknownName("actuator", cable, names)
-        places.append(names.index(cable))
+    chosen = require_names("cables", cables)
+    require_known("actuator", chosen, names)
+    places = [names.index(cable) for cable in chosen]
     if not places:
         return slack
     expected = "what actuators exert, (..., n_a) or of `forces`, which says what cables are slack"

@@ -15,11 +15,11 @@ from ..arguments import any_values, array
 from ..arrays import Floats
 from ..certify.enclosure import Enclosure, enclose
 from ..certify.provable import require_no_clearance
-from ..checks import require_angle, require_mapping, require_positive
+from ..checks import require_angle, require_known, require_mapping, require_positive
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..description.task import task_of
-from ..errors import InvalidArgument, UnknownName, UnsupportedMechanism
+from ..errors import InvalidArgument, UnsupportedMechanism
 from ..model import model_of
 from ..poses import SupportsMatrix
 from ..telling import OnProgress, telling
@@ -180,9 +180,9 @@ def _ends(space: Space, within: Mapping[str, tuple[float, float]] | None) -> tup
     """The ends of the map, (d,) each; by default half a turn either way for angles, infinite for lengths."""
     half_turn = np.where(space.is_angle, math.pi, np.inf)
     lowest, highest = -half_turn, half_turn
-    for name, ends in require_mapping("within", within, "ends by coordinate, such as {'z': (100, 200)}").items():
-        if name not in space.names:
-            raise UnknownName("coordinate", name, space.names)
+    given = require_mapping("within", within, "ends by coordinate, such as {'z': (100, 200)}")
+    require_known("coordinate", given, space.names)
+    for name, ends in given.items():
         low, high = _pair(f"within['{name}']", ends)
         axis = space.names.index(name)
         lowest[axis], highest[axis] = max(low, lowest[axis]), min(high, highest[axis])

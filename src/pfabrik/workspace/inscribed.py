@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import array, is_positive
 from ..arrays import Floats
+from ..checks import require_known
 from ..description.mechanism_html import card
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 
 if TYPE_CHECKING:
     from .region import Region
@@ -84,8 +85,7 @@ def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions:
 def _extents(region: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
     """The lengths along each coordinate of the shape of size one, (d,)."""
     d = len(region.names)
-    if not isinstance(kind, str) or kind not in get_args(Kind):
-        raise UnknownName("shape", kind, get_args(Kind))
+    require_known("shape", [kind], get_args(Kind))
     if kind == "cylinder" and d != 3:
         raise InvalidArgument("kind", "'cylinder'", "a sphere or a box: the workspace lies in a plane")
     alike = len(set(region.units[:2] if kind == "cylinder" else region.units)) == 1

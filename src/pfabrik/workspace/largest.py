@@ -13,9 +13,9 @@ from ..arrays import Floats
 from ..certify.certificates import Certificate
 from ..certify.pose_region import PoseRegion
 from ..certify.question import certify
-from ..checks import require_positive
+from ..checks import require_known, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument, PfabrikError, UnknownName
+from ..errors import InvalidArgument, PfabrikError
 from .ask import workspace
 
 Kind = Literal["box", "cylinder", "ball"]
@@ -82,8 +82,7 @@ def largest(
     UnsupportedMechanism : as of `certify`.
     InvalidArgument : not even a hundredth of the shape is proved about the centre.
     """
-    if not isinstance(kind, str) or kind not in get_args(Kind):
-        raise UnknownName("shape", kind, get_args(Kind))
+    require_known("shape", [kind], get_args(Kind))
     step = require_positive("accuracy", accuracy)
     middle, half = _first(checked_mechanism(mechanism), kind, centre, extents, certified)
     if certified is False:

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..arguments import array
 from ..arrays import Floats
-from ..checks import require_finite, require_mapping, require_names
+from ..checks import require_finite, require_known, require_mapping, require_names
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..errors import InvalidArgument, UnknownName
+from ..errors import InvalidArgument
 from ..motion.displacements import columns, home_coordinates
 from ..motion.mobility import generic_of
 from ..motion.tilt_axis import tilt_axis
@@ -184,12 +184,9 @@ def _rotation(mechanism: Mechanism, orientation: Any, start: Floats) -> Floats:
 
 
 def _checked_fixed(fixed: Mapping[str, float] | None, known: Sequence[str]) -> dict[str, float]:
-    checked = {}
-    for name, value in require_mapping("fixed", fixed, "coordinates by name, such as {'z': 200}").items():
-        if name not in known:
-            raise UnknownName("coordinate", name, known)
-        checked[name] = require_finite(f"fixed['{name}']", value)
-    return checked
+    given = require_mapping("fixed", fixed, "coordinates by name, such as {'z': 200}")
+    require_known("coordinate", given, known)
+    return {name: require_finite(f"fixed['{name}']", value) for name, value in given.items()}
 
 
 def _checked_over(
@@ -198,11 +195,10 @@ def _checked_over(
     if over is None:
         return None
     names = (over,) if isinstance(over, str) else require_names("over", over)
-    for name in names:
-        if name not in known:
-            raise UnknownName("coordinate", name, known)
-        if name in fixed:
-            raise InvalidArgument("over", f"'{name}', which is fixed", "coordinates that may vary")
+    require_known("coordinate", names, known)
+    held = [name for name in names if name in fixed]
+    if held:
+        raise InvalidArgument("over", f"'{held[0]}', which is fixed", "coordinates that may vary")
     if len(set(names)) < len(names):
         raise InvalidArgument("over", ", ".join(names), "every coordinate once")
     return names
