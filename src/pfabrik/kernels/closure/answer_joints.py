@@ -137,22 +137,27 @@ def descend_from(tables: JointTables, scratch: JointScratch, aim: int, begin: in
 
 @routine
 def search_by(
-    tables: JointTables, scratch: JointScratch, aim: int, n_starts: int, n_seeds: int, steps: int, best: Closed
+    tables: JointTables,
+    scratch: JointScratch,
+    aim: int,
+    n_starts: int,
+    n_seeds: int,
+    moves_start: bool,
+    steps: int,
+    best: Closed,
 ) -> float:
     """The nearest configuration by a projection, from starts and seeds, into `best`; its distance [L].
 
     Of equal results that of the first start is taken. Seeds are first moved to hold what is to be held; where nothing
-    else has an end, so is the start.
+    else has an end, so is the start, with `moves_start`.
     """
     tally, start, holds = scratch.tally[0], scratch.start, tables.holds[aim] != HOLD_NOTHING
-    n_near = (
-        min(NEAR, scratch.distances.shape[0]) if n_seeds > 0 and is_beyond_reach(tables, scratch.pose) else 0
-    )
-    last = n_starts + max(n_seeds, 0) + n_near
+    n_near = min(NEAR, scratch.distances.shape[0]) if n_seeds > 0 and is_beyond_reach(tables, scratch.pose) else 0
+    last = n_starts + n_seeds + n_near
     clear_tally(tally)
     if n_near > 0:
         measure_nearby(tables, scratch)
-    for number in range(n_starts + n_seeds + n_near + 1):
+    for number in range(last + 1 if moves_start else last):
         is_last, seed = number == last, number - n_starts
         if tally["agreements"] >= AGREEMENTS or (is_last and (tally["least"] < math.inf or not holds)):
             break
@@ -201,16 +206,16 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
     """
     machine, answer, last = tables.machine[0], scratch.answer, tables.weights.shape[0] - 1
     n_seeds = 0 if question["keeps_mode"] == 1 else tables.seeds.shape[0]
-    count = min(n_starts + n_seeds, machine["descents"])
+    count, moves_start = min(n_starts + n_seeds, machine["descents"]), True
     steps, distance, aim = min(MOST_STEPS, machine["descent_steps"] // count), math.inf, -1
     steps = steps if steps >= FEWEST else 0
     n_seeds = n_seeds if count == n_starts + n_seeds else 0
     if count < n_starts or steps == 0:
         choose_start(tables, scratch, n_starts)
-        n_starts, n_seeds = 1, -1
+        n_starts, n_seeds, moves_start = 1, 0, False
     while distance == math.inf and aim < last and steps > 0:
         aim += 1
-        distance = search_by(tables, scratch, aim, n_starts, n_seeds, steps, answer)
+        distance = search_by(tables, scratch, aim, n_starts, n_seeds, moves_start, steps, answer)
     if distance == math.inf:
         measure(tables, scratch, scratch.begin)
         copy_closed(scratch.begin, answer)
@@ -221,7 +226,7 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
         hold, weights = tables.holds[aim], tables.weights
         position, rotation = errors(tables.task[0], scratch.begin.poses[0], scratch.target[0], scratch.turn)
         if is_too_far(distance, weights[aim], hold, position, rotation):
-            released = search_by(tables, scratch, last, n_starts, min(n_seeds, 0), steps, scratch.nearest)
+            released = search_by(tables, scratch, last, n_starts, 0, moves_start, steps, scratch.nearest)
             if released == math.inf:
                 measure(tables, scratch, scratch.begin)
                 copy_closed(scratch.begin, scratch.nearest)
@@ -318,9 +323,9 @@ def answer_row(
         note(scratch, TO_CLOSE, AT_START, int(scratch.reached.iterations[0]), 0.0 if is_reached else math.inf)
         if is_reached or verb != ANSWER:
             status = put_answer(tables, scratch, row, target, scratch.reached, HOLD_NOTHING, answers)
-            return (
-                status if verb == ANSWER or (verb == EXPECTED and is_reached) else (REACHED if is_reached else FAILED)
-            )
+            if verb == ANSWER or (verb == EXPECTED and is_reached):
+                return status
+            return REACHED if is_reached else FAILED
     if question["keeps_mode"] == 0 and tables.machine[0]["has_seeds"] == 0:
         return OPEN
     clip(tables, scratch.target[0])
