@@ -32,13 +32,13 @@ PER_ROW, LIMIT = 4, 120
 """Targets of each question; seconds after which a search with a constant changed counts as slower."""
 
 MACHINES = {
-    "constants": ("stewart", "rps", "rrr", "palletizer"),
-    "platform.constants": ("stewart", "rps", "prr", "reachy_mini"),
-    "closure.constants": ("straight_arm", "arm_by_its_body", "four_bar_tripod"),
-    "chains.constants": ("panda", "spherical_cones", "universal_cones"),
-    "passes.constants": ("delta", "canfield", "exechon"),
-    "clearance.constants": ("struts",),
-    "legs.constants": ("rps", "agile_eye", "delta"),
+    "constants": ("stewart", "rps", "palletizer", "rrr", "panda", "straight_arm", "hexaglide", "nrpm"),
+    "platform.constants": ("stewart", "rps", "prr", "reachy_mini", "canfield", "hexaglide", "nrpm", "thick_hexaglide"),
+    "closure.constants": ("straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"),
+    "chains.constants": ("panda", "spherical_cones", "universal_cones", "snake60"),
+    "passes.constants": ("nrpm", "delta", "servo_hexapod", "canfield"),
+    "clearance.constants": ("struts", "delta_apart"),
+    "legs.constants": ("rps", "nrpm", "agile_eye", "reachy_mini", "canfield", "delta"),
 }
 """Machines whose searches have the constants of a record, the quickest first."""
 
@@ -244,16 +244,14 @@ def ask(folder: Path, record: str, names: list[str]) -> None:
     """Print what changes with each constant of a record ten times as large or, if nothing does, a tenth."""
     library = load(folder)
     warnings.simplefilter("ignore")
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # what runs is counted without a lock
+    cores = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})  # one: what runs is counted without a lock
     import pfabrik  # noqa: F401
 
     for each in MACHINES[record]:  # so that modules are loaded, and machines derived, once
         list(answers(each, record))
     n_calls = ctypes.c_int64.in_dll(library, "N_CALLS")
-    bases = {
-        is_derived: in_a_process(record, n_calls, {"is_derived": is_derived}, None) for is_derived in (False, True)
-    }
-    assert all(isinstance(base, list) for base in bases.values()), bases
+    base = cache(lambda is_derived: in_a_process(record, n_calls, {"is_derived": is_derived}, None))
     outside = {
         there
         for module in list(sys.modules)
@@ -267,7 +265,7 @@ def ask(folder: Path, record: str, names: list[str]) -> None:
         for factor in (10, 0.1):
             changed = times(value, factor)
             change = {"library": library, "name": name, "value": changed, "is_derived": is_derived}
-            told = in_a_process(record, n_calls, change, bases[is_derived])
+            told = in_a_process(record, n_calls, change, base(is_derived))
             if told:
                 break
         sys.stdout.write(f"{json.dumps([name, factor, told])}\n")
