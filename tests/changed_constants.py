@@ -32,13 +32,22 @@ PER_ROW, LIMIT = 4, 120
 """Targets of each question; seconds after which a search with a constant changed counts as slower."""
 
 MACHINES = {
-    "constants": ("stewart", "rps", "palletizer", "rrr", "panda", "straight_arm", "hexaglide", "nrpm"),
-    "platform.constants": ("stewart", "rps", "prr", "reachy_mini", "canfield", "hexaglide", "nrpm", "thick_hexaglide"),
-    "closure.constants": ("straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"),
-    "chains.constants": ("panda", "spherical_cones", "universal_cones", "snake60"),
-    "passes.constants": ("nrpm", "delta", "servo_hexapod", "canfield"),
-    "clearance.constants": ("struts", "delta_apart"),
-    "legs.constants": ("rps", "nrpm", "agile_eye", "reachy_mini", "canfield", "delta"),
+    "search_constants": ("stewart", "rps", "palletizer", "rrr", "panda", "straight_arm", "hexaglide", "nrpm"),
+    "platform.pose_constants": (
+        "stewart",
+        "rps",
+        "prr",
+        "reachy_mini",
+        "canfield",
+        "hexaglide",
+        "nrpm",
+        "thick_hexaglide",
+    ),
+    "closure.joint_constants": ("straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"),
+    "chains.chain_constants": ("panda", "spherical_cones", "universal_cones", "snake60"),
+    "passes.pass_constants": ("nrpm", "delta", "servo_hexapod", "canfield"),
+    "clearance.distance_constants": ("struts", "delta_apart"),
+    "legs.leg_constants": ("rps", "nrpm", "agile_eye", "reachy_mini", "canfield", "delta"),
 }
 """Machines whose searches have the constants of a record, the quickest first."""
 
@@ -52,7 +61,7 @@ def imported(module: str) -> dict[str, tuple[str, str]]:
     return {
         alias.asname or alias.name: (importlib.util.resolve_name("." * node.level + node.module, package), alias.name)
         for node in nodes
-        if isinstance(node, ast.ImportFrom) and node.level and (node.module or "").split(".")[-1] == "constants"
+        if isinstance(node, ast.ImportFrom) and node.level and (node.module or "").endswith("_constants")
         for alias in node.names
     }
 
@@ -147,7 +156,7 @@ def answers(name: str, record: str) -> Iterator[Any]:
         )
 
     near, far, beyond = poses(0.1), poses(0.5), poses(2.0)
-    if record == "passes.constants":
+    if record == "passes.pass_constants":
         for method in ("plain", "accelerated", "centroid"):
             yield pf.passes.solve(asked, far, pf.passes.Options(method=method))
         return
@@ -252,11 +261,9 @@ def ask(folder: Path, record: str, names: list[str]) -> None:
         list(answers(each, record))
     n_calls = ctypes.c_int64.in_dll(library, "N_CALLS")
     base = cache(lambda is_derived: in_a_process(record, n_calls, {"is_derived": is_derived}, None))
+    importers = {module: imported(module) for module in list(sys.modules) if module.startswith("pfabrik.")}
     outside = {
-        there
-        for module in list(sys.modules)
-        if module.startswith("pfabrik.") and not module.startswith(PACKAGE)
-        for there in imported(module).values()
+        there for module, names in importers.items() if not module.startswith(PACKAGE) for there in names.values()
     }
     for name, value in numbers(record).items():
         if names and name not in names:

@@ -8,7 +8,6 @@ import pytest
 import pfabrik as pf
 from oracles import targets_about
 from pfabrik import Options
-from pfabrik.kernels.constants import MOST_STEPS
 from pfabrik.kernels.handle import Handle
 from pfabrik.kernels.platform import tables as T
 from pfabrik.kernels.platform.answer_row import weigh_limits
@@ -16,6 +15,7 @@ from pfabrik.kernels.platform.answer_rows import answer_rows
 from pfabrik.kernels.platform.search_records import PoseSolutions, new_solutions
 from pfabrik.kernels.projecting import UNBOUNDED
 from pfabrik.kernels.rows import PENDING, PROJECTED, REACHED, UNSURE
+from pfabrik.kernels.search_constants import MOST_STEPS
 from pfabrik.model import model_of
 from pfabrik.platform.tables import limit_names, tables_of
 from pfabrik.tolerances import TOLERANCES

@@ -37,7 +37,7 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_each_constant_of_a_search_has_its_reason() -> None:
     package = Path(pf.__file__).parent / "kernels"
     records = {
-        ".".join(path.relative_to(package).with_suffix("").parts): path for path in package.rglob("constants.py")
+        ".".join(path.relative_to(package).with_suffix("").parts): path for path in package.rglob("*_constants.py")
     }
     assert records.keys() == MACHINES.keys()
     for record, path in records.items():

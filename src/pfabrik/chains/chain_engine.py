@@ -19,7 +19,7 @@ from ..closure.configurations import Configurations, coordinates_for, joint_coor
 from ..closure.engine_contract import Engine, Prepared
 from ..closure.projection import ProjectionMode
 from ..closure.stretched import BentConfiguration
-from ..kernels.chains.constants import MET, MOST_BENT
+from ..kernels.chains.chain_constants import MET, MOST_BENT
 from ..kernels.handle import Handle
 from ..kernels.platform.tables import BY_LEGS, Question
 from ..kernels.rows import PROJECTED, REACHED, Rows

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..derived import derived
+from ..kernels.chains.chain_constants import ACROSS, INDEPENDENT, REACH_OF_SLIDES, WAVES
 from ..kernels.chains.chain_records import SEEDS
-from ..kernels.chains.constants import ACROSS, INDEPENDENT, REACH_OF_SLIDES, WAVES
 from ..kernels.closure.loops import BALL, SLIDE
 from ..model import Model
 from .run_chains import NO_SCREWS, posed

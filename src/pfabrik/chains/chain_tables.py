@@ -9,8 +9,8 @@ import numpy as np
 from ..closure.projection import projection_modes
 from ..derived import derived
 from ..description.home_mobility import column_moves
+from ..kernels.chains.chain_constants import FEW, LONG, MET, SHORT
 from ..kernels.chains.chain_records import COLUMN, MACHINE, ChainTables
-from ..kernels.chains.constants import FEW, LONG, MET, SHORT
 from ..kernels.handle import Handle
 from ..kernels.platform.tables import BY_LEGS, NEAREST, QUESTION, Question
 from ..kernels.projecting import UNBOUNDED

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask
 from ..batch import put, take
 from ..derived import derived
-from ..kernels.closure.constants import ASSEMBLY_STARTS, LONGEST_SEARCH, NEAR_VALUES, NOISE, PROJECTIONS, SAME_GAP
-from ..kernels.constants import MOST_STEPS
+from ..kernels.closure.joint_constants import ASSEMBLY_STARTS, LONGEST_SEARCH, NEAR_VALUES, NOISE, PROJECTIONS, SAME_GAP
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
+from ..kernels.search_constants import MOST_STEPS
 from ..motion.closure import Closure
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES

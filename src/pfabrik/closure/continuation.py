@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..kernels.constants import SHORTEST_SHARE
+from ..kernels.search_constants import SHORTEST_SHARE
 
 
 def continued(n: int, advance: Callable[[NDArray[np.intp], Floats], Mask], shortest: float = SHORTEST_SHARE) -> Floats:

@@ -11,8 +11,8 @@ from ..arrays import Floats
 from ..batch import take
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, Closed, Objective, PoseObjective
-from ..kernels.constants import MOST_STEPS, SIGHT
 from ..kernels.handle import Scratch
+from ..kernels.search_constants import MOST_STEPS, SIGHT
 from ..kernels.threads import in_blocks
 from ..motion.closure import Closure
 from ..tolerances import TOLERANCES

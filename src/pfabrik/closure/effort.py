@@ -8,7 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels.closure.constants import A_DESCENT, CLOSING, CONTINUATION, DESCENDING, FEWEST, FEWEST_CLOSING, LIMIT_COST
+from ..kernels.closure.joint_constants import (
+    A_DESCENT,
+    CLOSING,
+    CONTINUATION,
+    DESCENDING,
+    FEWEST,
+    FEWEST_CLOSING,
+    LIMIT_COST,
+)
 from ..motion.closure import Closure
 
 

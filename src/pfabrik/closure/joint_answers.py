@@ -11,13 +11,13 @@ from ..arrays import Floats, Ints, Records
 from ..batch import take
 from ..derived import derived, is_derived
 from ..description.home_mobility import column_moves
-from ..kernels.closure.constants import A_DESCENT, MOST_CLOSING, NEARBY, STARTS, STEPS
+from ..kernels.closure.joint_constants import A_DESCENT, MOST_CLOSING, NEARBY, STARTS, STEPS
 from ..kernels.closure.joint_tables import ASKED, MACHINE, Answered, JointQuestion, JointTables, new_joint_scratch
 from ..kernels.closure.loops import LOCKED
-from ..kernels.constants import CONTINUATION_STEPS
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs.records import TASK
 from ..kernels.rows import OPEN, Rows
+from ..kernels.search_constants import CONTINUATION_STEPS
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..options import Options

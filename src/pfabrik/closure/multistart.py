@@ -6,9 +6,9 @@ import numpy as np
 
 from ..arrays import Floats
 from ..derived import derived
-from ..kernels.closure.constants import RANDOM_STARTS, RANDOM_STEPS, SEED_DISTANCE, SEED_TURN, SEEDS
+from ..kernels.closure.joint_constants import RANDOM_STARTS, RANDOM_STEPS, SEED_DISTANCE, SEED_TURN, SEEDS
 from ..kernels.closure.loops import BASE_AXES
-from ..kernels.constants import MOST_STEPS
+from ..kernels.search_constants import MOST_STEPS
 from ..motion.closure import Closure
 from ..poses import pose
 from ..tolerances import TOLERANCES

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays import Floats
-from ..kernels.closure.constants import SPREAD
+from ..kernels.closure.joint_constants import SPREAD
 from ..motion.closure import Closure
 from ..motion.displacements import columns
 from ..rotations import from_quaternion, random_quaternions, rotvec_from_quaternion

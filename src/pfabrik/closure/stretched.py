@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..arrays import Floats
-from ..kernels.constants import SAME_DISTANCE
 from ..kernels.rows import PROJECTED, REACHED, Rows
+from ..kernels.search_constants import SAME_DISTANCE
 from ..model import Model
 from ..options import Options
 from .first_order import are_stretched

@@ -10,8 +10,8 @@ import numpy as np
 from ..arrays import Records
 from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
-from ..kernels.clearance.constants import MOST_CORNERS
 from ..kernels.clearance.convex import new_polytope
+from ..kernels.clearance.distance_constants import MOST_CORNERS
 from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.clearance.solids import KIND, WIDTH
 from ..kernels.controller.assembled import Assembling

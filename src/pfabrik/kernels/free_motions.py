@@ -8,8 +8,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ._jit import routine
-from .constants import EASE, IMPLIED, LOOSE, SHARED
 from .qp import QP, factorise, solve_qp
+from .search_constants import EASE, IMPLIED, LOOSE, SHARED
 from .sqp import Linearisation, new_linearisation
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ..arrays import Floats
 from ._jit import routine
-from .constants import REGULARISATION
 from .qp import QP, apply_inverse, factorise, solve_qp
+from .search_constants import REGULARISATION
 from .sqp import Linearisation
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from ..arrays import Floats, Record, Records
 from ._jit import routine
 from .closure.loops import LOCKED
-from .constants import HOLD_COST, SAME_DISTANCE
 from .rows import HOLD_ORIENTATION
+from .search_constants import HOLD_COST, SAME_DISTANCE
 
 TALLY = np.dtype(
     [

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ._jit import allocator, routine
-from .constants import DEPENDENT, KEPT, ROUNDED
+from .search_constants import DEPENDENT, KEPT, ROUNDED
 
 
 class QP(NamedTuple):

@@ -22,7 +22,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Record, Records
 from ._jit import routine
-from .constants import (
+from .qp import QP, factorise, solve_qp
+from .search_constants import (
     CLOSED,
     CONVERGING,
     EXACT,
@@ -42,7 +43,6 @@ from .constants import (
     SOLVABLE,
     SUFFICIENT,
 )
-from .qp import QP, factorise, solve_qp
 
 TOTALS = np.dtype(
     [

@@ -11,10 +11,10 @@ from ..closure.projection import ProjectionMode, projection_modes
 from ..derived import derived
 from ..description.home_mobility import column_joints
 from ..kernels.closure.loops import BASE_AXES
-from ..kernels.constants import MOST_STEPS
-from ..kernels.platform.constants import AGREEMENTS_OF_VALUES
+from ..kernels.platform.pose_constants import AGREEMENTS_OF_VALUES
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
+from ..kernels.search_constants import MOST_STEPS
 from ..model import Model
 from ..options import Options
 from ..tolerances import TOLERANCES

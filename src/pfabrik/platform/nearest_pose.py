@@ -16,7 +16,7 @@ from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, LOCKED
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
-from ..kernels.platform.constants import (
+from ..kernels.platform.pose_constants import (
     AGREEMENTS,
     AGREEMENTS_OF_MANY,
     AGREEMENTS_OF_RAILS,

@@ -11,11 +11,11 @@ from ..decomposition.leg_table import LegTable
 from ..decomposition.plan import compile_trunks
 from ..derived import derived
 from ..kernels.clearance.link_records import NO_LINKS
-from ..kernels.constants import MOST_STEPS
 from ..kernels.passes import plan as P
 from ..kernels.platform import redundant_sets as R
 from ..kernels.platform.nearest import NO_STARTS
 from ..kernels.platform.search_records import SETTINGS, Along, MultistartPlan
+from ..kernels.search_constants import MOST_STEPS
 from ..model import Model
 from ..tolerances import TOLERANCES
 from .nearest_pose import no_starts, search_plan

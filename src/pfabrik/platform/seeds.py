@@ -14,7 +14,7 @@ from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES
 from ..kernels.legs import records as K
-from ..kernels.platform.constants import (
+from ..kernels.platform.pose_constants import (
     BEYOND,
     DRAW_STEPS,
     DRAWS,

@@ -11,7 +11,7 @@ from ..batch import take
 from ..decomposition.leg_table import LegTable
 from ..decomposition.resting import Resting, at_rest
 from ..derived import derived
-from ..kernels.closure.constants import STRANGE
+from ..kernels.closure.joint_constants import STRANGE
 from ..kernels.handle import Handle, Scratch
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES

@@ -9,7 +9,7 @@ import numpy as np
 from ..closure.assemble import is_over_determined
 from ..closure.parasitic import follows_task, has_other_assemblies, has_parasitic_motion
 from ..derived import derived, is_derived
-from ..kernels.closure.constants import NOISE
+from ..kernels.closure.joint_constants import NOISE
 from ..kernels.handle import Handle, Scratch
 from ..kernels.platform import tables as T
 from ..kernels.projecting import UNBOUNDED

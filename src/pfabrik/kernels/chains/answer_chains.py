@@ -6,7 +6,6 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine, search
-from ..constants import SIGHT
 from ..legs.complete_poses import is_pose, orthonormalise
 from ..platform.answer_row import errors
 from ..platform.tables import BY_LEGS
@@ -26,6 +25,7 @@ from ..rows import (
     ROTATION_ERROR,
     Rows,
 )
+from ..search_constants import SIGHT
 from ..vectors import copy_row, copy_table
 from .chain_records import ChainTables
 from .chain_state import ChainScratch, open_chain, open_chain_scratch, open_question, open_tables

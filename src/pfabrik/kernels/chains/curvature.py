@@ -20,9 +20,9 @@ from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import turn_of_tilt, yaw_gradient
 from ..linear import solve_spd
+from .chain_constants import HELD_WEIGHT
 from .chain_records import SerialChain
 from .chain_state import ChainScratch
-from .constants import HELD_WEIGHT
 
 SMALL_TURN = 1e-3
 """Angle below which series replace the second derivative of a rotation's angle [rad]."""

@@ -7,14 +7,12 @@ import math
 from ...arrays import Floats
 from .._jit import routine
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
-from ..constants import MOST_STEPS
 from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
 from ..quaternions import difference
+from ..search_constants import MOST_STEPS
 from ..vectors import copy_table, norm, vec
-from .chain_records import SerialChain
-from .chain_state import ChainScratch
-from .constants import (
+from .chain_constants import (
     CONVERGED,
     EXACT,
     FINE,
@@ -33,6 +31,8 @@ from .constants import (
     SUFFICIENT,
     SWEEPS,
 )
+from .chain_records import SerialChain
+from .chain_state import ChainScratch
 from .curvature import fill_curvature, model_change, plan_newton_step
 from .reach_target import largest, measure_pose, reach_target
 from .walk_chain import copy_chain_state, move_chain

@@ -7,16 +7,16 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
-from ..constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE
 from ..legs.complete_poses import turn_pose
 from ..platform.answer_row import errors
 from ..projecting import brings_nearer, clear_tally, count_ending, is_agreed, is_spent, is_too_far, note_attempt
 from ..quaternions import difference
 from ..rows import HOLD_NOTHING
+from ..search_constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE
 from ..vectors import copy_table
+from .chain_constants import BENT, CLOSENESS, DESCENTS_NEARBY, NEARER, NEARLY, PULLED_FROM, PULLS, STEPS
 from .chain_records import ChainTables, SerialChain
 from .chain_state import ChainScratch
-from .constants import BENT, CLOSENESS, DESCENTS_NEARBY, NEARER, NEARLY, PULLED_FROM, PULLS, STEPS
 from .descend_chain import descend_chain, pull
 from .reach_target import largest, reach_target
 from .walk_chain import copy_chain_state, load_chain, walk_chain

@@ -15,7 +15,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from .._jit import allocator, routine
 from ..vectors import Vec, along, cross, dot, flatten, norm, put, scale, sub, vec
-from .constants import CLOSE, FLAT, MOST_SIMPLICES, MOST_STALLED, ROUNDING
+from .distance_constants import CLOSE, FLAT, MOST_SIMPLICES, MOST_STALLED, ROUNDING
 from .simplices import NOTHING, Weights, combined, nearest_weights, with_corner
 from .solids import DISC, KIND, Solid, farthest_in, middle_of, square_to
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from .._jit import allocator, routine
 from ..vectors import Vec, dot, put, scale, sub, vec
-from .constants import MOST_CORNERS
 from .convex import new_polytope
+from .distance_constants import MOST_CORNERS
 from .least_clearance import clearance_within
 from .link_records import LinkLimits
 from .solids import CAPSULE, KIND

@@ -7,7 +7,7 @@ import math
 from ...arrays import Floats
 from .._jit import inlined, routine
 from ..vectors import Vec, along, cross, dot, norm, put, scale, sub, vec
-from .constants import PARALLEL
+from .distance_constants import PARALLEL
 from .solids import Solid, square_to
 
 

@@ -16,7 +16,7 @@ from typing import TypeAlias
 from ...arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, flatten, norm, scale, sub, vec
-from .constants import ALONG_AXIS
+from .distance_constants import ALONG_AXIS
 
 CAPSULE, BOX, DISC, HULL = 0, 1, 2, 3
 KIND, ROUND, A, B, C, WIDTH = 0, 1, 2, 3, 4, 5

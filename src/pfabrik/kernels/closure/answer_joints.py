@@ -9,7 +9,6 @@ import numpy as np
 from ...arrays import Floats, Ints, Record
 from .._jit import opener, routine, search
 from ..clearance.link_records import NO_LINKS
-from ..constants import MOST_STEPS, SIGHT
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise
 from ..legs.records import TASK
 from ..projecting import brings_nearer, clear_tally, count_ending, is_too_far, weighted_distance
@@ -30,6 +29,7 @@ from ..rows import (
     RESIDUAL,
     ROTATION_ERROR,
 )
+from ..search_constants import MOST_STEPS, SIGHT
 from ..vectors import copy_table
 from .close_on_target import (
     close_legs,
@@ -48,8 +48,8 @@ from .close_on_target import (
     start_at,
     take_nearby,
 )
-from .constants import AGREEMENTS, FEWEST, LONG_CHAIN_STEPS, MOST_CLOSING, NEAR
 from .descend import nearest_of
+from .joint_constants import AGREEMENTS, FEWEST, LONG_CHAIN_STEPS, MOST_CLOSING, NEAR
 from .joint_tables import (
     ANSWER,
     ASKED,

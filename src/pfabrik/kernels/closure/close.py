@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from ...arrays import Floats
 from .._jit import inlined, opener, routine, search
-from ..constants import CONTRACTION, NEWTON_STEP
 from ..quaternions import exponential, turn_about_z, turn_ball, yaw_of
-from .constants import DAMPING, FEW, LEAST_DAMPING, MOST_DAMPING
+from ..search_constants import CONTRACTION, NEWTON_STEP
+from .joint_constants import DAMPING, FEW, LEAST_DAMPING, MOST_DAMPING
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .normal_equations import (
     add_cones,

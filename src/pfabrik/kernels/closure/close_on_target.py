@@ -6,12 +6,12 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
-from ..constants import CLOSED, CONTINUATION_STEPS, LONGEST_IN_MODE
 from ..legs.complete_poses import tilt_to, turn_pose
 from ..quaternions import difference, turn_about_z, yaw_difference
+from ..search_constants import CLOSED, CONTINUATION_STEPS, LONGEST_IN_MODE
 from ..vectors import copy_row, copy_table, norm, scale, vec
 from .close import close_row
-from .constants import BRANCH_AGREEMENTS, MOST_CLOSING, SAME_GAP, STEPS, STRANGE
+from .joint_constants import BRANCH_AGREEMENTS, MOST_CLOSING, SAME_GAP, STEPS, STRANGE
 from .joint_tables import EXPECTED, REACH, STEP, JointScratch, JointTables
 from .loops import BASE_AXES, Closed, ClosureProblem
 from .path_kinematics import end_path, load_row, store_row, walk_path

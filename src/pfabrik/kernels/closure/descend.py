@@ -11,10 +11,10 @@ import math
 from ...arrays import Floats
 from .._jit import routine, search
 from ..clearance.link_limits import pair_excess
-from ..constants import CLOSED, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import limit_multipliers
 from ..quaternions import turn_ball
+from ..search_constants import CLOSED, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
 from ..sqp import (
     allowed_violation,
     begin_descent,

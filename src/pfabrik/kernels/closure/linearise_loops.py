@@ -11,7 +11,6 @@ from ...arrays import Floats, Records
 from .._jit import opener, routine
 from ..clearance.link_limits import new_link_limits, pair_excess
 from ..clearance.link_records import NO_LINKS, LinkLimits
-from ..constants import REACH
 from ..free_motions import (
     Elimination,
     FreeMotions,
@@ -22,6 +21,7 @@ from ..free_motions import (
     project_gradient,
 )
 from ..qp import QP, new_qp
+from ..search_constants import REACH
 from ..sqp import CONTROL, Hessian, new_hessian
 from .loops import BALL, Loops, Objective
 from .path_kinematics import (

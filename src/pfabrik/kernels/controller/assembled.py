@@ -9,7 +9,6 @@ from ...arrays import Floats, Ints
 from .._jit import routine
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose
 from ..legs.records import Table
-from ..platform.constants import ASSEMBLED, NEARLY_ASSEMBLED
 from ..platform.equations import evaluate_legs
 from ..platform.forward import (
     NewtonScratch,
@@ -20,6 +19,7 @@ from ..platform.forward import (
     put_deviations,
 )
 from ..platform.nearest import is_other_mode
+from ..platform.pose_constants import ASSEMBLED, NEARLY_ASSEMBLED
 from ..platform.search_records import Starts
 from ..platform.starts import put_sides
 from ..rows import PENDING

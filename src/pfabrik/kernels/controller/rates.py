@@ -8,8 +8,8 @@ from ...arrays import Floats, Ints
 from .._jit import routine
 from ..closure.first_order import set_apart
 from ..legs.answer import put_slopes
-from ..legs.constants import LEAST_MARGIN
 from ..legs.frames import redundant_slope
+from ..legs.leg_constants import LEAST_MARGIN
 from ..legs.records import Table
 from ..legs.rods import put_proximal_slope
 from ..platform.equations import LegEvaluation, direction, has_proximal

@@ -9,15 +9,15 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import allocator, flattened, routine
-from ..constants import CLOSED, NEARLY_CLOSED, NEWTON_STEP
 from ..linear import solve_spd
 from ..quaternions import yaw_of
 from ..rows import LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
+from ..search_constants import CLOSED, NEARLY_CLOSED, NEWTON_STEP
 from ..vectors import copy_row, cross, dot, move, norm, put, scale, vec, where, wrap_into
 from .complete_poses import read_target, set_yaw, turn_pose
-from .constants import DAMPING, KEPT, LEAST_MARGIN, MOST_STEPS, MOST_STEPS_IMPLICIT
 from .frames import new_frames, orienting_coordinate, q_redundant_of, redundant_slope, set_frames
 from .kinds import leg_rows, leg_slopes, place_leg
+from .leg_constants import DAMPING, KEPT, LEAST_MARGIN, MOST_STEPS, MOST_STEPS_IMPLICIT
 from .open_table import open_table
 from .pivots import any_across
 from .records import N_VALUES, SHARED, Table

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
-from ..constants import CLOSED, NEARLY_CLOSED
 from ..rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL
+from ..search_constants import CLOSED, NEARLY_CLOSED
 from ..vectors import ON_BOUND, Vec, add, along, copy_row, cross, dot, scale, sub, vec, wrap
 from .columns import (
     AX,
@@ -45,7 +45,7 @@ from .columns import (
     project_on_base_direction,
     project_on_platform_direction,
 )
-from .constants import KEPT, LEAST_MARGIN, ROUNDED
+from .leg_constants import KEPT, LEAST_MARGIN, ROUNDED
 from .open_table import open_table
 from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
 

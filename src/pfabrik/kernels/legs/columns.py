@@ -8,7 +8,7 @@ from ...arrays import Floats, Record
 from .._jit import inlined, routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
 from .complete_poses import orthonormalise
-from .constants import NOT_A_ROTATION, ROUNDED
+from .leg_constants import NOT_A_ROTATION, ROUNDED
 from .records import CRANK
 
 # Few enough for the first-level cache, many enough to amortise what is read once a block.

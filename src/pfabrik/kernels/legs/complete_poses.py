@@ -8,8 +8,8 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..quaternions import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec
-from .constants import LEAST_MARGIN, NOT_A_ROTATION, ROUNDED
 from .endings import turned
+from .leg_constants import LEAST_MARGIN, NOT_A_ROTATION, ROUNDED
 
 
 @routine

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
-from ..constants import NEARLY_CLOSED
 from ..quaternions import difference, turn_about_z, yaw_difference
+from ..search_constants import NEARLY_CLOSED
 from ..vectors import angle_between, copy_row, scale, vec
 from .answer import complete_pose, deviation, new_completion, put_rows
 from .complete_poses import put_pose, read_target, tilt_to, turn_pose
-from .constants import KEPT, MORE_PARTS, PARTS
 from .endings import pointing_error
+from .leg_constants import KEPT, MORE_PARTS, PARTS
 from .open_table import open_table
 from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, SLIDE
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
-from ..constants import CLOSED, NEARLY_CLOSED
+from ..search_constants import CLOSED, NEARLY_CLOSED
 from .blocks import counting_range, fill_rod, fill_sides, project_on_cone_axis, wrap_between
 from .columns import (
     BLOCK,
@@ -27,8 +27,8 @@ from .columns import (
     fill_inverse,
     fill_poses,
 )
-from .constants import KEPT
 from .feasibility import relative_margin
+from .leg_constants import KEPT
 from .open_table import open_table
 from .records import SHARED, SLIDE
 

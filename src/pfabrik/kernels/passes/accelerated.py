@@ -14,7 +14,19 @@ from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..quaternions import difference
 from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
-from .constants import (
+from .fit import revise_target
+from .half_spaces import (
+    PLATFORM,
+    LeastStep,
+    add_branch,
+    add_ranges,
+    begin_programme,
+    dot_of,
+    least_step,
+)
+from .meet import reach_end
+from .moving_frames import load_seed, move_carriers
+from .pass_constants import (
     CAME_BACK,
     CHEAP,
     CLOSING,
@@ -38,18 +50,6 @@ from .constants import (
     WEAKER,
     WINDOW,
 )
-from .fit import revise_target
-from .half_spaces import (
-    PLATFORM,
-    LeastStep,
-    add_branch,
-    add_ranges,
-    begin_programme,
-    dot_of,
-    least_step,
-)
-from .meet import reach_end
-from .moving_frames import load_seed, move_carriers
 from .plan import TRANSLATES, TURNS, Configuration, Plan, Seeds, Settings
 
 

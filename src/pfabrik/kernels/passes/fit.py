@@ -6,8 +6,8 @@ from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..linear import solve_spd
 from ..vectors import Vec, add, along, cross, dot, move, norm, scale, sub, turn, vec
-from .constants import FIT_DAMPING, FIT_STEPS, LARGEST_TURN, TURN_DAMPING
 from .moving_frames import move_carriers
+from .pass_constants import FIT_DAMPING, FIT_STEPS, LARGEST_TURN, TURN_DAMPING
 from .plan import TRANSLATES, TURNS, Configuration, Plan, Settings
 
 

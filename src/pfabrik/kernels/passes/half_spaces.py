@@ -20,8 +20,8 @@ from ...arrays import Floats, Records
 from .._jit import allocator, routine
 from ..qp import QP, new_qp, solve_with_equations
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec
-from .constants import NO_LENGTH, NO_RATE, NO_SIDE, PROBE, STIFF
 from .meet import base_of, is_two_part, reach_end
+from .pass_constants import NO_LENGTH, NO_RATE, NO_SIDE, PROBE, STIFF
 from .plan import CARRIER_CONE, PLATFORM_CONE, TRANSLATES, TURNS, Configuration, Plan, Settings
 from .restrict import any_normal, hinge_angle
 

@@ -7,7 +7,7 @@ import math
 from ...arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec
-from .constants import BRACKETS, GOLDEN, NO_LENGTH, SECTIONS
+from .pass_constants import BRACKETS, GOLDEN, NO_LENGTH, SECTIONS
 from .passes import reach_backward, reach_forward
 from .plan import Configuration, Plan, Settings
 from .restrict import clamp_stroke

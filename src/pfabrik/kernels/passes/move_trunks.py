@@ -6,9 +6,9 @@ from ...arrays import Floats
 from .._jit import routine
 from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import reach_from_start
-from .constants import PATIENT
 from .half_spaces import LeastStep
 from .moving_frames import move_carriers
+from .pass_constants import PATIENT
 from .plan import Configuration, Plan, Settings
 
 

@@ -23,7 +23,7 @@ from ..vectors import (
     wrap,
     wrap_into,
 )
-from .constants import LEAST_SHARE, NO_LENGTH, NO_SIDE, SWEEPS, UNMOVED, WELL_INSIDE
+from .pass_constants import LEAST_SHARE, NO_LENGTH, NO_SIDE, SWEEPS, UNMOVED, WELL_INSIDE
 from .plan import CARRIER_CONE, PLATFORM_CONE, Plan
 
 

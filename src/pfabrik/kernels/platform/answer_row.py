@@ -26,8 +26,8 @@ from ..rows import (
 )
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode
-from .constants import NEARLY
 from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
+from .pose_constants import NEARLY
 from .redundant_sets import search_sets, step_trunks
 from .search_records import PlatformObjective, PoseSolutions, Starts
 from .starts import load_target

@@ -15,14 +15,14 @@ from ..legs.answer import (
     write_answer,
 )
 from ..legs.complete_poses import read_target
-from ..legs.constants import KEPT, LEAST_MARGIN
 from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
+from ..legs.leg_constants import KEPT, LEAST_MARGIN
 from ..legs.records import Table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
-from .constants import HALF_DIGITS, MOST_CHOICES
 from .equations import owner_of
+from .pose_constants import HALF_DIGITS, MOST_CHOICES
 
 
 @routine

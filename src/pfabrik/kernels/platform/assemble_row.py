@@ -20,9 +20,9 @@ from ..rows import (
 )
 from ..vectors import copy_row
 from .answer_row import copy_solution, load_own, nearest_turn, put_start, turns_repeatedly
-from .constants import WAY_HALVINGS
 from .forward import assemble_from_others, assemble_from_own, put_deviations, write_assembled
 from .nearest import nearest_of_row
+from .pose_constants import WAY_HALVINGS
 from .search_records import PoseSolutions, Starts
 from .tables import BY_LEGS, NEAREST, AnswerScratch, Start, Tables
 

@@ -49,12 +49,12 @@ from ..legs.records import (
 from ..projecting import is_over
 from ..sqp import note_multipliers, sum_of_multipliers
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
-from .constants import BALANCED, CONTRADICTING, FARTHEST, NEARER
 from .descend_pose import take_step
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
 from .lagrangian import put_limited_gradient
 from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction
 from .linearise import linearise
+from .pose_constants import BALANCED, CONTRADICTING, FARTHEST, NEARER
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 

@@ -10,10 +10,10 @@ import math
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine
-from ..constants import CLOSED, CORRECTIONS, LARGE_DAMPING, LONGEST_STEP, NEARLY_CLOSED, RESTORING
 from ..free_motions import FreeMotions, put_step, restoring_step
 from ..legs.records import Table
 from ..projecting import is_over
+from ..search_constants import CLOSED, CORRECTIONS, LARGE_DAMPING, LONGEST_STEP, NEARLY_CLOSED, RESTORING
 from ..sqp import (
     allowed_violation,
     begin_descent,
@@ -28,7 +28,10 @@ from ..sqp import (
     violation,
 )
 from ..vectors import wrap
-from .constants import (
+from .equations import PlatformState, close_rods
+from .lagrangian import lagrangian_hessian
+from .linearise import linearise
+from .pose_constants import (
     ARRIVED,
     HOPELESS,
     MISSES,
@@ -41,9 +44,6 @@ from .constants import (
     STEPS_AWAY,
     STUCK,
 )
-from .equations import PlatformState, close_rods
-from .lagrangian import lagrangian_hessian
-from .linearise import linearise
 from .search import SearchScratch, copy_platform_state, move, set_platform_users
 from .search_records import PlatformObjective
 

@@ -48,7 +48,7 @@ from ..legs.rods import (
     twist_rate,
 )
 from ..vectors import Vec, along, cross, dot, move, norm, scale, sub, turn, vec, wrap
-from .constants import FAR_FROM_DEAD_POINT
+from .pose_constants import FAR_FROM_DEAD_POINT
 
 
 class PlatformState(NamedTuple):

@@ -11,8 +11,8 @@ from ...arrays import Floats
 from .._jit import opener, routine, search
 from ..legs.answer import deviation, place_legs, put_rows, put_slopes
 from ..legs.complete_poses import load_pose
-from ..legs.constants import LEAST_MARGIN
 from ..legs.frames import set_frames
+from ..legs.leg_constants import LEAST_MARGIN
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import Table
 from ..legs.rods import put_proximal_slope

@@ -14,19 +14,18 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record
 from .._jit import kernel, opener, routine
-from ..constants import CONTRACTION, NEWTON_STEP, SHORTEST_SHARE
 from ..legs.answer import deviation, excess_of, largest_entry
 from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
-from ..legs.constants import KEPT
 from ..legs.endings import turned
+from ..legs.leg_constants import KEPT
 from ..legs.open_table import SAMPLE, open_table
 from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, Table
 from ..linear import solve_spd, solve_square
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
+from ..search_constants import CONTRACTION, NEWTON_STEP, SHORTEST_SHARE
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, scale, sub, turn, vec, wrap
 from ..vectors import move as moved
-from .constants import ASSEMBLED, FARTHEST_VALUE, FORWARD_STEPS, NEARLY_ASSEMBLED, ON_THE_WAY
 from .equations import (
     LegEvaluation,
     PlatformState,
@@ -37,6 +36,7 @@ from .equations import (
     put_slopes,
 )
 from .limits import coordinate_slope, is_multiturn
+from .pose_constants import ASSEMBLED, FARTHEST_VALUE, FORWARD_STEPS, NEARLY_ASSEMBLED, ON_THE_WAY
 from .search import copy_platform_state, move
 from .search_records import Starts
 from .spheres import Spheres, new_spheres, put_spheres, set_spheres

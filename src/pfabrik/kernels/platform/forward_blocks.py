@@ -13,17 +13,17 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from .._jit import inlined, kernel, routine
-from ..constants import CONTRACTION, NEWTON_STEP
 from ..legs.blocks import answer_blocks
 from ..legs.columns import PX, PY, PZ, XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ
 from ..legs.open_table import open_table
 from ..legs.records import COSINE, N_VALUES, Q_PROXIMAL, SINE, Table
 from ..legs.rods import base_end_of
 from ..rows import PENDING, REACHED, RESIDUAL
+from ..search_constants import CONTRACTION, NEWTON_STEP
 from ..vectors import Vec, add, along, copy_row, cross, dot, move, scale, sub, vec
-from .constants import ASSEMBLED, BLOCK_STEPS, NEARLY_ASSEMBLED
 from .equations import owner_of
 from .forward import open_starts, put_deviations
+from .pose_constants import ASSEMBLED, BLOCK_STEPS, NEARLY_ASSEMBLED
 from .search_records import Starts
 
 COLUMNS = 32

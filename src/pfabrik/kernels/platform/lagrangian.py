@@ -7,10 +7,10 @@ import math
 from ...arrays import Floats
 from .._jit import routine
 from ..clearance.link_limits import pair_excess
-from ..constants import PROBE
 from ..free_motions import FreeMotions, project, put_multipliers
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
+from ..search_constants import PROBE
 from ..sqp import symmetrise
 from .equations import PlatformState, evaluate_leg, has_proximal, length_row, put_leg_slopes
 from .leg_links import add_pair_slope, place_links

@@ -10,10 +10,10 @@ from ..free_motions import FreeMotions, add_limit, eliminate, project_gradient
 from ..legs.answer import deviation
 from ..legs.records import Table
 from ..vectors import dot, vec
-from .constants import NEAR_LINKS
 from .equations import PlatformState, evaluate_legs, put_slopes
 from .leg_links import add_pair_slope, place_links
 from .limits import cone_slope, coordinate_slope, dead_point_slope
+from .pose_constants import NEAR_LINKS
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 

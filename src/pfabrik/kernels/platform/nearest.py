@@ -48,11 +48,11 @@ from ..rows import (
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global, is_held_nowhere
-from .constants import EASING, HOLDABLE
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .leg_links import place_links
 from .linearise import linearise
+from .pose_constants import EASING, HOLDABLE
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
 from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along

@@ -20,9 +20,9 @@ from ..projecting import EFFORT, UNBOUNDED
 from ..qp import QP, new_qp
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import copy_row, copy_table, wrap
-from .constants import NEAR
 from .equations import LegEvaluation, PlatformState, count_unknowns, new_leg_evaluation, new_platform_state
 from .limits import coordinate_slope, is_multiturn
+from .pose_constants import NEAR
 from .search_records import PlatformObjective
 
 

@@ -8,16 +8,16 @@ from ...arrays import Floats, Record
 from .._jit import routine
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..closure.pose_objective import pose_gradient
-from ..constants import SIGHT
 from ..legs.complete_poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.frames import ZERO, orienting_coordinate, q_redundant_of, set_frames
 from ..legs.kinds import place_frame
 from ..legs.records import CRANK, Q_PROXIMAL, Table
 from ..legs.rods import solve_proximal
 from ..quaternions import yaw_of
+from ..search_constants import SIGHT
 from ..vectors import Vec, copy_row, copy_table, cross, dot, move, norm, scale, sub, turn, vec, wrap
-from .constants import AROUND, BENT, STRETCHED
 from .equations import LegEvaluation, PlatformState, has_proximal, redundant_side
+from .pose_constants import AROUND, BENT, STRETCHED
 from .search import SearchScratch
 from .search_records import Along, Starts
 
