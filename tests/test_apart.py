@@ -159,7 +159,7 @@ def test_searches_in_poses_and_in_joint_coordinates_agree(machine: pf.Mechanism)
     assert isinstance(engine, LegsEngine) and keeps_links(model)
     targets = around(machine, COUNT, 0.3, 0.8)
     ends = [
-        pf.Solution(machine, each.nearest(targets, None, FREE, keep_mode=False), (COUNT,))
+        pf.Solution(machine, each.answer(targets, None, FREE, keep_mode=False), (COUNT,))
         for each in (LegsEngine(model), ClosureEngine(model))
     ]
     one, other = (distances_from(targets, each) for each in ends)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from .apart.apart_engine import ApartEngine
 from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .closure.closure_engine import ClosureEngine
@@ -39,15 +38,6 @@ def _knows_all_modes(model: Model) -> bool:
 
 @derived
 def _engine(model: Model) -> Engine:
-    if model.mechanism.clearance is None:
-        return _usual(model)
-    usual = _usual(_without_clearance(model))
-    return ApartEngine(model, usual, usual)
-
-
-@derived
-def _usual(model: Model) -> Engine:
-    """The engine that knows nothing of links."""
     at_tip = read_at_tip(model)
     return _completing(model) if at_tip is None else TipEngine(model, _completing(model), LegsEngine(at_tip))
 
@@ -57,7 +47,3 @@ def _completing(model: Model) -> Engine:
     if model.has_legs:
         return LegsEngine(model)
     return ChainEngine(model) if is_chain(model) else ClosureEngine(model)
-
-
-def _without_clearance(model: Model) -> Model:
-    return model_of(model.mechanism.with_clearance(None))

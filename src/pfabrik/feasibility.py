@@ -8,10 +8,9 @@ import numpy as np
 
 from .answers.aligned_text import plain
 from .answers.start_configuration import Start, start_of
-from .apart.link_distances import least_distances, pair_names
-from .apart.links_at_poses import links_at_poses
 from .arrays import Floats, Ints, shaped
 from .closure.configurations import Configurations
+from .closure.link_distances import least_distances, pair_names
 from .closure.parasitic import has_parasitic_motion
 from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable
@@ -23,6 +22,7 @@ from .kernels.threads import in_blocks
 from .model import Model, model_of
 from .platform.answers import sides_at
 from .platform.folds import starts_beside
+from .platform.links_at_poses import links_at_poses
 from .platform.table import table_handle
 from .platform.tip_engine import measured, start_at_tip
 from .targets import Target, as_targets

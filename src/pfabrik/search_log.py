@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
+from .answers.status import Status
 from .closure.attempts import Attempt
+from .closure.closure_engine import ClosureEngine
+from .closure.configurations import Configurations
 from .description.mechanism import Mechanism
 from .description.mechanism_html import card
 from .engine import engine_of
@@ -105,8 +109,21 @@ def search_log(
         raise InvalidArgument("target", f"{len(targets)} targets", "a single one")
     solution = solve_ik(mechanism, targets[0], start=start, options=options)
     begin = start_of(mechanism, start, ())
-    attempts = tuple(engine_of(mechanism).attempts(targets, begin, options, keep_mode=keeps_mode(options, begin)))
+    free, keep_mode = mechanism.with_clearance(None), keeps_mode(options, begin)
+    attempts = tuple(engine_of(free).attempts(targets, begin, options, keep_mode=keep_mode))
+    if mechanism.clearance is not None:
+        usual = engine_of(free).answer(targets, begin, options, keep_mode=keep_mode)
+        attempts += _kept_apart(solution, usual, options.rotation_length or mechanism.rotation_length)
     return SearchLog(solution, attempts, _blocked_by(mechanism, targets[0], start))
+
+
+def _kept_apart(solution: Solution, usual: Configurations, lever: float) -> tuple[Attempt, ...]:
+    """The searches that keep links apart, as one attempt; none where they are far enough without."""
+    if not len(ClosureEngine(model_of(solution.mechanism)).too_near(usual)):
+        return ()
+    distance = hypot(solution.position_error, lever * solution.rotation_error)
+    ending = "reached" if solution.status == Status.REACHED else "nearest"
+    return (Attempt(KEPT_APART, "the start", int(solution.iterations), distance, ending),)
 
 
 def _blocked_by(mechanism: Mechanism, target: Target, start: Start | None) -> tuple[str, str, float] | None:

@@ -9,9 +9,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..apart.link_distances import pair_distances_at, pair_names
 from ..arrays import Floats
 from ..closure.first_order import are_stretched
+from ..closure.link_distances import pair_distances_at, pair_names
 from ..description.mechanism import Mechanism
 from ..model import Model
 from ..motion.displacements import rate_units

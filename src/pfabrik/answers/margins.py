@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..apart.link_distances import pair_distances, pair_names
-from ..apart.placed_links import placed_at
 from ..arrays import Floats, shaped
+from ..closure.link_distances import pair_distances, pair_names
+from ..closure.placed_links import placed_at
 from ..description.mechanism_html import card
 from ..frozen import FrozenMapping
 from ..motion.limited_coordinates import coned, ranges_of

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..apart.on_the_way import least_on_the_way
 from ..arguments import array, is_not_infinite
 from ..arrays import Floats, Ints, Mask
 from ..checks import put_limits, require_positive
 from ..closure.configurations import Configurations
+from ..closure.on_the_way import least_on_the_way
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..engine import engine_of

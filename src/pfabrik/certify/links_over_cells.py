@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..apart.link_distances import pair_names
 from ..arrays import Ints
+from ..closure.link_distances import pair_names
 from ..closure.links_on_paths import link_limits
 from ..derived import derived
 from ..description.links import NOWHERE, links_of

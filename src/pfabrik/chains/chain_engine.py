@@ -22,7 +22,7 @@ from ..closure.stretched import BentConfiguration
 from ..kernels.chains.chain_constants import MET, MOST_BENT
 from ..kernels.handle import Handle
 from ..kernels.platform.tables import BY_LEGS, Question
-from ..kernels.rows import PROJECTED, REACHED, Rows
+from ..kernels.rows import PROJECTED, REACHED, TOO_NEAR, Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..options import USUAL, Options
@@ -75,7 +75,7 @@ class ChainEngine(Engine):
             block = start if start is None or len(start) == 1 else start.at(failed)
             fallback = self._joint_space.answer(targets[failed], block, options, keep_mode=keep_mode)
             answers = answers.with_rows(failed, fallback)
-        return answers
+        return self._joint_space.apart(answers, targets, start, options, keep_mode=keep_mode or nearby)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -114,7 +114,7 @@ class ChainEngine(Engine):
     def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
         """As `Engine.prepared`; None if joints beside the chain do not keep their limits at the start."""
         begin = self._home if start is None else start.coordinates
-        if not self._are_idle_within(begin):
+        if not self._are_idle_within(begin) or self.model.mechanism.clearance is not None:
             return None
         question, tables = question_of(start is not None, keep_mode, last=BY_LEGS), tables_of(self.model, USUAL)
         scratch = Handle(new_scratch(self.model, 0))
@@ -174,6 +174,7 @@ class ChainEngine(Engine):
         question, begin = question_of(start is not None, True, nearby=True), joint_coordinates(self.model, start)
         _, answers = self._run(question, options, targets, begin, follows=True)
         status = answers.rows.status
+        status[self._joint_space.too_near(answers)] = TOO_NEAR
         n = 1 + int(np.argmax(np.append(status[:-1] != REACHED, True)))
         if status[n - 1] <= PROJECTED:
             return answers.at(np.arange(n))
@@ -237,7 +238,7 @@ class ChainEngine(Engine):
             block = start if start is None or len(start) == 1 else start.at(unsolved)
             others = self._joint_space.forward(values[unsolved], block, tolerance, keep_mode=keep_mode)
             answers = answers.with_rows(unsolved, others)
-        return answers
+        return self._joint_space.forward_apart(answers, values, start, tolerance)
 
     def _are_idle_within(self, coordinates: Floats) -> bool:
         """True if the coordinates of idle joints, which stay as they are, keep their limits in all rows."""

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.solution import Solution, checked_solution
-from ..apart.link_distances import least_distances
-from ..apart.placed_links import PlacedLinks
 from ..arrays import Floats, Ints, shaped
+from ..closure.link_distances import least_distances
+from ..closure.placed_links import PlacedLinks
 from ..description.links import has_pairs, links_of
 from ..description.mechanism_html import card
 from ..errors import UnsupportedMechanism

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..batch import put
@@ -41,6 +42,8 @@ from .configurations import (
 )
 from .engine_contract import Engine
 from .joint_answers import answer_rows, logged, question_of
+from .link_distances import clearance_excess
+from .placed_links import placed_at
 from .projection import ProjectionMode, projection_multipliers
 from .stretched import BentConfiguration
 
@@ -150,10 +153,14 @@ class ClosureEngine(Engine):
         return self._answer(targets, start_coordinates(self.model, start), options, question)
 
     def as_configurations(self, closing: Closing) -> Configurations:
-        """The configurations of a closing; their status is PENDING."""
+        """The configurations of a closing; their status is PENDING. Links that are too near exceed a limit."""
         rows = new_rows(self.model, len(closing.poses))
         write_closing(self.model.path_closure, closing, rows)
-        return Configurations(rows, closing.coordinates)
+        answers = Configurations(rows, closing.coordinates)
+        if self.model.mechanism.clearance is not None:
+            excess = clearance_excess(placed_at(self.model.mechanism, answers))
+            rows.measures[:, LIMIT_EXCESS] = np.fmax(rows.measures[:, LIMIT_EXCESS], excess)
+        return answers
 
     def points(self, configurations: Configurations) -> Mapping[str, Floats]:
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
@@ -169,7 +176,40 @@ class ClosureEngine(Engine):
         """Solve for configurations with actuated values (n, n_a), from one start or one for each."""
         closure, coordinates = self.model.closure, coordinates_for(self.model, start, len(values))
         closing = assemble(closure, coordinates, values, has_start=start is not None, keep_mode=keep_mode)
-        return forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
+        answers = forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
+        return self.forward_apart(answers, values, start, tolerance)
+
+    def too_near(self, answers: Configurations) -> NDArray[np.intp]:
+        """The rows whose links are nearer than the clearance."""
+        if self.model.mechanism.clearance is None:
+            return np.zeros(0, np.intp)
+        return np.flatnonzero(clearance_excess(placed_at(self.model.mechanism, answers)) > TOLERANCES.limit)
+
+    def apart(
+        self,
+        answers: Configurations,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+    ) -> Configurations:
+        """Answers to targets (n, 4, 4), with those in place of which links are too near that a search finds."""
+        rows = self.too_near(answers)
+        if not len(rows):
+            return answers
+        begin = start if start is None or len(start) == 1 else start.at(rows)
+        return answers.with_rows(rows, self.nearest(targets[rows], begin, options, keep_mode=keep_mode))
+
+    def forward_apart(
+        self, answers: Configurations, values: Floats, start: Configurations | None, tolerance: float
+    ) -> Configurations:
+        """As `apart`, for actuated values (n, n_a)."""
+        rows = self.too_near(answers)
+        if not len(rows):
+            return answers
+        begin = start if start is None or len(start) == 1 else start.at(rows)
+        return answers.with_rows(rows, self.nearest_forward(values[rows], begin, tolerance))
 
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""

@@ -11,8 +11,8 @@ from ..arrays import Floats, Ints, Mask
 # Status of a row, numbered as the public Status.
 REACHED, PROJECTED, EXCEEDED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 4, 9
 # Intermediate: within reach, but legs close only once the unset coordinates are completed, if at all; and solved to
-# half the digits, for a leg is at a dead point.
-OPEN, UNSURE = 8, 10
+# half the digits, for a leg is at a dead point; and within reach, but with links that are too near.
+OPEN, UNSURE, TOO_NEAR = 8, 10, 11
 # Held part of the target in a projection.
 HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION = 0, 1, 2
 # Added to it if a certificate proves that no feasible pose is nearer.

@@ -10,14 +10,12 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..closure.configurations import Configurations, new_rows
 from ..derived import derived
+from ..kernels.platform.pose_constants import MOST_CHANGED
 from ..model import Model
 from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, columns_of_sides, sides_at
 from .coordinates import read_coordinates
-
-MOST_CHANGED = 64
-"""Most working modes that are looked through."""
 
 
 def subsets(legs: list[int]) -> Iterator[list[int]]:

@@ -9,11 +9,11 @@ from ..batch import take, take_each
 from ..closure.configurations import new_rows
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.platform.tables import EXACTLY, IN_OTHER_MODES, NEAREST
+from ..kernels.platform.tables import EXACTLY, IN_OTHER_MODES
 from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from .rows_one_by_one import Answers, Request, answer_phases
+from .rows_one_by_one import Answers, Request, answer_phases, mark_near
 from .single import AssemblyOutputs, assembly_of
 
 ROWS_A_BLOCK = 1024
@@ -38,14 +38,6 @@ def forward_kinematics(
     return answers
 
 
-def project_values(request: Request, values: Floats) -> Answers:
-    """The feasible configurations whose actuators are nearest to values (n, n_a); the rest as `forward_kinematics`."""
-    shape = len(values), len(request.model.legs.legs)
-    answers = Answers(new_rows(request.model, len(values)), np.empty(shape), np.empty(shape))
-    answer_phases(request, values, answers, np.arange(len(values)), NEAREST, NEAREST)
-    return answers
-
-
 def _assembled(model: Model, values: Floats, starts: Starts) -> tuple[Rows, AssemblyOutputs]:
     """Rows assembled at actuated values (n, n_a) from one start each, or one for all, on all cores."""
     assembly, rows = assembly_of(model), new_rows(model, len(values))
@@ -57,4 +49,5 @@ def _assembled(model: Model, values: Floats, starts: Starts) -> tuple[Rows, Asse
         assembly.prepared(own, take(rows, block), take(outputs, block), assembly.scratch)()
 
     in_blocks(run, len(values), ROWS_A_BLOCK)
+    mark_near(model, rows, outputs.sides)
     return rows, outputs

@@ -19,8 +19,7 @@ from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.platform.tables import NEAREST
-from ..kernels.rows import PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
+from ..kernels.rows import FAILED, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
 from ..model import Model
 from ..motion.outward import centres_at
 from ..options import Options
@@ -28,16 +27,16 @@ from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, leg_answers, sides_at
 from .coordinates import joint_coordinates
-from .folds import home_answer, starts_beside, subsets
-from .forward import forward_kinematics, project_values
+from .folds import home_answer, starts_beside
+from .forward import forward_kinematics
 from .keep import kept
 from .leg_attempts import attempts
+from .links_of_legs import keeps_links, links_of_legs
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
-from .reach import count_turns, reach, reach_on_sides, rest_redundant, turns_repeatedly
-from .rows_one_by_one import Answers, answer_phases, request_from
+from .reach import count_turns, reach, rest_redundant, turns_repeatedly
+from .rows_one_by_one import Answers, mark_near, request_from
 from .single import LegsAssembly, SingleTarget, assembly_of, new_scratch
-from .table import table_handle
 from .unreached import answer_unreached
 
 
@@ -78,6 +77,15 @@ class LegsEngine(Engine):
         Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
         `nearby` by a search around the start alone.
         """
+        answers = self._in_space(targets, start, options, keep_mode, nearby)
+        if keeps_links(self._model):
+            return answers
+        return self._joint_space.apart(answers, targets, start, options, keep_mode=keep_mode or nearby)
+
+    def _in_space(
+        self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool, nearby: bool
+    ) -> Configurations:
+        """As `answer`; links are apart if `keeps_links`."""
         answers = self._by_stages(targets, start, options, keep_mode, nearby)
         if options.most_steps or not keep_mode or not self._table.has_sides:
             return answers
@@ -118,9 +126,10 @@ class LegsEngine(Engine):
         rows, sides = self._single.new_rows() if is_one else new_rows(model, len(targets)), start_sides
         if is_one:
             sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
-            if self._reach_one(targets, start, sides, keep_mode, rows):
-                return leg_answers(model, rows, sides, None, start, start_sides)
-        n_unsolved, sides = reach(model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
+        n_unsolved = 0
+        if not (is_one and self._reach_one(targets, start, sides, keep_mode, rows)):
+            n_unsolved, sides = reach(model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
+        n_unsolved += mark_near(model, rows, sides)
         if not n_unsolved:
             return leg_answers(model, rows, sides, None, start, start_sides)
         unsolved, q = np.flatnonzero(rows.status != REACHED), None
@@ -180,52 +189,6 @@ class LegsEngine(Engine):
         others = leg_answers(self._model, rows, sides, None, old, old_sides)
         return answers.with_rows(projected[nearer], others.at(nearer)) if len(nearer) else answers
 
-    def in_other_modes(
-        self, targets: Floats, start: Configurations | None
-    ) -> Iterator[tuple[NDArray[np.intp], Configurations]]:
-        """The answers of the closed forms to targets (n, 4, 4) in other working modes, those of few changed legs first.
-
-        Yields the rows that are reached in a mode, and their answers.
-        """
-        table, start_sides = self._table, self._sides_of(start)
-        two_sided = np.flatnonzero(table.home_sides[0])
-        start_poses = np.broadcast_to(self._single.home if start is None else start.rows.poses, targets.shape).copy()
-        for changed in subsets(two_sided.tolist()):
-            sides, rows = (
-                np.repeat(start_sides, len(targets) // len(start_sides), axis=0),
-                new_rows(self._model, len(targets)),
-            )
-            sides[:, changed] *= -1.0
-            reach_on_sides(table_handle(table), targets, start_poses, sides, rows)
-            reached = np.flatnonzero(rows.status == REACHED)
-            if len(reached):
-                answers = leg_answers(self._model, rows, sides, None, start, start_sides)
-                yield reached, answers.at(reached)
-
-    def nearest(
-        self,
-        targets: Floats,
-        start: Configurations | None,
-        options: Options,
-        *,
-        keep_mode: bool,
-        nearby: bool = False,
-    ) -> Configurations:
-        """The nearest feasible configurations to targets (n, 4, 4) that searches find, one start for all or for each.
-
-        With `nearby` they stay around their starts, with `keep_mode` in the working modes of these.
-        """
-        start_sides, rows = self._sides_of(start), new_rows(self._model, len(targets))
-        shape = len(targets), len(self._table.legs)
-        answers = Answers(rows, np.empty(shape), np.empty(shape))
-        request = request_from(self._model, options, start, start_sides, keep_mode, nearby)
-        answer_phases(request, targets, answers, np.arange(len(targets)), NEAREST, NEAREST)
-
-        def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
-            return self._joint_space.nearest(targets[rows], begin, options, keep_mode=keep_mode, nearby=nearby)
-
-        return self._completed(rows, answers.sides, answers.q, start, by_joints, options)
-
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Iterator[Attempt]:
@@ -250,11 +213,14 @@ class LegsEngine(Engine):
 
     def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
         """As `Engine.prepared`; None if actuators may turn more than once, and are counted from a start."""
-        if start is not None and turns_repeatedly(self._table):
+        if (start is not None and turns_repeatedly(self._table)) or not keeps_links(self._model):
             return None
         single, start_pose = self._single, self._single.home if start is None else start.rows.poses
         sides = single.home_sides if start is None else sides_at(self._model, start)
-        return single.prepared(target, start_pose, sides, rows, nearby=keep_mode), single
+        call, links = single.prepared(target, start_pose, sides, rows, nearby=keep_mode), links_of_legs(self._model)
+        if not len(links.pairs):
+            return call, single
+        return lambda: call() or mark_near(self._model, rows, sides), single
 
     def follow(
         self,
@@ -319,7 +285,9 @@ class LegsEngine(Engine):
             fallback = self._joint_space.advance(targets[unsolved], start.at(unsolved))
             put(rows, unsolved, fallback.rows)
             coordinates[unsolved] = fallback.coordinates
-        return Configurations(rows, coordinates)
+        answers = Configurations(rows, coordinates)
+        rows.status[self._joint_space.too_near(answers)] = FAILED
+        return answers
 
     def as_configurations(self, closing: Closing) -> Configurations:
         """Configurations found in joint coordinates, as answers whose status is not set yet."""
@@ -358,7 +326,8 @@ class LegsEngine(Engine):
             rows, solution = outputs = self._single.new_rows(), self._assembly.new_outputs(1)
             rows.actuators[:] = values
             own = self._forward_start(start, start_sides)
-            if self._assembly.prepared(own, rows, solution, self._assembly.scratch)() == 0:
+            is_solved = self._assembly.prepared(own, rows, solution, self._assembly.scratch)() == 0
+            if keeps_links(self._model) and is_solved and not mark_near(self._model, rows, solution.sides):
                 return leg_answers(self._model, rows, solution.sides, solution.q, start, start_sides)
         nearby = start is not None and keep_mode
         request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
@@ -373,21 +342,15 @@ class LegsEngine(Engine):
         def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
             return self._joint_space.forward(values[rows], begin, tolerance, keep_mode=keep_mode)
 
-        return self._completed(rows, sides, q_proximal, start, by_joints, request.options)
+        answers = self._completed(rows, sides, q_proximal, start, by_joints, request.options)
+        if keeps_links(self._model):
+            return answers
+        return self._joint_space.forward_apart(answers, values, start, tolerance)
 
-    def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
-        """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
-        start_sides = self._sides_of(start)
-        request = request_from(self._model, Options(), start, start_sides, False, start is not None, tolerance)
-
-        def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
-            return self._joint_space.nearest_forward(values[rows], begin, tolerance)
-
-        rows, q_proximal, sides = project_values(request, values)
-        return self._completed(rows, sides, q_proximal, start, by_joints, request.options)
-
-    def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared:
-        """As `Engine.prepared_forward`; with the call, its start and its scratch memory."""
+    def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared | None:
+        """As `Engine.prepared_forward`; with the call, its start and its scratch memory; None with a clearance."""
+        if self._model.mechanism.clearance is not None:
+            return None
         start_handle = self._forward_start(start, self._sides_of(start))
         scratch = Handle(new_scratch(self._model))
         call = self._assembly.prepared(start_handle, rows, self._assembly.new_outputs(1), scratch)

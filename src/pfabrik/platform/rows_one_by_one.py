@@ -15,10 +15,11 @@ from ..kernels.platform.tables import IN_OTHER_MODES, Start
 from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from ..options import Options
+from ..options import USUAL, Options
+from .links_of_legs import links_of_legs
 from .tables import handle_of, home_of, question_of, scratch_of_answers
 
-ROWS_A_BLOCK = 16
+ROWS_A_BLOCK, ROWS_A_RUN = 16, 1024
 
 
 class Answers(NamedTuple):
@@ -89,6 +90,25 @@ def answer_phases(
         in_blocks(
             lambda part: run(given[part], *take_each(start, part), *take(outputs, part)), len(asked), ROWS_A_BLOCK
         )
+
+
+def mark_near(model: Model, rows: Rows, sides: Floats) -> int:
+    """Make rows TOO_NEAR that legs reach on sides (n or 1, legs), but with links nearer than the clearance; how many.
+
+    None where searches in joint coordinates keep the links apart.
+    """
+    if not len(links_of_legs(model).pairs):
+        return 0
+    from ..kernels.platform.answer_rows import mark_near as mark
+
+    tables = handle_of(model, USUAL, with_seeds=False)
+    scratch = scratch_of_answers(tables)
+
+    def run(block: slice) -> int:
+        own = sides if len(sides) == 1 else sides[block]
+        return mark(tables.address, scratch.address, rows.poses[block], own, rows.status[block])
+
+    return sum(in_blocks(run, len(rows.status), ROWS_A_RUN))
 
 
 def step_redundant_joints(model: Model, targets: Floats, sides: Floats) -> None:

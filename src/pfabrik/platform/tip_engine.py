@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..closure.attempts import Attempt
 from ..closure.close import Closing, platform_poses
+from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations
 from ..closure.engine_contract import Engine
 from ..closure.projection import ProjectionMode
@@ -17,7 +18,7 @@ from ..derived import derived
 from ..description.geometry import home_numbers, with_numbers
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from ..kernels.rows import INVALID
+from ..kernels.rows import FAILED, INVALID
 from ..model import Model
 from ..options import Options
 from .legs_engine import LegsEngine
@@ -77,7 +78,12 @@ class TipEngine(Engine):
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """As `InverseEngine.answer`."""
-        return self._with_rotations(self.at_tip.answer(targets, start_at_tip(start), options, keep_mode=keep_mode))
+        answers = self._with_rotations(self.at_tip.answer(targets, start_at_tip(start), options, keep_mode=keep_mode))
+        rows = ClosureEngine(self.model).too_near(answers)
+        if not len(rows):
+            return answers
+        begin = start if start is None or len(start) == 1 else start.at(rows)
+        return answers.with_rows(rows, self.usual.answer(targets[rows], begin, options, keep_mode=keep_mode))
 
     def follow(
         self,
@@ -87,6 +93,8 @@ class TipEngine(Engine):
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """As `InverseEngine.follow`."""
+        if self.model.mechanism.clearance is not None:
+            return self.usual.follow(targets, start, options, on_progress)
         return self._with_rotations(self.at_tip.follow(targets, start_at_tip(start), options, on_progress))
 
     def attempts(
@@ -99,7 +107,9 @@ class TipEngine(Engine):
         """As `Engine.advance`."""
         at_start = start_at_tip(start)
         assert at_start is not None
-        return self._with_rotations(self.at_tip.advance(targets, at_start))
+        answers = self._with_rotations(self.at_tip.advance(targets, at_start))
+        answers.rows.status[ClosureEngine(self.model).too_near(answers)] = FAILED
+        return answers
 
     def forward(
         self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True

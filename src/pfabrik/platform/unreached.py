@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..kernels.platform.tables import EXACTLY, IN_OTHER_ASSEMBLIES, IN_OTHER_MODES
-from ..kernels.rows import OPEN
+from ..kernels.rows import OPEN, TOO_NEAR
 from .rows_one_by_one import Answers, Request, answer_phases
 from .tables import has_seeds
 
@@ -20,6 +20,6 @@ def answer_unreached(request: Request, targets: Floats, answers: Answers, places
     first, model = IN_OTHER_MODES, request.model
     if not (request.keep_mode or has_seeds(model)) and model.legs.has_sides:
         answer_phases(request, targets, answers, places, first, first)
-        first, places = IN_OTHER_ASSEMBLIES, places[answers.rows.status[places] == OPEN]
+        first, places = IN_OTHER_ASSEMBLIES, places[np.isin(answers.rows.status[places], (OPEN, TOO_NEAR))]
     if len(places):
         answer_phases(request, targets, answers, places, first, EXACTLY)

@@ -12,12 +12,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..apart.link_distances import clearance_excess
-from ..apart.placed_links import placed_at
 from ..arrays import Floats, Mask
 from ..chains.chain_engine import ChainEngine
 from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows
+from ..closure.link_distances import clearance_excess
+from ..closure.placed_links import placed_at
 from ..description.mechanism import Mechanism
 from ..kernels.rows import REACHED
 from ..tolerances import TOLERANCES

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..answers.solution import Solution
-from ..apart.link_distances import clearance_excess
-from ..apart.placed_links import PlacedLinks
 from ..arrays import Floats, Mask
 from ..batch import take, take_each
+from ..closure.link_distances import clearance_excess
 from ..closure.parasitic import has_other_assemblies
+from ..closure.placed_links import PlacedLinks
 from ..derived import derived
 from ..kernels.platform.search_records import PoseSolutions, Starts
 from ..kernels.rows import LIMIT_EXCESS, REACHED, RESIDUAL, Rows

@@ -10,12 +10,11 @@ import numpy as np
 from ..answers.active_limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
-from ..apart.apart_engine import ApartEngine
-from ..apart.link_distances import pair_names
 from ..arrays import Floats, Ints, Mask
 from ..batch import take
 from ..chains.chain_engine import ChainEngine
 from ..closure.closure_engine import ClosureEngine
+from ..closure.link_distances import pair_names
 from ..configuration import configuration
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
@@ -78,8 +77,7 @@ class MapQuestion:
 
     def explorer(self) -> Explorer | None:
         """An explorer that begins at the start, where points are solved one by one by the closure engine; else None."""
-        engine = engine_of(self.mechanism)
-        engine = engine.usual if isinstance(engine, ApartEngine) else engine
+        engine = engine_of(self.mechanism.with_clearance(None))
         if self.has_margins or self.hold == "position" or len(self.turns) > 1:
             return None
         if not isinstance(engine, ClosureEngine | ChainEngine):

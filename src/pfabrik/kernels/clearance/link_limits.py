@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .._jit import allocator, routine
@@ -20,9 +22,11 @@ def new_link_limits(limits: LinkLimits) -> LinkLimits:
     for i in range(limits.sizes.shape[0]):
         has_solids = has_solids or limits.sizes[i, KIND] != CAPSULE
     places, points, pulls = np.zeros(limits.home.shape), np.zeros((2, 3)), np.zeros((4, 6))
+    kept = np.zeros(1, np.int64)
+    kept[0] = limits.pairs.shape[0]
     polytope = new_polytope(MOST_CORNERS if has_solids else 0)
     return LinkLimits(
-        limits.sizes, limits.home, limits.bodies, limits.pairs, limits.least, places, polytope, points, pulls
+        limits.sizes, limits.home, limits.bodies, limits.pairs, limits.least, places, polytope, points, pulls, kept
     )
 
 
@@ -35,6 +39,15 @@ def pair_excess(links: LinkLimits, pair: int, near: float) -> float:
     i, j, least = links.pairs[pair, 0], links.pairs[pair, 1], links.least[0]
     one, other = (links.sizes[i], links.places[i]), (links.sizes[j], links.places[j])
     return least - clearance_within(one, other, least + near, links.polytope, links.points)
+
+
+@routine
+def links_excess(links: LinkLimits) -> float:
+    """By how much the nearest links are nearer than the clearance, with all placed; -infinity if it is surely kept."""
+    excess = -math.inf
+    for pair in range(links.pairs.shape[0]):
+        excess = max(excess, pair_excess(links, pair, 0.0))
+    return excess
 
 
 @routine

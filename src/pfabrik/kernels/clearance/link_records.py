@@ -28,6 +28,7 @@ class LinkLimits(NamedTuple):
     polytope: Polytope  # memory of overlaps
     points: Floats  # (2, 3): nearest points of the pair that was measured last [L]
     pulls: Floats  # (4, 6): points at the ends of this pair's links, and forces there, as of `put_pulls`
+    kept: Ints  # (1,): pairs that a search keeps apart now: all or none
 
 
 NO_LINKS = LinkLimits(
@@ -40,5 +41,6 @@ NO_LINKS = LinkLimits(
     new_polytope(0),
     np.zeros((2, 3)),
     np.zeros((4, 6)),
+    np.zeros(1, np.int64),
 )
 """Nothing to be kept apart."""

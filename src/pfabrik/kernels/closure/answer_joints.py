@@ -66,7 +66,8 @@ from .joint_tables import (
     new_joint_scratch,
 )
 from .loops import BASE_AXES, LOCKED, Closed, Objective, PoseObjective
-from .path_kinematics import LAYOUT, LOOPS
+from .path_kinematics import LAYOUT, LOOPS, load_row
+from .path_links import are_apart
 
 
 def _sample() -> JointTables:
@@ -99,6 +100,14 @@ def distance_of(tables: JointTables, scratch: JointScratch, aim: int, closed: Cl
         return math.inf
     position, rotation = errors(tables.task[0], closed.poses[0], scratch.target[0], scratch.turn)
     return weighted_distance(tables.weights[aim], position, rotation)
+
+
+@routine
+def keeps_clearance(tables: JointTables, scratch: JointScratch, closed: Closed) -> bool:
+    """True if no links of a configuration are nearer than the clearance."""
+    descent = scratch.descent
+    load_row(tables.loops, 0, closed, descent.trial)
+    return are_apart(descent.links, descent.ways, descent.trial, descent.way_eq, tables.machine[0]["limit"])
 
 
 @routine
@@ -198,16 +207,20 @@ def choose_start(tables: JointTables, scratch: JointScratch, n_starts: int) -> N
 
 
 @routine
-def project(tables: JointTables, scratch: JointScratch, question: Record, n_starts: int) -> int:
+def project(tables: JointTables, scratch: JointScratch, question: Record, n_starts: int, first: int) -> int:
     """The nearest feasible configuration, into `scratch.answer`; what it holds.
 
     Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
     target than a start that was given, nothing is held. The fallback is the start, which is feasible, or nearly.
+
+    Parameters
+    ----------
+    first : the projection that is tried first.
     """
     machine, answer, last = tables.machine[0], scratch.answer, tables.weights.shape[0] - 1
     n_seeds = 0 if question["keeps_mode"] == 1 else tables.seeds.shape[0]
     count, moves_start = min(n_starts + n_seeds, machine["descents"]), True
-    steps, distance, aim = min(MOST_STEPS, machine["descent_steps"] // count), math.inf, -1
+    steps, distance, aim = min(MOST_STEPS, machine["descent_steps"] // count), math.inf, first - 1
     steps = steps if steps >= FEWEST else 0
     n_seeds = n_seeds if count == n_starts + n_seeds else 0
     if count < n_starts or steps == 0:
@@ -308,7 +321,7 @@ def answer_row(
     answers: Answered,
 ) -> int:
     """Answer a target (4, 4) [length] from a start (columns,) [length or rad]; the status, OPEN if it takes seeds."""
-    verb, follows = question["verb"], tables.machine[0]["follows"] == 1
+    verb, follows, links = question["verb"], tables.machine[0]["follows"] == 1, scratch.descent.links
     if not is_pose(target):
         return put_invalid(row, answers)
     load_pose(target, tables.task[0]["length"], scratch.target[0])
@@ -318,8 +331,11 @@ def answer_row(
     pose_platform(tables, scratch, scratch.begin)
     scratch.logged[0] = 0
     n_starts = 1 if question["keeps_mode"] == 1 or follows or verb == NEAREST else 2
+    links.kept[0] = 0
     if verb != NEAREST:
         is_reached = reach(tables, scratch, question)
+        if is_reached and not keeps_clearance(tables, scratch, scratch.reached):
+            is_reached, n_starts, links.kept[0] = False, 1, links.pairs.shape[0]
         note(scratch, TO_CLOSE, AT_START, int(scratch.reached.iterations[0]), 0.0 if is_reached else math.inf)
         if is_reached or verb != ANSWER:
             status = put_answer(tables, scratch, row, target, scratch.reached, HOLD_NOTHING, answers)
@@ -329,8 +345,12 @@ def answer_row(
     if question["keeps_mode"] == 0 and tables.machine[0]["has_seeds"] == 0:
         return OPEN
     clip(tables, scratch.target[0])
-    hold = project(tables, scratch, question, n_starts)
-    return put_answer(tables, scratch, row, target, scratch.answer, hold, answers)
+    hold, last = project(tables, scratch, question, n_starts, 0), tables.weights.shape[0] - 1
+    if links.kept[0] < links.pairs.shape[0] and not keeps_clearance(tables, scratch, scratch.answer):
+        links.kept[0] = links.pairs.shape[0]
+        hold = project(tables, scratch, question, 1, last if hold == HOLD_NOTHING else 0)
+    status = put_answer(tables, scratch, row, target, scratch.answer, hold, answers)
+    return status if links.kept[0] == 0 or keeps_clearance(tables, scratch, scratch.answer) else FAILED
 
 
 @search

@@ -68,7 +68,7 @@ def lagrangian_gradient(
             cone_excess(loops, cone, objective.pose.margin, state, scratch)
             add_cone(loops, cone, multipliers[2 * n + cone], scratch, out)
     offset, links, is_placed = 2 * n + len(loops.cone_angles), scratch.links, False
-    for pair in range(len(links.pairs)):
+    for pair in range(links.kept[0]):
         if multipliers[offset + pair] != 0.0:
             if not is_placed:
                 place_links(scratch.ways, state, scratch.way_eq, scratch.links)

@@ -212,9 +212,9 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
             excess = max(excess, h)
             k = add_limit(k, h, 2 * n + cone, scratch.row, reduced)
     offset, links = 2 * n + len(loops.cone_angles), scratch.links
-    if len(links.pairs) > 0:
+    if links.kept[0] > 0:
         place_links(scratch.ways, state, scratch.way_eq, scratch.links)
-    for pair in range(len(links.pairs)):
+    for pair in range(links.kept[0]):
         h = pair_excess(scratch.links, pair, REACH) + margin
         if h > -REACH:
             for j in range(n):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ...arrays import Floats
 from .._jit import routine
-from ..clearance.link_limits import put_pulls
+from ..clearance.link_limits import links_excess, put_pulls
 from ..clearance.link_records import LinkLimits
 from ..clearance.solids import CAPSULE, KIND
 from ..vectors import Vec, add, cross, dot, put, sub, turn, vec
@@ -31,6 +31,15 @@ def place_links(ways: Loops, state: State, eq: Equations, links: LinkLimits) -> 
                 if links.bodies[i, 1 if is_capsule and k == 1 else 0] == body:
                     turned = turn(eq.T, vec(links.home[i, k]))
                     put(links.places[i, k], add(turned, shift) if is_capsule or k == 0 else turned)
+
+
+@routine
+def are_apart(links: LinkLimits, ways: Loops, state: State, eq: Equations, tolerance: float) -> bool:
+    """True if no links are nearer than the clearance, but for a tolerance [L]."""
+    if links.pairs.shape[0] == 0:
+        return True
+    place_links(ways, state, eq, links)
+    return bool(links_excess(links) <= tolerance)
 
 
 @routine

@@ -6,9 +6,11 @@ import math
 
 from ...arrays import Floats, Record, Records
 from .._jit import routine
+from ..clearance.link_limits import links_excess
 from ..closure.loops import PoseObjective
-from ..legs.answer import Completion, answer_on_sides
+from ..legs.answer import Completion, answer_on_sides, place_legs
 from ..legs.complete_poses import read_target
+from ..legs.frames import set_frames
 from ..legs.records import Table
 from ..projecting import UNBOUNDED, begin_effort, brings_nearer, is_too_far
 from ..rows import (
@@ -22,12 +24,14 @@ from ..rows import (
     PROJECTED,
     REACHED,
     ROTATION_ERROR,
+    TOO_NEAR,
     UNSURE,
 )
 from ..vectors import copy_row, copy_table
-from .any_mode import answer_in_any_mode
+from .any_mode import answer_in_any_mode, count_changes, note_choices, put_changed
+from .leg_links import place_links
 from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
-from .pose_constants import NEARLY
+from .pose_constants import MOST_CHANGED, MOST_CHOICES, NEARLY
 from .redundant_sets import search_sets, step_trunks
 from .search_records import PlatformObjective, PoseSolutions, Starts
 from .starts import load_target
@@ -151,6 +155,19 @@ def reach_from(
 
 
 @routine
+def are_apart(tables: Tables, scratch: AnswerScratch, pose: Floats, sides: Floats) -> bool:
+    """True if no links are nearer than the clearance, with legs on given sides (legs,) at a pose [length]."""
+    table, links, own = tables.legs, scratch.nearest.search.links, scratch.completion
+    if links.pairs.shape[0] == 0:
+        return True
+    load_own(pose, table.task[0]["length"], own.pose)
+    set_frames(own.pose, table.task[0], own.frames)
+    place_legs(table.legs, own.frames, sides, own.values, own.lines)
+    place_links(table, scratch.nearest.search.links, own.frames, own.values)
+    return bool(links_excess(links) <= tables.plan.settings[0]["limit"])
+
+
+@routine
 def reach_at_start(
     tables: Tables, scratch: AnswerScratch, start: Start, target: Floats, question: Record, answer: PoseSolutions
 ) -> int:
@@ -235,7 +252,27 @@ def reach_in_other_mode(
     )
     if status == REACHED:
         copy_row(sides, answer.sides[0])
+        return REACHED if are_apart(tables, scratch, answer.poses[0], sides) else TOO_NEAR
     return status
+
+
+@routine
+def reach_apart(tables: Tables, scratch: AnswerScratch, start: Start, target: Floats, answer: PoseSolutions) -> int:
+    """Solve a target by legs on other sides than those of the start, so that links are apart: few changes first."""
+    sides, choices, n_tried = scratch.other.sides[0], scratch.choices, 0
+    n = min(note_choices(tables.legs, start.sides[0], choices), MOST_CHOICES)
+    for n_changed in range(1, n + 1):
+        for choice in range(2**n - 1, 0, -1):
+            if n_tried == MOST_CHANGED or count_changes(choice) != n_changed:
+                continue
+            n_tried += 1
+            put_changed(start.sides[0], choices, n, choice, sides)
+            status = reach_from(tables.legs, target, start.poses[0], sides, scratch.completion, answer)
+            if status == REACHED and are_apart(tables, scratch, answer.poses[0], sides):
+                copy_row(sides, answer.sides[0])
+                return REACHED
+    copy_row(start.sides[0], answer.sides[0])
+    return PENDING
 
 
 @routine
@@ -364,26 +401,41 @@ def project(
 
 @routine
 def project_or_reach(
-    tables: Tables, scratch: AnswerScratch, start: Start, targets: Floats, question: Record, answer: PoseSolutions
+    tables: Tables,
+    scratch: AnswerScratch,
+    start: Start,
+    targets: Floats,
+    question: Record,
+    is_near: bool,
+    answer: PoseSolutions,
 ) -> int:
     """Answer a target by the nearest feasible pose; the status.
 
     From a pose within `NEARLY` of its target, and from every pose where the task leaves some of it open, legs then try
     to reach the target exactly. What is within `NEARLY`, stays unreached and has no certificate is UNSURE.
+
+    Parameters
+    ----------
+    is_near : legs reach the target, but with links that are too near.
     """
+    links, other = scratch.nearest.search.links, scratch.other
+    links.kept[0] = links.pairs.shape[0] if is_near else 0
     distance = project(tables, scratch, start, targets, question, answer)
     if distance == math.inf:
         put_start(start, answer)
         return PENDING
     status, q, measures = answer.status[0], answer.q, answer.measures
-    if question["last"] == NEAREST:
+    if question["last"] == NEAREST or is_near:
         return int(status)
     if distance <= NEARLY and not (status == PROJECTED and answer.counters[0, HOLD] >= CERTAIN):
         status = UNSURE
     if status == UNSURE or tables.machine[0]["is_partial"] == 1:
         table, begin = tables.near if question["is_nearby"] == 1 else tables.legs, scratch.begin[0]
         copy_table(answer.poses[0], begin)
-        if reach_from(table, targets[0], begin, answer.sides[0], scratch.completion, answer) == REACHED:
+        copy_solution(answer, other)
+        is_reached = reach_from(table, targets[0], begin, other.sides[0], scratch.completion, other) == REACHED
+        if is_reached and are_apart(tables, scratch, other.poses[0], other.sides[0]):
+            copy_solution(other, answer)
             for k in range(q.shape[1]):
                 q[0, k] = math.nan
             measures[0, POSITION_ERROR], measures[0, ROTATION_ERROR] = 0.0, 0.0
@@ -397,32 +449,39 @@ def answer_by_phases(
 ) -> int:
     """Answer a target by the phases that are asked for; the status, as of `answer_row`."""
     machine, first, last, target = tables.machine[0], question["first"], question["last"], targets[0]
-    keeps_mode = question["keeps_mode"] == 1
+    keeps_mode, is_near = question["keeps_mode"] == 1, first > BY_LEGS and answer.status[0] == TOO_NEAR
     if first == BY_LEGS and reach_at_start(tables, scratch, start, target, question, answer) == REACHED:
-        return REACHED
-    is_moved = first == BY_LEGS and machine["is_free"] == 1
+        is_near = not are_apart(tables, scratch, answer.poses[0], answer.sides[0])
+        if not is_near:
+            return REACHED
+    is_moved = first == BY_LEGS and machine["is_free"] == 1 and not is_near
     if is_moved and reach_moved(tables, scratch, start, targets, question, answer) == REACHED:
         return REACHED
     if last == BY_LEGS:
-        return OPEN
+        return TOO_NEAR if is_near else OPEN
     if machine["searches"] == 0:
         return PENDING
     if first <= IN_OTHER_MODES and machine["has_sides"] == 1:
         turn = scratch.nearest.search.gradient.turn
-        if question["has_start"] == 1 and is_on_target(tables, target, start.poses[0], turn):
+        if not is_near and question["has_start"] == 1 and is_on_target(tables, target, start.poses[0], turn):
             return PENDING
-        if not keeps_mode:
+        if not (keeps_mode or is_near):
             status = reach_in_other_mode(tables, scratch, start, target, answer)
-            if status != PENDING:
+            is_near = status == TOO_NEAR
+            if status != PENDING and not is_near:
                 return REACHED if status == REACHED else PENDING
+        if is_near and not keeps_mode and reach_apart(tables, scratch, start, target, answer) == REACHED:
+            return REACHED
     if last == IN_OTHER_MODES:
-        return OPEN
-    is_elsewhere = first <= IN_OTHER_ASSEMBLIES and machine["is_completed"] == 1 and not keeps_mode
+        return TOO_NEAR if is_near else OPEN
+    is_elsewhere = first <= IN_OTHER_ASSEMBLIES and machine["is_completed"] == 1 and not (keeps_mode or is_near)
     if is_elsewhere and reach_in_other_assembly(tables, scratch, target, answer) == REACHED:
-        return REACHED
+        is_near = not are_apart(tables, scratch, answer.poses[0], answer.sides[0])
+        if not is_near or reach_apart(tables, scratch, start, target, answer) == REACHED:
+            return REACHED
     if last == IN_OTHER_ASSEMBLIES:
-        return OPEN
-    return project_or_reach(tables, scratch, start, targets, question, answer)
+        return TOO_NEAR if is_near else OPEN
+    return project_or_reach(tables, scratch, start, targets, question, is_near, answer)
 
 
 @routine
@@ -435,7 +494,8 @@ def answer_row(
     need not be kept, on others and in other assemblies. Else PROJECTED to the nearest feasible pose found, or REACHED
     from there. PENDING where no feasible pose was found, or only joint coordinates are exact enough: at a dead point,
     or on a target that the start is on already. UNSURE where these may come nearer than a projection that nearly
-    reaches. OPEN if the phases asked for do not answer it.
+    reaches. OPEN if the phases asked for do not answer it, TOO_NEAR if they reach it, but with links that are too near.
+    Later phases are to be told so by the status of the answer.
 
     Parameters
     ----------
@@ -454,7 +514,7 @@ def answer_row(
     if most > 0 and status == PROJECTED:
         answer.counters[0, ITERATIONS] = most if effort["is_cut"] == 1 else effort["linearised"]
     answer.status[0] = status
-    if question["has_start"] == 1 and status != PENDING and status != OPEN:
+    if question["has_start"] == 1 and status != PENDING and status != OPEN and status != TOO_NEAR:
         count_turns(tables.legs.driven, start.actuators[0], answer.actuators[0])
     return status
 

@@ -8,8 +8,8 @@ from ...arrays import Floats, Ints
 from .._jit import opener, search
 from ..legs.open_table import SAMPLE
 from ..passes import plan as P
-from ..rows import PROJECTED
-from .answer_row import answer_row
+from ..rows import PROJECTED, REACHED, TOO_NEAR
+from .answer_row import answer_row, are_apart
 from .assemble_row import assemble_row
 from .nearest import NO_STARTS, PLAN
 from .redundant_sets import MOVING, MovedTrunks, RedundantSet, RedundantSets, step_trunks
@@ -89,6 +89,23 @@ def answer_rows(
             found = answer_row(tables, scratch, start, asked[row:end], question, answer)
         n_left += 1 if found > PROJECTED else 0
     return n_left
+
+
+@search
+def mark_near(tables_address: int, scratch_address: int, poses: Floats, sides: Floats, status: Ints) -> int:
+    """Make rows TOO_NEAR that are REACHED with links nearer than the clearance; their number.
+
+    Parameters
+    ----------
+    poses, sides, status : (n, 4, 4) [length], (n or 1, legs), (n,).
+    """
+    tables, scratch, n_near = open_tables(tables_address), open_scratch(scratch_address), 0
+    for row in range(status.shape[0]):
+        own = row if sides.shape[0] > 1 else 0
+        if status[row] == REACHED and not are_apart(tables, scratch, poses[row], sides[own]):
+            status[row] = TOO_NEAR
+            n_near += 1
+    return n_near
 
 
 @search

@@ -69,6 +69,25 @@ def note_choices(table: Table, sides: Floats, choices: Ints) -> int:
 
 
 @routine
+def count_changes(choice: int) -> int:
+    """How many legs a choice changes: the bits that are set."""
+    n = 0
+    while choice > 0:
+        n += choice & 1
+        choice >>= 1
+    return n
+
+
+@routine
+def put_changed(start_sides: Floats, choices: Ints, n_choices: int, choice: int, sides: Floats) -> None:
+    """Fill the sides of a start with some legs changed: the first of the choices is the highest bit."""
+    copy_row(start_sides, sides)
+    for c in range(n_choices):
+        if choice >> (n_choices - 1 - c) & 1 == 1:
+            sides[choices[c]] = -start_sides[choices[c]]
+
+
+@routine
 def answer_in_any_mode(
     table: Table,
     target: Floats,

@@ -17,9 +17,10 @@ from ..rows import (
     PROJECTED,
     REACHED,
     ROTATION_ERROR,
+    TOO_NEAR,
 )
 from ..vectors import copy_row
-from .answer_row import copy_solution, load_own, nearest_turn, put_start, turns_repeatedly
+from .answer_row import are_apart, copy_solution, load_own, nearest_turn, put_start, turns_repeatedly
 from .forward import assemble_from_others, assemble_from_own, put_deviations, write_assembled
 from .nearest import nearest_of_row
 from .pose_constants import WAY_HALVINGS
@@ -186,8 +187,14 @@ def assemble_elsewhere(
 
 
 @routine
-def assemble_row(
-    tables: Tables, scratch: AnswerScratch, start: Start, values: Floats, question: Record, answer: PoseSolutions
+def assemble_anyhow(
+    tables: Tables,
+    scratch: AnswerScratch,
+    start: Start,
+    values: Floats,
+    question: Record,
+    is_near: bool,
+    answer: PoseSolutions,
 ) -> int:
     """Assemble one row at actuated values (1, n_a) [length or rad], from a start, `tables.home` if none is given.
 
@@ -200,6 +207,7 @@ def assemble_row(
     scratch, answer : as of `answer_row`; `distances` is without meaning.
     question : `first` and `last` are BY_LEGS to assemble from the start alone, whose status, PENDING, or EXCEEDED if it
         leads beyond a limit, is in `answer` if `first` is later; and NEAREST to search alone.
+    is_near : nothing more is asked for than what a search needs.
     """
     machine, table, first, last = tables.machine[0], tables.assembly, question["first"], question["last"]
     is_cold, own, newton = question["has_start"] == 0, scratch.own, scratch.newton
@@ -211,6 +219,8 @@ def assemble_row(
     put_start(start, scratch.other)
     copy_row(values[0], answer.actuators[0])
     put_deviations(table, values[0], scratch.wished[0])
+    if is_near:
+        return TOO_NEAR
     if first == BY_LEGS:
         starts = Starts(own, scratch.home_q if is_cold else scratch.no_q, start.sides)
         status = assemble_from_own(table, scratch.wished[0], starts, 0, newton)
@@ -235,4 +245,28 @@ def assemble_row(
     is_missed = is_missed and not (is_near and measures[0, ACTUATOR_ERROR] <= machine["noise"])
     if is_missed and answer.status[0] != REACHED:
         assemble_elsewhere(tables, scratch, start, values, question, answer)
+    return int(answer.status[0])
+
+
+@routine
+def assemble_row(
+    tables: Tables, scratch: AnswerScratch, start: Start, values: Floats, question: Record, answer: PoseSolutions
+) -> int:
+    """Assemble one row as `assemble_anyhow` does, so that links are apart, by a search where they would be too near.
+
+    TOO_NEAR, as status of the answer, tells that the start alone leads to such links.
+    """
+    links, is_known = scratch.nearest.search.links, question["first"] > BY_LEGS and answer.status[0] == TOO_NEAR
+    links.kept[0] = 0
+    status = assemble_anyhow(tables, scratch, start, values, question, is_known, answer)
+    if status == REACHED and not are_apart(tables, scratch, answer.poses[0], answer.sides[0]):
+        status = answer.status[0] = TOO_NEAR
+    if status == TOO_NEAR and question["last"] > BY_LEGS:
+        links.kept[0] = links.pairs.shape[0]
+        put_start(start, answer)
+        copy_row(values[0], answer.actuators[0])
+        answer.status[0] = PENDING
+        project_values(tables, scratch, start, values, question, question["has_start"] == 0, answer)
+        if is_asked_for(answer, question["tolerance"]):
+            answer.status[0] = REACHED
     return int(answer.status[0])

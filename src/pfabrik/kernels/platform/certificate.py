@@ -72,7 +72,7 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
         if pose.platform[i] != 1.0:
             return False
     n_pairs, multipliers = search.links.pairs.shape[0], search.hessian.multipliers
-    for pair in range(n_pairs):  # which the bound does not know
+    for pair in range(search.links.kept[0]):  # which the bound does not know
         if multipliers[multipliers.shape[0] - n_pairs + pair] > 0.0:
             return False
     if search.leg_eval.rows.shape[0] == 0:

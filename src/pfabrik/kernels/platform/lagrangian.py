@@ -51,11 +51,11 @@ def put_limited_gradient(table: Table, search: SearchScratch, out: Floats) -> No
             for j in range(out.shape[0]):
                 out[j] += multiplier * slope[j]
     offset, links, is_placed = offset + kept_sides.shape[0], search.links, False
-    for pair in range(links.pairs.shape[0]):
+    for pair in range(links.kept[0]):
         multiplier = multipliers[offset + pair]
         if multiplier != 0.0:
             if not is_placed:
-                place_links(table, search.links, search.leg_eval)
+                place_links(table, search.links, search.leg_eval.frames, search.leg_eval.values)
             is_placed = True
             over = pair_excess(search.links, pair, math.inf)
             add_pair_slope(table, search.links, pair, over, multiplier, search.leg_eval, out)
@@ -104,7 +104,7 @@ def note_involved(table: Table, objective: PlatformObjective, search: SearchScra
         if multipliers[2 * n_ranges + i] > 0.0:
             involved[table.cones[i]["leg"]] = 1
     links = search.links
-    for pair in range(links.pairs.shape[0]):
+    for pair in range(links.kept[0]):
         for end in range(4 if multipliers[offset + n + pair] > 0.0 else 0):
             body = links.bodies[links.pairs[pair, end // 2], end % 2]
             if body >= 0:

@@ -18,29 +18,29 @@ from .equations import LegEvaluation
 
 
 @routine
-def place_links(table: Table, links: LinkLimits, leg_eval: LegEvaluation) -> None:
+def place_links(table: Table, links: LinkLimits, frames: Floats, values: Floats) -> None:
     """Fill the places of all links, with legs evaluated."""
     for i in range(links.home.shape[0]):
         is_capsule = links.sizes[i, KIND] == CAPSULE
         for k in range(4):
             at, body = vec(links.home[i, k]), links.bodies[i, 1 if is_capsule and k == 1 else 0]
-            put(links.places[i, k], place_in(table, body, at, is_capsule or k == 0, leg_eval))
+            put(links.places[i, k], place_in(table, body, at, is_capsule or k == 0, frames, values))
 
 
 @routine
-def place_in(table: Table, body: int, at: Vec, is_point: bool, leg_eval: LegEvaluation) -> Vec:
+def place_in(table: Table, body: int, at: Vec, is_point: bool, frames: Floats, values: Floats) -> Vec:
     """A point of a body, or a direction in it, given at home, where it is now."""
     if body == BASE:
         return at
     if body == PLATFORM:
-        frame = leg_eval.frames[FROM_BASE]
+        frame = frames[FROM_BASE]
         return move(frame, sub(at, vec(table.task[0]["reference"]))) if is_point else turn(frame, at)
-    leg, values = table.legs[body], leg_eval.values[body]
+    leg = table.legs[body]
     axis, point = vec(leg["proximal_axis"]), vec(leg["proximal_point"])
     if leg["proximal"] == CRANK:
-        lever = turned(sub(at, point) if is_point else at, axis, values[COSINE], values[SINE])
+        lever = turned(sub(at, point) if is_point else at, axis, values[body, COSINE], values[body, SINE])
         return add(point, lever) if is_point else lever
-    return along(at, values[Q_PROXIMAL], axis) if is_point else at
+    return along(at, values[body, Q_PROXIMAL], axis) if is_point else at
 
 
 @routine

@@ -110,10 +110,10 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
                     slope[j] *= kept_sides[leg]
                 k = add_limit(k, over, offset + leg, search.leg_eval.slope, reduced)
     offset, links = offset + kept_sides.shape[0], search.links
-    if links.pairs.shape[0] > 0:
-        place_links(table, search.links, search.leg_eval)
+    if links.kept[0] > 0:
+        place_links(table, search.links, search.leg_eval.frames, search.leg_eval.values)
     near = min(near, NEAR_LINKS)
-    for pair in range(links.pairs.shape[0]):
+    for pair in range(links.kept[0]):
         over = pair_excess(search.links, pair, near) + margin
         if over > -near:
             excess = max(excess, over)

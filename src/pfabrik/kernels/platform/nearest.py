@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints, Record, Records
 from .._jit import opener, routine, search
-from ..clearance.link_limits import pair_excess
+from ..clearance.link_limits import links_excess
 from ..clearance.link_records import NO_LINKS
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
 from ..closure.pose_objective import pose_gradient, turn_of_tilt
@@ -114,10 +114,6 @@ def write_solution(
     orthonormalise(best.pose)
     measures[RESIDUAL] = evaluate_legs(table, best, leg_eval) * length
     measures[LIMIT_EXCESS] = max(excess_of(table.limited, table.cones, leg_eval.values), 0.0)
-    if search.links.pairs.shape[0] > 0:
-        place_links(table, search.links, search.leg_eval)
-    for pair in range(search.links.pairs.shape[0]):
-        measures[LIMIT_EXCESS] = max(measures[LIMIT_EXCESS], pair_excess(search.links, pair, 0.0))
     copy_row(best.q, solutions.q[row])
     copy_row(best.sides, solutions.sides[row])
     for i in range(table.driven.shape[0]):
@@ -370,9 +366,10 @@ def nearest_of_row(
     """Fill the nearest feasible configuration of a row by one of the plan's objectives; its distance [L].
 
     Where it ends beyond a cone that was not constrained, it is searched for again with all cones: constraining those
-    that limit where crossed hinges can point their rods may stop a search early.
+    that limit where crossed hinges can point their rods may stop a search early. So it is with links that are too near:
+    of what keeps the limits, the nearest that keeps links apart unasked is the nearest of all that keep them apart.
     """
-    setting, search = plan.settings[aim], scratch.search
+    setting, search, links = plan.settings[aim], scratch.search, scratch.search.links
     frame, margin, near, steps = setting["frame"], setting["margin"], setting["near"], min(setting["steps"], most_steps)
     pose = PoseObjective(targets, plan.weights[aim], frame, margin, near, steps)
     objective = PlatformObjective(pose, values, setting["implied"])
@@ -383,12 +380,14 @@ def nearest_of_row(
     solutions.distances[row] = math.inf
     if not load_target(table, pose, row, search):
         return math.inf
-    n_seeds, least, n_cones = min(plan.seeds.poses.shape[0], most_seeds), math.inf, setting["cones"]
+    n_seeds, least = min(plan.seeds.poses.shape[0], most_seeds), math.inf
+    n_cones, n_pairs = setting["cones"], links.kept[0]
     search.n_cones[0] = n_cones
     if setting["steps"] == 0:
+        links.kept[0] = links.pairs.shape[0]
         put_limit_multipliers(table, row, objective, starts, scratch, weights[row])
         return math.inf
-    for _attempt in range(2):
+    for _attempt in range(3):
         least = search_row(
             table,
             row,
@@ -405,15 +404,22 @@ def nearest_of_row(
         solutions.distances[row] = least
         if least == math.inf:
             solutions.status[row] = PENDING
-            return least
+            break
         solutions.counters[row, ITERATIONS] = search.control[0]["steps"]
         write_solution(table, row, pose, search, scratch.best, solutions)
         set_status(setting, row, solutions)
         solutions.counters[row, HOLD] += CERTAIN if scratch.best_tally[0]["agreements"] == math.inf else 0
-        if n_cones == table.cones.shape[0] or solutions.measures[row, LIMIT_EXCESS] <= setting["limit"]:
-            return least
-        n_cones = table.cones.shape[0]
+        place_links(table, search.links, search.leg_eval.frames, search.leg_eval.values)
+        excess, over = solutions.measures[row, LIMIT_EXCESS], links_excess(search.links)
+        solutions.measures[row, LIMIT_EXCESS] = max(excess, over)
+        is_beyond = n_cones < table.cones.shape[0] and excess > setting["limit"]
+        is_near = links.kept[0] < links.pairs.shape[0] and over > setting["limit"]
+        if not (is_beyond or is_near):
+            break
+        n_cones = table.cones.shape[0] if is_beyond else n_cones
         search.n_cones[0] = n_cones
+        links.kept[0] = links.pairs.shape[0] if is_near else links.kept[0]
+    links.kept[0] = n_pairs
     return least
 
 
@@ -463,6 +469,7 @@ def nearest_pose(
         0,
     )
     stays = plan.settings[0]["stays"]
+    scratch.search.links.kept[0] = 0
     solutions = PoseSolutions(distances, ends, ends_q, ends_sides, counters, actuators, measures, status)
     for row in range(distances.shape[0]):
         least = nearest_of_row(

@@ -79,6 +79,9 @@ AGREEMENTS_OF_MANY = 8
 """Agreements with implicit joints, or where task and legs leave some of the pose open: there are many more
 configurations."""
 
+MOST_CHANGED = 64
+"""Most working modes that are looked through: those that change the fewest sides."""
+
 # Seeds (`pfabrik.platform.seeds`)
 
 SEEDS, MANY_SEEDS = 16, 32

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..closure.configurations import Configurations
-from ..closure.engine_contract import Engine
 from ..description.links import links_of
 from ..description.mechanism import Mechanism
 from ..options import USUAL
 from ..poses import between
+from .configurations import Configurations
+from .engine_contract import Engine
 from .link_distances import least_distances
 from .placed_links import PlacedLinks
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..closure.configurations import Configurations, new_rows
 from ..derived import derived
 from ..description.links import Links, links_of
 from ..description.mechanism import Mechanism
@@ -13,6 +12,7 @@ from ..kernels.clearance.link_records import PLATFORM
 from ..kernels.threads import in_blocks
 from ..model import model_of
 from ..motion.displacements import end_effector_pose
+from .configurations import Configurations, new_rows
 from .placed_links import PlacedLinks, bodies_of_links, placed_at
 
 ROWS_A_BLOCK = 4096

@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..closure.configurations import Configurations
 from ..derived import derived
 from ..description.links import ends_on, links_of
 from ..description.mechanism import Mechanism
 from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..motion.displacements import centres, displacements
+from .configurations import Configurations
 
 
 @dataclass(frozen=True, eq=False)

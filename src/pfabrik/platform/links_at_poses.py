@@ -6,16 +6,16 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..closure.configurations import Configurations, new_rows
+from ..closure.placed_links import PlacedLinks, bodies_of_links
 from ..derived import derived
 from ..description.links import links_of
 from ..kernels.clearance.link_records import BASE, PLATFORM
 from ..kernels.rows import PENDING, REACHED, Rows
-from ..model import Model
+from ..model import Model, model_of
 from ..options import Options
-from ..platform.answers import leg_answers
-from ..platform.legs_engine import LegsEngine
-from ..platform.reach import reach
-from .placed_links import PlacedLinks, bodies_of_links
+from .answers import leg_answers
+from .legs_engine import LegsEngine
+from .reach import reach
 
 NO_NUMBERS, NO_COUNTERS = np.zeros((0, 0)), np.zeros((0, 0), np.int64)
 
@@ -40,7 +40,8 @@ def links_at_poses(
     if n_unsolved:
         unsolved = np.flatnonzero(rows.status != REACHED)
         rows.status[unsolved] = PENDING
-        others = LegsEngine(model).answer(poses[unsolved], start, Options(), keep_mode=True)
+        free = LegsEngine(model_of(model.mechanism.with_clearance(None)))
+        others = free.answer(poses[unsolved], start, Options(), keep_mode=True)
         answers = answers.with_rows(unsolved, others)
     placed = PlacedLinks(model.mechanism, answers, lambda: LegsEngine(model).points(answers))
     return placed, np.asarray(answers.rows.status == REACHED)

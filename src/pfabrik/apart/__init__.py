@@ -1,1 +1,0 @@
-"""Links kept apart: their distances, and answers in which they keep the clearance."""
