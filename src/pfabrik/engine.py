@@ -9,7 +9,8 @@ from .closure.engine_contract import Engine
 from .derived import derived
 from .description.mechanism import Mechanism
 from .model import Model, model_of
-from .platform.legs_engine import LegsEngine
+from .platform.legs_engine import LegsApartByJoints, LegsEngine
+from .platform.links_of_legs import keeps_links
 from .platform.seeds import seeds_of_other_assemblies
 from .platform.tip_engine import TipEngine, measured, read_at_tip
 
@@ -45,5 +46,5 @@ def _engine(model: Model) -> Engine:
 def _completing(model: Model) -> Engine:
     """The engine that completes what a task leaves open of a pose."""
     if model.has_legs:
-        return LegsEngine(model)
+        return LegsEngine(model) if keeps_links(model) else LegsApartByJoints(model)
     return ChainEngine(model) if is_chain(model) else ClosureEngine(model)

@@ -10,8 +10,8 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .closure.attempts import Attempt
-from .closure.closure_engine import ClosureEngine
 from .closure.configurations import Configurations
+from .closure.link_distances import too_near
 from .description.mechanism import Mechanism
 from .description.mechanism_html import card
 from .engine import engine_of
@@ -119,7 +119,7 @@ def search_log(
 
 def _kept_apart(solution: Solution, usual: Configurations, lever: float) -> tuple[Attempt, ...]:
     """The searches that keep links apart, as one attempt; none where they are far enough without."""
-    if not len(ClosureEngine(model_of(solution.mechanism)).too_near(usual)):
+    if not len(too_near(engine_of(solution.mechanism), solution.mechanism, usual)):
         return ()
     distance = hypot(solution.position_error, lever * solution.rotation_error)
     ending = "reached" if solution.status == Status.REACHED else "nearest"

@@ -75,7 +75,10 @@ class ChainEngine(Engine):
             block = start if start is None or len(start) == 1 else start.at(failed)
             fallback = self._joint_space.answer(targets[failed], block, options, keep_mode=keep_mode)
             answers = answers.with_rows(failed, fallback)
-        return self._joint_space.apart(answers, targets, start, options, keep_mode=keep_mode or nearby)
+        if self.model.mechanism.clearance is None:
+            return answers
+        near = self._joint_space.too_near(answers)
+        return self._joint_space.apart(near, answers, targets, start, options, keep_mode=keep_mode or nearby)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -238,7 +241,9 @@ class ChainEngine(Engine):
             block = start if start is None or len(start) == 1 else start.at(unsolved)
             others = self._joint_space.forward(values[unsolved], block, tolerance, keep_mode=keep_mode)
             answers = answers.with_rows(unsolved, others)
-        return self._joint_space.forward_apart(answers, values, start, tolerance)
+        if self.model.mechanism.clearance is None:
+            return answers
+        return self._joint_space.forward_apart(self._joint_space.too_near(answers), answers, values, start, tolerance)
 
     def _are_idle_within(self, coordinates: Floats) -> bool:
         """True if the coordinates of idle joints, which stay as they are, keep their limits in all rows."""

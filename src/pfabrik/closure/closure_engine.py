@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..batch import put
@@ -15,6 +15,7 @@ from ..kernels.handle import Handle
 from ..kernels.rows import (
     FAILED,
     HOLD,
+    HOLD_NOTHING,
     INVALID,
     LIMIT_EXCESS,
     POSITION_ERROR,
@@ -41,7 +42,7 @@ from .configurations import (
     write_closing,
 )
 from .engine_contract import Engine
-from .joint_answers import answer_rows, logged, question_of
+from .joint_answers import answer_rows, logged, near_rows, question_of
 from .link_distances import clearance_excess
 from .placed_links import placed_at
 from .projection import ProjectionMode, projection_multipliers
@@ -177,16 +178,16 @@ class ClosureEngine(Engine):
         closure, coordinates = self.model.closure, coordinates_for(self.model, start, len(values))
         closing = assemble(closure, coordinates, values, has_start=start is not None, keep_mode=keep_mode)
         answers = forward_answers(closure, self.as_configurations(closing), closing, values, tolerance)
-        return self.forward_apart(answers, values, start, tolerance)
+        return self.forward_apart(self.too_near(answers), answers, values, start, tolerance)
 
-    def too_near(self, answers: Configurations) -> NDArray[np.intp]:
+    def too_near(self, answers: Configurations) -> Ints:
         """The rows whose links are nearer than the clearance."""
-        if self.model.mechanism.clearance is None:
-            return np.zeros(0, np.intp)
-        return np.flatnonzero(clearance_excess(placed_at(self.model.mechanism, answers)) > TOLERANCES.limit)
+        rows = near_rows(self.model, answers.coordinates)
+        return np.asarray(rows[answers.rows.status[rows] != INVALID])
 
     def apart(
         self,
+        near: Ints,
         answers: Configurations,
         targets: Floats,
         start: Configurations | None,
@@ -194,18 +195,28 @@ class ClosureEngine(Engine):
         *,
         keep_mode: bool,
     ) -> Configurations:
-        """Answers to targets (n, 4, 4), with those in place of which links are too near that a search finds."""
-        rows = self.too_near(answers)
-        if not len(rows):
+        """Answers to targets (n, 4, 4), in rows whose links are too near of a search that keeps them apart.
+
+        What cannot be held anyhow is not searched for again.
+        """
+        if not len(near):
             return answers
-        begin = start if start is None or len(start) == 1 else start.at(rows)
-        return answers.with_rows(rows, self.nearest(targets[rows], begin, options, keep_mode=keep_mode))
+        holds = (answers.rows.status[near] != PROJECTED) | (answers.rows.holds[near] != HOLD_NOTHING)
+        for rows, asked in ((near[holds], options), (near[~holds], replace(options, hold=None))):
+            if len(rows):
+                begin = start if start is None or len(start) == 1 else start.at(rows)
+                answers = answers.with_rows(rows, self.nearest(targets[rows], begin, asked, keep_mode=keep_mode))
+        return answers
 
     def forward_apart(
-        self, answers: Configurations, values: Floats, start: Configurations | None, tolerance: float
+        self,
+        rows: Ints,
+        answers: Configurations,
+        values: Floats,
+        start: Configurations | None,
+        tolerance: float,
     ) -> Configurations:
         """As `apart`, for actuated values (n, n_a)."""
-        rows = self.too_near(answers)
         if not len(rows):
             return answers
         begin = start if start is None or len(start) == 1 else start.at(rows)

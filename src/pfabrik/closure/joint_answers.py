@@ -20,7 +20,7 @@ from ..kernels.rows import OPEN, Rows
 from ..kernels.search_constants import CONTINUATION_STEPS
 from ..kernels.threads import in_blocks
 from ..model import Model
-from ..options import Options
+from ..options import USUAL, Options
 from ..tolerances import TOLERANCES
 from .close import CLOSED, in_lengths, locking
 from .configurations import new_rows
@@ -35,7 +35,7 @@ from .reaches import reaches_of
 if TYPE_CHECKING:
     from ..kernels.closure.joint_tables import JointScratch
 
-ROWS_A_BLOCK = 16
+ROWS_A_BLOCK, ROWS_A_RUN = 16, 1024
 
 
 def answer_rows(
@@ -63,6 +63,22 @@ def answer_rows(
         if not n_open:
             break
     return coordinates
+
+
+def near_rows(model: Model, coordinates: Floats) -> Ints:
+    """The rows of joint coordinates (n, columns) whose links are nearer than the clearance; none without one."""
+    is_near = np.zeros(len(coordinates), np.int64)
+    if model.mechanism.clearance is not None:
+        from ..kernels.closure.answer_joints import note_near
+
+        tables, scratch = prepared(model, USUAL, False)
+        coordinates = np.ascontiguousarray(coordinates)
+        in_blocks(
+            lambda block: note_near(tables.address, scratch.address, coordinates[block], is_near[block]),
+            len(is_near),
+            ROWS_A_RUN,
+        )
+    return np.flatnonzero(is_near)
 
 
 def _answer_block(

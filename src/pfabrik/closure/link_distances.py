@@ -12,7 +12,9 @@ from ..kernels.clearance.link_records import PLATFORM
 from ..kernels.threads import in_blocks
 from ..model import model_of
 from ..motion.displacements import end_effector_pose
+from ..tolerances import TOLERANCES
 from .configurations import Configurations, new_rows
+from .engine_contract import Engine
 from .placed_links import PlacedLinks, bodies_of_links, placed_at
 
 ROWS_A_BLOCK = 4096
@@ -50,6 +52,14 @@ def clearance_excess(placed: PlacedLinks) -> Floats:
     mechanism = placed.mechanism
     excess: Floats = ((mechanism.clearance or 0.0) - least_distances(placed)[0]) / mechanism.characteristic_length
     return excess
+
+
+def too_near(engine: Engine, mechanism: Mechanism, answers: Configurations) -> Ints:
+    """The rows of an engine's answers whose links are nearer than the clearance; none without a clearance."""
+    if mechanism.clearance is None:
+        return np.zeros(0, np.int64)
+    excess = clearance_excess(PlacedLinks(mechanism, answers, lambda: engine.points(answers)))
+    return np.flatnonzero(excess > TOLERANCES.limit)
 
 
 def pair_distances(placed: PlacedLinks) -> Floats:

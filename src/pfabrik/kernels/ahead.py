@@ -10,7 +10,7 @@ from .certify.prove import prove
 from .chains.answer_chains import answer_chains, walk_chains
 from .clearance.capsules import capsule_clearance, place_ends
 from .clearance.least_clearance import least_clearance
-from .closure.answer_joints import answer_joints
+from .closure.answer_joints import answer_joints, note_near
 from .closure.close import close
 from .closure.descend import nearest_configuration
 from .closure.first_order import rates
@@ -74,6 +74,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer, tuple(_values("i F3 F3 f2 i1 f3 f2 f2"))),
     (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
     (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
+    (note_near, tuple(_values("i i F2 i1"))),
     (solve_by_passes, _PASSES),
     (step_rows, tuple(_values("i i F3 f2"))),
     (mark_near, tuple(_values("i i F3 F2 i1"))),

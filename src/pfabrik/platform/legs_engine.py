@@ -15,6 +15,7 @@ from ..closure.close import Closing, in_lengths
 from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows, steps_of
 from ..closure.engine_contract import Engine, Prepared
+from ..closure.link_distances import too_near
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
 from ..kernels.handle import Handle
@@ -31,7 +32,7 @@ from .folds import home_answer, starts_beside
 from .forward import forward_kinematics
 from .keep import kept
 from .leg_attempts import attempts
-from .links_of_legs import keeps_links, links_of_legs
+from .links_of_legs import links_of_legs
 from .nearest import limit_multipliers
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, rest_redundant, turns_repeatedly
@@ -52,7 +53,7 @@ class LegsEngine(Engine):
     def __init__(self, model: Model) -> None:
         self._model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
-        self.bounds_steps = self._searches
+        self.bounds_steps, self._keeps_apart = self._searches, len(links_of_legs(model).pairs) > 0
 
     @cached_property
     def _assembly(self) -> LegsAssembly:
@@ -77,15 +78,6 @@ class LegsEngine(Engine):
         Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
         `nearby` by a search around the start alone.
         """
-        answers = self._in_space(targets, start, options, keep_mode, nearby)
-        if keeps_links(self._model):
-            return answers
-        return self._joint_space.apart(answers, targets, start, options, keep_mode=keep_mode or nearby)
-
-    def _in_space(
-        self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool, nearby: bool
-    ) -> Configurations:
-        """As `answer`; links are apart if `keeps_links`."""
         answers = self._by_stages(targets, start, options, keep_mode, nearby)
         if options.most_steps or not keep_mode or not self._table.has_sides:
             return answers
@@ -129,7 +121,8 @@ class LegsEngine(Engine):
         n_unsolved = 0
         if not (is_one and self._reach_one(targets, start, sides, keep_mode, rows)):
             n_unsolved, sides = reach(model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
-        n_unsolved += mark_near(model, rows, sides)
+        if self._keeps_apart:
+            n_unsolved += mark_near(model, rows, sides)
         if not n_unsolved:
             return leg_answers(model, rows, sides, None, start, start_sides)
         unsolved, q = np.flatnonzero(rows.status != REACHED), None
@@ -213,12 +206,12 @@ class LegsEngine(Engine):
 
     def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
         """As `Engine.prepared`; None if actuators may turn more than once, and are counted from a start."""
-        if (start is not None and turns_repeatedly(self._table)) or not keeps_links(self._model):
+        if start is not None and turns_repeatedly(self._table):
             return None
         single, start_pose = self._single, self._single.home if start is None else start.rows.poses
         sides = single.home_sides if start is None else sides_at(self._model, start)
-        call, links = single.prepared(target, start_pose, sides, rows, nearby=keep_mode), links_of_legs(self._model)
-        if not len(links.pairs):
+        call = single.prepared(target, start_pose, sides, rows, nearby=keep_mode)
+        if not self._keeps_apart:
             return call, single
         return lambda: call() or mark_near(self._model, rows, sides), single
 
@@ -286,7 +279,7 @@ class LegsEngine(Engine):
             put(rows, unsolved, fallback.rows)
             coordinates[unsolved] = fallback.coordinates
         answers = Configurations(rows, coordinates)
-        rows.status[self._joint_space.too_near(answers)] = FAILED
+        rows.status[too_near(self, model.mechanism, answers)] = FAILED
         return answers
 
     def as_configurations(self, closing: Closing) -> Configurations:
@@ -327,7 +320,7 @@ class LegsEngine(Engine):
             rows.actuators[:] = values
             own = self._forward_start(start, start_sides)
             is_solved = self._assembly.prepared(own, rows, solution, self._assembly.scratch)() == 0
-            if keeps_links(self._model) and is_solved and not mark_near(self._model, rows, solution.sides):
+            if is_solved and not (self._keeps_apart and mark_near(self._model, rows, solution.sides)):
                 return leg_answers(self._model, rows, solution.sides, solution.q, start, start_sides)
         nearby = start is not None and keep_mode
         request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
@@ -342,10 +335,7 @@ class LegsEngine(Engine):
         def by_joints(rows: NDArray[np.intp], begin: Configurations | None) -> Configurations:
             return self._joint_space.forward(values[rows], begin, tolerance, keep_mode=keep_mode)
 
-        answers = self._completed(rows, sides, q_proximal, start, by_joints, request.options)
-        if keeps_links(self._model):
-            return answers
-        return self._joint_space.forward_apart(answers, values, start, tolerance)
+        return self._completed(rows, sides, q_proximal, start, by_joints, request.options)
 
     def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared | None:
         """As `Engine.prepared_forward`; with the call, its start and its scratch memory; None with a clearance."""
@@ -375,3 +365,33 @@ class LegsEngine(Engine):
         if start is not None:
             count_turns(self._model, start.rows.actuators, rows)
         return True
+
+
+class LegsApartByJoints(LegsEngine):
+    """The engine of legs with links whose places poses do not tell: searches in joint coordinates keep them apart."""
+
+    def answer(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        *,
+        keep_mode: bool,
+        nearby: bool = False,
+    ) -> Configurations:
+        """As `LegsEngine.answer`."""
+        answers = super().answer(targets, start, options, keep_mode=keep_mode, nearby=nearby)
+        near = too_near(self, self._model.mechanism, answers)
+        return self._joint_space.apart(near, answers, targets, start, options, keep_mode=keep_mode or nearby)
+
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
+        """As `Engine.forward`."""
+        answers = super().forward(values, start, tolerance, keep_mode=keep_mode)
+        near = too_near(self, self._model.mechanism, answers)
+        return self._joint_space.forward_apart(near, answers, values, start, tolerance)
+
+    def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
+        """As `Engine.prepared`: none."""
+        return None

@@ -10,9 +10,9 @@ import numpy as np
 from ..arrays import Floats
 from ..closure.attempts import Attempt
 from ..closure.close import Closing, platform_poses
-from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations
 from ..closure.engine_contract import Engine
+from ..closure.link_distances import too_near
 from ..closure.projection import ProjectionMode
 from ..derived import derived
 from ..description.geometry import home_numbers, with_numbers
@@ -79,7 +79,7 @@ class TipEngine(Engine):
     ) -> Configurations:
         """As `InverseEngine.answer`."""
         answers = self._with_rotations(self.at_tip.answer(targets, start_at_tip(start), options, keep_mode=keep_mode))
-        rows = ClosureEngine(self.model).too_near(answers)
+        rows = too_near(self, self.model.mechanism, answers)
         if not len(rows):
             return answers
         begin = start if start is None or len(start) == 1 else start.at(rows)
@@ -108,7 +108,7 @@ class TipEngine(Engine):
         at_start = start_at_tip(start)
         assert at_start is not None
         answers = self._with_rotations(self.at_tip.advance(targets, at_start))
-        answers.rows.status[ClosureEngine(self.model).too_near(answers)] = FAILED
+        answers.rows.status[too_near(self, self.model.mechanism, answers)] = FAILED
         return answers
 
     def forward(

@@ -331,7 +331,7 @@ def answer_row(
     pose_platform(tables, scratch, scratch.begin)
     scratch.logged[0] = 0
     n_starts = 1 if question["keeps_mode"] == 1 or follows or verb == NEAREST else 2
-    links.kept[0] = 0
+    links.kept[0] = links.pairs.shape[0] if verb == NEAREST else 0
     if verb != NEAREST:
         is_reached = reach(tables, scratch, question)
         if is_reached and not keeps_clearance(tables, scratch, scratch.reached):
@@ -351,6 +351,16 @@ def answer_row(
         hold = project(tables, scratch, question, 1, last if hold == HOLD_NOTHING else 0)
     status = put_answer(tables, scratch, row, target, scratch.answer, hold, answers)
     return status if links.kept[0] == 0 or keeps_clearance(tables, scratch, scratch.answer) else FAILED
+
+
+@search
+def note_near(tables_address: int, scratch_address: int, coordinates: Floats, is_near: Ints) -> None:
+    """Note which rows of joint coordinates (n, columns) have links nearer than the clearance, (n,)."""
+    tables, scratch = open_tables(tables_address), open_scratch(scratch_address)
+    for row in range(is_near.shape[0]):
+        for j in range(tables.scale.shape[0]):
+            scratch.begin.coordinates[0, j] = coordinates[row, j] * tables.scale[j]
+        is_near[row] = 0 if keeps_clearance(tables, scratch, scratch.begin) else 1
 
 
 @search

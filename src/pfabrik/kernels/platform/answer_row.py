@@ -29,7 +29,7 @@ from ..rows import (
 )
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode, count_changes, note_choices, put_changed
-from .leg_links import place_links
+from .leg_links import are_on_legs, place_links
 from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
 from .pose_constants import MOST_CHANGED, MOST_CHOICES, NEARLY
 from .redundant_sets import search_sets, step_trunks
@@ -162,7 +162,8 @@ def are_apart(tables: Tables, scratch: AnswerScratch, pose: Floats, sides: Float
         return True
     load_own(pose, table.task[0]["length"], own.pose)
     set_frames(own.pose, table.task[0], own.frames)
-    place_legs(table.legs, own.frames, sides, own.values, own.lines)
+    if are_on_legs(links):
+        place_legs(table.legs, own.frames, sides, own.values, own.lines)
     place_links(table, scratch.nearest.search.links, own.frames, own.values)
     return bool(links_excess(links) <= tables.plan.settings[0]["limit"])
 

@@ -20,6 +20,10 @@ least V^2 / (1 - sum_k m_k) / (A_max - A), with A_max the largest A for which f_
 For a redundant joint that carries a proximal joint, a slide d on a hinge or a hinge on a slide, f_g has the further
 term d (lean (cos q - 1) + twist sin q). Its first part is at least the largest lean d, as if it were part of A; its
 second at least - w d^2 / 2 + twist^2 / w (cos q - 1) for any w, here half of what the slide has left.
+
+Links that are c apart have no two points that are nearer, whatever their shares s and t along links from the base to
+the platform: with u = (s - t) y + const from one to the other, m (c^2 - |u|^2) / 2 is not positive, as of a rod at its
+shortest, and (s - t)^2 m counts in the sum of the m_k. The shares are those of the nearest points at x.
 """
 
 from __future__ import annotations
@@ -28,6 +32,9 @@ import math
 from typing import TypeAlias
 
 from .._jit import routine
+from ..clearance.link_limits import pair_excess, share_of_end
+from ..clearance.link_records import PLATFORM, LinkLimits
+from ..clearance.solids import ROUND
 from ..closure.loops import BASE_AXES
 from ..free_motions import easing_step, put_multipliers
 from ..legs.answer import deviation
@@ -52,6 +59,7 @@ from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, 
 from .descend_pose import take_step
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
 from .lagrangian import put_limited_gradient
+from .leg_links import place_links
 from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction
 from .linearise import linearise
 from .pose_constants import BALANCED, CONTRADICTING, FARTHEST, NEARER
@@ -71,10 +79,6 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
     for i in range(3):
         if pose.platform[i] != 1.0:
             return False
-    n_pairs, multipliers = search.links.pairs.shape[0], search.hessian.multipliers
-    for pair in range(search.links.kept[0]):  # which the bound does not know
-        if multipliers[multipliers.shape[0] - n_pairs + pair] > 0.0:
-            return False
     if search.leg_eval.rows.shape[0] == 0:
         evaluate_legs(table, search.best, search.leg_eval)
         put_objective(table, row, objective, search.best, search)
@@ -90,6 +94,8 @@ def is_global(table: Table, row: int, objective: PlatformObjective, search: Sear
     for root in range(table.legs.shape[0]):
         leg_force, push, share = leg_share(table, root, nearer, search)
         total, pushing, shares = add(total, leg_force), pushing + push, shares + share
+    links_force, push, _ = terms_of_links(table, BALANCED, search)
+    total, pushing = add(total, links_force), pushing + push
     return bool(norm(total) <= BALANCED * norm(gradient) and shares < unit - pushing)
 
 
@@ -138,6 +144,8 @@ def contradicts(table: Table, search: SearchScratch) -> bool:
         leg_force, push, excess, terms = leg_terms(table, root, math.inf, search)
         total, pushing, violated = add(total, leg_force), pushing + push, violated + excess
         levers += terms[0] + abs(terms[3])
+    links_force, push, excess = terms_of_links(table, math.inf, search)
+    total, pushing, violated = add(total, links_force), pushing + push, violated + excess
     if pushing >= 0.0:
         return False
     for root in range(table.legs.shape[0] if violated > 0.0 else 0):
@@ -240,6 +248,47 @@ def leg_terms(table: Table, root: int, slack: float, search: SearchScratch) -> t
             lean += dot(weight, flatten(slide_axis, axis)) if turns else -dot(weight, flatten(slide_axis, axis))
             twist += dot(weight, cross(axis, slide_axis))
     return force, pushing, violated, (norm(moved), A, B, push, b, lean, twist, hinge, slide)
+
+
+@routine
+def terms_of_links(table: Table, slack: float, search: SearchScratch) -> tuple[Vec, float, float]:
+    """Force, push and sum of the pairs of links that are kept apart; an infinite push if the bound does not know one.
+
+    Parameters
+    ----------
+    slack : as of `leg_terms`.
+    """
+    links, multipliers, force, pushing, violated = search.links, search.hessian.multipliers, ZERO, 0.0, 0.0
+    first, is_placed = multipliers.shape[0] - links.pairs.shape[0], False
+    for pair in range(links.kept[0]):
+        multiplier = multipliers[first + pair]
+        if multiplier == 0.0:
+            continue
+        if not is_placed:
+            place_links(table, search.links, search.leg_eval.frames, search.leg_eval.values)
+        is_placed = True
+        excess, i, j = pair_excess(search.links, pair, math.inf), links.pairs[pair, 0], links.pairs[pair, 1]
+        if excess < -slack:
+            continue
+        distance, radii = links.least[0] - excess, links.sizes[i, ROUND] + links.sizes[j, ROUND]
+        here, least, one, other = distance + radii, links.least[0] + radii, vec(links.points[0]), vec(links.points[1])
+        share = share_of_platform(links, j, other) - share_of_platform(links, i, one)
+        if distance == 0.0 or here <= 0.0 or not abs(share) <= 1.0:
+            return ZERO, math.inf, 0.0
+        force = along(force, -multiplier * share / distance, sub(other, one))
+        pushing += multiplier / here * share * share
+        violated += 0.5 * multiplier / here * (least * least - here * here)
+    return force, pushing, violated
+
+
+@routine
+def share_of_platform(links: LinkLimits, link: int, x: Vec) -> float:
+    """The share of the platform's displacement that a point of a link makes; infinite if proximal joints move it."""
+    first, second = links.bodies[link, 0], links.bodies[link, 1]
+    if first >= 0 or second >= 0:
+        return math.inf
+    share = share_of_end(links, link, x)
+    return (1.0 - share if first == PLATFORM else 0.0) + (share if second == PLATFORM else 0.0)
 
 
 @routine

@@ -28,6 +28,15 @@ def place_links(table: Table, links: LinkLimits, frames: Floats, values: Floats)
 
 
 @routine
+def are_on_legs(links: LinkLimits) -> bool:
+    """True if some links move with proximal joints."""
+    for i in range(links.bodies.shape[0]):
+        if max(links.bodies[i, 0], links.bodies[i, 1]) >= 0:
+            return True
+    return False
+
+
+@routine
 def place_in(table: Table, body: int, at: Vec, is_point: bool, frames: Floats, values: Floats) -> Vec:
     """A point of a body, or a direction in it, given at home, where it is now."""
     if body == BASE:

@@ -387,7 +387,7 @@ def nearest_of_row(
         links.kept[0] = links.pairs.shape[0]
         put_limit_multipliers(table, row, objective, starts, scratch, weights[row])
         return math.inf
-    for _attempt in range(3):
+    for _attempt in range(4):
         least = search_row(
             table,
             row,
@@ -416,9 +416,9 @@ def nearest_of_row(
         is_near = links.kept[0] < links.pairs.shape[0] and over > setting["limit"]
         if not (is_beyond or is_near):
             break
-        n_cones = table.cones.shape[0] if is_beyond else n_cones
+        n_cones = table.cones.shape[0] if is_beyond else setting["cones"]
         search.n_cones[0] = n_cones
-        links.kept[0] = links.pairs.shape[0] if is_near else links.kept[0]
+        links.kept[0] = links.kept[0] if is_beyond else links.pairs.shape[0]
     links.kept[0] = n_pairs
     return least
 
