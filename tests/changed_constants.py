@@ -15,6 +15,7 @@ import importlib.util
 import json
 import multiprocessing
 import os
+import pkgutil
 import sys
 import warnings
 from collections.abc import Iterator
@@ -119,7 +120,6 @@ def load(folder: Path) -> ctypes.CDLL:
     return ctypes.CDLL(spec.origin)
 
 
-@cache
 def machine(name: str) -> Any:
     """A machine of the catalogue, of the tests' files, or one that a test makes."""
     import pfabrik as pf
@@ -182,8 +182,6 @@ def measures(solution: Any) -> list[bytes]:
 def answer(record: str, n_calls: Any, change: dict[str, Any], base: Any, sink: Connection) -> None:
     """Answer in a process of its own; with a base, until something differs from it."""
     library, name, value = change.get("library"), change.get("name"), change.get("value")
-    if change["is_derived"]:
-        machine.cache_clear()
     own = f"{PACKAGE}.{record}"
     if library is not None:
         setattr(sys.modules[own], name, value)
@@ -255,28 +253,34 @@ def ask(folder: Path, record: str, names: list[str]) -> None:
     warnings.simplefilter("ignore")
     cores = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})  # one: what runs is counted without a lock
-    import pfabrik  # noqa: F401
-
-    for each in MACHINES[record]:  # so that modules are loaded, and machines derived, once
-        list(answers(each, record))
+    for package in ("platform", "closure", "chains", "passes"):
+        for found in pkgutil.iter_modules([str(ROOT / "src" / "pfabrik" / package)], f"pfabrik.{package}."):
+            importlib.import_module(found.name)
     n_calls = ctypes.c_int64.in_dll(library, "N_CALLS")
-    base = cache(lambda is_derived: in_a_process(record, n_calls, {"is_derived": is_derived}, None))
     importers = {module: imported(module) for module in list(sys.modules) if module.startswith("pfabrik.")}
     outside = {
-        there for module, names in importers.items() if not module.startswith(PACKAGE) for there in names.values()
+        there
+        for module, constants in importers.items()
+        if not module.startswith(PACKAGE)
+        for there in constants.values()
     }
-    for name, value in numbers(record).items():
-        if names and name not in names:
-            continue
-        is_derived = (f"{PACKAGE}.{record}", name) in outside
-        for factor in (10, 0.1):
-            changed = times(value, factor)
-            change = {"library": library, "name": name, "value": changed, "is_derived": is_derived}
-            told = in_a_process(record, n_calls, change, base(is_derived))
-            if told:
-                break
-        sys.stdout.write(f"{json.dumps([name, factor, told])}\n")
-        sys.stdout.flush()
+    for is_derived in (
+        True,
+        False,
+    ):  # what follows from a machine is kept: the first in processes that have nothing yet
+        own = [name for name in numbers(record) if ((f"{PACKAGE}.{record}", name) in outside) == is_derived]
+        own = [name for name in own if not names or name in names]
+        for each in MACHINES[record] if own and not is_derived else ():
+            list(answers(each, record))
+        base = in_a_process(record, n_calls, {}, None) if own else None
+        for name in own:
+            for factor in (10, 0.1):
+                change = {"library": library, "name": name, "value": times(numbers(record)[name], factor)}
+                told = in_a_process(record, n_calls, change, base)
+                if told:
+                    break
+            sys.stdout.write(f"{json.dumps([name, factor, told])}\n")
+            sys.stdout.flush()
 
 
 if __name__ == "__main__":
