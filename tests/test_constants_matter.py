@@ -20,16 +20,16 @@ GUARDS = {
     "search_constants": "LAST SOLVABLE",
     "platform.pose_constants": "NEAR_INCUMBENT STRETCHED HOLDABLE EASING BENT",
     "closure.joint_constants": "MOST_DAMPING FEW",
-    "chains.chain_constants": "ALONG PULLED_TURN ON_BOUND MOST_DAMPING LEAST_PIVOT NOTHING RESTORED PULLED_FROM PULLS BENT "
-    "DESCENTS_NEARBY",
-    "passes.pass_constants": "CONTENT OBLIQUE LARGEST_TURN TURN_DAMPING NO_LENGTH NO_SIDE WELL_INSIDE LEAST_SHARE HASTY "
-    "MARGINS INSIDE OPEN VARIED LOST PULLED NO_RATE",
-    "clearance.distance_constants": "MOST_SIMPLICES MOST_STALLED ROUNDING MOST_CORNERS FLAT CLOSE TOUCHING NEAR PARALLEL "
-    "ALONG_AXIS",
+    "chains.chain_constants": "ALONG PULLED_TURN ON_BOUND MOST_DAMPING LEAST_PIVOT NOTHING RESTORED PULLED_FROM PULLS "
+    "BENT DESCENTS_NEARBY",
+    "passes.pass_constants": "CONTENT OBLIQUE LARGEST_TURN TURN_DAMPING NO_LENGTH NO_SIDE WELL_INSIDE LEAST_SHARE "
+    "HASTY MARGINS INSIDE OPEN VARIED LOST PULLED NO_RATE",
+    "clearance.distance_constants": "MOST_SIMPLICES MOST_STALLED ROUNDING MOST_CORNERS FLAT CLOSE TOUCHING NEAR "
+    "PARALLEL ALONG_AXIS",
     "legs.leg_constants": "MOST_STEPS_IMPLICIT KEPT NOT_A_ROTATION PARTS MORE_PARTS LEAST_MARGIN",
 }
-"""Constants that nothing depends on of what these machines are asked: they guard against rounding, loops without an end,
-and what other machines have."""
+"""Constants that nothing depends on of what these machines are asked: they guard against rounding, loops without an
+end, and what other machines have."""
 
 
 def run(*arguments: object) -> str:
