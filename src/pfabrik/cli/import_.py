@@ -93,9 +93,9 @@ def imported(
 ) -> Imported:
     """The mechanism in a file, whose kind follows from its first element."""
     choices |= {"fixed": fixed or (), "length_unit": unit}
-    if pf.interop.kind_of(file) == "urdf":
+    if pf.interop.kind_of(file) != "mjcf":
         if configuration != "qpos0":
-            raise click.UsageError("--configuration: a URDF has one configuration; expected none")
+            raise click.UsageError("--configuration: a robot description has one configuration; expected none")
         return pf.interop.from_urdf(file, loops, **choices)
     if loops is not None:
         raise click.UsageError("--loops: a MuJoCo model tells its loops itself; expected none")

@@ -1,4 +1,4 @@
-"""Mechanisms from and for other programs: MuJoCo models (MJCF) and robot descriptions (URDF).
+"""Mechanisms from and for other programs: MuJoCo models (MJCF) and robot descriptions (URDF, SDF).
 
 m = pf.interop.from_mjcf("robot.xml", base="body", end_effector="head").mechanism
 pf.interop.to_mjcf(m, "machine.xml")         # starts closed, and stays closed
@@ -11,7 +11,7 @@ from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
 from .notes import Note
 from .opened import Loop, OpenMechanism
-from .urdf_reading import from_urdf
+from .urdf_reading import from_sdf, from_urdf
 from .verifying import AgainstOriginal, Verification, verify
 from .xml_reading import kind_of
 
@@ -24,6 +24,7 @@ __all__ = [
     "Verification",
     "assemble",
     "from_mjcf",
+    "from_sdf",
     "from_urdf",
     "kind_of",
     "mjcf_qpos",

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
+from ..motion.displacements import columns, rate_units
+from ..tolerances import TOLERANCES
+from .closing import OpenLoops, close_home
 from .notes import Note
 from .opened import OpenMechanism
+
+
+OFF_HOME = 0.1
+"""Distance from home [rad or L] at which loops are asked what they hold: far from any singular home, within reach."""
+
+SAME_ROW = 1e-4
+"""Singular value, relative to the largest, below which a row of the loops follows from others, up to rounding."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +92,20 @@ def with_coupled_drives(
         if not names:
             omitted += group.couplings
         elif len(names) == 1:
-            is_driven = any(moving[name].driven for name in group.slopes)
-            machine[names[0]] = _coupled_joint(machine[names[0]], is_driven, group, notes)
+            machine[names[0]] = _coupled_joint(machine[names[0]], _is_driven(group, moving), group, notes)
         elif set(names) <= set(chosen):
             notes.append(Note(f"a coupling is left to who drives these, {_text(group.couplings)}", tuple(names)))
         else:
-            faults += [_fault(names[0], follower, group) for follower in names[1:]]
+            leader = next((name for name in names if moving[name].driven), names[0])
+            followers = [name for name in names if name != leader]
+            held = _ratios_of_loops(opened, leader, followers)
+            faults += [_fault(leader, name, group) for name in followers if name not in held]
+            if held.keys() >= {*followers}:
+                machine |= {name: dataclasses.replace(machine[name], actuated=False) for name in followers}
+                if not machine[leader].driven:
+                    machine[leader] = _coupled_joint(machine[leader], _is_driven(group, moving), group, notes)
+                told = tuple(f"{name} by {held[name]:.6g} as {leader} by 1, near home" for name in followers)
+                notes.append(Note(f"loops say how these follow, and count, not {_text(group.couplings)}", told))
     if faults:
         raise InvalidMechanism(faults)
     omitted += [each for each in couplings if not all(name in moving for name in each.names)]
@@ -125,6 +145,36 @@ def _groups(couplings: Sequence[Coupling], moving: Collection[str]) -> list[_Gro
                 group.slopes[leader] = None if ratio is None or slope is None else slope / ratio
         groups.append(group)
     return groups
+
+
+def _is_driven(group: _Group, moving: Mapping[str, Joint]) -> bool:
+    return any(moving[name].driven for name in group.slopes)
+
+
+def _ratios_of_loops(opened: OpenMechanism, leader: str, names: Sequence[str]) -> dict[str, float]:
+    """Of joints that move as loops make them once the leader's coordinate is given, how fast by that of the leader.
+
+    Found where the leader is off home, for legs that are stretched out there may go either way.
+    """
+    if not opened.loops:
+        return {}
+    loops = OpenLoops(opened)
+    place = {name: columns(loops.tree)[name].start for name in names}
+    low, high, at = loops.low.copy(), loops.high.copy(), columns(loops.tree)[leader].start
+    step = OFF_HOME * rate_units(loops.tree)[at]
+    low[at] = high[at] = step if step <= high[at] else max(-step, low[at])
+    home = close_home(loops, np.ones(len(low), bool), low, high)
+    slopes = loops.linearised(home.q)[1]
+    _, sizes, directions = np.linalg.svd(slopes)
+    motions = directions[(sizes > SAME_ROW * sizes.max(initial=0.0)).sum() :].T
+    if home.gap > TOLERANCES.file_digits or not motions[at].any():
+        return {}
+    ratios = {name: motions[row] @ motions[at] / (motions[at] @ motions[at]) for name, row in place.items()}
+    return {
+        name: float(ratio)
+        for name, ratio in ratios.items()
+        if np.abs(motions[place[name]] - ratio * motions[at]).max() <= SAME_ROW
+    }
 
 
 def _text(couplings: Iterable[Coupling]) -> str:

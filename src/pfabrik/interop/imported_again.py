@@ -65,7 +65,7 @@ def _imported_again(
     }
     for fixed in ((), original.left_out):
         try:
-            if kind_of(path) == "urdf":
+            if kind_of(path) != "mjcf":
                 machine = from_urdf(path, loops, fixed=fixed, **asked).mechanism
             else:
                 machine = from_mjcf(path, configuration=configuration, fixed=fixed, **asked).mechanism

@@ -61,6 +61,7 @@ class LinkLoop:
     links : the two.
     points : the point on each, (2, 3) [m].
     axes : the axis of a hinge on each, of any length, (2, 3).
+    turns : the rotation on each that a weld holds, (2, 3, 3).
     """
 
     name: str
@@ -68,6 +69,7 @@ class LinkLoop:
     links: tuple[str, str]
     points: Floats
     axes: Floats
+    turns: Floats = field(default_factory=lambda: np.array([np.eye(3)] * 2))
 
 
 @dataclass(frozen=True)
@@ -112,8 +114,7 @@ def placed_loops(loops: Iterable[LinkLoop], frames: Mapping[str, Floats]) -> lis
         sides = [frames[link] for link in loop.links]
         points = [side[:3, :3] @ point + side[:3, 3] for side, point in zip(sides, loop.points, strict=True)]
         turned = np.array([side[:3, :3] for side in sides])
-        if loop.type == "revolute":
-            turned = turned @ np.array([frame_along(axis) for axis in loop.axes])
+        turned = turned @ (np.array([*map(frame_along, loop.axes)]) if loop.type == "revolute" else loop.turns)
         placed.append(Loop(loop.name, loop.type, loop.links, points, None if loop.type == "spherical" else turned))
     return placed
 

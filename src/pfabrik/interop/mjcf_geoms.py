@@ -13,8 +13,9 @@ import numpy as np
 from ..arrays import Floats
 from .collision import EVERYTHING, MOST_SOLIDS, Collision, Solid, solid_shape
 from .mjcf_model import MjcfModel
-from .mjcf_plain import PLACE, number
+from .mjcf_plain import PLACE
 from .notes import Note
+from .xml_reading import number
 
 SOLIDS = ("sphere", "capsule", "box", "cylinder")
 """Types of geoms that have a shape here. One more, and it is read: `solid_shape` says what becomes of it."""

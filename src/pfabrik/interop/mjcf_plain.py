@@ -8,8 +8,8 @@ from xml.etree import ElementTree as ET
 
 from ..errors import InvalidMechanism
 from .notes import Note
-from .unread_loops import unread_loops
-from .xml_reading import fault
+from .told_loops import unread_loops
+from .xml_reading import fault, number
 
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 KEPT: dict[str, tuple[str, ...]] = {
@@ -158,11 +158,3 @@ def transmission_text(actuator: ET.Element) -> str:
     name = actuator.get("name", f"a {actuator.tag}")
     driven = [f"{key} {actuator.get(key)}" for key in TRANSMISSIONS if actuator.get(key)]
     return f"{name} (through {' and '.join(driven)})" if driven else name
-
-
-def number(element: ET.Element, key: str) -> float:
-    """The value of an attribute; 0 where it is none."""
-    try:
-        return float(element.get(key, "0").split()[0])
-    except (ValueError, IndexError):
-        return 0.0

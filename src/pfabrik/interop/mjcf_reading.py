@@ -74,7 +74,7 @@ def from_mjcf(
     InvalidArgument : no end effector given, and none that is evident.
     """
     require("reading a MuJoCo model", "mujoco", "mujoco")
-    root = read_xml(source, "mujoco")
+    root = read_xml(source, "mjcf")
     notes: list[Note] = []
     with noting(notes):
         model = MjcfModel(plain_model(root, notes), configuration)

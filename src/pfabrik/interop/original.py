@@ -20,8 +20,8 @@ from ..tolerances import TOLERANCES
 from .compiled_model import CompiledModel
 from .loops_file import read_loops
 from .mjcf_plain import plain_model
-from .urdf_links import read_links
 from .urdf_plain import plain_robot
+from .urdf_reading import read_description
 from .xml_reading import kind_of, read_xml
 
 LED = 10
@@ -191,10 +191,8 @@ class Original:
 
 def _plain(path: str | os.PathLike[str], loops: str | os.PathLike[str] | Mapping[str, Any] | None) -> ET.Element:
     """The kinematics of a model, or of a robot description with its loops, as a MuJoCo model."""
-    if kind_of(path) == "urdf":
-        loops_file = read_loops(loops)
-        links = read_links(read_xml(path, "robot"), loops_file.retyped)
-        return plain_robot(links, loops_file.loops(links.frames, links.link_of))
+    if kind_of(path) != "mjcf":
+        return plain_robot(*read_description(read_xml(path, "urdf", "sdf"), read_loops(loops), []))
     if loops is not None:
         raise InvalidArgument("loops", "some", "none: a MuJoCo model tells its loops itself")
-    return plain_model(read_xml(path, "mujoco"), [])
+    return plain_model(read_xml(path, "mjcf"), [])

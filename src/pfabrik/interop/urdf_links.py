@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from ..arrays import Floats
 from ..description.joint_types import JointType
-from ..errors import Fault, InvalidMechanism
+from ..errors import Fault, InvalidMechanism, near_miss
 from ..rotations import from_rpy, square_to
 from .couplings import Coupling
-from .xml_reading import fault
+from .digits import FEWEST, NOTHING, Rounding, digits_of
+from .loops_file import LinkLoop
+from .opened import LoopType
+from .xml_reading import fault, numbers_in
 
-TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-"""Joint types of URDF."""
+TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
+"""Joint types that are read: those of URDF, and those that Drake and MuJoCo add."""
+
+MOST_JOINTS, MOST_FAULTS = 5_000, 20
+"""Most joints of a robot, which is a humanoid with every bolt ten times, and most faults that are told at once."""
+
+ZERO, X = "0 0 0", "1 0 0"
+HERE: Floats = np.eye(4)
+"""A frame that is another's."""
 
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint of a description.
+    """A joint of a description, from a link to one that hangs on it.
 
     Attributes
     ----------
     type : as of URDF, or of a file of loops that retypes it, in capitals.
-    parent, child : its links; the child's frame is the joint's.
-    xyz, rpy, axis_text : three numbers each, as they are written [m], [rad].
+    frame : the child's frame at zero in that of the parent, (4, 4) [m].
+    placed : the same as attributes of MuJoCo, in the numbers of the file.
+    point : the place of the joint in the child's frame, (3,) [m].
+    axes : its axis there, of any length but zero, and the second one of a universal joint, (2, 3).
     limits : least and largest coordinate [rad or m]; None where the file has none.
     max_speed : [rad/s or m/s]; None where the file has none, or 0, which stands for none.
     mimic : how it follows another joint; None where it does not.
@@ -37,63 +51,98 @@ class UrdfJoint:
     type: str
     parent: str
     child: str
-    xyz: str
-    rpy: str
-    axis_text: str
-    limits: tuple[float, float] | None
-    max_speed: float | None
-    mimic: Coupling | None
-
-    @property
-    def frame(self) -> Floats:
-        """The joint's frame at zero in that of its parent, (4, 4) [m]."""
-        return frame_at(self.xyz, self.rpy)
-
-    @property
-    def axis(self) -> Floats:
-        """The direction of the axis in the joint's frame, (3,), of any length but zero."""
-        return numbers_in(self.axis_text)
+    frame: Floats
+    placed: Mapping[str, str]
+    point: Floats
+    axes: Floats
+    limits: tuple[float, float] | None = None
+    max_speed: float | None = None
+    mimic: Coupling | None = None
 
     def elementary(self) -> list[tuple[str, JointType, Floats | None]]:
-        """Names, types and axes (3,), in the joint's frame, of the joints that it is, from its parent to its child."""
+        """Names, types and axes (3,), in the child's frame, of the joints that it is, from its parent to its child."""
         x, y, z = np.eye(3)
         letters = {"X": x, "Y": y, "Z": z}
         parts: list[tuple[str, JointType, Floats | None]]
         if self.type == "FIXED":
             parts = [("", "fixed", None)]
-        elif self.type == "SPHERICAL":
+        elif self.type in ("SPHERICAL", "BALL"):
             parts = [("", "spherical", None)]
         elif self.type == "FLOATING":
             parts = [("_x", "prismatic", x), ("_y", "prismatic", y), ("_z", "prismatic", z), ("", "spherical", None)]
         elif self.type.startswith("UJOINT_"):
             parts = [(f"_{letter}", "revolute", letters[letter]) for letter in self.type[-2:]]
+        elif self.type == "UNIVERSAL":
+            parts = [("_1", "revolute", self.axes[0]), ("_2", "revolute", self.axes[1])]
         elif self.type == "PLANAR":
-            first, second = square_to(self.axis)
-            parts = [("_x", "prismatic", first), ("_y", "prismatic", second), ("", "revolute", self.axis)]
+            first, second = square_to(self.axes[0])
+            parts = [("_x", "prismatic", first), ("_y", "prismatic", second), ("", "revolute", self.axes[0])]
         else:
-            parts = [("", "prismatic" if self.type == "PRISMATIC" else "revolute", self.axis)]
+            parts = [("", "prismatic" if self.type == "PRISMATIC" else "revolute", self.axes[0])]
         return [(self.name + suffix, kind, axis) for suffix, kind, axis in parts]
 
 
 @dataclass(frozen=True)
 class UrdfLinks:
-    """The tree of a description's links.
+    """The tree of a description's links, and the loops that the file itself tells.
 
     Attributes
     ----------
     root : the link from which all others hang.
     joints : from the root outward.
-    frames : link -> its frame at zero in that of the root, (4, 4) [m].
-    link_of : joint -> its child, whose frame is the joint's.
-    driven : names of the joints that a transmission drives.
+    frames : link -> its frame at zero in base coordinates, (4, 4) [m].
+    roundings : link -> how exactly the digits of the file place it [m, rad].
+    joint_roundings : joint -> the same.
+    driven : names of the joints that the file says are driven.
+    loops : those of joints whose child hangs on another joint too.
+    points : what else an end effector may be called -> its link, and where it is [m].
+    frame_joints : joint -> the link whose frame it is, where joints are such frames.
     """
 
     name: str
     root: str
     joints: Sequence[UrdfJoint]
     frames: Mapping[str, Floats]
-    link_of: Mapping[str, str]
+    roundings: Mapping[str, Rounding]
+    joint_roundings: Mapping[str, Rounding]
     driven: Sequence[str]
+    loops: Sequence[LinkLoop] = ()
+    points: Mapping[str, tuple[str, Floats]] = field(default_factory=dict)
+    frame_joints: Mapping[str, str] = field(default_factory=dict)
+
+    def closed_by(self, joints: Sequence[tuple[UrdfJoint, Floats]]) -> UrdfLinks:
+        """With joints that close loops, each with its place (4, 4) [m] in its child's frame.
+
+        A ball, a weld and a free hinge are loops; what has coordinates of its own moves a twin of the child, which is
+        welded to it.
+        """
+        tree, loops, frames = [*self.joints], [*self.loops], dict(self.frames)
+        roundings, joint_roundings = dict(self.roundings), dict(self.joint_roundings)
+        for joint, on_child in joints:
+            on_parent, name, links = joint.frame, joint.name, (joint.parent, joint.child)
+            parts = [kind for _, kind, _ in joint.elementary()]
+            kind: LoopType = "spherical" if parts == ["spherical"] else "fixed"
+            if parts == ["revolute"] and not (joint.limits or joint.mimic or joint.name in self.driven):
+                kind = "revolute"
+            elif parts not in (["spherical"], ["fixed"]):
+                twin, offset = f"{joint.child}:{joint.name}", on_parent[:3, 3]
+                digits = digits_of([number_text(offset)])
+                rounding = self.roundings[joint.parent].on(offset, float(np.linalg.norm(digits.errors(offset))), 0.0)
+                roundings[twin] = joint_roundings.setdefault(joint.name, rounding)
+                frames[twin] = frames[joint.parent] @ on_parent
+                tree.append(replace(joint, child=twin))
+                on_parent, name, links = HERE, f"{joint.name}:weld", (twin, joint.child)
+            turns = np.array([on_parent[:3, :3], on_child[:3, :3]])
+            points = np.array([on_parent[:3, 3], on_child[:3, 3]])
+            loops.append(LinkLoop(name, kind, links, points, turns @ joint.axes[0], turns))
+        return replace(
+            self,
+            joints=tree,
+            loops=loops,
+            frames=frames,
+            roundings=roundings,
+            joint_roundings=joint_roundings,
+        )
 
 
 def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
@@ -103,61 +152,109 @@ def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
     ----------
     retyped : joint -> its type, in place of that of the description.
     """
-    faults = list(_faults(root))
+    require_few(len(root.findall("joint")))
+    faults = list(islice(_faults(root), MOST_FAULTS))
     if faults:
         raise InvalidMechanism(faults)
-    joints = [_joint(element, retyped) for element in root.iterfind("joint")]
-    link_of = {joint.name: joint.child for joint in joints}
+    written = {element.get("name", ""): element for element in root.iterfind("joint")}
+    first: dict[str, UrdfJoint] = {}
+    second = []
+    for element in written.values():
+        joint = _joint(element, retyped)
+        second += [joint] if joint.child in first else []
+        first.setdefault(joint.child, joint)
     names = [link.get("name", "") for link in root.iterfind("link")]
-    roots = [name for name in names if name not in link_of.values()]
+    roots = [name for name in names if name not in first]
     if len(roots) != 1:
         found = f"{len(roots)} links that are no child" + (f" ({', '.join(roots[:5])})" if roots else "")
         raise fault("robot", found, "one, from which all others hang")
-    children: dict[str, list[UrdfJoint]] = {}
-    for joint in joints:
-        children.setdefault(joint.parent, []).append(joint)
-    frames: dict[str, Floats] = {roots[0]: np.eye(4)}
-    outward: list[UrdfJoint] = []
-    links = [roots[0]]
-    for link in links:  # grows while it is looked through
-        for joint in children.get(link, []):
-            frames[joint.child] = frames[link] @ joint.frame
-            outward.append(joint)
-            links.append(joint.child)
-    apart = [name for name in names if name not in frames]
+    outward = outward_from(roots[0], first.values())
+    frames, apart = {roots[0]: HERE}, set(names) - {roots[0], *(joint.child for joint in outward)}
     if apart:
-        raise fault("robot", f"links that do not hang on '{roots[0]}' ({', '.join(apart[:5])})", "a tree of all links")
-    transmitted = dict.fromkeys(joint.get("name", "") for joint in root.iterfind("transmission/joint"))
-    driven = [name for name in transmitted if name in link_of]
-    return UrdfLinks(root.get("name", "mechanism"), roots[0], outward, frames, link_of, driven)
+        some = ", ".join(sorted(apart)[:5])
+        raise fault("robot", f"links that do not hang on '{roots[0]}' ({some})", "a tree of all links")
+    for joint in outward:
+        frames[joint.child] = frames[joint.parent] @ joint.frame
+    of_links, of_joints = _roundings(outward, second, written, roots[0])
+    driven = [each.get("name", "") for each in root.iterfind("transmission/joint")]
+    driven += [joint.get("name", "") for joint in root.iterfind("ros2_control/joint[command_interface]")]
+    tree = UrdfLinks(
+        root.get("name", "mechanism"),
+        roots[0],
+        outward,
+        frames,
+        of_links,
+        of_joints,
+        [name for name in dict.fromkeys(driven) if name in written],
+        frame_joints={joint.name: joint.child for joint in outward},
+    )
+    return tree.closed_by([(joint, HERE) for joint in second])
 
 
-def frame_at(xyz: str, rpy: str) -> Floats:
-    """A frame (4, 4) at three numbers [m], turned by roll, pitch and yaw [rad]."""
+def require_few(n_joints: int) -> None:
+    """Refuse a robot of more joints than any has."""
+    if n_joints > MOST_JOINTS:
+        raise fault("robot", f"{n_joints} joints", f"at most {MOST_JOINTS}")
+
+
+def outward_from(root: str, joints: Iterable[UrdfJoint]) -> list[UrdfJoint]:
+    """The joints that hang on a link, directly or through others, from it outward."""
+    hanging: dict[str, list[UrdfJoint]] = {}
+    for joint in joints:
+        hanging.setdefault(joint.parent, []).append(joint)
+    outward, links = [], [root]
+    for link in links:  # grows while it is looked through
+        outward += hanging.pop(link, [])
+        links += [joint.child for joint in outward[len(links) - 1 :]]
+    return outward
+
+
+def frame_at(xyz: Floats, rpy: Floats) -> Floats:
+    """A frame (4, 4) at a point (3,) [m], turned by roll, pitch and yaw (3,) [rad]."""
     frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = from_rpy(numbers_in(rpy)), numbers_in(xyz)
+    frame[:3, :3], frame[:3, 3] = from_rpy(rpy), xyz
     return frame
 
 
-def numbers_in(text: str) -> Floats:
-    """The numbers of a text, with blanks between them."""
-    return np.array([float(word) for word in text.split()])
+def placed_at(point: Floats, turn: Floats) -> dict[str, str]:
+    """A place (3,) [m] and a rotation (3, 3) as attributes of MuJoCo."""
+    return {"pos": number_text(point), "xyaxes": number_text(turn[:, :2].T.ravel())}
+
+
+def number_text(values: Iterable[float]) -> str:
+    """Numbers as a file has them, with all their digits."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def vector_in(element: ET.Element | None, key: str, default: str = ZERO) -> Floats:
+    """Three numbers of an attribute; ValueError where it has others."""
+    value = numbers_in(_text(element, key, default), 3)
+    if value is None:
+        raise ValueError(key)
+    return value
+
+
+def origin_of(element: ET.Element | None) -> Floats:
+    """The frame (4, 4) [m] of an element with `xyz` and `rpy`; ValueError where they are not three numbers each."""
+    return frame_at(vector_in(element, "xyz"), vector_in(element, "rpy"))
 
 
 def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
     name, origin, limit = element.get("name", ""), element.find("origin"), element.find("limit")
     is_limited = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
     limits = (_number(limit, "lower", 0.0), _number(limit, "upper", 0.0))
-    speed = _number(limit, "velocity", 0.0)
+    speed, kind = _number(limit, "velocity", 0.0), retyped.get(name, element.get("type", "")).upper()
+    axis = vector_in(element.find("axis"), "xyz", X)
     return UrdfJoint(
         name,
-        retyped.get(name, element.get("type", "")).upper(),
+        kind,
         _link(element, "parent"),
         _link(element, "child"),
-        _text(origin, "xyz", "0 0 0"),
-        _text(origin, "rpy", "0 0 0"),
-        _text(element.find("axis"), "xyz", "1 0 0"),
-        limits if is_limited else None,
+        origin_of(origin),
+        {"pos": _text(origin, "xyz", ZERO), "euler": _text(origin, "rpy", ZERO)},
+        np.zeros(3),
+        np.eye(3)[:2] if kind == "UNIVERSAL" else np.array([axis, axis]),
+        limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
         speed if speed > 0.0 else None,
         _coupling(name, element.find("mimic")),
     )
@@ -182,49 +279,58 @@ def _number(element: ET.Element | None, key: str, default: float) -> float:
     return float(_text(element, key, str(default)))
 
 
+def _roundings(
+    outward: Sequence[UrdfJoint], closing: Sequence[UrdfJoint], written: Mapping[str, ET.Element], root: str
+) -> tuple[dict[str, Rounding], dict[str, Rounding]]:
+    """Link, and joint -> how exactly the digits of the file place it [m, rad], from the root outward."""
+    lengths, turns = (digits_of(each.placed[key] for each in (*outward, *closing)) for key in ("pos", "euler"))
+    axes = digits_of(_text(each.find("axis"), "xyz", X) for each in written.values())
+    of_links, of_joints = {root: NOTHING}, {}
+    for joint in (*outward, *closing):
+        offset, axis = joint.frame[:3, 3], joint.axes[0]
+        length = float(np.linalg.norm(lengths.errors(offset)))
+        rpy = vector_in(written[joint.name].find("origin"), "rpy")
+        angle = float(np.linalg.norm(turns.errors(rpy, FEWEST - 1)))
+        rounding = of_links[joint.parent].on(offset, length, angle)
+        of_links.setdefault(joint.child, rounding)
+        skew = np.linalg.norm(axes.errors(axis)) / np.linalg.norm(axis) if np.count_nonzero(axis) > 1 else 0.0
+        of_joints[joint.name] = rounding._replace(angle=rounding.angle + float(skew))
+    return of_links, of_joints
+
+
 def _faults(root: ET.Element) -> Iterator[Fault]:
     """Yield what keeps the links and joints from being read, each at its joint."""
-    links = [link.get("name", "") for link in root.iterfind("link")]
-    names = [joint.get("name", "") for joint in root.iterfind("joint")]
-    for kind, listed in (("link", links), ("joint", names)):
-        for name in sorted({name for name in listed if not name or listed.count(name) > 1}):
-            yield Fault(f"{kind} '{name}'", "a name that is empty, or used twice", "a name of its own")
-    children: set[str] = set()
+    links = Counter(link.get("name", "") for link in root.iterfind("link"))
+    names = Counter(joint.get("name", "") for joint in root.iterfind("joint"))
+    for what, listed in (("link", links), ("joint", names)):
+        for name in sorted(name for name, count in listed.items() if not name or count > 1):
+            yield Fault(f"{what} '{name}'", "a name that is empty, or used twice", "a name of its own")
     for joint in root.iterfind("joint"):
-        place = f"joint '{joint.get('name', '')}'"
-        if joint.get("type") not in TYPES:
-            yield Fault(place, f"type '{joint.get('type')}'", f"one of {', '.join(TYPES)}")
+        place, kind = f"joint '{joint.get('name', '')}'", joint.get("type", "")
+        if kind not in TYPES:
+            yield Fault(place, f"type '{kind}'", f"one of {', '.join(TYPES)}")
         for end in ("parent", "child"):
-            if _link(joint, end) not in links:
-                yield Fault(f"{place}.{end}", f"'{_link(joint, end)}'", "a link of the robot")
-        if _link(joint, "child") in children:
-            yield Fault(f"{place}.child", f"'{_link(joint, 'child')}', which hangs on another joint too", "a tree")
-        children.add(_link(joint, "child"))
+            link = _link(joint, end)
+            if link not in links:
+                yield Fault(f"{place}.{end}", f"'{link}'{near_miss(link, links)}", "a link of the robot")
         for tag in ("origin", "axis", "limit"):
             element = joint.find(tag)
             for key, text in () if element is None else element.attrib.items():
                 count = 3 if key in ("xyz", "rpy") else 1
-                if not _is_numbers(text, count):
+                if numbers_in(text, count) is None:
                     yield Fault(f"{place}.{tag}.{key}", f"'{text}'", f"{count} numbers; xacro files want xacro")
         yield from _mimic_faults(place, joint.find("mimic"), names)
-        axis = _text(joint.find("axis"), "xyz", "1 0 0")
-        if joint.get("type") not in ("fixed", "floating") and not (_is_numbers(axis, 3) and numbers_in(axis).any()):
+        axis = numbers_in(_text(joint.find("axis"), "xyz", X), 3)
+        if kind not in ("fixed", "floating", "ball", "spherical", "universal") and (axis is None or not axis.any()):
             yield Fault(f"{place}.axis", "no direction", "three numbers, not all zero")
 
 
-def _mimic_faults(place: str, mimic: ET.Element | None, names: Sequence[str]) -> Iterator[Fault]:
+def _mimic_faults(place: str, mimic: ET.Element | None, names: Mapping[str, int]) -> Iterator[Fault]:
     if mimic is None:
         return
-    if mimic.get("joint", "") not in names:
-        yield Fault(f"{place}.mimic.joint", f"'{mimic.get('joint', '')}'", "a joint of the robot")
+    leader = mimic.get("joint", "")
+    if leader not in names:
+        yield Fault(f"{place}.mimic.joint", f"'{leader}'{near_miss(leader, names)}", "a joint of the robot")
     for key in ("multiplier", "offset"):
-        if not _is_numbers(mimic.get(key, "0"), 1):
+        if numbers_in(mimic.get(key, "0"), 1) is None:
             yield Fault(f"{place}.mimic.{key}", f"'{mimic.get(key)}'", "a number")
-
-
-def _is_numbers(text: str, count: int) -> bool:
-    try:
-        values = numbers_in(text)
-    except ValueError:
-        return False
-    return len(values) == count and bool(np.isfinite(values).all())

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from .loops_file import LinkLoop
-from .urdf_links import UrdfJoint, UrdfLinks
+from .urdf_links import UrdfJoint, UrdfLinks, number_text, placed_at
 
 MUJOCO_TYPES = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
 
@@ -19,15 +19,17 @@ def plain_robot(links: UrdfLinks, loops: Iterable[LinkLoop]) -> ET.Element:
     # roll, pitch and yaw are about fixed axes; what moves has a mass, which one does not matter
     ET.SubElement(plain, "compiler", angle="radian", eulerseq="XYZ", boundmass="1", boundinertia="1")
     world, equality = ET.SubElement(plain, "worldbody"), ET.SubElement(plain, "equality")
-    bodies = {links.root: ET.SubElement(world, "body", name=links.root)}
+    frame = links.frames[links.root]
+    root = {"name": links.root, **placed_at(frame[:3, 3], frame[:3, :3])}
+    bodies = {links.root: world if links.root == "world" else ET.SubElement(world, "body", root)}
     for joint in links.joints:
         bodies[joint.child] = _body(bodies[joint.parent], joint)
     for number, loop in enumerate(loops):
         steps = loop.axes / np.linalg.norm(loop.axes, axis=1, keepdims=True)
         for part in range(2 if loop.type == "revolute" else 1):  # of a hinge, a second pair of points along its axis
             sites = [f"loop {number} {part} {side}" for side in range(2)]
-            for link, site, point in zip(loop.links, sites, loop.points + part * steps, strict=True):
-                ET.SubElement(bodies[link], "site", name=site, pos=_text(point))
+            for link, site, point, turn in zip(loop.links, sites, loop.points + part * steps, loop.turns, strict=True):
+                ET.SubElement(bodies[link], "site", {"name": site, **placed_at(point, turn)})
             tag = "weld" if loop.type == "fixed" else "connect"
             ET.SubElement(equality, tag, site1=sites[0], site2=sites[1])
     return plain
@@ -35,13 +37,10 @@ def plain_robot(links: UrdfLinks, loops: Iterable[LinkLoop]) -> ET.Element:
 
 def _body(parent: ET.Element, joint: UrdfJoint) -> ET.Element:
     """The child of a joint, with the joints of MuJoCo that the joint is."""
-    body = ET.SubElement(parent, "body", name=joint.child, pos=joint.xyz, euler=joint.rpy)
+    body = ET.SubElement(parent, "body", {"name": joint.child, **joint.placed})
     for name, kind, axis in joint.elementary():
         if kind != "fixed":
-            attributes = {} if axis is None else {"axis": _text(axis)}
-            ET.SubElement(body, "joint", {"name": name, "type": MUJOCO_TYPES[kind], **attributes})
+            attributes = {} if axis is None else {"axis": number_text(axis)}
+            at = number_text(joint.point)
+            ET.SubElement(body, "joint", {"name": name, "type": MUJOCO_TYPES[kind], "pos": at, **attributes})
     return body
-
-
-def _text(values: Iterable[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from ..arrays import Floats
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
-from ..errors import InvalidMechanism
+from ..errors import Fault, InvalidMechanism
 from .assembling import Imported
-from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .driving import Rates
-from .loops_file import LoopsFile, placed_loops, read_loops, roundings_of_loops
+from .loops_file import LinkLoop, LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, noting
-from .opened import Loop, loops_by_name
+from .opened import loops_by_name
 from .robots import Robot, mechanism_of
-from .unread_loops import unread_loops
+from .sdf_links import Poses, read_sdf, sdf_joint
+from .told_loops import DIALECTS, SPRING, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
-from .urdf_links import UrdfJoint, UrdfLinks, numbers_in, read_links
+from .urdf_links import UrdfJoint, UrdfLinks, read_links
 from .xml_reading import read_xml
 
 
@@ -68,40 +66,81 @@ def from_urdf(
     InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found; else as of `from_mjcf`.
     UnknownName, InvalidArgument : as of `from_mjcf`.
     """
-    element = read_xml(source, "robot")
     notes: list[Note] = []
     with noting(notes):
+        element = read_xml(source, "urdf", "sdf")
         loops_file = read_loops(loops)
-        links = read_links(element, loops_file.retyped)
-        robot = replace(_robot(links, loops_file, notes), collision=read_collision(element, links, notes))
-        _require_read_loops(element, links, robot.loops)
-        motors = [name for name in loops_file.actuated if name in links.link_of] or None
+        links, link_loops = read_description(element, loops_file, notes)
+        robot = replace(_robot(links, link_loops, loops_file, notes), collision=read_collision(element, links, notes))
+        motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
         drives = motors if actuated is None else actuated
         return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task)
 
 
-def _require_read_loops(element: ET.Element, links: UrdfLinks, loops: Sequence[Loop]) -> None:
-    """Refuse elements beside links and joints that bind two links, unless a file of loops says how."""
-    known = {frozenset(loop.connects) for loop in loops}
-    parts = [part for each in element for part in (each if each.tag in ("link", "joint") else [each])]
+from_sdf = from_urdf
+"""The same function: what a file is follows from its first element."""
+
+
+def read_description(root: ET.Element, loops_file: LoopsFile, notes: list[Note]) -> tuple[UrdfLinks, list[LinkLoop]]:
+    """The links of a description, and all loops: those of a file of loops, then those that the description tells."""
+    links = read_sdf(root, notes) if root.tag == "sdf" else read_links(root, loops_file.retyped)
+    written = loops_file.loops(links.frames, links.frame_joints)
+    known = {frozenset(loop.links) for loop in written}
+    links = links.closed_by(list(_told_joints(root, links, known, notes)))
+    twice = tuple(loop.name for loop in links.loops if frozenset(loop.links) in known)
+    if twice:
+        notes.append(Note("loops of the description that the file of loops tells too, which counts", twice))
+    told = [loop for loop in links.loops if loop.name not in twice]
+    for kind, plural in (("spherical", "balls"), ("revolute", "hinges"), ("fixed", "welds")):
+        of_kind = tuple(loop.name for loop in told if loop.type == kind)
+        if of_kind:
+            notes.append(Note(f"loops that the description tells, as {plural}", of_kind))
+    return links, [*written, *told]
+
+
+def _told_joints(
+    root: ET.Element, links: UrdfLinks, known: Collection[frozenset[str]], notes: list[Note]
+) -> Iterator[tuple[UrdfJoint, Floats]]:
+    """Yield the joints that elements beside links and joints tell; a fault for each that binds two links otherwise."""
     remedy = "the loop in a file of loops (--loops), or a description without this element"
-    faults = [fault for part in parts for fault in unread_loops(part, links.frames, links.root, known, remedy)]
+    springs: list[str] = []
+    faults: list[Fault] = []
+    tops = [each for model in ([root] if root.tag == "robot" else root.iter("model")) for each in model]
+    parts = [part for each in tops for part in (each if each.tag in ("link", "joint", "gazebo") else [each])]
+    for number, part in enumerate(parts):
+        names = links_named(part, links.frames)
+        if part.tag == "frame" or set(names) == {links.root} or frozenset(names) in known:
+            continue
+        try:
+            if part.tag == SPRING:
+                springs.append(part.get("name") or " and ".join(names))
+            elif part.tag in DIALECTS and len(part):
+                yield told_joint(part, links.frames, number)
+            elif part.tag == "joint" and part.find("child") is not None:
+                model = ET.Element("model")
+                model.append(part)
+                yield sdf_joint(part, Poses(model, links.frames)).closing(links.frames)
+            else:
+                faults += unread_loops(part, links.frames, links.root, known, remedy)
+        except InvalidMechanism as error:
+            faults += error.faults
     if faults:
         raise InvalidMechanism(faults)
+    if springs:
+        notes.append(Note("springs between links are left out", tuple(springs)))
 
 
-def _robot(links: UrdfLinks, loops_file: LoopsFile, notes: list[Note]) -> Robot:
+def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFile, notes: list[Note]) -> Robot:
     """The links as a robot, with its loops."""
     joints = [part for joint in links.joints for part in _parts(joint, links, notes)]
-    unknown = tuple(name for name in (*loops_file.retyped, *loops_file.actuated) if name not in links.link_of)
+    names = [joint.name for joint in links.joints]
+    unknown = tuple(name for name in (*loops_file.retyped, *loops_file.actuated) if name not in names)
     if unknown:
         notes.append(Note("told of in the loops, but no joint of the robot", unknown))
-    link_loops = loops_file.loops(links.frames, links.link_of)
     loops = placed_loops(link_loops, links.frames)
-    places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()}
-    frames = {joint: places[link] for joint, link in links.link_of.items()} | places
-    taken = [*links.link_of, *(loop.name for loop in loops)]
-    of_links, of_joints = _roundings(links.joints, links.root)
+    places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()} | {**links.points}
+    frames = {joint: places[link] for joint, link in links.frame_joints.items()} | places
+    taken = [*names, *(loop.name for loop in loops)]
     return Robot(
         links.name,
         joints,
@@ -110,7 +149,7 @@ def _robot(links: UrdfLinks, loops_file: LoopsFile, notes: list[Note]) -> Robot:
         places,
         order=links.driven,
         rates={joint.name: Rates(joint.max_speed) for joint in links.joints},
-        roundings=of_joints | roundings_of_loops(link_loops, of_links),
+        roundings={**links.joint_roundings, **roundings_of_loops(link_loops, links.roundings)},
         couplings=[joint.mimic for joint in links.joints if joint.mimic is not None],
         undriven="no transmission, and no motor in a file of loops",
     )
@@ -118,8 +157,6 @@ def _robot(links: UrdfLinks, loops_file: LoopsFile, notes: list[Note]) -> Robot:
 
 def _parts(joint: UrdfJoint, links: UrdfLinks, notes: list[Note]) -> Iterator[Joint]:
     """The joints of a mechanism that one of the description is, in series, where they are at zero."""
-    if joint.mimic is not None:
-        notes.append(Note("a coupling is left out: this joint moves freely", (joint.name,)))
     frame, parts = links.frames[joint.child], joint.elementary()
     bodies = [joint.parent, *(f"{joint.child}:{name}" for name, _, _ in parts[:-1]), joint.child]
     for (name, kind, axis), connects in zip(parts, pairwise(bodies), strict=True):
@@ -127,10 +164,10 @@ def _parts(joint: UrdfJoint, links: UrdfLinks, notes: list[Note]) -> Iterator[Jo
             name,
             kind,
             connects,
-            None if kind in ("prismatic", "fixed") else frame[:3, 3],
+            None if kind in ("prismatic", "fixed") else frame[:3, :3] @ joint.point + frame[:3, 3],
             None if axis is None else frame[:3, :3] @ axis,
             actuated=name in links.driven and KINDS[kind].actuatable,
-            range=_range(joint, notes) if joint.type in ("REVOLUTE", "PRISMATIC") else None,
+            range=_range(joint, notes),
         )
 
 
@@ -140,21 +177,3 @@ def _range(joint: UrdfJoint, notes: list[Note]) -> tuple[float, float] | None:
         return joint.limits
     notes.append(Note("a range in which nothing moves is left out, of", (joint.name,)))
     return None
-
-
-def _roundings(joints: Sequence[UrdfJoint], root: str) -> tuple[dict[str, Rounding], dict[str, Rounding]]:
-    """Link, and joint -> how exactly the digits of the file place it [m, rad], from the root outward."""
-    lengths, turns, axes = (digits_of(getattr(each, key) for each in joints) for key in ("xyz", "rpy", "axis_text"))
-    of_links, of_joints = {root: NOTHING}, {}
-    for joint in joints:
-        offset, axis = numbers_in(joint.xyz), joint.axis
-        length = _norm(lengths.errors(offset))
-        angle = _norm(turns.errors(numbers_in(joint.rpy), FEWEST - 1))
-        rounding = of_links[joint.child] = of_links[joint.parent].on(offset, length, angle)
-        skew = _norm(axes.errors(axis)) / (_norm(axis) or 1.0) if np.count_nonzero(axis) > 1 else 0.0
-        of_joints[joint.name] = rounding._replace(angle=rounding.angle + skew)
-    return of_links, of_joints
-
-
-def _norm(vector: Floats) -> float:
-    return float(np.linalg.norm(vector))

@@ -8,6 +8,9 @@ from typing import Literal
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
+import numpy as np
+
+from ..arrays import Floats
 from ..checks import require_path
 from ..description.form_faults import shown
 from ..errors import Fault, InvalidArgument, InvalidMechanism
@@ -18,18 +21,20 @@ LARGEST = 10_000_000
 DEEPEST = 100
 """Deepest nesting of elements."""
 
-KINDS: dict[str, Literal["mjcf", "urdf"]] = {"mujoco": "mjcf", "robot": "urdf"}
+Kind = Literal["mjcf", "urdf", "sdf"]
+KINDS: dict[str, Kind] = {"mujoco": "mjcf", "robot": "urdf", "sdf": "sdf"}
 """First element of a file -> its kind."""
 
 MOST_ELEMENTS, MOST_INCLUDED = 200_000, 20
 
 
-def read_xml(source: str | os.PathLike[str], root: str) -> ET.Element:
-    """The element tree of a file, or of a text that begins with ``<``, with its includes put in.
+def read_xml(source: str | os.PathLike[str], *kinds: Kind) -> ET.Element:
+    """The element tree of a file, or of a text that begins with ``<``; tags without prefixes, a MuJoCo model's includes
+    put in.
 
     Parameters
     ----------
-    root : name of the element that it must be.
+    kinds : what it may be.
 
     Raises
     ------
@@ -46,19 +51,38 @@ def read_xml(source: str | os.PathLike[str], root: str) -> ET.Element:
         path = Path(source)
         tree = _parsed(budget.read(path), str(path))
         folder = path.resolve().parent
-    if tree.tag != root:
-        raise fault("text" if folder is None else str(source), f"<{shown(tree.tag)[1:-1]}>", f"<{root}>")
-    _include(tree, folder, budget, () if folder is None else (Path(source).resolve(),))
+    kind = _kind(tree, "text" if folder is None else str(source), kinds)
+    if kind == "mjcf":
+        _include(tree, folder, budget, () if folder is None else (Path(source).resolve(),))
     return tree
 
 
-def kind_of(path: str | os.PathLike[str]) -> Literal["mjcf", "urdf"]:
-    """The kind of a file, by its first element; InvalidMechanism where it is neither."""
+def kind_of(path: str | os.PathLike[str]) -> Kind:
+    """The kind of a file, by its first element; InvalidMechanism where it is none that is read."""
     tree = _parsed(_Budget().read(require_path("path", path)), os.fspath(path))
-    if tree.tag not in KINDS:
-        expected = " or ".join(f"<{tag}> ({kind.upper()})" for tag, kind in KINDS.items())
-        raise fault(os.fspath(path), f"<{shown(tree.tag)[1:-1]}>", expected)
+    return _kind(tree, os.fspath(path), tuple(KINDS.values()))
+
+
+def _kind(tree: ET.Element, place: str, kinds: tuple[Kind, ...]) -> Kind:
+    if KINDS.get(tree.tag) not in kinds:
+        expected = " or ".join(f"<{tag}> ({kind.upper()})" for tag, kind in KINDS.items() if kind in kinds)
+        raise fault(place, f"<{shown(tree.tag)[1:-1]}>", expected)
     return KINDS[tree.tag]
+
+
+def numbers_in(text: str, count: int) -> Floats | None:
+    """The numbers of a text, with blanks between them, (count,); None where it has others, or not finite ones."""
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        return None
+    return values if values.shape == (count,) and np.isfinite(values).all() else None
+
+
+def number(element: ET.Element, key: str) -> float:
+    """The first number of an attribute; 0 where it is none."""
+    value = numbers_in(" ".join(element.get(key, "").split()[:1]), 1)
+    return 0.0 if value is None else float(value[0])
 
 
 def fault(place: str, found: str, expected: str) -> InvalidMechanism:
@@ -94,32 +118,36 @@ class _Budget:
 
 
 def _parsed(content: bytes, place: str) -> ET.Element:
-    """The tree of a text whose size and declarations are checked first: nothing is expanded before."""
-    parser = expat.ParserCreate()
+    """The tree of a text, checked as it is read, so that nothing is expanded; prefixes of tags are left out."""
+    parser, builder = expat.ParserCreate(), ET.TreeBuilder()
     depth = count = 0
 
-    def begin(*_: object) -> None:
+    def begin(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth, count
         depth, count = depth + 1, count + 1
         if depth > DEEPEST or count > MOST_ELEMENTS:
             raise fault(place, "elements nested too deeply, or too many", f"{DEEPEST} levels, {MOST_ELEMENTS} elements")
+        if tag.startswith("xacro:"):
+            raise fault(place, f"<{shown(tag)[1:-1]}>, of a file for xacro", "what `xacro FILE` makes of it")
+        builder.start(tag.rpartition(":")[2], attributes)
 
-    def end(*_: object) -> None:
+    def end(tag: str) -> None:
         nonlocal depth
         depth -= 1
+        builder.end(tag.rpartition(":")[2])
 
     def declared(*_: object) -> None:
         raise fault(place, "a document type declaration, with which XML pulls in what is elsewhere", "elements alone")
 
     parser.StartElementHandler, parser.EndElementHandler = begin, end
-    parser.StartDoctypeDeclHandler = declared
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, declared
     try:
         parser.Parse(content, True)
-        return ET.fromstring(content)
-    except (expat.ExpatError, ET.ParseError, ValueError, LookupError) as error:
+    except (expat.ExpatError, ValueError, LookupError) as error:
         if isinstance(error, InvalidMechanism):
             raise
         raise fault(place, f"no XML: {error}", "XML") from None
+    return builder.close()
 
 
 def _include(element: ET.Element, folder: Path | None, budget: _Budget, around: tuple[Path, ...]) -> None:
