@@ -151,7 +151,7 @@ def pose_in(pose: ET.Element | None, place: str) -> Floats:
         raise fault(place, f"'{(pose.text or '').strip()}'", expected)
     if is_quaternion:
         frame = frame_at(values[:3], np.zeros(3))
-        frame[:3, :3] = from_quaternion(values[[6, 3, 4, 5]] / np.linalg.norm(values[3:]))
+        frame[:3, :3] = from_quaternion(values[3:])
         return frame
     return frame_at(values[:3], np.radians(values[3:]) if pose.get("degrees") in ("true", "1") else values[3:])
 
