@@ -97,8 +97,11 @@ def test_a_loop_that_an_element_of_a_urdf_tells_closes_it_as_in_mujoco(element: 
     agrees(found, Model.of(IN_MUJOCO), "rocker")
     checked = verify(found.mechanism, poses=3, original=path)
     assert checked and checked.original
-    again = {"loops": [{"links": ["rocker", "coupler"], "at": [[-0.03, 0, 0.12], [0.17, 0, 0.06]]}]}
-    assert "spherical" in {joint.type for joint in from_urdf(path, again, end_effector="rocker").mechanism.joints}
+    loops = {"loops": [{"links": ["rocker", "coupler"], "at": [[-0.03, 0, 0.12], [0.17, 0, 0.06]]}]}
+    again = from_urdf(path, loops, end_effector="rocker")
+    assert again.mechanism.joint("closure_1").type == "spherical" and "C" not in {
+        each.name for each in again.mechanism.joints
+    }
 
 
 def test_a_link_that_hangs_on_two_joints_closes_a_loop_whose_joint_keeps_its_range() -> None:
@@ -223,3 +226,130 @@ def test_a_model_in_sdf_moves_as_in_mujoco_whatever_its_frames_are(
     assert begin == pytest.approx(PLACED["rocker"][1])
     agrees(found, model, "hand", reach=0.3)
     assert verify(found.mechanism, poses=3, original=path)
+
+
+def test_collision_geometry_of_sdf_is_where_its_links_are() -> None:
+    parts = "<collision name='a'><pose>0.01 0.02 0.03 0.1 0.2 0.3</pose><geometry><box><size>0.02 0.04 0.06</size></box></geometry></collision>"
+    parts += "<collision name='b'><geometry><sphere><radius>0.004</radius></sphere></geometry></collision>"
+    parts += "<collision name='c'><geometry><mesh><uri>model://x.stl</uri></mesh></geometry></collision>"
+    text = rod_in_sdf("chain").replace('<link name="rocker">', f'<link name="rocker">{parts}')
+    found = from_sdf(text, end_effector="rocker", task=["tilt"], length_unit="mm")
+    turn, at = PLACED["rocker"]
+    shapes = {shape.kind: shape for shape in found.mechanism.shapes}
+    assert shapes["sphere"].at == pytest.approx(1e3 * at)
+    assert shapes["box"].at == pytest.approx(1e3 * (at + turn.apply([0.01, 0.02, 0.03])))
+    axes = (turn * Rotation.from_euler("xyz", [0.1, 0.2, 0.3])).as_matrix().T[:2]
+    np.testing.assert_allclose(shapes["box"].axes, axes, atol=1e-9)
+    assert "mesh (1)" in notes_of(found)
+
+
+# What is wrong, by its name.
+
+CLOSED = FOUR_BAR.format(f"<loop_joint name='C' type='spherical'>{IN_FRAMES}</loop_joint>")
+SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("link2 link='rocker'", "link2 link='roker'", "'roker'; did you mean 'rocker'?"),
+        ("<link2 link='rocker'", "<kink2 link='rocker'", "1 links; expected two"),
+        (ONE, "nan 0 0", "three finite numbers"),
+        (OTHER, "0 0", "three finite numbers"),
+        (OTHER, "-30 0 120", r"loop 'C': found open by 1\d\d m"),
+        ("type='spherical'", "type='distance'", "type 'distance'; expected one of ball"),
+        ("type='spherical'", "", "neither a type nor an axis"),
+        ("type='spherical'", "type='hinge'", "C'.axis: found no direction"),
+        ("</robot>", f"<drake:linear_bushing_rpy>{SPRING}</drake:linear_bushing_rpy></robot>", "<linear_bushing_rpy>"),
+        ("</robot>", f"<gazebo><joint name='E' type='gearbox'>{IN_SDF}</joint></gazebo></robot>", "type 'gearbox'"),
+        ("</robot>", "<xacro:include filename='a'/></robot>", "of a file for xacro"),
+        ("<link name", "<link/>" * 300_000 + "<link name", "too many"),
+        ("<link name", "".join(f'<joint name="{i}"/>' for i in range(6000)) + "<link name", "joints; expected at most 5000"),
+        ('name="crank"', 'name="rocker"', "'rocker': found a name that is empty, or used twice"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_told_loop_is_refused_in_a_sentence(old: str, new: str, said: str) -> None:
+    with pytest.raises(InvalidMechanism, match=said):
+        from_urdf(CLOSED.replace(old, new), end_effector="rocker")
+
+
+def test_springs_between_links_are_noted_and_rolling_couplings_of_a_rotor_left_to_its_joint() -> None:
+    sprung = CLOSED.replace("</robot>", f"<drake:linear_spring_damper>{SPRING}</drake:linear_spring_damper></robot>")
+    assert "springs between links are left out: coupler and rocker" in notes_of(
+        from_urdf(sprung, end_effector="rocker")
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("</sdf>", "<model name='b'/></sdf>", "2 models (rod, b)"),
+        ("</model>", "<include><uri>model://x</uri></include></model>", "<include> 'model://x' within it"),
+        ("</model>", "<model name='inner'/></model>", "<model> 'inner' within it; expected .* `gz sdf -p FILE`"),
+        ('type="ball"', 'type="screw"', "type 'screw'"),
+        ('type="ball"', 'type="gearbox"', "type 'gearbox'; expected .*--actuated"),
+        ("<child>rocker</child>", "<child>roker</child>", "'roker'; did you mean 'rocker'?"),
+        ("<pose>", "<pose>0 ", "expected 6 numbers"),
+        ("<pose>", '<pose relative_to="rode">', "'rode', of no link, joint or frame; did you mean 'rod'"),
+        ('attached_to="crank"', 'attached_to="F"', "a frame attached to itself"),
+        ('<link name="crank"><pose>', '<link name="crank"><pose relative_to="A">', "relative to itself"),
+        ('<joint name="A"', '<joint name="rod"', "the name 'rod', which is empty, reserved or used twice"),
+        ("<lower>-1", "<lower>nan", "'nan'; expected a number"),
+        ("<xyz>", "<xyz>0 0 0</xyz><xyz>", "no direction"),
+        ('name="A" type="revolute"', 'name="A"', "type ''"),
+        ("<parent>world</parent>", "<parent>rocker</parent>", "'rocker' as parent and as child"),
+    ],
+)
+def test_what_is_wrong_with_a_model_in_sdf_is_refused_in_a_sentence(old: str, new: str, said: str) -> None:
+    text = rod_in_sdf("model", limits="<limit><lower>-1</lower><upper>1</upper></limit>")
+    assert old in text
+    with pytest.raises(InvalidMechanism, match=re.sub(r"([()?])", r"\\\1", said)):
+        from_sdf(text.replace(old, new), end_effector="rocker")
+
+
+def test_of_a_world_its_one_model_is_read_and_frames_may_be_end_effectors() -> None:
+    text = rod_in_sdf("frame").replace("<model", "<world name='w'><include><uri>model://sun</uri></include><model")
+    found = from_sdf(text.replace("</model>", "</model></world>"), end_effector="F", task=["tilt"])
+    assert found.mechanism.end_effector == "crank" and "model://sun" in notes_of(found)
+    turn, at = PLACED["crank"]
+    assert found.mechanism.reference_point == pytest.approx(at + turn.apply([0.1, 0, 0]))
+
+
+# Joints that follow others, beside the loop that says how.
+
+
+@pytest.mark.parametrize(("ratio", "drive"), [(-1.0, "A"), (-0.9, "A"), (-1.0, "D")])
+def test_a_loop_counts_before_a_mimic_that_says_the_same_or_nearly(ratio: float, drive: str) -> None:
+    """A parallelogram, at its flat home too, where a loop by itself might go either way."""
+    lower = hinge("A", "base", "lower", "0 0 0") + hinge("D", "base", "rod", "-0.08 0 0.0")
+    upper = hinge("B", "lower", "upper", "0 0 0.3").replace(
+        "</joint>", f'<mimic joint="A" multiplier="{ratio}"/></joint>'
+    )
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "lower", "upper", "rod"))
+    motor = f'<transmission name="t"><joint name="{drive}"/></transmission>'
+    loop = "<loop_joint name='C' type='ball'><link1 link='rod' xyz='0 0 0.3'/><link2 link='upper' xyz='-0.08 0 0'/></loop_joint>"
+    found = from_urdf(f'<robot name="p">{links}{lower}{upper}{motor}{loop}</robot>', end_effector="upper", task=["x"])
+    assert found.mechanism.actuator_names == (drive,)
+    assert f"not B = {ratio:.6g} A: B by -1 as A by 1" in notes_of(found)
+    solution = pf.solve_fk(found.mechanism, [0.4])
+    at = 0.3 * np.array([np.sin(0.4), 0.0, np.cos(0.4)])
+    assert solution.pose[:3, 3] == pytest.approx(at, abs=1e-9)
+    assert solution.pose[:3, :3] == pytest.approx(np.eye(3), abs=1e-9)
+
+
+def test_a_mimic_of_sdf_counts_from_its_reference_and_is_refused_where_no_loop_explains_it() -> None:
+    mimic = (
+        "<mimic joint='A' axis='axis'><multiplier>2</multiplier><offset>0.1</offset><reference>0.3</reference></mimic>"
+    )
+    text = rod_in_sdf("model").replace('name="D" type="revolute"', 'name="D" type="revolute" ')
+    joint, rest = text.split('name="D"')
+    text = f'{joint}name="D"{rest.replace("</axis>", f"{mimic}</axis>", 1)}'
+    open_chain = re.sub(r'<joint name="C".*?</joint>', "", text)
+    alone = from_sdf(open_chain, end_effector="rocker", task=["tilt"])
+    assert alone.mechanism.actuator_names == ("D",)
+    assert "driven through a coupling, D = -0.5 + 2 A" in notes_of(alone)
+    closed = from_sdf(text, end_effector="rocker", task=["tilt"])
+    assert closed.mechanism.actuator_names == ("A",) and "loops say how these follow" in notes_of(closed)
+    series = text.replace("<parent>world</parent><child>rocker</child>", "<parent>crank</parent><child>rocker</child>")
+    with pytest.raises(InvalidMechanism, match=r"follows 'A' at the ratio 2 .* --actuated|--fixed"):
+        from_sdf(re.sub(r'<joint name="C".*?</joint>', "", series), end_effector="rocker")

@@ -764,11 +764,9 @@ OPEN = """
 @pytest.mark.parametrize(
     ("element", "named"),
     [
-        ('<loop_joint name="C"><link1 link="upper"/><link2 link="rod"/></loop_joint>', "<loop_joint> 'C'"),
-        ('<drake:ball_constraint><a name="upper"/><b name="rod"/></drake:ball_constraint>', "<ball_constraint>"),
+        ('<drake:distance_constraint><a name="upper"/><b name="rod"/></drake:distance_constraint>', "<distance_"),
         ('<constraint links="upper, rod" type="point"/>', "<constraint>"),
-        ("<gazebo><joint name='C'><parent>upper</parent><child>rod</child></joint></gazebo>", "<gazebo><joint> 'C'"),
-        ("<gazebo><joint name='C'><parent>a::upper</parent><child>a::rod</child></joint></gazebo>", "<joint> 'C'"),
+        ("<gazebo><bond name='C'><parent>a::upper</parent><child>a::rod</child></bond></gazebo>", "<bond> 'C'"),
         ('<mujoco><equality><connect body1="upper" body2="rod"/></equality></mujoco>', "<equality><connect>"),
     ],
 )

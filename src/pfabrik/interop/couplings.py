@@ -18,7 +18,6 @@ from .closing import OpenLoops, close_home
 from .notes import Note
 from .opened import OpenMechanism
 
-
 OFF_HOME = 0.1
 """Distance from home [rad or L] at which loops are asked what they hold: far from any singular home, within reach."""
 

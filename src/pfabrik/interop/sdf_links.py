@@ -253,8 +253,9 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> SdfJoint:
     name, kind = element.get("name", ""), element.get("type", "")
     place = f"joint '{name}'"
     if kind not in TYPES:
-        couples = "; what couples joints is left to who drives them, each a joint of its own" * (kind == "gearbox")
-        raise fault(place, f"type '{kind}'", f"one of {', '.join(TYPES)}{couples}")
+        raise fault(
+            place, f"type '{kind}'", f"one of {', '.join(TYPES)}; what couples joints goes by --actuated or --fixed"
+        )
     parent, child = (poses.link(_end(element, end), f"{place}.{end}") for end in ("parent", "child"))
     if parent == child:
         raise fault(place, f"'{parent}' as parent and as child", "two links")

@@ -67,7 +67,7 @@ def told_joint(element: ET.Element, frames: Mapping[str, Floats], number: int) -
     said = element.get("type", element.tag.removesuffix("_constraint") if is_typed else "hinge").lower()
     if said not in TYPES or (not is_typed and not axes[0].any()):
         found = f"type '{said}'" if is_typed else "neither a type nor an axis"
-        raise fault(place, found, f"one of {', '.join(TYPES)}; what is none, by what it is made of")
+        raise fault(place, found, f"one of {', '.join(TYPES)}; what couples joints goes by --actuated or --fixed")
     kind = TYPES[said]
     if kind not in ("spherical", "fixed") and not all(axis.any() for axis in axes):
         raise fault(f"{place}.axis", "no direction", "three numbers, not all zero")

@@ -163,6 +163,12 @@ def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
         joint = _joint(element, retyped)
         second += [joint] if joint.child in first else []
         first.setdefault(joint.child, joint)
+    for element in root.iterfind("coupling"):
+        leader, follower = (first.get(_link(element, end)) for end in ("predecessor", "successor"))
+        ratio = numbers_in(_text(element.find("ratio"), "value", ""), 1)
+        if leader and follower and ratio is not None and leader.parent == follower.parent:
+            coupling = Coupling(follower.name, leader.name, (0.0, float(ratio[0])))
+            first[follower.child] = replace(follower, mimic=coupling)
     names = [link.get("name", "") for link in root.iterfind("link")]
     roots = [name for name in names if name not in first]
     if len(roots) != 1:

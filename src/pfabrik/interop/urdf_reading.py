@@ -22,7 +22,7 @@ from .robots import Robot, mechanism_of
 from .sdf_links import Poses, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
-from .urdf_links import UrdfJoint, UrdfLinks, read_links
+from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
 from .xml_reading import read_xml
 
 
@@ -107,15 +107,20 @@ def _told_joints(
     faults: list[Fault] = []
     tops = [each for model in ([root] if root.tag == "robot" else root.iter("model")) for each in model]
     parts = [part for each in tops for part in (each if each.tag in ("link", "joint", "gazebo") else [each])]
-    for number, part in enumerate(parts):
+    count = 0
+    child = {joint.name: joint.child for joint in links.joints}
+    coupled = {frozenset(child[name] for name in joint.mimic.names) for joint in links.joints if joint.mimic}
+    for part in parts:
         names = links_named(part, links.frames)
-        if part.tag == "frame" or set(names) == {links.root} or frozenset(names) in known:
+        is_read = part.tag == "frame" or (part.tag == "coupling" and frozenset(names) in coupled)
+        if is_read or set(names) == {links.root} or frozenset(names) in known:
             continue
         try:
             if part.tag == SPRING:
                 springs.append(part.get("name") or " and ".join(names))
             elif part.tag in DIALECTS and len(part):
-                yield told_joint(part, links.frames, number)
+                count += 1
+                yield told_joint(part, links.frames, count)
             elif part.tag == "joint" and part.find("child") is not None:
                 model = ET.Element("model")
                 model.append(part)
@@ -125,7 +130,7 @@ def _told_joints(
         except InvalidMechanism as error:
             faults += error.faults
     if faults:
-        raise InvalidMechanism(faults)
+        raise InvalidMechanism(faults[:MOST_FAULTS])
     if springs:
         notes.append(Note("springs between links are left out", tuple(springs)))
 
