@@ -188,6 +188,13 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
             joints.append(sdf_joint(element, poses, root.get("version", "")))
         except InvalidMechanism as error:
             faults += error.faults
+    named = [joint.name for joint in joints]
+    for joint in joints:
+        if joint.mimic is not None and joint.mimic.leader not in named:
+            leader = joint.mimic.leader
+            faults.append(
+                Fault(f"joint '{joint.name}'.mimic", f"'{leader}'{near_miss(leader, named)}", "another joint")
+            )
     if faults:
         raise InvalidMechanism(faults[:MOST_FAULTS])
     links = [link.get("name", "") for link in model.findall("link")]
@@ -195,7 +202,7 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     is_held = any(WORLD in (joint.parent, joint.child) for joint in joints)
     base = WORLD if is_held else next((link for link in links if link not in children), (links or [WORLD])[0])
     frames = {link: poses[link] for link in ([WORLD] if is_held else []) + links}
-    driven = _driven(model, {joint.name for joint in joints})
+    driven = _driven(model, named)
     return _tree(model, base, joints, frames, poses, driven)
 
 
@@ -311,7 +318,7 @@ def _coupling(name: str, mimic: ET.Element, place: str) -> Coupling:
     return Coupling(name, mimic.get("joint", ""), (offset - ratio * reference, ratio))
 
 
-def _driven(model: ET.Element, joints: set[str]) -> list[str]:
+def _driven(model: ET.Element, joints: Sequence[str]) -> list[str]:
     """The joints that a controller drives."""
     named = [
         (each.text or "").strip()

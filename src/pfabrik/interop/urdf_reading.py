@@ -109,7 +109,7 @@ def _told_joints(
     parts = [part for each in tops for part in (each if each.tag in ("link", "joint", "gazebo") else [each])]
     count = 0
     child = {joint.name: joint.child for joint in links.joints}
-    coupled = {frozenset(child[name] for name in joint.mimic.names) for joint in links.joints if joint.mimic}
+    coupled = {frozenset(child.get(name, name) for name in joint.mimic.names) for joint in links.joints if joint.mimic}
     for part in parts:
         names = links_named(part, links.frames)
         is_read = part.tag == "frame" or (part.tag == "coupling" and frozenset(names) in coupled)
