@@ -229,6 +229,8 @@ def test_a_model_in_sdf_moves_as_in_mujoco_whatever_its_frames_are(
     assert begin == pytest.approx(PLACED["rocker"][1])
     agrees(found, model, "hand", reach=0.3)
     assert verify(found.mechanism, poses=3, original=path)
+    one_sided = from_sdf(rod_in_sdf(style, order, turned, "<limit><lower>-0.7</lower></limit>"), end_effector="rocker")
+    assert one_sided.mechanism.joint("A").range[0] == -0.7 and one_sided.mechanism.joint("A").range[1] > 6.0
 
 
 def test_collision_geometry_of_sdf_is_where_its_links_are() -> None:
@@ -292,10 +294,10 @@ def test_springs_between_links_are_noted_and_rolling_couplings_of_a_rotor_left_t
         ("</model>", "<model name='inner'/></model>", "<model> 'inner' within it; expected .* `gz sdf -p FILE`"),
         ('type="ball"', 'type="screw"', "type 'screw'"),
         ('type="ball"', 'type="gearbox"', "type 'gearbox'; expected .*--actuated"),
-        ("<child>rocker</child>", "<child>roker</child>", "'roker'; did you mean 'rocker'?"),
-        ("<pose>", "<pose>0 ", "expected 6 numbers"),
-        ("<pose>", '<pose relative_to="rode">', "'rode', of no link, joint or frame; did you mean 'rod'"),
-        ('attached_to="crank"', 'attached_to="F"', "a frame attached to itself"),
+        ("<child>rocker</child>", "<child>roker</child>", "'roker', no link; did you mean 'rocker'?"),
+        ("<pose>", "<pose>0 ", "expected x y z and roll pitch yaw"),
+        ("<pose>", '<pose relative_to="rode">', "'rode', no frame; did you mean 'rod'"),
+        ('attached_to="crank"', 'attached_to="F"', "'F', which is attached to itself"),
         ('<link name="crank"><pose>', '<link name="crank"><pose relative_to="A">', "relative to itself"),
         ('<joint name="A"', '<joint name="rod"', "the name 'rod', which is empty, reserved or used twice"),
         ("<lower>-1", "<lower>nan", "'nan'; expected a number"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from heapq import heappop, heappush
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -27,8 +28,11 @@ MODEL = "__model__"
 
 WORLD = "world"
 
-ENDLESS = 1e16
-"""A limit [rad or m] that stands for none."""
+ENDLESS, FAR = 1e16, 20.0
+"""A limit [rad or m] that stands for none; how far off the other one, three turns, one that takes its place is."""
+
+OLD = ("1.0", "1.2", "1.3", "1.4")
+"""Versions in which axes are in the model's frame."""
 
 CUT_LAST = {"ball": 2, "revolute": 1, "continuous": 1}
 """Joint types -> how much rather than others they close a loop: those whose coordinates nobody asks for."""
@@ -46,6 +50,11 @@ class SdfJoint(NamedTuple):
     limits: tuple[float, float] | None
     max_speed: float | None
     mimic: Coupling | None
+
+    @property
+    def is_asked(self) -> bool:
+        """True if its coordinate has a range, or follows another."""
+        return self.limits is not None or self.mimic is not None
 
     def between(self, parent: str, child: str, frames: Mapping[str, Floats]) -> UrdfJoint:
         """The joint that hangs a link on another, whichever is its child in the file."""
@@ -78,13 +87,12 @@ class Poses:
 
     Parameters
     ----------
-    known : frames that are placed already, (4, 4) [m].
+    known : links that are placed already, (4, 4) [m].
     """
 
     def __init__(self, model: ET.Element, known: Mapping[str, Floats]) -> None:
-        self.elements = {
-            each.get("name", ""): each for tag in ("link", "frame", "joint") for each in model.findall(tag)
-        }
+        self.elements = {each.get("name", ""): each for each in model if each.tag in ("link", "frame", "joint")}
+        self.links = {WORLD, *known, *(name for name, each in self.elements.items() if each.tag == "link")}
         self.frames: dict[str, Floats] = {MODEL: HERE, WORLD: HERE, **known}
         self.roundings: dict[str, Rounding] = dict.fromkeys(self.frames, NOTHING)
         poses = [(each.findtext("pose") or "").split() for each in self.elements.values()]
@@ -93,67 +101,56 @@ class Poses:
 
     def link(self, name: str, place: str) -> str:
         """The link that a name of a link or frame stands for."""
-        seen = {name}
-        while name in self.elements and self.elements[name].tag == "frame":
-            name = self.elements[name].get("attached_to", "")
-            if name in seen:
-                raise fault(place, f"'{name}', a frame attached to itself", "a frame on a link")
+        seen: set[str] = set()
+        while name not in self.links and name in self.elements and name not in seen:
             seen.add(name)
-        if name != WORLD and (
-            name not in self.frames if name not in self.elements else self.elements[name].tag != "link"
-        ):
-            links = [name for name, each in self.elements.items() if each.tag == "link"] or self.frames
-            raise fault(
-                place, f"'{name}'{near_miss(name, links)}", "a link of the model; links of nested ones are not read"
-            )
+            name = self.elements[name].get("attached_to", "")
+        if name not in self.links:
+            found = "which is attached to itself" if name in seen else f"no link{near_miss(name, self.links)}"
+            raise fault(place, f"'{name}', {found}", "a link of the model, or a frame on one")
         return name
 
     def __getitem__(self, name: str) -> Floats:
         """The place of a frame in the model, (4, 4) [m]."""
         chain: dict[str, ET.Element] = {}
         while name not in self.frames:
-            element = self.elements.get(name)
-            if element is None or name in chain:
-                found = (
-                    "which is relative to itself"
-                    if name in chain
-                    else f"of no link, joint or frame{near_miss(name, self.elements)}"
-                )
+            if name not in self.elements or name in chain:
+                found = "relative to itself" if name in chain else f"no frame{near_miss(name, self.elements)}"
                 raise fault(f"pose of '{next(iter(chain), name)}'", f"'{name}', {found}", "a frame of the model")
-            chain[name] = element
-            name = _base(element)
+            chain[name] = self.elements[name]
+            name = _base(chain[name])
         for each, element in reversed(chain.items()):
-            local, length, angle = self._local(element)
-            self.frames[each] = self.frames[name] @ local
-            self.roundings[each] = self.roundings[name].on(local[:3, 3], length, angle)
+            pose = element.find("pose")
+            local = pose_in(pose, f"pose of '{each}'")
+            turn = [] if pose is None else [float(word) for word in (pose.text or "").split()[3:]]
+            length, angle = self._lengths.errors(local[:3, 3]), self._turns.errors(turn, FEWEST - 1)
+            unit = np.pi / 180.0 if _is_in_degrees(pose) else 1.0
+            rounding = self.roundings[name].on(
+                local[:3, 3], float(np.linalg.norm(length)), unit * float(np.linalg.norm(angle))
+            )
+            self.frames[each], self.roundings[each] = self.frames[name] @ local, rounding
             name = each
         return self.frames[name]
-
-    def _local(self, element: ET.Element) -> tuple[Floats, float, float]:
-        """An element's pose (4, 4) [m], and the error of its digits [m], [rad]."""
-        pose, place = element.find("pose"), f"pose of '{element.get('name', '')}'"
-        local = pose_in(pose, place)
-        words = [] if pose is None else (pose.text or "").split()
-        turn = np.array([float(word) for word in words[3:]])
-        length = float(np.linalg.norm(self._lengths.errors(local[:3, 3])))
-        angle = float(np.linalg.norm(self._turns.errors(turn, FEWEST - 1)))
-        return local, length, np.radians(angle) if pose is not None and pose.get("degrees") in ("true", "1") else angle
 
 
 def pose_in(pose: ET.Element | None, place: str) -> Floats:
     """The frame (4, 4) [m] of a <pose>."""
-    if pose is None or not (pose.text or "").strip():
+    text = "" if pose is None else (pose.text or "").strip()
+    if pose is None or not text:
         return HERE
     is_quaternion = pose.get("rotation_format") == "quat_xyzw"
-    values = numbers_in(pose.text or "", 7 if is_quaternion else 6)
+    values = numbers_in(text, 7 if is_quaternion else 6)
     if values is None or (is_quaternion and not values[3:].any()):
-        expected = "3 numbers and a quaternion x y z w" if is_quaternion else "6 numbers: x y z roll pitch yaw"
-        raise fault(place, f"'{(pose.text or '').strip()}'", expected)
+        raise fault(place, f"'{text}'", f"x y z and {'a quaternion x y z w' if is_quaternion else 'roll pitch yaw'}")
     if is_quaternion:
         frame = frame_at(values[:3], np.zeros(3))
         frame[:3, :3] = from_quaternion(values[3:])
         return frame
-    return frame_at(values[:3], np.radians(values[3:]) if pose.get("degrees") in ("true", "1") else values[3:])
+    return frame_at(values[:3], np.radians(values[3:]) if _is_in_degrees(pose) else values[3:])
+
+
+def _is_in_degrees(pose: ET.Element | None) -> bool:
+    return pose is not None and pose.get("degrees") in ("true", "1")
 
 
 def _end(joint: ET.Element, end: str) -> str:
@@ -170,89 +167,64 @@ def _base(element: ET.Element) -> str:
 
 
 def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
-    """The links of the one model in a file."""
+    """The links of the one model in a file, hung on each other by joints whose coordinates somebody asks for first."""
     model = _only_model(root, notes)
+    name = model.get("name", "mechanism")
+    place, poses = f"model '{name}'", Poses(model, {})
     require_few(len(model.findall("joint")))
-    names = Counter(each.get("name", "") for tag in ("link", "frame", "joint") for each in model.findall(tag))
-    for name, count in names.items():
-        if count > 1 or name in ("", WORLD, MODEL):
-            raise fault(
-                f"model '{model.get('name', '')}'",
-                f"the name '{name}', which is empty, reserved or used twice",
-                "one each",
-            )
-    poses, joints = Poses(model, {}), []
+    counts = Counter(each.get("name", "") for each in model if each.tag in ("link", "frame", "joint"))
+    for each in [each for each, count in counts.items() if count > 1 or each in ("", WORLD, MODEL)]:
+        raise fault(place, f"the name '{each}', which is empty, reserved or used twice", "a name of its own")
+    joints: list[SdfJoint] = []
     faults: list[Fault] = []
     for element in model.findall("joint"):
         try:
             joints.append(sdf_joint(element, poses, root.get("version", "")))
         except InvalidMechanism as error:
             faults += error.faults
-    named = [joint.name for joint in joints]
-    for joint in joints:
-        if joint.mimic is not None and joint.mimic.leader not in named:
-            leader = joint.mimic.leader
-            faults.append(
-                Fault(f"joint '{joint.name}'.mimic", f"'{leader}'{near_miss(leader, named)}", "another joint")
-            )
     if faults:
         raise InvalidMechanism(faults[:MOST_FAULTS])
     links = [link.get("name", "") for link in model.findall("link")]
+    touching: dict[str, list[int]] = {link: [] for link in (WORLD, *links)}
+    for index, joint in enumerate(joints):
+        touching[joint.parent].append(index)
+        touching[joint.child].append(index)
     children = {joint.child for joint in joints}
-    is_held = any(WORLD in (joint.parent, joint.child) for joint in joints)
-    base = WORLD if is_held else next((link for link in links if link not in children), (links or [WORLD])[0])
-    frames = {link: poses[link] for link in ([WORLD] if is_held else []) + links}
-    driven = _driven(model, named)
-    return _tree(model, base, joints, frames, poses, driven)
-
-
-def _tree(
-    model: ET.Element,
-    base: str,
-    joints: Sequence[SdfJoint],
-    frames: Mapping[str, Floats],
-    poses: Poses,
-    driven: Sequence[str],
-) -> UrdfLinks:
-    """A tree of all links, and the joints that are left as what closes its loops."""
-    group = {link: link for link in frames}
-
-    def first_of(link: str) -> str:
-        while group[link] != link:
-            group[link] = link = group[group[link]]
-        return link
-
-    tree: list[SdfJoint] = []
-    closing: list[SdfJoint] = []
-    is_asked = {joint.name: bool(joint.name in driven or joint.limits or joint.mimic) for joint in joints}
-    for joint in sorted(joints, key=lambda each: 0 if is_asked[each.name] else CUT_LAST.get(each.type, 0)):
-        one, other = first_of(joint.parent), first_of(joint.child)
-        (closing if one == other else tree).append(joint)
-        group[one] = other
-    hanging: dict[str, list[tuple[SdfJoint, str]]] = {}
-    for joint in tree:
-        hanging.setdefault(joint.parent, []).append((joint, joint.child))
-        hanging.setdefault(joint.child, []).append((joint, joint.parent))
-    reached, outward = [base], []
-    for link in reached:  # grows while it is looked through
-        for joint, other in hanging.get(link, []):
-            if other not in reached:
-                outward.append(joint.between(link, other, frames))
-                reached.append(other)
-    apart = [link for link in frames if link not in reached]
+    free = next((link for link in links if link not in children), (links or [WORLD])[0])
+    base = WORLD if touching[WORLD] else free
+    frames = {link: poses[link] for link in (base, *links)}
+    driven = _driven(model, joints)
+    costs = [0 if joint.name in driven or joint.is_asked else CUT_LAST.get(joint.type, 0) for joint in joints]
+    reached, outward = {base: -1}, []
+    nearest = [(costs[index], index, base) for index in touching[base]]
+    while nearest:  # Prim's tree of least cost
+        _, index, link = heappop(nearest)
+        joint = joints[index]
+        other = joint.child if joint.parent == link else joint.parent
+        if other not in reached:
+            reached[other] = index
+            outward.append(joint.between(link, other, frames))
+            for index in touching[other]:
+                heappush(nearest, (costs[index], index, other))
+    apart = [link for link in links if link not in reached]
     if apart:
         found = f"links that no joint connects with '{base}' ({', '.join(apart[:5])})"
-        raise fault(f"model '{model.get('name', '')}'", found, "joints between all links")
-    points = {
-        name: (poses.link(name, "frame"), poses[name][:3, 3])
-        for name, each in poses.elements.items()
-        if each.tag == "frame"
-    }
-    roundings = {link: poses.roundings[link] for link in frames}
-    of_joints = {joint.name: poses.roundings[joint.name] for joint in joints}
-    name = model.get("name", "mechanism")
-    links = UrdfLinks(name, base, outward, frames, roundings, of_joints, driven, points=points)
-    return links.closed_by([joint.closing(frames) for joint in closing])
+        raise fault(place, found, "joints between all links")
+    tree = UrdfLinks(
+        name,
+        base,
+        outward,
+        frames,
+        {link: poses.roundings[link] for link in frames},
+        {joint.name: poses.roundings[joint.name] for joint in joints},
+        driven,
+        points={
+            frame: (poses.link(frame, f"frame '{frame}'"), poses[frame][:3, 3])
+            for frame in (each.get("name", "") for each in model.findall("frame"))
+        },
+    )
+    used = set(reached.values())
+    return tree.closed_by([joint.closing(frames) for index, joint in enumerate(joints) if index not in used])
 
 
 def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> SdfJoint:
@@ -260,73 +232,63 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> SdfJoint:
     name, kind = element.get("name", ""), element.get("type", "")
     place = f"joint '{name}'"
     if kind not in TYPES:
-        raise fault(
-            place, f"type '{kind}'", f"one of {', '.join(TYPES)}; what couples joints goes by --actuated or --fixed"
-        )
+        ways = "; what couples joints goes by --actuated or --fixed"
+        raise fault(place, f"type '{kind}'", f"one of {', '.join(TYPES)}{ways}")
     parent, child = (poses.link(_end(element, end), f"{place}.{end}") for end in ("parent", "child"))
     if parent == child:
         raise fault(place, f"'{parent}' as parent and as child", "two links")
-    at = poses[name]
+    is_old = (element.findtext("axis/use_parent_model_frame") or "").strip() in ("1", "true") or version in OLD
     axes = []
     for tag in ("axis", "axis2"):
-        axis, xyz = element.find(tag), element.find(f"{tag}/xyz")
+        xyz = element.find(f"{tag}/xyz")
         direction = numbers_in("0 0 1" if xyz is None else xyz.text or "", 3)
         if direction is None or not direction.any():
             raise fault(f"{place}.{tag}", "no direction", "three numbers, not all zero")
-        said = (axis.findtext("use_parent_model_frame") or "").strip() if axis is not None else ""
-        is_old = said in ("1", "true") or (version[:3] in ("1.0", "1.2", "1.3", "1.4") and len(version) == 3)
         frame = xyz.get("expressed_in", "") if xyz is not None else ""
-        axes.append((HERE if is_old else poses[frame] if frame else at)[:3, :3] @ direction)
-    low, high, speed = (_limit(element, key, place) for key in ("lower", "upper", "velocity"))
-    is_limited = kind in ("revolute", "prismatic") and max(abs(low), abs(high)) < ENDLESS
-    mimic = next((each for tag in ("axis/mimic", "mimic") if (each := element.find(tag)) is not None), None)
-    return SdfJoint(
-        name,
-        kind,
-        parent,
-        child,
-        at,
-        np.array(axes),
-        (low, high) if is_limited else None,
-        speed if 0.0 < speed < ENDLESS else None,
-        None if mimic is None else _coupling(name, mimic, place),
+        axes.append(poses[MODEL if is_old else frame or name][:3, :3] @ direction)
+    low, high, speed = (
+        _number(element, f"axis/limit/{key}", default, place)
+        for key, default in (("lower", -ENDLESS), ("upper", ENDLESS), ("velocity", ENDLESS))
     )
+    limits = None
+    if kind in ("revolute", "prismatic") and min(abs(low), abs(high)) < ENDLESS:
+        limits = (low if low > -ENDLESS else high - FAR, high if high < ENDLESS else low + FAR)
+    mimic = next((each for path in ("axis/mimic", "mimic") if (each := element.find(path)) is not None), None)
+    coupling = None
+    if mimic is not None:
+        leader = mimic.get("joint", "")
+        if leader not in poses.elements:
+            raise fault(f"{place}.mimic", f"'{leader}'{near_miss(leader, poses.elements)}", "another joint")
+        offset, ratio, reference = (
+            _number(mimic, key, default, place)
+            for key, default in (("offset", 0.0), ("multiplier", 1.0), ("reference", 0.0))
+        )
+        coupling = Coupling(name, leader, (offset - ratio * reference, ratio))
+    max_speed = speed if 0.0 < speed < ENDLESS else None
+    return SdfJoint(name, kind, parent, child, poses[name], np.array(axes), limits, max_speed, coupling)
 
 
-def _limit(element: ET.Element, key: str, place: str) -> float:
-    """A limit of a joint's first axis; endless where it has none."""
-    default = -np.inf if key == "lower" else np.inf
-    text = (element.findtext(f"axis/limit/{key}") or str(default)).strip()
+def _number(element: ET.Element, path: str, default: float, place: str) -> float:
+    """A number that an element or attribute has, endless ones among them."""
+    text = (element.findtext(path) or element.get(path) or str(default)).strip()
     try:
         value = float(text)
     except ValueError:
         value = np.nan
     if np.isnan(value):
-        raise fault(f"{place}.limit.{key}", f"'{text}'", "a number")
+        raise fault(f"{place}.{path.replace('/', '.')}", f"'{text}'", "a number")
     return value
 
 
-def _coupling(name: str, mimic: ET.Element, place: str) -> Coupling:
-    """How a joint follows another: by its multiple of the leader's distance from a reference, and an offset."""
-    values = []
-    for key, default in (("multiplier", "1"), ("offset", "0"), ("reference", "0")):
-        value = numbers_in(mimic.get(key) or mimic.findtext(key) or default, 1)
-        if value is None:
-            raise fault(f"{place}.mimic.{key}", "no number", "a number")
-        values.append(float(value[0]))
-    ratio, offset, reference = values
-    return Coupling(name, mimic.get("joint", ""), (offset - ratio * reference, ratio))
-
-
-def _driven(model: ET.Element, joints: Sequence[str]) -> list[str]:
+def _driven(model: ET.Element, joints: Sequence[SdfJoint]) -> list[str]:
     """The joints that a controller drives."""
-    named = [
-        (each.text or "").strip()
+    controllers = [
+        plugin
         for plugin in model.findall("plugin")
         if "controller" in f"{plugin.get('name', '')} {plugin.get('filename', '')}".lower()
-        for each in plugin.iter("joint_name")
     ]
-    return [name for name in dict.fromkeys(named) if name in joints]
+    named = [(each.text or "").strip() for plugin in controllers for each in plugin.iter("joint_name")]
+    return [name for name in dict.fromkeys(named) if name in {joint.name for joint in joints}]
 
 
 def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
@@ -334,10 +296,8 @@ def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     models = [*root.findall("model"), *root.findall("world/model")]
     flat = "one model in one piece, as `gz sdf -p FILE` prints it"
     if len(models) != 1:
-        found = f"{len(models)} models" + (
-            f" ({', '.join(each.get('name', '') for each in models[:5])})" if models else ""
-        )
-        raise fault("sdf", found, flat)
+        names = ", ".join(each.get("name", "") for each in models[:5])
+        raise fault("sdf", f"{len(models)} models" + f" ({names})" * bool(models), flat)
     for tag in ("include", "model"):
         if (inner := models[0].find(tag)) is not None:
             name = inner.get("name") or (inner.findtext("uri") or "").strip()
