@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 @force_option
 @json_option("One JSON object on stdout: what was found, and the file's text.")
 def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any) -> int:
-    """Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.
+    """Turn a MuJoCo model (MJCF), a URDF or an SDF into a mechanism file.
 
     FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed;
     collision geometry becomes shapes of bodies.
