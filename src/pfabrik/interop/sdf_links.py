@@ -18,7 +18,7 @@ from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .notes import Note
 from .told_loops import named_in
 from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, placed_at, require_few
-from .xml_reading import fault, numbers_in
+from .xml_reading import fault, number, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal")
 """Joint types of SDF that are read."""
@@ -194,6 +194,9 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     base = WORLD if touching[WORLD] else free
     frames = {link: poses[link] for link in (base, *links)}
     driven = _driven(model, joints)
+    begun = [each.get("name", "") for each in model.findall("joint") if number(each, "axis/initial_position")]
+    if begun:
+        notes.append(Note("initial positions are left out, of", tuple(begun)))
     costs = [0 if joint.name in driven or joint.is_asked else CUT_LAST.get(joint.type, 0) for joint in joints]
     reached, outward = {base: -1}, []
     nearest = [(costs[index], index, base) for index in touching[base]]
@@ -210,19 +213,14 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     if apart:
         found = f"links that no joint connects with '{base}' ({', '.join(apart[:5])})"
         raise fault(place, found, "joints between all links")
-    tree = UrdfLinks(
-        name,
-        base,
-        outward,
-        frames,
-        {link: poses.roundings[link] for link in frames},
-        {joint.name: poses.roundings[joint.name] for joint in joints},
-        driven,
-        points={
-            frame: (poses.link(frame, f"frame '{frame}'"), poses[frame][:3, 3])
-            for frame in (each.get("name", "") for each in model.findall("frame"))
-        },
-    )
+    for each in (element.get("name", "") for element in model.findall("frame")):
+        link = poses.link(each, f"frame '{each}'")
+        frames[each] = poses[each]
+        fixed = SdfJoint(f"{each}_frame", "fixed", link, each, poses[each], np.eye(3)[:2], None, None, None)
+        outward.append(fixed.between(link, each, frames))
+    of_joints = {joint.name: poses.roundings[joint.name] for joint in joints}
+    of_links = {link: poses.roundings[link] for link in frames}
+    tree = UrdfLinks(name, base, outward, frames, of_links, of_joints, driven)
     used = set(reached.values())
     return tree.closed_by([joint.closing(frames) for index, joint in enumerate(joints) if index not in used])
 

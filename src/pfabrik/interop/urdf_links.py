@@ -95,7 +95,6 @@ class UrdfLinks:
     joint_roundings : joint -> the same.
     driven : names of the joints that the file says are driven.
     loops : those of joints whose child hangs on another joint too.
-    points : what else an end effector may be called -> its link, and where it is [m].
     frame_joints : joint -> the link whose frame it is, where joints are such frames.
     """
 
@@ -107,7 +106,6 @@ class UrdfLinks:
     joint_roundings: Mapping[str, Rounding]
     driven: Sequence[str]
     loops: Sequence[LinkLoop] = ()
-    points: Mapping[str, tuple[str, Floats]] = field(default_factory=dict)
     frame_joints: Mapping[str, str] = field(default_factory=dict)
 
     def closed_by(self, joints: Sequence[tuple[UrdfJoint, Floats]]) -> UrdfLinks:

@@ -143,7 +143,7 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
     if unknown:
         notes.append(Note("told of in the loops, but no joint of the robot", unknown))
     loops = placed_loops(link_loops, links.frames)
-    places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()} | {**links.points}
+    places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()}
     frames = {joint: places[link] for joint, link in links.frame_joints.items()} | places
     taken = [*names, *(loop.name for loop in loops)]
     return Robot(

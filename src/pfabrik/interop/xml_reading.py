@@ -80,8 +80,8 @@ def numbers_in(text: str, count: int) -> Floats | None:
 
 
 def number(element: ET.Element, key: str) -> float:
-    """The first number of an attribute; 0 where it is none."""
-    value = numbers_in(" ".join(element.get(key, "").split()[:1]), 1)
+    """The first number of an attribute, or an element; 0 where it is none."""
+    value = numbers_in(" ".join((element.get(key) or element.findtext(key) or "").split()[:1]), 1)
     return 0.0 if value is None else float(value[0])
 
 
