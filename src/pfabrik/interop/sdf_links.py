@@ -92,7 +92,8 @@ class Poses:
 
     def __init__(self, model: ET.Element, known: Mapping[str, Floats]) -> None:
         self.elements = {each.get("name", ""): each for each in model if each.tag in ("link", "frame", "joint")}
-        self.links = {WORLD, *known, *(name for name, each in self.elements.items() if each.tag == "link")}
+        links = [name for name, each in self.elements.items() if each.tag == "link"]
+        self.links, self._canonical = {WORLD, *known, *links}, model.get("canonical_link") or "".join(links[:1])
         self.frames: dict[str, Floats] = {MODEL: HERE, WORLD: HERE, **known}
         self.roundings: dict[str, Rounding] = dict.fromkeys(self.frames, NOTHING)
         poses = [(each.findtext("pose") or "").split() for each in self.elements.values()]
@@ -100,11 +101,13 @@ class Poses:
         self._turns = digits_of(" ".join(words[3:]) for words in poses)
 
     def link(self, name: str, place: str) -> str:
-        """The link that a name of a link or frame stands for."""
+        """The link that a name of a link, or of a frame or joint on one, stands for."""
         seen: set[str] = set()
-        while name not in self.links and name in self.elements and name not in seen:
+        while name not in self.links and name in (*self.elements, MODEL) and name not in seen:
             seen.add(name)
-            name = self.elements[name].get("attached_to", "")
+            element = self.elements.get(name)
+            on = "" if element is None else _end(element, "child") or element.get("attached_to", MODEL)
+            name = on or self._canonical
         if name not in self.links:
             found = "which is attached to itself" if name in seen else f"no link{near_miss(name, self.links)}"
             raise fault(place, f"'{name}', {found}", "a link of the model, or a frame on one")
@@ -279,19 +282,16 @@ def _number(element: ET.Element, path: str, default: float, place: str) -> float
 
 
 def _driven(model: ET.Element, joints: Sequence[SdfJoint]) -> list[str]:
-    """The joints that a controller drives."""
-    controllers = [
-        plugin
-        for plugin in model.findall("plugin")
-        if "controller" in f"{plugin.get('name', '')} {plugin.get('filename', '')}".lower()
-    ]
-    named = [(each.text or "").strip() for plugin in controllers for each in plugin.iter("joint_name")]
+    """The joints that plugins name, which drive them, but for those that publish where joints are."""
+    plugins = [each for each in model.findall("plugin") if "publisher" not in each.get("name", "").lower()]
+    named = [(each.text or "").strip() for plugin in plugins for each in plugin.iter("joint_name")]
     return [name for name in dict.fromkeys(named) if name in {joint.name for joint in joints}]
 
 
 def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     """The one model of a file; refused where there are more, or where it is put together from others."""
-    models = [*root.findall("model"), *root.findall("world/model")]
+    every = [*root.findall("model"), *root.findall("world/model")]
+    models = [model for model in every if model.find("joint") is not None] or every
     flat = "one model in one piece, as `gz sdf -p FILE` prints it"
     if len(models) != 1:
         names = ", ".join(each.get("name", "") for each in models[:5])
@@ -300,9 +300,10 @@ def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
         if (inner := models[0].find(tag)) is not None:
             name = inner.get("name") or (inner.findtext("uri") or "").strip()
             raise fault(f"model '{models[0].get('name', '')}'", f"<{tag}> '{name}' within it", flat)
-    included = [(each.findtext("uri") or "").strip() for each in root.findall("world/include")]
-    if included:
-        notes.append(Note("what the world includes beside the model is left out", tuple(included)))
+    beside = [each.get("name", "") for each in every if each is not models[0]]
+    beside += [(each.findtext("uri") or "").strip() for each in root.findall("world/include")]
+    if beside:
+        notes.append(Note("what the world has beside the model is left out", tuple(beside)))
     if pose_in(models[0].find("pose"), "pose of the model").tolist() != HERE.tolist():
         notes.append(Note("base coordinates are those of the model: its own pose in the world is left out"))
     return models[0]

@@ -82,6 +82,18 @@ def told_joint(element: ET.Element, frames: Mapping[str, Floats], number: int) -
     return UrdfJoint(name, kind.upper(), links[0], links[1], first, at, np.zeros(3), np.array(axes)), second
 
 
+def attached_by(plugin: ET.Element) -> ET.Element:
+    """The fixed joint of SDF that a plugin makes of two links once a simulation runs; else the plugin itself."""
+    joint = ET.Element("joint", name=plugin.get("name", "").rpartition("::")[2], type="fixed")
+    for end in ("parent", "child"):
+        ET.SubElement(joint, end).text = (plugin.findtext(f"{end}_link") or plugin.findtext(end) or "").strip()
+    return (
+        joint
+        if all(end.text for end in joint) and re.search("attach|detach", joint.get("name", "").lower())
+        else plugin
+    )
+
+
 def named_in(element: ET.Element) -> str:
     """The name that an element has as an attribute, or as its text."""
     keys = ("link", "name", "value", "body")

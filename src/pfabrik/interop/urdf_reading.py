@@ -20,7 +20,7 @@ from .notes import Note, noting
 from .opened import loops_by_name
 from .robots import Robot, mechanism_of
 from .sdf_links import Poses, read_sdf, sdf_joint
-from .told_loops import DIALECTS, SPRING, links_named, told_joint, unread_loops
+from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
 from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
 from .xml_reading import read_xml
@@ -111,6 +111,7 @@ def _told_joints(
     child = {joint.name: joint.child for joint in links.joints}
     coupled = {frozenset(child.get(name, name) for name in joint.mimic.names) for joint in links.joints if joint.mimic}
     for part in parts:
+        part = attached_by(part) if part.tag == "plugin" else part
         names = links_named(part, links.frames)
         is_read = part.tag == "frame" or (part.tag == "coupling" and frozenset(names) in coupled)
         if is_read or set(names) == {links.root} or frozenset(names) in known:
