@@ -73,6 +73,7 @@ TURNED = f"<parent_origin xyz='{ONE}'/><child_origin xyz='{OTHER}' rpy='-0.64350
 BODIES = "<{0}body_A name='coupler'/><{0}body_B name='rocker'/><{0}p_AP value='{1}'/><{0}p_BQ value='{2}'/>"
 IN_SDF = "<parent>coupler</parent><child>rocker</child>"
 IN_GAZEBO = f"<gazebo><joint name='C' type='{{}}'>{IN_SDF}<pose>{{}}</pose>{{}}</joint></gazebo>"
+CROSS = "<axis><xyz>0 1 0</xyz></axis><axis2><xyz>1 0 0</xyz></axis2>"
 RANGE, ON_PARENT = "<limit><lower>-1</lower><upper>2</upper></limit>", "<axis xyz='0 1 0' frame='parent'/>"
 
 
@@ -87,6 +88,7 @@ RANGE, ON_PARENT = "<limit><lower>-1</lower><upper>2</upper></limit>", "<axis xy
         (f"<constraint name='C' type='continuous'>{ENDS}{TURNED}{TURNED_AXES}</constraint>", "hinges: C"),
         (f"<drake:ball_constraint>{BODIES.format('drake:ball_', ONE, OTHER)}</drake:ball_constraint>", "balls: "),
         (IN_GAZEBO.format("revolute", f"{OTHER} 0 0 0", "<axis><xyz>0 1 0</xyz></axis>"), "hinges: C"),
+        (IN_GAZEBO.format("universal", f"{OTHER} 0 0 0", CROSS), "welds: C:weld"),
         (IN_GAZEBO.format("ball", f"{OTHER} 1 2 3", "").replace(">c", ">m::c"), "balls: C"),
         (IN_GAZEBO.format("revolute", f"{OTHER} 0 0 0", f"<axis><xyz>0 1 0</xyz>{RANGE}</axis>"), "welds: C:weld"),
     ],
@@ -172,7 +174,12 @@ def pose_text(frame: tuple[Rotation, np.ndarray], style: str, base: str = "") ->
     return f"<pose{said}>{' '.join(map(repr, map(float, [*frame[1], *turn])))}</pose>"
 
 
-def rod_in_sdf(style: str, order: str = "ABCD", turned: Sequence[str] = (), limits: str = "") -> str:
+CROSSED = ((0.6, 0.8, 0.0), (-0.48, 0.36, 0.8))  # axes of a universal joint in place of B
+
+
+def rod_in_sdf(
+    style: str, order: str = "ABCD", turned: Sequence[str] = (), limits: str = "", middle: str = "ball"
+) -> str:
     """The machine, its poses relative to the model, the link before, or a frame, and joints listed in an order."""
     links, before = '<frame name="F" attached_to="crank"><pose>0.1 0 0 0 0 0.5</pose></frame>', ""
     f_in_crank = (Rotation.from_euler("z", 0.5), np.array([0.1, 0.0, 0.0]))
@@ -186,7 +193,7 @@ def rod_in_sdf(style: str, order: str = "ABCD", turned: Sequence[str] = (), limi
     joints = {}
     for name, kind, parent, child in (
         ("A", "revolute", "world", "crank"),
-        ("B", "ball", "crank", "rod"),
+        ("B", middle, "crank", "rod"),
         ("C", "ball", "rod", "rocker"),
         ("D", "revolute", "world", "rocker"),
     ):
@@ -194,12 +201,14 @@ def rod_in_sdf(style: str, order: str = "ABCD", turned: Sequence[str] = (), limi
         at = (Rotation.from_rotvec([0.2, 0.1, -0.4]), np.array(POINTS[name]))
         outer = PLACED.get(child, MODEL)
         pose = pose_text(at, style, "__model__") if style == "frame" else pose_text(in_frame(outer, at), style)
-        axis = np.array(TURN.get(name, (0, 0, 1))) * (-1 if name in turned else 1)
+        axes = np.array([TURN[name]] if kind == "revolute" else CROSSED if kind == "universal" else [])
+        axes = -axes[::-1] if name in turned else axes
         said = ' expressed_in="__model__"' if style == "chain" else ""
-        axis = axis if said else at[0].inv().apply(axis)
-        xyz = f"<axis><xyz{said}>{' '.join(map(repr, map(float, axis)))}</xyz>{limits if name == 'A' else ''}</axis>"
-        ends = f"<parent>{parent}</parent><child>{child}</child>"
-        joints[name] = f'<joint name="{name}" type="{kind}">{ends}{pose}{xyz if kind == "revolute" else ""}</joint>'
+        text = f"<parent>{parent}</parent><child>{child}</child>{pose}"
+        for tag, axis in zip(("axis", "axis2"), axes, strict=False):
+            xyz = " ".join(map(repr, map(float, axis if said else at[0].inv().apply(axis))))
+            text += f"<{tag}><xyz{said}>{xyz}</xyz>{limits if name == 'A' else ''}</{tag}>"
+        joints[name] = f'<joint name="{name}" type="{kind}">{text}</joint>'
     plugin = '<plugin filename="x" name="gz::sim::systems::JointPositionController"><joint_name>A</joint_name></plugin>'
     return (
         f'<sdf version="1.11"><model name="rod">{links}{"".join(joints[name] for name in order)}{plugin}</model></sdf>'
@@ -231,6 +240,25 @@ def test_a_model_in_sdf_moves_as_in_mujoco_whatever_its_frames_are(
     assert verify(found.mechanism, poses=3, original=path)
     one_sided = from_sdf(rod_in_sdf(style, order, turned, "<limit><lower>-0.7</lower></limit>"), end_effector="rocker")
     assert one_sided.mechanism.joint("A").range[0] == -0.7 and one_sided.mechanism.joint("A").range[1] > 6.0
+
+
+@pytest.mark.parametrize("turned", ["", "B"])
+def test_a_universal_joint_of_sdf_has_its_first_axis_on_its_parent(turned: str) -> None:
+    found = from_sdf(rod_in_sdf("model", turned=turned, middle="universal"), end_effector="rod", task=["tilt"])
+    hinges = "".join(f'<joint name="B{axis}" axis="{" ".join(map(str, axis))}"/>' for axis in CROSSED)
+    at = " ".join(map(repr, (PLACED["rod"][1] - POINTS["B"]).tolist()))
+    model = rod_in_mujoco().replace('<joint name="B" type="ball"/>', f'{hinges}<body name="end" pos="{at}"/>')
+    agrees(found, Model.of(model), "end", reach=0.3)
+
+
+def test_joints_that_drake_adds_to_a_urdf_are_joints_of_the_tree() -> None:
+    tree = FOUR_BAR.replace('<joint name="B" type="continuous">', '<drake:joint name="B" type="universal">', 1)
+    tree = tree.replace('<axis xyz="0 1 0"/></joint><trans', "</drake:joint><trans")
+    drives = ["A", "B_1", "B_2"]
+    found = from_urdf(tree.format(""), end_effector="coupler", actuated=drives, task=["x", "tilt"])
+    hinges = '<joint name="B_1" axis="1 0 0"/><joint name="B_2" axis="0 1 0"/>'
+    text = IN_MUJOCO.replace('<joint name="B" axis="0 1 0"/>', hinges)
+    agrees(found, Model.of(re.sub("<equality>.*</equality>", "", text)), "coupler")
 
 
 def test_collision_geometry_of_sdf_is_where_its_links_are() -> None:
@@ -289,7 +317,7 @@ def test_springs_between_links_are_noted_and_rolling_couplings_of_a_rotor_left_t
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("</sdf>", "<model name='b'/></sdf>", "2 models (rod, b)"),
+        ("</sdf>", "<model name='b'><joint/></model></sdf>", "2 models (rod, b)"),
         ("</model>", "<include><uri>model://x</uri></include></model>", "<include> 'model://x' within it"),
         ("</model>", "<model name='inner'/></model>", "<model> 'inner' within it; expected .* `gz sdf -p FILE`"),
         ('type="ball"', 'type="screw"', "type 'screw'"),
@@ -334,6 +362,20 @@ def test_frames_of_sdf_meet_as_a_file_of_loops_says() -> None:
     agrees(found, Model.of(rod_in_mujoco()), "hand", reach=0.3)
     with pytest.raises(InvalidMechanism, match=r"loops\[0\].frames: found 'D'"):
         from_sdf(text, {"loops": [{"frames": ["one", "D"]}]}, end_effector="rocker")
+
+
+def test_a_plugin_that_attaches_links_closes_a_loop_beside_a_world_of_other_things() -> None:
+    link = re.findall(r'<link name="rocker">.*?</link>', rod_in_sdf("model"))[0]
+    ends = "<parent_link>rocker</parent_link><child_model>rod</child_model><child_link>tip</child_link>"
+    plugin = f"<plugin filename='x.so' name='gz::sim::systems::DetachableJoint'>{ends}</plugin>"
+    text = rod_in_sdf("model").replace(
+        "<parent>rod</parent><child>rocker</child>", "<parent>rod</parent><child>tip</child>"
+    )
+    text = text.replace("<model", "<world name='w'><model name='floor'><link name='slab'/></model><model", 1)
+    text = text.replace("</model></sdf>", f"{link.replace('rocker', 'tip')}{plugin}</model></world></sdf>")
+    found = from_sdf(text, end_effector="rocker", task=["tilt"])
+    assert "left out: floor" in notes_of(found) and "as welds: DetachableJoint" in notes_of(found)
+    agrees(found, Model.of(rod_in_mujoco()), "hand", reach=0.3)
 
 
 # Joints that follow others, beside the loop that says how.

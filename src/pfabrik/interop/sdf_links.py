@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from heapq import heappop, heappush
-from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -17,7 +17,7 @@ from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .notes import Note
 from .told_loops import named_in
-from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, placed_at, require_few
+from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, require_few
 from .xml_reading import fault, number, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal")
@@ -34,44 +34,22 @@ ENDLESS, FAR = 1e16, 20.0
 OLD = ("1.0", "1.2", "1.3", "1.4")
 """Versions in which axes are in the model's frame."""
 
-CUT_LAST = {"ball": 2, "revolute": 1, "continuous": 1}
+CUT_LAST = {"BALL": 2, "REVOLUTE": 1, "CONTINUOUS": 1}
 """Joint types -> how much rather than others they close a loop: those whose coordinates nobody asks for."""
 
 
-class SdfJoint(NamedTuple):
-    """A joint of a model: its place (4, 4) [m] and axes (2, 3) in the model, else as of `UrdfJoint`."""
+def hung(joint: UrdfJoint, parent: str, child: str, frames: Mapping[str, Floats]) -> UrdfJoint:
+    """A joint that is placed in the model as one that hangs a link on another, whichever is its child there."""
+    frame, inward = _within(frames[parent], frames[child]), _within(frames[child], HERE)
+    axes = joint.axes if child == joint.child else -joint.axes[:: -1 if joint.type == "UNIVERSAL" else 1]
+    point, axes = (inward @ joint.frame)[:3, 3], axes @ inward[:3, :3].T
+    return replace(joint, parent=parent, child=child, frame=frame, point=point, axes=axes)
 
-    name: str
-    type: str
-    parent: str
-    child: str
-    place: Floats
-    axes: Floats
-    limits: tuple[float, float] | None
-    max_speed: float | None
-    mimic: Coupling | None
 
-    @property
-    def is_asked(self) -> bool:
-        """True if its coordinate has a range, or follows another."""
-        return self.limits is not None or self.mimic is not None
-
-    def between(self, parent: str, child: str, frames: Mapping[str, Floats]) -> UrdfJoint:
-        """The joint that hangs a link on another, whichever is its child in the file."""
-        frame, inward = _within(frames[parent], frames[child]), _within(frames[child], HERE)
-        axes = self.axes if child == self.child else -self.axes[:: -1 if self.type == "universal" else 1]
-        point = (inward @ self.place)[:3, 3]
-        return self._joint(parent, child, frame, point, axes @ inward[:3, :3].T)
-
-    def closing(self, frames: Mapping[str, Floats]) -> tuple[UrdfJoint, Floats]:
-        """The joint as one that closes a loop, and its place (4, 4) [m] in its child's frame."""
-        frame, on_child = (_within(frames[link], self.place) for link in (self.parent, self.child))
-        return self._joint(self.parent, self.child, frame, np.zeros(3), self.axes @ self.place[:3, :3]), on_child
-
-    def _joint(self, parent: str, child: str, frame: Floats, point: Floats, axes: Floats) -> UrdfJoint:
-        placed = placed_at(frame[:3, 3], frame[:3, :3])
-        more = (self.limits, self.max_speed, self.mimic)
-        return UrdfJoint(self.name, self.type.upper(), parent, child, frame, placed, point, axes, *more)
+def closing(joint: UrdfJoint, frames: Mapping[str, Floats]) -> tuple[UrdfJoint, Floats]:
+    """A joint that is placed in the model as one that closes a loop, and its place (4, 4) [m] in its child's frame."""
+    frame, on_child = (_within(frames[link], joint.frame) for link in (joint.parent, joint.child))
+    return replace(joint, frame=frame, axes=joint.axes @ joint.frame[:3, :3]), on_child
 
 
 def _within(outer: Floats, frame: Floats) -> Floats:
@@ -178,7 +156,7 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     counts = Counter(each.get("name", "") for each in model if each.tag in ("link", "frame", "joint"))
     for each in [each for each, count in counts.items() if count > 1 or each in ("", WORLD, MODEL)]:
         raise fault(place, f"the name '{each}', which is empty, reserved or used twice", "a name of its own")
-    joints: list[SdfJoint] = []
+    joints: list[UrdfJoint] = []
     faults: list[Fault] = []
     for element in model.findall("joint"):
         try:
@@ -200,7 +178,8 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     begun = [each.get("name", "") for each in model.findall("joint") if number(each, "axis/initial_position")]
     if begun:
         notes.append(Note("initial positions are left out, of", tuple(begun)))
-    costs = [0 if joint.name in driven or joint.is_asked else CUT_LAST.get(joint.type, 0) for joint in joints]
+    asked = [joint.name in driven or joint.limits is not None or joint.mimic is not None for joint in joints]
+    costs = [0 if is_asked else CUT_LAST.get(joint.type, 0) for joint, is_asked in zip(joints, asked, strict=True)]
     reached, outward = {base: -1}, []
     nearest = [(costs[index], index, base) for index in touching[base]]
     while nearest:  # Prim's tree of least cost
@@ -209,7 +188,7 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
         other = joint.child if joint.parent == link else joint.parent
         if other not in reached:
             reached[other] = index
-            outward.append(joint.between(link, other, frames))
+            outward.append(hung(joint, link, other, frames))
             for index in touching[other]:
                 heappush(nearest, (costs[index], index, other))
     apart = [link for link in links if link not in reached]
@@ -219,17 +198,16 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     for each in (element.get("name", "") for element in model.findall("frame")):
         link = poses.link(each, f"frame '{each}'")
         frames[each] = poses[each]
-        fixed = SdfJoint(f"{each}_frame", "fixed", link, each, poses[each], np.eye(3)[:2], None, None, None)
-        outward.append(fixed.between(link, each, frames))
+        outward.append(UrdfJoint(f"{each}_frame", "FIXED", link, each, _within(frames[link], frames[each])))
     of_joints = {joint.name: poses.roundings[joint.name] for joint in joints}
     of_links = {link: poses.roundings[link] for link in frames}
     tree = UrdfLinks(name, base, outward, frames, of_links, of_joints, driven)
     used = set(reached.values())
-    return tree.closed_by([joint.closing(frames) for index, joint in enumerate(joints) if index not in used])
+    return tree.closed_by([closing(joint, frames) for index, joint in enumerate(joints) if index not in used])
 
 
-def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> SdfJoint:
-    """A <joint> of SDF, in a model or in the <gazebo> of a URDF."""
+def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint:
+    """A <joint> of SDF, in a model or in the <gazebo> of a URDF; its frame and axes in the model."""
     name, kind = element.get("name", ""), element.get("type", "")
     place = f"joint '{name}'"
     if kind not in TYPES:
@@ -266,7 +244,8 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> SdfJoint:
         )
         coupling = Coupling(name, leader, (offset - ratio * reference, ratio))
     max_speed = speed if 0.0 < speed < ENDLESS else None
-    return SdfJoint(name, kind, parent, child, poses[name], np.array(axes), limits, max_speed, coupling)
+    joint = UrdfJoint(name, kind.upper(), parent, child, poses[name], axes=np.array(axes))
+    return replace(joint, limits=limits, max_speed=max_speed, mimic=coupling)
 
 
 def _number(element: ET.Element, path: str, default: float, place: str) -> float:
@@ -281,7 +260,7 @@ def _number(element: ET.Element, path: str, default: float, place: str) -> float
     return value
 
 
-def _driven(model: ET.Element, joints: Sequence[SdfJoint]) -> list[str]:
+def _driven(model: ET.Element, joints: Sequence[UrdfJoint]) -> list[str]:
     """The joints that plugins name, which drive them, but for those that publish where joints are."""
     plugins = [each for each in model.findall("plugin") if "publisher" not in each.get("name", "").lower()]
     named = [(each.text or "").strip() for plugin in plugins for each in plugin.iter("joint_name")]

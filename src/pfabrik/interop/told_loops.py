@@ -22,7 +22,7 @@ from ..arrays import Floats
 from ..errors import Fault, near_miss
 from .loops_file import KINDS
 from .opened import frame_along
-from .urdf_links import HERE, UrdfJoint, frame_at, origin_of, placed_at, vector_in
+from .urdf_links import HERE, UrdfJoint, frame_at, origin_of, vector_in
 from .xml_reading import fault, numbers_in
 
 DIALECTS = ("loop_joint", "constraint", "loop", "ball_constraint", "weld_constraint")
@@ -78,8 +78,8 @@ def told_joint(element: ET.Element, frames: Mapping[str, Floats], number: int) -
     if kind in ("revolute", "prismatic") and not np.array_equal(axes[0], axes[1]):
         second = second.copy()
         second[:3, :3] = second[:3, :3] @ frame_along(axes[1]) @ frame_along(axes[0]).T
-    name, at = element.get("name") or f"closure_{number}", placed_at(first[:3, 3], first[:3, :3])
-    return UrdfJoint(name, kind.upper(), links[0], links[1], first, at, np.zeros(3), np.array(axes)), second
+    name = element.get("name") or f"closure_{number}"
+    return UrdfJoint(name, kind.upper(), links[0], links[1], first, axes=np.array(axes)), second
 
 
 def attached_by(plugin: ET.Element) -> ET.Element:

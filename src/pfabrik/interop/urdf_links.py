@@ -39,12 +39,12 @@ class UrdfJoint:
     ----------
     type : as of URDF, or of a file of loops that retypes it, in capitals.
     frame : the child's frame at zero in that of the parent, (4, 4) [m].
-    placed : the same as attributes of MuJoCo, in the numbers of the file.
     point : the place of the joint in the child's frame, (3,) [m].
     axes : its axis there, of any length but zero, and the second one of a universal joint, (2, 3).
     limits : least and largest coordinate [rad or m]; None where the file has none.
     max_speed : [rad/s or m/s]; None where the file has none, or 0, which stands for none.
     mimic : how it follows another joint; None where it does not.
+    written : `frame` as attributes of MuJoCo, in the numbers of the file; empty where it has none.
     """
 
     name: str
@@ -52,12 +52,12 @@ class UrdfJoint:
     parent: str
     child: str
     frame: Floats
-    placed: Mapping[str, str]
-    point: Floats
-    axes: Floats
+    point: Floats = field(default_factory=lambda: np.zeros(3))
+    axes: Floats = field(default_factory=lambda: np.eye(3)[:2])
     limits: tuple[float, float] | None = None
     max_speed: float | None = None
     mimic: Coupling | None = None
+    written: Mapping[str, str] = field(default_factory=dict)
 
     def elementary(self) -> list[tuple[str, JointType, Floats | None]]:
         """Names, types and axes (3,), in the child's frame, of the joints that it is, from its parent to its child."""
@@ -133,14 +133,8 @@ class UrdfLinks:
             turns = np.array([on_parent[:3, :3], on_child[:3, :3]])
             points = np.array([on_parent[:3, 3], on_child[:3, 3]])
             loops.append(LinkLoop(name, kind, links, points, turns @ joint.axes[0], turns))
-        return replace(
-            self,
-            joints=tree,
-            loops=loops,
-            frames=frames,
-            roundings=roundings,
-            joint_roundings=joint_roundings,
-        )
+        placed = replace(self, frames=frames, roundings=roundings, joint_roundings=joint_roundings)
+        return replace(placed, joints=tree, loops=loops)
 
 
 def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
@@ -220,7 +214,7 @@ def frame_at(xyz: Floats, rpy: Floats) -> Floats:
     return frame
 
 
-def placed_at(point: Floats, turn: Floats) -> dict[str, str]:
+def placed_at(point: Floats, turn: Floats) -> Mapping[str, str]:
     """A place (3,) [m] and a rotation (3, 3) as attributes of MuJoCo."""
     return {"pos": number_text(point), "xyaxes": number_text(turn[:, :2].T.ravel())}
 
@@ -255,12 +249,11 @@ def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
         _link(element, "parent"),
         _link(element, "child"),
         origin_of(origin),
-        {"pos": _text(origin, "xyz", ZERO), "euler": _text(origin, "rpy", ZERO)},
-        np.zeros(3),
-        np.eye(3)[:2] if kind == "UNIVERSAL" else np.array([axis, axis]),
-        limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
-        speed if speed > 0.0 else None,
-        _coupling(name, element.find("mimic")),
+        axes=HERE[:2, :3] if kind == "UNIVERSAL" else np.array([axis, axis]),
+        limits=limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
+        max_speed=speed if speed > 0.0 else None,
+        mimic=_coupling(name, element.find("mimic")),
+        written={"pos": _text(origin, "xyz", ZERO), "euler": _text(origin, "rpy", ZERO)},
     )
 
 
@@ -287,7 +280,7 @@ def _roundings(
     outward: Sequence[UrdfJoint], closing: Sequence[UrdfJoint], written: Mapping[str, ET.Element], root: str
 ) -> tuple[dict[str, Rounding], dict[str, Rounding]]:
     """Link, and joint -> how exactly the digits of the file place it [m, rad], from the root outward."""
-    lengths, turns = (digits_of(each.placed[key] for each in (*outward, *closing)) for key in ("pos", "euler"))
+    lengths, turns = (digits_of(each.written[key] for each in (*outward, *closing)) for key in ("pos", "euler"))
     axes = digits_of(_text(each.find("axis"), "xyz", X) for each in written.values())
     of_links, of_joints = {root: NOTHING}, {}
     for joint in (*outward, *closing):

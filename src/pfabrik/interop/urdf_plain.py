@@ -37,7 +37,8 @@ def plain_robot(links: UrdfLinks, loops: Iterable[LinkLoop]) -> ET.Element:
 
 def _body(parent: ET.Element, joint: UrdfJoint) -> ET.Element:
     """The child of a joint, with the joints of MuJoCo that the joint is."""
-    body = ET.SubElement(parent, "body", {"name": joint.child, **joint.placed})
+    placed = joint.written or placed_at(joint.frame[:3, 3], joint.frame[:3, :3])
+    body = ET.SubElement(parent, "body", {"name": joint.child, **placed})
     for name, kind, axis in joint.elementary():
         if kind != "fixed":
             attributes = {} if axis is None else {"axis": number_text(axis)}

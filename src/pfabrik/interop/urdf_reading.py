@@ -19,7 +19,7 @@ from .loops_file import LinkLoop, LoopsFile, placed_loops, read_loops, roundings
 from .notes import Note, noting
 from .opened import loops_by_name
 from .robots import Robot, mechanism_of
-from .sdf_links import Poses, read_sdf, sdf_joint
+from .sdf_links import Poses, closing, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
 from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
@@ -125,7 +125,7 @@ def _told_joints(
             elif part.tag == "joint" and part.find("child") is not None:
                 model = ET.Element("model")
                 model.append(part)
-                yield sdf_joint(part, Poses(model, links.frames)).closing(links.frames)
+                yield closing(sdf_joint(part, Poses(model, links.frames)), links.frames)
             else:
                 faults += unread_loops(part, links.frames, links.root, known, remedy)
         except InvalidMechanism as error:
