@@ -97,15 +97,15 @@ def test_a_loop_that_an_element_of_a_urdf_tells_closes_it_as_in_mujoco(element: 
     path = tmp_path / "robot.urdf"
     path.write_text(FOUR_BAR.format(element))
     found = from_urdf(path, end_effector="rocker", task=["tilt"])
+    assert "millimetres" not in notes_of(found)
     assert f"loops that the description tells, as {kind}" in notes_of(found)
     agrees(found, Model.of(IN_MUJOCO), "rocker")
     checked = verify(found.mechanism, poses=3, original=path)
     assert checked and checked.original
     loops = {"loops": [{"links": ["rocker", "coupler"], "at": [[-0.03, 0, 0.12], [0.17, 0, 0.06]]}]}
     again = from_urdf(path, loops, end_effector="rocker")
-    assert again.mechanism.joint("closure_1").type == "spherical" and "C" not in {
-        each.name for each in again.mechanism.joints
-    }
+    assert again.mechanism.joint("closure_1").type == "spherical" and "tells too, which counts" in notes_of(again)
+    assert "C" not in {joint.name for joint in again.mechanism.joints}
 
 
 def test_a_link_that_hangs_on_two_joints_closes_a_loop_whose_joint_keeps_its_range() -> None:
@@ -289,6 +289,7 @@ SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
         ("link2 link='rocker'", "link2 link='roker'", "'roker'; did you mean 'rocker'?"),
         ("<link2 link='rocker'", "<kink2 link='rocker'", "1 links; expected two"),
         (ONE, "nan 0 0", "three finite numbers"),
+        ("loop_joint name='C'", "loop_joint name='A'", "loop 'A': found a name that a joint or another loop has"),
         (OTHER, "0 0", "three finite numbers"),
         (OTHER, "-30 0 120", r"loop 'C': found open by 1\d\d m"),
         ("type='spherical'", "type='distance'", "type 'distance'; expected one of ball"),
@@ -305,6 +306,12 @@ SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
 def test_what_is_wrong_with_a_told_loop_is_refused_in_a_sentence(old: str, new: str, said: str) -> None:
     with pytest.raises(InvalidMechanism, match=said):
         from_urdf(CLOSED.replace(old, new), end_effector="rocker")
+
+
+def test_a_description_in_millimetres_is_asked_for_its_unit() -> None:
+    far = CLOSED.replace('xyz="0.2 0 0"', 'xyz="200 0 0"').replace("0 0 0.06", "0 0 60")
+    far = far.replace(ONE, "170 0 60").replace(OTHER, "-30 0 120")
+    assert "up to 200 m away: a description has metres" in notes_of(from_urdf(far, end_effector="rocker"))
 
 
 def test_springs_between_links_are_noted_and_rolling_couplings_of_a_rotor_left_to_its_joint() -> None:

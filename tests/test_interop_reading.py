@@ -608,6 +608,7 @@ def test_the_command_says_what_is_wrong_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "robot.urdf").write_text(URDF)
     (tmp_path / "model.xml").write_text(FIVE_BAR)
     (tmp_path / "page.html").write_text("<html/>")
+    (tmp_path / "robot.sdf").write_text("<sdf/>")
     for words, said in (
         (("import", str(tmp_path / "page.html")), "<mujoco> (MJCF) or <robot> (URDF)"),
         (("import", str(tmp_path / "none.xml")), "no such file"),
@@ -615,6 +616,7 @@ def test_the_command_says_what_is_wrong_in_one_line(tmp_path: Path) -> None:
         (("import", str(tmp_path / "robot.urdf"), "--configuration", "up"), "--configuration"),
         (("check", str(tmp_path / "model.xml")), "pfabrik import"),
         (("check", str(tmp_path / "robot.urdf")), "pfabrik import"),
+        (("check", str(tmp_path / "robot.sdf")), "pfabrik import"),
         (("export", "stewart"), "FORMAT"),
         (("export", "stewart", "mjfc"), "mjcf"),
         (("export", "stewart", "mjcf", "--name", "arm"), "--name is of c, c-float and"),

@@ -94,7 +94,12 @@ def _text(path: Path) -> str:
         raise _unusable(f"a file that cannot be read ({error.strerror})", "a readable file") from None
 
 
-FORMATS = {"<mujoco": "a MuJoCo model (MJCF)", "<robot": "a robot description (URDF)", "<": "XML"}
+FORMATS = {
+    "<mujoco": "a MuJoCo model (MJCF)",
+    "<robot": "a robot description (URDF)",
+    "<sdf": "a model in SDF",
+    "<": "XML",
+}
 """Tags by which files of other programs are recognised."""
 
 

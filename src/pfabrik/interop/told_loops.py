@@ -155,7 +155,8 @@ def _names(element: ET.Element, bodies: Collection[str]) -> Iterator[str]:
     if element.tag in HARMLESS or "collision" in element.tag:
         return
     for text in (*element.attrib.values(), element.text or ""):
-        words = [text.strip()] if text.strip() in bodies else text.replace(",", " ").split()
+        name = text.strip().rpartition("::")[2]
+        words = [name] if name in bodies else text.replace(",", " ").split()
         if all(word in bodies for word in words):
             yield from words
     for child in element:

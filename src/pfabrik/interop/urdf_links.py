@@ -26,6 +26,8 @@ TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "
 MOST_JOINTS, MOST_FAULTS = 5_000, 20
 """Most joints of a robot, which is a humanoid with every bolt ten times, and most faults that are told at once."""
 
+XACRO = "; xacro files want xacro"
+
 ZERO, X = "0 0 0", "1 0 0"
 HERE: Floats = np.eye(4)
 """A frame that is another's."""
@@ -315,7 +317,7 @@ def _faults(root: ET.Element) -> Iterator[Fault]:
             for key, text in () if element is None else element.attrib.items():
                 count = 3 if key in ("xyz", "rpy") else 1
                 if numbers_in(text, count) is None:
-                    yield Fault(f"{place}.{tag}.{key}", f"'{text}'", f"{count} numbers; xacro files want xacro")
+                    yield Fault(f"{place}.{tag}.{key}", f"'{text}'", f"{count} finite numbers{XACRO * ('$' in text)}")
         yield from _mimic_faults(place, joint.find("mimic"), names)
         axis = numbers_in(_text(joint.find("axis"), "xyz", X), 3)
         if kind not in ("fixed", "floating", "ball", "spherical", "universal") and (axis is None or not axis.any()):

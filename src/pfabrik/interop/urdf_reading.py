@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 from xml.etree import ElementTree as ET
+
+import numpy as np
 
 from ..arrays import Floats
 from ..description.joint_types import KINDS
@@ -23,7 +26,10 @@ from .sdf_links import Poses, closing, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
 from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
-from .xml_reading import read_xml
+from .xml_reading import fault, read_xml
+
+FAR = 50.0
+"""Distance of a link from the root [m] at which an import asks for the unit: a robot in millimetres has hundreds."""
 
 
 def from_urdf(
@@ -87,14 +93,17 @@ def read_description(root: ET.Element, loops_file: LoopsFile, notes: list[Note])
     written = loops_file.loops(links.frames, links.frame_joints)
     known = {frozenset(loop.links) for loop in written}
     links = links.closed_by(list(_told_joints(root, links, known, notes)))
-    twice = tuple(loop.name for loop in links.loops if frozenset(loop.links) in known)
-    if twice:
-        notes.append(Note("loops of the description that the file of loops tells too, which counts", twice))
-    told = [loop for loop in links.loops if loop.name not in twice]
+    told = [loop for loop in links.loops if frozenset(loop.links) not in known]
     for kind, plural in (("spherical", "balls"), ("revolute", "hinges"), ("fixed", "welds")):
         of_kind = tuple(loop.name for loop in told if loop.type == kind)
         if of_kind:
             notes.append(Note(f"loops that the description tells, as {plural}", of_kind))
+    counts = Counter([*(joint.name for joint in links.joints), *(loop.name for loop in (*written, *told))])
+    for name in (name for name, count in counts.items() if count > 1):
+        raise fault(f"loop '{name}'", "a name that a joint or another loop has too", "a name of its own")
+    farthest = max(float(np.linalg.norm(frame[:3, 3])) for frame in links.frames.values())
+    if farthest > FAR:
+        notes.append(Note(f"links are up to {farthest:.4g} m away: a description has metres; were millimetres meant?"))
     return links, [*written, *told]
 
 
@@ -104,6 +113,7 @@ def _told_joints(
     """Yield the joints that elements beside links and joints tell; a fault for each that binds two links otherwise."""
     remedy = "the loop in a file of loops (--loops), or a description without this element"
     springs: list[str] = []
+    twice = [loop.name for loop in links.loops if frozenset(loop.links) in known]
     faults: list[Fault] = []
     tops = [each for model in ([root] if root.tag == "robot" else root.iter("model")) for each in model]
     parts = [part for each in tops for part in (each if each.tag in ("link", "joint", "gazebo") else [each])]
@@ -114,7 +124,10 @@ def _told_joints(
         part = attached_by(part) if part.tag == "plugin" else part
         names = links_named(part, links.frames)
         is_read = part.tag == "frame" or (part.tag == "coupling" and frozenset(names) in coupled)
-        if is_read or set(names) == {links.root} or frozenset(names) in known:
+        if is_read or set(names) == {links.root}:
+            continue
+        if frozenset(names) in known:
+            twice += [part.get("name") or part.tag] if part.tag in (*DIALECTS, "joint") else []
             continue
         try:
             if part.tag == SPRING:
@@ -132,8 +145,11 @@ def _told_joints(
             faults += error.faults
     if faults:
         raise InvalidMechanism(faults[:MOST_FAULTS])
-    if springs:
-        notes.append(Note("springs between links are left out", tuple(springs)))
+    for what, left_out in (
+        ("springs between links are left out", springs),
+        ("loops that the file of loops tells too, which counts", twice),
+    ):
+        notes += [Note(what, tuple(left_out))] if left_out else []
 
 
 def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFile, notes: list[Note]) -> Robot:
@@ -157,7 +173,7 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
         rates={joint.name: Rates(joint.max_speed) for joint in links.joints},
         roundings={**links.joint_roundings, **roundings_of_loops(link_loops, links.roundings)},
         couplings=[joint.mimic for joint in links.joints if joint.mimic is not None],
-        undriven="no transmission, and no motor in a file of loops",
+        undriven="no transmission, no controller, and no motor in a file of loops",
     )
 
 
