@@ -28,7 +28,7 @@ __all__ = ["main"]
         "speed": "Tell how fast the platform may move.",
         "plot": "Draw a machine at home, or where a target takes it.",
         "view": "Show a machine in the browser: drag its target, drive its actuators, see what stops it.",
-        "import": "Turn a MuJoCo model (MJCF) or a URDF into a mechanism file.",
+        "import": "Turn a MuJoCo model (MJCF), a URDF or an SDF into a mechanism file.",
         "export": "Write a mechanism for another program.",
         "verify": "Compare answers with those of MuJoCo.",
         "demo": "Follow circles that leave the workspace.",
