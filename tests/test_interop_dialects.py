@@ -289,6 +289,7 @@ SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
         ("link2 link='rocker'", "link2 link='roker'", "'roker'; did you mean 'rocker'?"),
         ("<link2 link='rocker'", "<kink2 link='rocker'", "1 links; expected two"),
         (ONE, "nan 0 0", "three finite numbers"),
+        ("</robot>", IN_GAZEBO.format("ball", "", "").replace("coupler", "world") + "</robot>", "'world', no link"),
         ("loop_joint name='C'", "loop_joint name='A'", "loop 'A': found a name that a joint or another loop has"),
         (OTHER, "0 0", "three finite numbers"),
         (OTHER, "-30 0 120", r"loop 'C': found open by 1\d\d m"),

@@ -71,7 +71,7 @@ class Poses:
     def __init__(self, model: ET.Element, known: Mapping[str, Floats]) -> None:
         self.elements = {each.get("name", ""): each for each in model if each.tag in ("link", "frame", "joint")}
         links = [name for name, each in self.elements.items() if each.tag == "link"]
-        self.links, self._canonical = {WORLD, *known, *links}, model.get("canonical_link") or "".join(links[:1])
+        self.links, self._canonical = {*(known or [WORLD]), *links}, model.get("canonical_link") or "".join(links[:1])
         self.frames: dict[str, Floats] = {MODEL: HERE, WORLD: HERE, **known}
         self.roundings: dict[str, Rounding] = dict.fromkeys(self.frames, NOTHING)
         poses = [(each.findtext("pose") or "").split() for each in self.elements.values()]
