@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from in_mujoco import Model
-from pfabrik.errors import InvalidMechanism
+from pfabrik.errors import InvalidArgument, InvalidMechanism
 from pfabrik.interop import Imported, from_sdf, from_urdf, verify
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -313,6 +313,11 @@ def test_a_description_in_millimetres_is_asked_for_its_unit() -> None:
     far = CLOSED.replace('xyz="0.2 0 0"', 'xyz="200 0 0"').replace("0 0 0.06", "0 0 60")
     far = far.replace(ONE, "170 0 60").replace(OTHER, "-30 0 120")
     assert "up to 200 m away: a description has metres" in notes_of(from_urdf(far, end_effector="rocker"))
+
+
+def test_an_end_effector_that_is_fixed_to_the_base_is_refused() -> None:
+    with pytest.raises(InvalidArgument, match="'rocker', which is fixed to 'ground'"):
+        from_urdf(CLOSED.replace('name="D" type="continuous"', 'name="D" type="fixed"'), end_effector="rocker")
 
 
 def test_springs_between_links_are_noted_and_rolling_couplings_of_a_rotor_left_to_its_joint() -> None:

@@ -81,6 +81,8 @@ def mechanism_of(
     base = _base(robot, base)
     end_effector = _end_effector(robot, end_effector, base, notes)
     tip, point = _place(robot, end_effector)
+    if tip != base and merged_bodies(robot.joints, base)[1].get(tip) == base:
+        raise InvalidArgument("end_effector", f"'{tip}', which is fixed to '{base}'", "a body that moves")
     rigid = _with_merged_bodies(robot, base, tip)
     if point is not None:
         rigid = _without_joint_named(tip, rigid, notes)
