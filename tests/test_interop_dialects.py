@@ -261,6 +261,20 @@ def test_joints_that_drake_adds_to_a_urdf_are_joints_of_the_tree() -> None:
     agrees(found, Model.of(re.sub("<equality>.*</equality>", "", text)), "coupler")
 
 
+def test_a_hinge_that_closes_a_loop_may_be_driven_or_held(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    told = IN_GAZEBO.format("revolute", f"{OTHER} 0 0 0", "<axis><xyz>0 1 0</xyz></axis>")
+    path.write_text(FOUR_BAR.format(told))
+    found = from_urdf(path, end_effector="rocker", actuated=["C"], task=["tilt"])
+    assert found.mechanism.actuator_names == ("C",)
+    checked = verify(found.mechanism, poses=3, original=path)
+    assert checked and checked.original
+    held = from_urdf(path, end_effector="rocker", fixed=["C"], task=["tilt"]).mechanism
+    assert pf.mobility(held).platform == 0
+    sdf = from_sdf(rod_in_sdf("model").replace("A</joint_name>", "</joint_name>"), end_effector="crank", actuated=["D"])
+    assert sdf.mechanism.actuator_names == ("D",)
+
+
 def test_collision_geometry_of_sdf_is_where_its_links_are() -> None:
     box = "<geometry><box><size>0.02 0.04 0.06</size></box></geometry>"
     parts = f"<collision name='a'><pose>0.01 0.02 0.03 0.1 0.2 0.3</pose>{box}</collision>"
@@ -296,6 +310,7 @@ SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
         ("type='spherical'", "type='distance'", "type 'distance'; expected one of ball"),
         ("type='spherical'", "", "neither a type nor an axis"),
         ("type='spherical'", "type='hinge'", "C'.axis: found no direction"),
+        ("spherical'>", "universal'><axis xyz='0 1 0'/>", "C'.axis: found one direction; expected two"),
         ("</robot>", f"<drake:linear_bushing_rpy>{SPRING}</drake:linear_bushing_rpy></robot>", "<linear_bushing_rpy>"),
         ("</robot>", f"<gazebo><joint name='E' type='gearbox'>{IN_SDF}</joint></gazebo></robot>", "type 'gearbox'"),
         ("</robot>", "<xacro:include filename='a'/></robot>", "of a file for xacro"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -55,7 +55,7 @@ class Original:
         require("the referee", "mujoco", "mujoco")
         self.mechanism = mechanism
         self.metres = metres_of(mechanism.length_unit)
-        self.compiled = CompiledModel(ET.tostring(_plain(path, loops), encoding="unicode"))
+        self.compiled = CompiledModel(ET.tostring(_plain(path, loops, mechanism.actuator_names), encoding="unicode"))
         self.compiled.put_configuration(configuration)
         self.model, self.data = self.compiled.model, self.compiled.data
         self._columns = dict(self._matched())
@@ -189,10 +189,12 @@ class Original:
         return self.data.xpos[self._body].copy(), self.data.xmat[self._body].reshape(3, 3).copy()
 
 
-def _plain(path: str | os.PathLike[str], loops: str | os.PathLike[str] | Mapping[str, Any] | None) -> ET.Element:
+def _plain(
+    path: str | os.PathLike[str], loops: str | os.PathLike[str] | Mapping[str, Any] | None, driven: Sequence[str]
+) -> ET.Element:
     """The kinematics of a model, or of a robot description with its loops, as a MuJoCo model."""
     if kind_of(path) != "mjcf":
-        return plain_robot(*read_description(read_xml(path, "urdf", "sdf"), read_loops(loops), []))
+        return plain_robot(*read_description(read_xml(path, "urdf", "sdf"), read_loops(loops), driven, []))
     if loops is not None:
         raise InvalidArgument("loops", "some", "none: a MuJoCo model tells its loops itself")
     return plain_model(read_xml(path, "mjcf"), [])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 from xml.etree import ElementTree as ET
@@ -147,8 +147,13 @@ def _base(element: ET.Element) -> str:
     return (pose.get("relative_to", "") if pose is not None else "") or default.get(element.tag, "") or MODEL
 
 
-def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
-    """The links of the one model in a file, hung on each other by joints whose coordinates somebody asks for first."""
+def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> UrdfLinks:
+    """The links of the one model in a file, hung on each other by joints whose coordinates somebody asks for first.
+
+    Parameters
+    ----------
+    asked : names of the joints that a caller drives or holds.
+    """
     model = _only_model(root, notes)
     name = model.get("name", "mechanism")
     place, poses = f"model '{name}'", Poses(model, {})
@@ -178,8 +183,8 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     begun = [each.get("name", "") for each in model.findall("joint") if number(each, "axis/initial_position")]
     if begun:
         notes.append(Note("initial positions are left out, of", tuple(begun)))
-    asked = [joint.name in driven or joint.limits is not None or joint.mimic is not None for joint in joints]
-    costs = [0 if is_asked else CUT_LAST.get(joint.type, 0) for joint, is_asked in zip(joints, asked, strict=True)]
+    named = {*driven, *asked, *(joint.name for joint in joints if joint.limits is not None or joint.mimic is not None)}
+    costs = [0 if joint.name in named else CUT_LAST.get(joint.type, 0) for joint in joints]
     reached, outward = {base: -1}, []
     nearest = [(costs[index], index, base) for index in touching[base]]
     while nearest:  # Prim's tree of least cost
@@ -203,7 +208,8 @@ def read_sdf(root: ET.Element, notes: list[Note]) -> UrdfLinks:
     of_links = {link: poses.roundings[link] for link in frames}
     tree = UrdfLinks(name, base, outward, frames, of_links, of_joints, driven)
     used = set(reached.values())
-    return tree.closed_by([closing(joint, frames) for index, joint in enumerate(joints) if index not in used])
+    loops = [closing(joint, frames) for index, joint in enumerate(joints) if index not in used]
+    return tree.closed_by(loops, asked)
 
 
 def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint:

@@ -71,6 +71,8 @@ def told_joint(element: ET.Element, frames: Mapping[str, Floats], number: int) -
     kind = TYPES[said]
     if kind not in ("spherical", "fixed") and not all(axis.any() for axis in axes):
         raise fault(f"{place}.axis", "no direction", "three numbers, not all zero")
+    if kind == "universal" and not np.cross(axes[0], axes[1]).any():
+        raise fault(f"{place}.axis", "one direction", "two, as in <parent_axis/> and <child_axis/>")
     if element.find("axis[@frame='parent']") is not None:
         across = frames[links[1]][:3, :3].T @ frames[links[0]][:3, :3]
         axes = [first[:3, :3].T @ axes[0], second[:3, :3].T @ across @ axes[0]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from xml.etree import ElementTree as ET
@@ -110,11 +110,15 @@ class UrdfLinks:
     loops: Sequence[LinkLoop] = ()
     frame_joints: Mapping[str, str] = field(default_factory=dict)
 
-    def closed_by(self, joints: Sequence[tuple[UrdfJoint, Floats]]) -> UrdfLinks:
+    def closed_by(self, joints: Sequence[tuple[UrdfJoint, Floats]], asked: Collection[str]) -> UrdfLinks:
         """With joints that close loops, each with its place (4, 4) [m] in its child's frame.
 
-        A ball, a weld and a free hinge are loops; what has coordinates of its own moves a twin of the child, which is
-        welded to it.
+        A ball, a weld and a free hinge are loops; what has coordinates that somebody asks for moves a twin of the
+        child, which is welded to it.
+
+        Parameters
+        ----------
+        asked : names of the joints that a caller drives or holds.
         """
         tree, loops, frames = [*self.joints], [*self.loops], dict(self.frames)
         roundings, joint_roundings = dict(self.roundings), dict(self.joint_roundings)
@@ -122,7 +126,7 @@ class UrdfLinks:
             on_parent, name, links = joint.frame, joint.name, (joint.parent, joint.child)
             parts = [kind for _, kind, _ in joint.elementary()]
             kind: LoopType = "spherical" if parts == ["spherical"] else "fixed"
-            if parts == ["revolute"] and not (joint.limits or joint.mimic or joint.name in self.driven):
+            if parts == ["revolute"] and not (joint.limits or joint.mimic or joint.name in {*self.driven, *asked}):
                 kind = "revolute"
             elif parts not in (["spherical"], ["fixed"]):
                 twin, offset = f"{joint.child}:{joint.name}", on_parent[:3, 3]
@@ -139,12 +143,13 @@ class UrdfLinks:
         return replace(placed, joints=tree, loops=loops)
 
 
-def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
+def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[str]) -> UrdfLinks:
     """The links of a description; InvalidMechanism with every fault.
 
     Parameters
     ----------
     retyped : joint -> its type, in place of that of the description.
+    asked : names of the joints that a caller drives or holds.
     """
     require_few(len(root.findall("joint")))
     faults = list(islice(_faults(root), MOST_FAULTS))
@@ -188,7 +193,7 @@ def read_links(root: ET.Element, retyped: Mapping[str, str]) -> UrdfLinks:
         [name for name in dict.fromkeys(driven) if name in written],
         frame_joints={joint.name: joint.child for joint in outward},
     )
-    return tree.closed_by([(joint, HERE) for joint in second])
+    return tree.closed_by([(joint, HERE) for joint in second], asked)
 
 
 def require_few(n_joints: int) -> None:

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_names
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
@@ -76,10 +77,12 @@ def from_urdf(
     with noting(notes):
         element = read_xml(source, "urdf", "sdf")
         loops_file = read_loops(loops)
-        links, link_loops = read_description(element, loops_file, notes)
+        chosen = None if actuated is None else require_names("actuated", actuated)
+        asked = {*(chosen or ()), *require_names("fixed", fixed), *loops_file.actuated}
+        links, link_loops = read_description(element, loops_file, asked, notes)
         robot = replace(_robot(links, link_loops, loops_file, notes), collision=read_collision(element, links, notes))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
-        drives = motors if actuated is None else actuated
+        drives = motors if chosen is None else chosen
         return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task)
 
 
@@ -87,12 +90,19 @@ from_sdf = from_urdf
 """The same function: what a file is follows from its first element."""
 
 
-def read_description(root: ET.Element, loops_file: LoopsFile, notes: list[Note]) -> tuple[UrdfLinks, list[LinkLoop]]:
-    """The links of a description, and all loops: those of a file of loops, then those that the description tells."""
-    links = read_sdf(root, notes) if root.tag == "sdf" else read_links(root, loops_file.retyped)
+def read_description(
+    root: ET.Element, loops_file: LoopsFile, asked: Collection[str], notes: list[Note]
+) -> tuple[UrdfLinks, list[LinkLoop]]:
+    """The links of a description, and all loops: those of a file of loops, then those that the description tells.
+
+    Parameters
+    ----------
+    asked : names of the joints that a caller drives or holds.
+    """
+    links = read_sdf(root, asked, notes) if root.tag == "sdf" else read_links(root, loops_file.retyped, asked)
     written = loops_file.loops(links.frames, links.frame_joints)
     known = {frozenset(loop.links) for loop in written}
-    links = links.closed_by(list(_told_joints(root, links, known, notes)))
+    links = links.closed_by(list(_told_joints(root, links, known, notes)), asked)
     told = [loop for loop in links.loops if frozenset(loop.links) not in known]
     for kind, plural in (("spherical", "balls"), ("revolute", "hinges"), ("fixed", "welds")):
         of_kind = tuple(loop.name for loop in told if loop.type == kind)
