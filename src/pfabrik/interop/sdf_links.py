@@ -157,7 +157,7 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     model = _only_model(root, notes)
     name = model.get("name", "mechanism")
     place, poses = f"model '{name}'", Poses(model, {})
-    require_few(len(model.findall("joint")))
+    require_few(model)
     counts = Counter(each.get("name", "") for each in model if each.tag in ("link", "frame", "joint"))
     for each in [each for each, count in counts.items() if count > 1 or each in ("", WORLD, MODEL)]:
         raise fault(place, f"the name '{each}', which is empty, reserved or used twice", "a name of its own")

@@ -89,11 +89,8 @@ def attached_by(plugin: ET.Element) -> ET.Element:
     joint = ET.Element("joint", name=plugin.get("name", "").rpartition("::")[2], type="fixed")
     for end in ("parent", "child"):
         ET.SubElement(joint, end).text = (plugin.findtext(f"{end}_link") or plugin.findtext(end) or "").strip()
-    return (
-        joint
-        if all(end.text for end in joint) and re.search("attach|detach", joint.get("name", "").lower())
-        else plugin
-    )
+    is_bond = all(end.text for end in joint) and re.search("attach|detach", joint.get("name", ""), re.IGNORECASE)
+    return joint if is_bond else plugin
 
 
 def named_in(element: ET.Element) -> str:

@@ -23,8 +23,8 @@ from .xml_reading import fault, numbers_in
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
 """Joint types that are read: those of URDF, and those that Drake and MuJoCo add."""
 
-MOST_JOINTS, MOST_FAULTS = 5_000, 20
-"""Most joints of a robot, which is a humanoid with every bolt ten times, and most faults that are told at once."""
+MOST_PARTS, MOST_FAULTS = 5_000, 20
+"""Most links or joints of a robot: a humanoid with every bolt ten times; and most faults that are told at once."""
 
 XACRO = "; xacro files want xacro"
 
@@ -151,7 +151,7 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
     retyped : joint -> its type, in place of that of the description.
     asked : names of the joints that a caller drives or holds.
     """
-    require_few(len(root.findall("joint")))
+    require_few(root)
     faults = list(islice(_faults(root), MOST_FAULTS))
     if faults:
         raise InvalidMechanism(faults)
@@ -196,10 +196,11 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
     return tree.closed_by([(joint, HERE) for joint in second], asked)
 
 
-def require_few(n_joints: int) -> None:
-    """Refuse a robot of more joints than any has."""
-    if n_joints > MOST_JOINTS:
-        raise fault("robot", f"{n_joints} joints", f"at most {MOST_JOINTS}")
+def require_few(robot: ET.Element) -> None:
+    """Refuse a robot of more links, joints or frames than any has."""
+    for tag in ("joint", "link", "frame"):
+        if (count := len(robot.findall(tag))) > MOST_PARTS:
+            raise fault("robot", f"{count} {tag}s", f"at most {MOST_PARTS}")
 
 
 def outward_from(root: str, joints: Iterable[UrdfJoint]) -> list[UrdfJoint]:
