@@ -443,7 +443,7 @@ def nearest_pose(
     status: Ints,
     weights: Floats,
 ) -> int:
-    """Fill the nearest feasible configuration of every row, by the first objective of the plan.
+    """Fill the nearest feasible configuration of every row, by the first objective of the plan, with links kept apart.
 
     With no steps to take, fill `weights` instead, (n, 2 ranges + cones + legs + pairs of links): the
     multipliers of the limits where each row starts, as in `closure.descend.nearest_configuration`.
@@ -469,7 +469,7 @@ def nearest_pose(
         0,
     )
     stays = plan.settings[0]["stays"]
-    scratch.search.links.kept[0] = 0
+    scratch.search.links.kept[0] = scratch.search.links.pairs.shape[0]
     solutions = PoseSolutions(distances, ends, ends_q, ends_sides, counters, actuators, measures, status)
     for row in range(distances.shape[0]):
         least = nearest_of_row(
