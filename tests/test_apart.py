@@ -145,6 +145,25 @@ def test_no_start_of_slsqp_comes_nearer_in_many_tries() -> None:
         assert distances[k] <= own.nearest(targets[k], 200) + 1e-7
 
 
+def test_nothing_in_the_same_orientation_is_nearer_than_what_is_certified() -> None:
+    machine = struts(20.0, clearance=2)
+    own, targets, rng = Struts(machine, 22.0), around(machine, 2 * COUNT, 0.3, 0.8, seed=3), np.random.default_rng(0)
+    answers, checked, length = pf.solve_ik(machine, targets), 0, machine.characteristic_length
+    for k in np.flatnonzero(answers.certified & (np.asarray(answers.status) == pf.Status.PROJECTED)):
+        held = any(each.bound == "clearance" for each in answers[int(k)].active_limits)
+        turn, far = Rotation.from_matrix(answers.pose[k, :3, :3]).as_rotvec(), 1.0 - 1e-7
+        steps = rng.normal(size=(300, 3))
+        steps *= (answers.position_error[k] / length * far * rng.uniform(size=300) ** (1 / 3) / norm(steps))[:, None]
+        for step in steps:
+            assert own.room(np.concatenate([targets[k, :3, 3] / length + step, turn])).min() < 1e-9
+        checked += held
+    assert INTERPRETED or checked > 4
+
+
+def norm(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
+
+
 @pytest.mark.parametrize("method", ["paper", "accelerated", "centroid"])
 def test_passes_keep_links_apart(method: str) -> None:
     machine, options = struts(20.0, clearance=2), replace(getattr(pf.passes.Options, method)(), hold=None)
