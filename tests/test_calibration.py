@@ -16,15 +16,15 @@ from pfabrik.rotations import to_rotvec
 PRINTER = Path(__file__).parents[1] / "examples" / "data" / "printer.cfg"
 
 FIRMWARE = {
-    "radius": 162.76928,
+    "delta_radius": 162.76928,
     "angle_a": 210.128266,
     "angle_b": 329.914363,
-    "endstop_a": 418.72172,
-    "endstop_b": 417.979258,
-    "endstop_c": 419.036135,
-    "arm_a": 345.511546,
-    "arm_b": 346.790457,
-    "arm_c": 346.713602,
+    "position_endstop_a": 418.72172,
+    "position_endstop_b": 417.979258,
+    "position_endstop_c": 419.036135,
+    "arm_length_a": 345.511546,
+    "arm_length_b": 346.790457,
+    "arm_length_c": 346.713602,
 }
 """What the firmware of that printer identified: github.com/phnxdrgn536/FLSun-v400 @e0368ae (CC0-1.0)."""
 
@@ -112,8 +112,8 @@ def test_tied_copies_vary_as_one() -> None:
 
 def test_dimensions_are_parameters_by_name(tmp_path: Path) -> None:
     printer = pf.read_klipper(PRINTER).mechanism
-    own = pf.parameters(printer, ["radius", "arm_a"])
-    assert own.apply([164.0, 345.0]).dimensions["radius"] == 164.0
+    own = pf.parameters(printer, ["delta_radius", "arm_length_a"])
+    assert own.apply([164.0, 345.0]).dimensions["delta_radius"] == 164.0
     solution = pf.solve_ik(printer, [20.0, 10.0, 5.0])
     slopes = pf.sensitivity(solution, own).pose[:3]
     for k in (0, 1):
@@ -165,11 +165,11 @@ def test_heights_alone_leave_the_arms_open() -> None:
     printer = pf.read_klipper(PRINTER)
     heights = printer.measurements.without(range(7, printer.measurements.rows))
     few = pf.calibrate(printer.mechanism, heights, free=printer.free)
-    assert few.rank == 7 and not few.determined.any() and "arm_c change together" in few.undetermined[0]
+    assert few.rank == 7 and not few.determined.any() and "arm_length_c change together" in few.undetermined[0]
     rng = np.random.default_rng(5)
     angles, radii = rng.uniform(0.0, 2.0 * math.pi, 30), 100.0 * np.sqrt(rng.uniform(0.0, 1.0, 30))
     targets = np.stack([radii * np.cos(angles), radii * np.sin(angles), 0.0 * angles], axis=1)
-    readings = pf.solve_ik(printer.mechanism.with_dimensions(arm_a=346.4, endstop_b=417.8), targets).actuators
+    readings = pf.solve_ik(printer.mechanism.with_dimensions(arm_length_a=346.4, position_endstop_b=417.8), targets).actuators
     many = pf.Measurements(readings, height=0.01 * rng.standard_normal(30))
     found = pf.calibrate(printer.mechanism, many, free=printer.free)
     assert found.rank == 9 and not found.determined[-3:].any() and found.determined[3:6].all()
@@ -326,8 +326,8 @@ def test_wrong_calls_say_what_is_wrong() -> None:
 def test_a_calibration_shows_itself() -> None:
     printer = pf.read_klipper(PRINTER)
     found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
-    assert "radius" in found._repr_html_() and "arm_a" in found.table()
-    assert found.to_dict()["parameters"][0]["name"] == "radius"
+    assert "delta_radius" in found._repr_html_() and "arm_length_a" in found.table()
+    assert found.to_dict()["parameters"][0]["name"] == "delta_radius"
     figure = pf.plot_calibration(found)
     assert len(figure.axes) == 2
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines.redescribed import moved
 from pfabrik.errors import UnsupportedMechanism
-from pfabrik.export.klipper import klipper
+from pfabrik.export.firmware_settings import klipper
 from pfabrik.export.linuxcnc import linuxcnc
 from test_export_c import COMPILERS, needs_compiler
 

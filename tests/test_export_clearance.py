@@ -17,7 +17,7 @@ import pfabrik as pf
 from pfabrik.description.links import links_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.export.export_c import c_source
-from pfabrik.export.klipper import klipper
+from pfabrik.export.firmware_settings import klipper
 from pfabrik.export.linuxcnc import linuxcnc
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.tensors import tensor_source

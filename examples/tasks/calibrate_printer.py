@@ -46,7 +46,7 @@ readings = pf.solve_ik(found.mechanism, touched).actuators
 probed = pf.Measurements(readings, height=rng.normal(0, 0.01, 30))
 thirty = pf.calibrate(printer.mechanism, probed, free=printer.free)
 for parameter in thirty.parameters:
-    print(f"{parameter.name:10} {parameter.deviation:5.2f}", "" if parameter.determined else " not determined")
+    print(f"{parameter.name:18} {parameter.deviation:5.2f}", "" if parameter.determined else " not determined")
 
 # ## Any other machine
 #

@@ -10,6 +10,7 @@ import click
 import pfabrik as pf
 
 from .arguments import MECH, load
+from .export import text_of
 from .outputs import OUTPUT, check_outputs, force_option, picture, refuse_both_on_stdout, refuse_existing, whole_file
 from .printing import json_option, note, print_answer
 
@@ -26,7 +27,9 @@ from .printing import json_option, note, print_answer
 @click.option("--tied", is_flag=True, help="Let copies of a joint vary as one.")
 @click.option("--sigma", type=float, help="Standard deviation of a measurement [length or rad]. Default: estimated.")
 @click.option("-o", "--output", help="Mechanism file to write, with the calibrated values.", **OUTPUT)
-@click.option("--klipper", "settings", help="File to write with Klipper's settings.", **OUTPUT)
+@click.option("--klipper", help="File to write with the settings for Klipper.", **OUTPUT)
+@click.option("--reprap", help="The same for RepRapFirmware.", **OUTPUT)
+@click.option("--marlin", help="The same for Marlin.", **OUTPUT)
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF.")
 @force_option
 @json_option()
@@ -37,22 +40,23 @@ def calibrate(
     tied: bool,
     sigma: float | None,
     output: Path | None,
-    settings: Path | None,
     plot: Path | None,
     force: bool,
     as_json: bool,
+    **settings: Path | None,
 ) -> int:
     """Find the parameters of a machine from measurements.
 
     DATA is a CSV file with a column for each actuator and for what was measured: x, y, z, roll, pitch, yaw, height,
-    distance and distance_to, other joints. With Klipper's printer.cfg in place of MECH there is no DATA: machine and
-    measurements are both in it.
+    distance and distance_to, other joints. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it.
     """
     from ..calibration.least_squares import calibrate as calibrated
 
-    check_outputs([("-o", output), ("--klipper", settings), ("--plot", plot)], [data] if data else [], as_json=as_json)
+    written = {form: path for form, path in settings.items() if path is not None}
+    outputs = [("-o", output), ("--plot", plot), *((f"--{form}", path) for form, path in written.items())]
+    check_outputs(outputs, [Path(mech), *([data] if data else [])], as_json=as_json)
     refuse_both_on_stdout(output, as_json)
-    for path in (output, settings):
+    for path in (output, *written.values()):
         if path is not None:
             refuse_existing(path, force)
     mechanism, measurements, names = _given(mech, data, free, sigma)
@@ -62,11 +66,9 @@ def calibrate(
 
         with whole_file(output) as file:
             file.write(dumps(result.mechanism))
-    if settings is not None:
-        from ..calibration.printer_settings import klipper_settings
-
-        text = klipper_settings(result)
-        with whole_file(settings) as file:
+    for form, path in written.items():
+        text = text_of(result.mechanism, form, "")
+        with whole_file(path) as file:
             file.write(text)
     if plot is not None:
         from ..calibration.plot_calibration import plot_calibration
@@ -83,11 +85,9 @@ def _given(
     mech: str, data: Path | None, free: tuple[str, ...], sigma: float | None
 ) -> tuple[pf.Mechanism, pf.Measurements, tuple[str, ...] | None]:
     """The machine, what was measured of it, and what may vary."""
-    if mech.endswith(".cfg"):
+    if data is None and mech.endswith(".cfg"):
         from ..calibration.printer_settings import read_klipper
 
-        if data is not None:
-            raise click.UsageError("DATA goes with a mechanism: a printer.cfg has both")
         printer = read_klipper(mech)
         if printer.measurements is None:
             raise click.ClickException(f"{mech}: no measurements; run DELTA_CALIBRATE and SAVE_CONFIG first")

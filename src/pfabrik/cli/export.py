@@ -14,7 +14,8 @@ from .arguments import MECH, comma_separated, load, named_joints
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import note
 
-FORMATS = ("c", "c-float", "mjcf", "linuxcnc", "klipper")
+FIRMWARES = ("klipper", "reprap", "marlin")
+FORMATS = ("c", "c-float", "mjcf", "linuxcnc", *FIRMWARES)
 NAMED = ("c", "c-float")
 """Formats whose names begin with one that can be chosen, and that take joints."""
 
@@ -40,10 +41,10 @@ def text_of(
         from ..export.linuxcnc import linuxcnc
 
         return linuxcnc(mechanism)
-    if form == "klipper":
-        from ..export.klipper import klipper
+    if form in FIRMWARES:
+        from ..export import firmware_settings
 
-        return klipper(mechanism)
+        return str(getattr(firmware_settings, form)(mechanism))
     if form == "web":
         from ..export.export_web import web_page
 
@@ -110,6 +111,8 @@ def export(
     mjcf      a MuJoCo model, which starts closed; what weighs and drives it is made up
     linuxcnc  HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile
     klipper   [printer] and [stepper_*] of a delta printer
+    reprap    M665 and M666, or M669, of a delta printer, for RepRapFirmware
+    marlin    M665 and M666 of a delta printer
 
     In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --web, --ros2-control.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from click.shell_completion import CompletionItem
 from ..answers.aligned_text import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from ..errors import UnknownName
-from .arguments import MECH
+from .arguments import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import json_option, print_answer
 
@@ -28,7 +29,13 @@ def complete_kind(ctx: click.Context, param: click.Parameter, incomplete: str) -
 
 @click.command(context_settings={"ignore_unknown_options": True, "allow_extra_args": True})
 @click.argument("kind", required=False, shell_complete=complete_kind)
-@click.option("--from", "machine", type=MECH, metavar="NAME", help="A machine of the catalogue, in place of a KIND.")
+@click.option(
+    "--from",
+    "machine",
+    type=MECH,
+    metavar="NAME",
+    help="A machine of the catalogue, or the file of one, in place of a KIND.",
+)
 @click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
 @force_option
 @click.option("--list", "list_all", is_flag=True, help="List the kinds of machines there are files for.")
@@ -47,7 +54,7 @@ def new(
 
     KIND is one of those that `pfabrik new` alone lists. The file describes a machine of this kind that works as it is.
     Its dimensions are at the top; each may be given as an option: `pfabrik new delta --rod 230 --arm 80`. With --from
-    it is a machine of `pfabrik catalog`, as it is there.
+    it is a machine of `pfabrik catalog`, as it is there, or one of your printer: `pfabrik new --from printer.cfg`.
     """
     if as_json and not list_all:
         raise click.UsageError("--json goes with --list: a file is TOML")
@@ -59,7 +66,7 @@ def new(
         return 0
     if (kind is None) == (machine is None):
         raise click.UsageError(f"give either --from NAME or one KIND of {', '.join(templates())}")
-    text = starting_file(str(kind)) if machine is None else catalog_file(machine).read_text(encoding="utf-8")
+    text = starting_file(str(kind)) if machine is None else file_of(machine)
     text = with_dimensions(text, ctx.args)
     refuse_existing(output, force)
     check_outputs([("-o", output)])
@@ -77,6 +84,15 @@ def starting_file(kind: str) -> str:
     if kind.lower() not in map(str.lower, templates()) and name in catalog():
         raise click.UsageError(f"no KIND '{kind}'; a machine of the catalogue is called so: --from {name}")
     return template(kind)
+
+
+def file_of(machine: str) -> str:
+    """The text of a mechanism file: one of the catalogue as it is there, or what a file describes."""
+    if machine in catalog() or not os.path.exists(machine):
+        return catalog_file(machine).read_text(encoding="utf-8")
+    from ..files import dumps
+
+    return dumps(load(machine))
 
 
 def with_dimensions(text: str, options: Sequence[str]) -> str:

@@ -36,8 +36,8 @@ class Thigh(NamedTuple):
     hip, ankle : (3,) [length]: the centre of the crank, and the middle of the rods on the platform from the reference
         point.
     length, shin : of the crank, and of the rods.
-    added : the actuator's value less the angle by which the crank hangs down [rad].
-    least : of that angle; infinite without a range.
+    added : the actuator's value, or minus it where it counts upward, less the angle by which the crank hangs down [rad].
+    least, most : of that angle; infinite without a range.
     """
 
     hip: Floats
@@ -46,6 +46,7 @@ class Thigh(NamedTuple):
     shin: float
     added: float
     least: float
+    most: float
 
 
 def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
@@ -103,20 +104,21 @@ def angle_of(place: Floats) -> float:
     return math.degrees(math.atan2(place[1], place[0])) % 360.0
 
 
-def thighs_of(machine: Machine) -> list[Thigh] | None:
+def thighs_of(machine: Machine, *, either_way: bool = False) -> list[Thigh] | None:
     """The cranks of a delta that hangs from them, in the order of its actuators; None for other machines.
 
-    Their axes are level and square to the way outward, they go down with their actuators, and their knees are outside.
+    Their axes are level and square to the way outward, they go down with their actuators (or up, if either way will
+    do), and their knees are outside.
     """
     mechanism = machine.mechanism
     if set(mechanism.task) != {"x", "y", "z"} or len(machine.driven) != 3 or len(machine.legs) != 6:
         return None
-    thighs = [_thigh(machine, driven) for driven in machine.driven]
+    thighs = [_thigh(machine, driven, either_way) for driven in machine.driven]
     fitting = [driven for driven in thighs if driven is not None]
     return fitting if len(fitting) == len(thighs) else None
 
 
-def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
+def _thigh(machine: Machine, driven: Coordinate, either_way: bool) -> Thigh | None:
     size, tolerance = machine.mechanism.characteristic_length, TOLERANCES.alignment
     pair = _pair(machine, driven, K.CRANK)
     if pair is None:
@@ -132,7 +134,8 @@ def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
     if difference > tolerance or max(abs(axis[2]), abs(axis @ outward)) > tolerance:
         return None
     down = np.array([0.0, 0.0, -1.0])
-    if np.cross(axis * driven.sense, outward) @ down < 0.0:
+    sense = math.copysign(1.0, np.cross(axis * driven.sense, outward) @ down)
+    if sense < 0.0 and not either_way:
         return None
     to_ankle = ankle + np.asarray(machine.mechanism.reference_point) - hip
     is_outside = (to_ankle @ down) * (crank @ outward) + (crank @ down) * -(to_ankle @ outward) > 0.0
@@ -140,4 +143,5 @@ def _thigh(machine: Machine, driven: Coordinate) -> Thigh | None:
         return None
     angle = math.atan2(crank @ down, crank @ outward)
     shin = _length(pair[0])
-    return Thigh(hip, ankle, float(np.linalg.norm(crank)), shin, driven.home - angle, angle + driven.lo)
+    least, most = sorted((angle + sense * driven.lo, angle + sense * driven.hi))
+    return Thigh(hip, ankle, float(np.linalg.norm(crank)), shin, sense * driven.home - angle, least, most)

@@ -12,6 +12,7 @@ from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
 from ..whole_files import whole_path
+from .printers import printer_table
 from .reading import read_mechanism
 from .writing import dumps
 
@@ -29,7 +30,8 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
 
     Parameters
     ----------
-    source : a catalogue name (a text equal to one of `catalog()`), or the path of a mechanism file.
+    source : a catalogue name (a text equal to one of `catalog()`), or the path of a mechanism file, or of the settings
+        of a delta printer: Klipper's `printer.cfg`, RepRapFirmware's `config.g`, Marlin's `Configuration.h`.
 
     Raises
     ------
@@ -44,7 +46,7 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
     if not os.path.exists(path):  # unlike Path.exists, it also answers for paths that no system could have
         raise UnknownName("mechanism file or catalogue name", str(path), catalog())
     try:
-        return read_mechanism(_parsed(_text(path)), path.parent)
+        return read_mechanism(_parsed(text_of(path), path.parent), path.parent)
     except InvalidMechanism as error:
         raise InvalidMechanism(error.faults, str(path)) from None
 
@@ -79,7 +81,7 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
         part.write_bytes(dumps(mechanism, Path(path).parent).encode())
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
     """The text of a file that could be a mechanism file; a fault when it cannot be one."""
     if not path.is_file():
         raise _unusable("a directory or device", "a mechanism file")
@@ -103,19 +105,25 @@ FORMATS = {
 """Tags by which files of other programs are recognised."""
 
 
-def _parsed(text: str) -> dict[str, Any]:
+def _parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
+    """The table of a text in TOML, or of the settings of a printer, with the folder of files that these include."""
     _refuse_large(text)
     if text.lstrip().startswith("<"):
         form = next(name for tag, name in FORMATS.items() if tag in text)
         hint = ", or `pfabrik import` to make one of it" if form != FORMATS["<"] else ""
         raise _unusable(form, f"a mechanism file (TOML), as `pfabrik new` writes{hint}")
     try:
-        if max(line.count(".") for line in text.split("\n") if not line.startswith("#")) > MOST_DOTS:
+        if max((line.count(".") for line in text.split("\n") if not line.startswith("#")), default=0) > MOST_DOTS:
             raise RecursionError
-        return tomllib.loads(text)
-    except RecursionError:
-        raise _unusable("values nested too deeply", "tables and lists a few levels deep") from None
-    except ValueError as error:  # a syntax error with its line and column, or a number of too many digits
+        return tomllib.loads(text) or printer_table(text, folder) or {}
+    except InvalidMechanism:
+        raise
+    except (RecursionError, ValueError) as error:  # a syntax error with its place, or a number of too many digits
+        table = printer_table(text, folder)
+        if table is not None:
+            return table
+        if isinstance(error, RecursionError):
+            raise _unusable("values nested too deeply", "tables and lists a few levels deep") from None
         raise _unusable(f"no TOML: {error}", "TOML") from None
 
 

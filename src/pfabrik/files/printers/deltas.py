@@ -1,0 +1,160 @@
+"""Deltas as firmwares know them, by few numbers: their tables, as of a mechanism file, with these as dimensions.
+
+A firmware knows nothing of platform and rod pairs: the joints are drawn `platform_radius` farther out, and the rods of
+a pair `apart`. No position depends on either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from ...errors import Fault, InvalidMechanism
+
+TOWERS = "abc"
+
+LOOPLESS = "a printer without closed loops, or with others than a delta's"
+
+SHOWN = 0.2
+"""Platform's radius, as drawn, over the delta's."""
+
+Table = dict[str, Any]
+
+
+def fault(place: str, found: str, expected: str) -> InvalidMechanism:
+    """The error of one wrong setting."""
+    return InvalidMechanism([Fault(place, found, expected)])
+
+
+def linear_delta(
+    radius: float, towers: Sequence[Mapping[str, float]], lowest: float = 0.0, *, from_endstops: bool = False
+) -> Table:
+    """Carriages on upright towers, with the nozzle at the origin at home.
+
+    A carriage at (r cos angle, r sin angle) is at sqrt(arm_length² - (x - its x)² - (y - its y)²) + z.
+
+    Parameters
+    ----------
+    radius : from the middle to the joints of a tower, less the platform's [mm].
+    towers : "angle" [deg], "arm_length" and "position_endstop" [mm], of the nozzle in the middle with this carriage at
+        its endstop; "radius_trim" [mm], what the tower is farther out.
+    lowest : of carriages [mm].
+    from_endstops : count carriages from their endstops, as steps are counted, in place of from the bed.
+    """
+    dimensions: Table = {"delta_radius": radius} | _drawn(radius)
+    joints: list[Table] = []
+    has_trims = any(tower.get("radius_trim") for tower in towers)
+    for letter, tower in zip(TOWERS, towers, strict=True):
+        names = ("angle", "arm_length", "position_endstop", *(("radius_trim",) if has_trims else ()))
+        dimensions |= {f"{name}_{letter}": float(tower.get(name, 0.0)) for name in names}
+        out = f"(delta_radius + radius_trim_{letter})" if has_trims else "delta_radius"
+        dimensions[f"height_{letter}"] = f"sqrt(arm_length_{letter}**2 - {out}**2)"
+        stop = f"position_endstop_{letter}"
+        rail = {"home": f"height_{letter}", "range": [lowest, f"height_{letter} + {stop}"]}
+        if from_endstops:
+            rail = {"home": f"-{stop}", "range": [f"{lowest:.17g} - height_{letter} - {stop}", 0]}
+        joints.append(
+            {"name": f"carriage_{letter}", "type": "prismatic", "actuated": True}
+            | {"connects": ["base", f"slide_{letter}"], "axis": [0, 0, 1]}
+            | rail
+        )
+        joints += _pair(letter, f"slide_{letter}", (f"({out} + platform_radius)", f"height_{letter}"), "0")
+    return _machine("Delta printer", dimensions, joints, 0)
+
+
+def rotary_delta(radius: float, arms: Sequence[Mapping[str, float]]) -> Table:
+    """Arms that turn about level axes, counted upward from level, with the nozzle in the middle at home.
+
+    Parameters
+    ----------
+    radius : from the middle to an arm's axis, less the platform's [mm].
+    arms : "angle" [deg], "upper_arm_length", "lower_arm_length", "shoulder_height" [mm]; "position_endstop", of the
+        nozzle in the middle with this arm at its endstop [mm], or "highest", the arm's angle there [deg]; "lowest"
+        [deg].
+    """
+    dimensions: Table = {"shoulder_radius": radius} | _drawn(radius)
+    shared = "shoulder_height" if len({arm["shoulder_height"] for arm in arms}) == 1 else None
+    if shared:
+        dimensions[shared] = arms[0]["shoulder_height"]
+    dimensions["home_height"] = _level_height(radius, arms[0])
+    joints: list[Table] = []
+    for letter, arm in zip(TOWERS, arms, strict=True):
+        dimensions |= {f"{name}_{letter}": float(value) for name, value in arm.items() if name != shared}
+        height = shared or f"shoulder_height_{letter}"
+        dimensions |= _arm_angle(letter, "home", height, "home_height")
+        if "position_endstop" in arm:
+            far = math.hypot(radius, arm["shoulder_height"] - arm["position_endstop"])
+            upper_arm, lower_arm = arm["upper_arm_length"], arm["lower_arm_length"]
+            if not abs(upper_arm - lower_arm) < far < upper_arm + lower_arm:
+                found = f"{arm['position_endstop']:g}, {far:g} from the shoulder, with arms of {upper_arm:g} and {lower_arm:g}"
+                raise fault(f"position_endstop of arm {letter}", found, "a height where the arms reach the middle")
+            dimensions |= _arm_angle(letter, "highest", height, f"position_endstop_{letter}")
+        angle, upper, raised = f"angle_{letter}", f"upper_arm_length_{letter}", f"home_{letter}"
+        out = "(shoulder_radius + platform_radius)"
+        joints.append(
+            {"name": f"arm_{letter}", "type": "revolute", "actuated": True}
+            | {"connects": ["base", f"upper_arm_{letter}"]}
+            | {"at": [f"{out}*cos({angle})", f"{out}*sin({angle})", height]}
+            | {"axis": [f"sin({angle})", f"-cos({angle})", 0], "home": raised}
+            | {"range": [arm.get("lowest", -180.0), f"highest_{letter}"]}
+        )
+        elbow = (f"({out} + {upper}*cos({raised}))", f"{height} + {upper}*sin({raised})")
+        joints += _pair(letter, f"upper_arm_{letter}", elbow, "home_height")
+    return _machine("Rotary delta printer", dimensions, joints, "home_height")
+
+
+def _drawn(radius: float) -> Table:
+    return {"platform_radius": round(SHOWN * radius, 1), "apart": round(2.0 * SHOWN * radius, 1)}
+
+
+def _level_height(radius: float, arm: Mapping[str, float]) -> float:
+    """Height of the nozzle in the middle with an arm level; half its endstop's where the arm cannot be level."""
+    below = arm["lower_arm_length"] ** 2 - (radius + arm["upper_arm_length"]) ** 2
+    if below > 0.0:
+        return float(arm["shoulder_height"] - below**0.5)
+    return float(arm.get("position_endstop", 0.0)) / 2.0
+
+
+def _arm_angle(letter: str, name: str, height: str, nozzle: str) -> Table:
+    """Dimensions that end in the angle of an arm with the nozzle in the middle at a height, the elbow outside.
+
+    By the cosine rule in the triangle of shoulder, elbow and nozzle: (upper² + reach² - lower²) / (2 upper reach).
+    """
+    upper, lower = f"upper_arm_length_{letter}", f"lower_arm_length_{letter}"
+    reach, bend = f"{name}_reach_{letter}", f"{name}_bend_{letter}"
+    return {
+        reach: f"sqrt(shoulder_radius**2 + ({height} - {nozzle})**2)",
+        bend: f"({upper}**2 + {reach}**2 - {lower}**2) / (2*{upper}*{reach})",
+        f"{name}_{letter}": f"atan2({nozzle} - {height}, -shoulder_radius) + atan2(sqrt(1 - {bend}**2), {bend})",
+    }
+
+
+def _pair(letter: str, carrier: str, knee: tuple[str, str], foot: str) -> Iterator[Table]:
+    """Two parallel rods from a carrier, at a radius and a height, to the platform, at a height."""
+    angle = f"angle_{letter}"
+    for side, along_x, along_y in (("l", "-", "+"), ("r", "+", "-")):
+        places = [
+            [
+                f"{radius}*cos({angle}) {along_x} apart/2*sin({angle})",
+                f"{radius}*sin({angle}) {along_y} apart/2*cos({angle})",
+                height,
+            ]
+            for radius, height in (knee, ("platform_radius", foot))
+        ]
+        rod = f"rod_{letter}{side}"
+        yield {"name": f"upper_{letter}{side}", "type": "spherical", "connects": [carrier, rod], "at": places[0]}
+        yield {"name": f"lower_{letter}{side}", "type": "spherical", "connects": [rod, "platform"], "at": places[1]}
+
+
+def _machine(name: str, dimensions: Table, joints: list[Table], height: object) -> Table:
+    return {
+        "schema": 1,
+        "name": name,
+        "units": {"length": "mm", "angle": "deg"},
+        "end_effector": "platform",
+        "reference_point": [0, 0, height],
+        "task": ["x", "y", "z"],
+        "dimensions": dimensions,
+        "joint": joints,
+    }

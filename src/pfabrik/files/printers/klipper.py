@@ -1,0 +1,123 @@
+"""Klipper's `printer.cfg`: its sections, and the deltas among its kinematics."""
+
+from __future__ import annotations
+
+import configparser
+import math
+import os
+import re
+from glob import glob
+from pathlib import Path
+
+from .deltas import LOOPLESS, TOWERS, Table, fault, linear_delta, rotary_delta
+
+_INCLUDE = re.compile(r"^\[include +([^\]]+)\]", re.MULTILINE)
+
+_DEEPEST = 10
+"""Files that include one another, at most."""
+
+
+class KlipperSettings:
+    """The sections of a `printer.cfg`, with the files that it includes.
+
+    What SAVE_CONFIG wrote at its end, behind `#*#`, holds where the text above does not say it.
+    """
+
+    def __init__(self, text: str, folder: Path | None) -> None:
+        lines = text.splitlines()
+        saved = "\n".join(["", *(line[3:].removeprefix(" ") for line in lines if line.startswith("#*#"))])
+        saved = saved[saved.find("\n[") :] if "\n[" in saved else ""
+        self._sections = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"))
+        for part in (saved, _included("\n".join(line for line in lines if not line.startswith("#*#")), folder, 0)):
+            try:
+                self._sections.read_string("\n".join(line.partition("#")[0] for line in part.splitlines()))
+            except configparser.Error as error:
+                raise fault("file", f"no settings of Klipper: {' '.join(str(error).split())}", "sections") from None
+
+    def text(self, section: str, key: str) -> str | None:
+        """What is said of a key, or None."""
+        return self._sections.get(section, key, fallback=None)
+
+    def number(self, section: str, key: str, default: float | None = None, above: float = -math.inf) -> float:
+        """A number above a bound."""
+        said = self.text(section, key)
+        if said is None and default is not None:
+            return default
+        try:
+            value = float(said) if said is not None else math.nan
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value > above):
+            expected = "a number" if above == -math.inf else f"a number above {above:g}"
+            raise fault(f"[{section}] {key}", "nothing" if said is None else repr(said), expected)
+        return value
+
+    def of_towers(self, key: str, defaults: tuple[float, ...] = (), above: float = -math.inf) -> list[float]:
+        """A number of each stepper; where one says nothing, its default, else what the first says."""
+        values: list[float] = []
+        for place, letter in enumerate(TOWERS):
+            default = defaults[place] if defaults else (values[0] if values else None)
+            values.append(self.number(f"stepper_{letter}", key, default, above))
+        return values
+
+
+def _included(text: str, folder: Path | None, depth: int) -> str:
+    """A text with the files that it includes in their places."""
+
+    def content(match: re.Match[str]) -> str:
+        pattern = match[1].strip()
+        try:
+            files = map(Path, sorted(glob(os.path.join(folder or "", pattern))))
+            texts = [_included(file.read_text(encoding="utf-8"), file.parent, depth + 1) for file in files]
+        except (OSError, ValueError) as error:
+            raise fault(f"[include {pattern}]", f"a file that cannot be read ({error})", "settings") from None
+        if not texts and not re.search(r"[*?\[]", pattern):
+            raise fault(f"[include {pattern}]", "no such file", "settings of Klipper beside this file")
+        return "\n".join(texts)
+
+    if depth > _DEEPEST:
+        raise fault("[include]", f"more than {_DEEPEST} files within one another", "files that end")
+    return _INCLUDE.sub(content, text)
+
+
+def klipper_table(text: str, folder: Path | None) -> Table:
+    """The machine of a `printer.cfg`: kinematics delta, with the carriages' heights, or rotary_delta, with angles."""
+    settings = KlipperSettings(text, folder)
+    kinematics = settings.text("printer", "kinematics")
+    if kinematics == "delta":
+        return delta_of(settings)
+    if kinematics == "rotary_delta":
+        return _rotary_delta_of(settings)
+    found = "nothing" if kinematics is None else f"'{kinematics}', {LOOPLESS}"
+    raise fault("[printer] kinematics", found, "delta or rotary_delta")
+
+
+def delta_of(settings: KlipperSettings, *, from_endstops: bool = False) -> Table:
+    """The machine of kinematics delta; see `linear_delta`."""
+    radius = settings.number("printer", "delta_radius", above=0.0)
+    values = {
+        "angle": settings.of_towers("angle", (210.0, 330.0, 90.0)),
+        "arm_length": settings.of_towers("arm_length", above=radius),
+        "position_endstop": _endstops(settings),
+    }
+    lowest = settings.number("printer", "minimum_z_position", 0.0)
+    return linear_delta(radius, _by_tower(values), lowest, from_endstops=from_endstops)
+
+
+def _rotary_delta_of(settings: KlipperSettings) -> Table:
+    values = {
+        "angle": settings.of_towers("angle", (30.0, 150.0, 270.0)),
+        "upper_arm_length": settings.of_towers("upper_arm_length", above=0.0),
+        "lower_arm_length": settings.of_towers("lower_arm_length", above=0.0),
+        "shoulder_height": [settings.number("printer", "shoulder_height", above=0.0)] * len(TOWERS),
+        "position_endstop": _endstops(settings),
+    }
+    return rotary_delta(settings.number("printer", "shoulder_radius", above=0.0), _by_tower(values))
+
+
+def _endstops(settings: KlipperSettings) -> list[float]:
+    return settings.of_towers("position_endstop")
+
+
+def _by_tower(values: dict[str, list[float]]) -> list[dict[str, float]]:
+    return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]

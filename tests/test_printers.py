@@ -1,0 +1,260 @@
+"""Settings of delta printers: machines that are where the firmware has them, there and back.
+
+The formulas are those of the firmwares, written anew: klippy/kinematics/delta.py and chelper/kin_rotary_delta.c of
+Klipper, LinearDeltaKinematics.cpp and RotaryDeltaKinematics.cpp of RepRapFirmware, delta.cpp of Marlin.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import pfabrik as pf
+from pfabrik.cli import main
+from pfabrik.cli.export import text_of
+from pfabrik.errors import InvalidMechanism, UnsupportedMechanism
+
+FILES = Path(__file__).parent / "data" / "printers"
+
+EXACT = 1e-9
+"""Largest difference from the firmware's own formula [mm or deg]: a few roundings of lengths of some 300 mm."""
+
+
+class Towers(NamedTuple):
+    """A linear delta as a firmware's file says it: sqrt(arm² - (x - tower)²) + z."""
+
+    radii: tuple[float, float, float]
+    angles: tuple[float, float, float]
+    arms: tuple[float, float, float]
+    tops: tuple[float, float, float]
+    """Height of the nozzle in the middle with the carriage at its endstop, from what the firmware does in homing."""
+
+    def __call__(self, x: float, y: float, z: float) -> list[float]:
+        turns = np.radians(self.angles)
+        across = np.hypot(np.array(self.radii) * np.cos(turns) - x, np.array(self.radii) * np.sin(turns) - y)
+        return [float(h) for h in np.sqrt(np.array(self.arms) ** 2 - across**2) + z]
+
+    @property
+    def endstops(self) -> list[float]:
+        return [self(0.0, 0.0, top)[k] for k, top in enumerate(self.tops)]
+
+
+class Arms(NamedTuple):
+    """A rotary delta: the angle at which an elbow outside is a rod's length from the nozzle [deg]."""
+
+    radius: float
+    heights: tuple[float, float, float]
+    angles: tuple[float, float, float]
+    upper: tuple[float, float, float]
+    lower: tuple[float, float, float]
+    tops: tuple[float, float, float] | None = None
+    highest: tuple[float, float, float] | None = None
+
+    def __call__(self, x: float, y: float, z: float) -> list[float]:
+        return [self.arm(k, x, y, z) for k in range(3)]
+
+    def arm(self, k: int, x: float, y: float, z: float) -> float:
+        turn = math.radians(self.angles[k])
+        aside = y * math.cos(turn) - x * math.sin(turn)
+        out = x * math.cos(turn) + y * math.sin(turn) - self.radius
+        up = z - self.heights[k]
+        # elbow_y = c1 - c2 elbow_x, in the circle of the upper arm; the root farther out
+        c1 = (out * out + up * up + self.upper[k] ** 2 - self.lower[k] ** 2 + aside * aside) / (2.0 * up)
+        c2 = out / up
+        scale = c2 * c2 + 1.0
+        along = c1 * c2 + math.sqrt(scale * self.upper[k] ** 2 - c1 * c1)
+        return math.degrees(math.atan2(c1 * scale - c2 * along, along))
+
+    @property
+    def endstops(self) -> list[float]:
+        if self.highest is not None:
+            return list(self.highest)
+        return [self.arm(k, 0.0, 0.0, top) for k, top in enumerate(self.tops or ())]
+
+
+PRINTERS: dict[str, tuple[Towers | Arms, float, tuple[float, float]]] = {
+    "per_tower.cfg": (
+        Towers((128.375,) * 3, (209.125, 330.5, 90.25), (271.5, 271.75, 270.875), (286.25, 286.25, 285.5)),
+        80.0,
+        (0.0, 200.0),
+    ),
+    "saved.cfg": (  # arm_length of stepper_a is said above the block, which holds elsewhere
+        Towers(
+            (104.718281,) * 3,
+            (210.057721, 329.842654, 90.0),
+            (241.0, 240.693147, 240.577215),
+            (251.331415, 251.173205, 251.414213),
+        ),
+        80.0,
+        (0.0, 180.0),
+    ),
+    "rotary.cfg": (
+        Arms(
+            41.25,
+            (362.5,) * 3,
+            (30.0, 151.25, 270.0),
+            (140.5, 141.125, 140.5),
+            (301.25, 301.25, 300.5),
+            tops=(187.5, 187.5, 186.75),
+        ),
+        60.0,
+        (0.0, 150.0),
+    ),
+    "config.g": (  # endstop = homed height + adjustment; towers at -150, -30 and 90 deg
+        Towers((121.062,) * 3, (-149.688, -30.125, 90.0), (250.125, 250.375, 249.875), (259.0, 259.999, 259.312)),
+        80.0,
+        (0.0, 180.0),
+    ),
+    "rotary.g": (
+        Arms(
+            48.5,
+            (270.0, 270.125, 270.25),
+            (-149.25, -30.5, 90.0),
+            (110.0, 110.25, 109.75),
+            (230.0,) * 3,
+            highest=(40.25, 39.5, 40.0),
+        ),
+        40.0,
+        (70.0, 120.0),
+    ),
+    "Configuration.h": (  # homed height = DELTA_HEIGHT - probe offset; a carriage retraces its adjustment from the stop
+        Towers(
+            (132.25, 131.75, 131.5),
+            (210.375, 329.75, 90.0),
+            (268.75, 268.125, 268.625),
+            (303.0, 302.75, 303.875),
+        ),
+        80.0,
+        (0.0, 200.0),
+    ),
+    "m503.gcode": (
+        Towers((131.75,) * 3, (210.38, 329.75, 90.0), (268.75, 268.12, 268.63), (301.5, 301.25, 302.38)),
+        80.0,
+        (0.0, 200.0),
+    ),
+}
+"""File -> the firmware's formula with the file's numbers; radius and heights [mm] within which positions are drawn."""
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+def test_actuators_are_where_the_firmware_has_them(name: str) -> None:
+    firmware, radius, heights = PRINTERS[name]
+    machine, rng = pf.load(FILES / name), np.random.default_rng(3)
+    turns, out = rng.uniform(0.0, 2.0 * math.pi, 100), radius * np.sqrt(rng.uniform(0.0, 1.0, 100))
+    positions = np.stack([out * np.cos(turns), out * np.sin(turns), rng.uniform(*heights, 100)], axis=1)
+    answers = pf.solve_ik(machine, positions)
+    unit = np.degrees if isinstance(firmware, Arms) else np.asarray
+    assert answers
+    np.testing.assert_allclose(unit(answers.actuators), [firmware(*place) for place in positions], rtol=0, atol=EXACT)
+    ends = [machine.joint(actuator).range[1] for actuator in machine.actuator_names]
+    np.testing.assert_allclose(unit(ends), firmware.endstops, rtol=0, atol=EXACT)
+
+
+def numbers(text: str) -> dict[str, list[float]]:
+    """The settings of a text by section or code and key."""
+    said, place = {}, ""
+    for line in text.splitlines():
+        line = line.partition("#")[0].partition(";")[0].strip()
+        place = line if line.startswith("[") else place
+        for key, value in re.findall(r"^(\w+)\s*[:=]\s*([-+.\d]+)$", line):
+            said[f"{place} {key}"] = [float(value)]
+        for code in re.findall(r"^M\d+(?: K\d+)?", line):
+            for letter, value in re.findall(r"([A-Z])([-+.\d:]+)", line.removeprefix(code)):
+                said[f"{code} {letter}"] = [float(part) for part in value.split(":")]
+    return said
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "unsaid"),
+    [
+        ("per_tower.cfg", "klipper", "microsteps rotation_distance max_velocity max_accel minimum_z_position radius"),
+        ("rotary.cfg", "klipper", "microsteps"),
+        ("config-override.g", "reprap", "A B"),
+        ("rotary.g", "reprap", "S"),
+    ],
+)
+def test_a_file_comes_back_with_its_numbers(name: str, form: str, unsaid: str) -> None:
+    file = FILES / name
+    written = numbers(text_of(pf.load(file), form, ""))
+    said = {key: value for key, value in numbers(file.read_text()).items() if key.split()[-1] not in unsaid.split()}
+    assert said and {key: written[key] for key in said} == said
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+@pytest.mark.parametrize("form", ["klipper", "reprap", "marlin"])
+def test_what_is_written_is_the_same_machine(name: str, form: str, tmp_path: Path) -> None:
+    """Of any firmware, for any other that has such a machine."""
+    machine = pf.load(FILES / name)
+    dimensions = machine.dimensions
+    has_heights = len({value for key, value in dimensions.items() if re.match("shoulder_height", key)}) > 1
+    is_rotary = "arm_a" in machine.actuator_names
+    if "radius_trim_a" in dimensions or (is_rotary and form == "marlin") or (has_heights and form == "klipper"):
+        with pytest.raises(UnsupportedMechanism, match=r"firmware has one|Marlin's delta has three upright rails"):
+            text_of(machine, form, "")
+        return
+    (tmp_path / "written").write_text(text_of(machine, form, ""))
+    again = pf.load(tmp_path / "written")
+    low = machine.home_pose[:3, 3] + [12.0, -7.0, 20.0]
+    np.testing.assert_allclose(
+        pf.solve_ik(again, low).actuators, pf.solve_ik(machine, low).actuators, rtol=0, atol=EXACT
+    )
+    tops = [[each.joint(joint).range[1] for joint in each.actuator_names] for each in (again, machine)]
+    np.testing.assert_allclose(tops[0], tops[1], rtol=0, atol=2e-9)  # two numbers, each written to a billionth
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[printer]\nkinematics: corexy\n", "found 'corexy', a printer without closed loops"),
+        ("[stepper_x]\nmicrosteps: 16\n", r"\[printer\] kinematics: found nothing"),
+        ("[printer]\nkinematics: delta\n", r"\[printer\] delta_radius: found nothing; expected a number above 0"),
+        ("[printer]\nkinematics: delta\ndelta_radius: 100\n[stepper_a]\narm_length: 90\n", "a number above 100"),
+        (
+            "[printer]\nkinematics: rotary_delta\nshoulder_radius: 30\nshoulder_height: 300\n[stepper_a]\n"
+            "upper_arm_length: 100\nlower_arm_length: 200\nposition_endstop: 250\n",
+            "position_endstop of arm a: found 250, 58.3095 from the shoulder",
+        ),
+        ("[include other.cfg]\n[printer]\nkinematics: delta\n", r"\[include other.cfg\]: found no such file"),
+        ("M669 K1\nM92 X80\n", "found K1, a printer without closed loops"),
+        ("M665 L200:201 R100 H200\n", "found 2 numbers; expected one number, or one for each of three towers"),
+        ("M665 L{var.l} R100\n", r"line 1: found M665 L\{var.l\} R100; expected numbers"),
+        ("M665 L200 R100 H200\nM666 A0.5\n", "found A0.5, which shears z"),
+        ("M665 L200 R100 S100\n", "found no H; expected L, R and H"),
+        ("// x\n#define X_BED_SIZE 200\n", "#define DELTA: found nothing: a printer without closed loops"),
+        (
+            "//\n#define DELTA\n#define DELTA_HEIGHT A\n#define A DELTA_HEIGHT\n",
+            "#define DELTA_DIAGONAL_ROD: found nothing",
+        ),
+        (
+            "//\n#define DELTA\n#define DELTA_DIAGONAL_ROD A\n#define A DELTA_DIAGONAL_ROD\n",
+            "which needs itself",
+        ),
+        ("//\n#define DELTA\n#define DELTA_DIAGONAL_ROD 2\n#define DELTA_DIAGONAL_ROD 3\n", "the one that holds"),
+    ],
+)
+def test_other_printers_are_refused_in_one_sentence(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "printer.cfg").write_text(text)
+    with pytest.raises(InvalidMechanism, match=said) as refused:
+        pf.load(tmp_path / "printer.cfg")
+    assert len(refused.value.faults) == 1 and str(refused.value).startswith(str(tmp_path / "printer.cfg"))
+
+
+def test_every_command_takes_a_printer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*line: str) -> Result:
+        result = CliRunner().invoke(main, list(line))
+        assert result.exit_code == 0, result.output
+        return result
+
+    monkeypatch.chdir(tmp_path)
+    printer, other = str(FILES / "per_tower.cfg"), str(FILES / "rotary.g")
+    for words in (("check",), ("info",), ("ik", "--position", "0", "0", "10"), ("export", "reprap")):
+        run(words[0], printer, *words[1:])
+    run("workspace", printer, "--fix", "z=0")
+    run("new", "--from", other, "-o", "my.toml")
+    assert pf.load(tmp_path / "my.toml") == pf.load(other)
