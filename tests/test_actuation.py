@@ -153,7 +153,7 @@ def closed_in_mujoco(a: Actuation, q: np.ndarray) -> tuple[Model, np.ndarray]:
     From MuJoCo's own rows alone: of the motions that these leave, those with unit rates of named joints.
     """
     model = Model.of(pf.interop.to_mjcf(a.mechanism))
-    model.data.qpos[:] = pf.interop.mjcf_qpos(a.to_actuators(q).solution)
+    model.data.qpos[:] = pf.interop.qpos(a.to_actuators(q).solution)
     model.update()
     _, rows = model.rows()
     motions = np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows, 1e-9) :].T

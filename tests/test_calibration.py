@@ -169,7 +169,8 @@ def test_heights_alone_leave_the_arms_open() -> None:
     rng = np.random.default_rng(5)
     angles, radii = rng.uniform(0.0, 2.0 * math.pi, 30), 100.0 * np.sqrt(rng.uniform(0.0, 1.0, 30))
     targets = np.stack([radii * np.cos(angles), radii * np.sin(angles), 0.0 * angles], axis=1)
-    readings = pf.solve_ik(printer.mechanism.with_dimensions(arm_length_a=346.4, position_endstop_b=417.8), targets).actuators
+    other = printer.mechanism.with_dimensions(arm_length_a=346.4, position_endstop_b=417.8)
+    readings = pf.solve_ik(other, targets).actuators
     many = pf.Measurements(readings, height=0.01 * rng.standard_normal(30))
     found = pf.calibrate(printer.mechanism, many, free=printer.free)
     assert found.rank == 9 and not found.determined[-3:].any() and found.determined[3:6].all()

@@ -21,7 +21,8 @@ from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
 from pfabrik.files.units import metres_of
 from pfabrik.files.writing import dumps
-from pfabrik.interop import mjcf_qpos, to_mjcf
+from pfabrik.interop import qpos as mjcf_qpos
+from pfabrik.interop import to_mjcf
 from pfabrik.kernels.clearance.capsules import capsule_clearance
 from pfabrik.kernels.clearance.least_clearance import least_clearance
 from pfabrik.kernels.clearance.solids import BOX, CAPSULE, DISC

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -219,14 +219,15 @@ class Actuation:
         """
         return feasible_hull(self._placer, box, seed)
 
-    def sample(self, n: int, seed: int = 0, *, box: ArrayLike | None = None) -> Sample:
+    def sample(self, n: int, seed: int = 0, *, box: ArrayLike | None = None, model: Any = None) -> Sample:
         """Feasible configurations, uniform in the joint coordinates: coordinates, Solution, and MuJoCo's `qpos`.
 
         Parameters
         ----------
         box : as of `hull`.
+        model : of the robot that `qpos` is of, as of `interop.qpos`; default what `to_mjcf` writes.
         """
-        return sample_feasible(self._placer, n, seed, box)
+        return sample_feasible(self._placer, n, seed, box, model)
 
     def plot_torques(
         self, torque_max: ArrayLike = 1.0, *, box: ArrayLike | None = None, ax: Axes | None = None

@@ -11,7 +11,7 @@ from ..answers.status import Status
 from ..arrays import Floats
 from ..checks import require_count
 from ..errors import InvalidArgument
-from ..interop.mjcf_qpos import mjcf_qpos
+from ..interop.mjcf_qpos import qpos
 from .named_values import box_of
 from .placed import Placer
 
@@ -26,18 +26,20 @@ class Sample(NamedTuple):
     ----------
     q : the named coordinates, (n, k).
     solution : the configurations, with actuators, poses and all joints.
+    model : of the robot whose states these are, as of `interop.qpos`; None for the model that `to_mjcf` writes.
     """
 
     q: Floats
     solution: Solution
+    model: Any = None
 
     @property
     def qpos(self) -> Floats:
-        """MuJoCo's joint positions of the model that `to_mjcf` writes, (n, nq) [rad, m]."""
-        return mjcf_qpos(self.solution)
+        """MuJoCo's joint positions of the model, (n, nq) [rad, m]; see `interop.qpos`."""
+        return qpos(self.solution, self.model)
 
 
-def sample_feasible(placer: Placer, n: int, seed: int, box: Any) -> Sample:
+def sample_feasible(placer: Placer, n: int, seed: int, box: Any, model: Any) -> Sample:
     """Draw coordinates within a box until n are reached.
 
     Raises
@@ -63,5 +65,5 @@ def sample_feasible(placer: Placer, n: int, seed: int, box: Any) -> Sample:
             reached = np.flatnonzero(np.asarray(solution.status) == Status.REACHED)
             kept = kept[reached]
             if len(kept) >= n:
-                return Sample(kept[:n], solution[reached[:n]])
+                return Sample(kept[:n], solution[reached[:n]], model)
     raise InvalidArgument("box", f"{len(kept)} feasible of {MOST_DRAWS * n} draws", "a box of which more is reachable")

@@ -92,7 +92,7 @@ def _steps_per_mm(settings: KlipperSettings, letter: str) -> float:
     return steps * turns / settings.number(section, "rotation_distance")
 
 
-def _measured(settings: _Settings) -> Measurements | None:
+def _measured(settings: KlipperSettings) -> Measurements | None:
     """The measurements that DELTA_CALIBRATE keeps: heights and distances at stepper positions."""
     per_mm = np.array([_steps_per_mm(settings, letter) for letter in TOWERS])
     rows: list[Floats] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..description.rod_lengths import uneven_rods, with_lengths
+from .rod_lengths import uneven_rods, with_lengths
 from ..errors import UnsupportedMechanism
 from ..files.printers.deltas import TOWERS
 from ..files.printers.m_codes import ROTARY_ANGLES

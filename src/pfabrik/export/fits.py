@@ -36,7 +36,7 @@ class Thigh(NamedTuple):
     hip, ankle : (3,) [length]: the centre of the crank, and the middle of the rods on the platform from the reference
         point.
     length, shin : of the crank, and of the rods.
-    added : the actuator's value, or minus it where it counts upward, less the angle by which the crank hangs down [rad].
+    added : the actuator's value, or minus it where that counts upward, less the angle by which the crank hangs [rad].
     least, most : of that angle; infinite without a range.
     """
 

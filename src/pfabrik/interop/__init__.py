@@ -6,7 +6,7 @@ pf.interop.verify(m)                         # with MuJoCo as the referee
 """
 
 from .assembling import Imported, assemble
-from .mjcf_qpos import mjcf_qpos
+from .mjcf_qpos import qpos
 from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
 from .notes import Note
@@ -27,7 +27,7 @@ __all__ = [
     "from_sdf",
     "from_urdf",
     "kind_of",
-    "mjcf_qpos",
+    "qpos",
     "to_mjcf",
     "verify",
 ]

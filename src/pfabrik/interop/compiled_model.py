@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -11,7 +12,7 @@ from ..errors import UnknownName
 
 
 class CompiledModel:
-    """A compiled model and its state, whose sites are where its text puts them.
+    """A model that is compiled, of a text or as a copy of another, and its state; sites are where the text puts them.
 
     MuJoCo takes frames that are less than 1e-6 apart, in whatever unit, for one; asked not to, it computes both.
 
@@ -22,11 +23,12 @@ class CompiledModel:
     joint_names : of the joints; those without a name have "".
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, model: Any) -> None:
         import mujoco
 
         self.mujoco: Any = mujoco
-        self.model: Any = mujoco.MjModel.from_xml_string(text)
+        self.model: Any = mujoco.MjModel.from_xml_string(model) if isinstance(model, str) else copy.deepcopy(model)
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         self.model.site_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
         self.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         self.data: Any = mujoco.MjData(self.model)

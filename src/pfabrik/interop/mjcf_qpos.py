@@ -1,32 +1,61 @@
-"""Joint positions of exported MuJoCo models, from configurations; MuJoCo itself is not needed."""
+"""Joint positions of MuJoCo models from configurations; for models that `to_mjcf` writes MuJoCo is not needed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
 from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism
+from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..motion.displacements import columns
+from ..poses import as_floats
 from ..rotations import to_quaternion
 from .cuts import Branch, CutTree, cut_tree
 from .mjcf_bodies import si_unit
 
 
-def mjcf_qpos(solution: Solution) -> Floats:
-    """The joint positions `qpos` of the model that `to_mjcf` writes, (..., nq) [rad, m; quaternions w, x, y, z].
+def qpos(
+    solution: Solution, model: Any = None, qpos: ArrayLike | None = None, *, configuration: str = "qpos0"
+) -> Floats:
+    """MuJoCo's joint positions of configurations, (..., nq) [rad, m; quaternions w, x, y, z], with the loops closed.
 
-    Of REACHED answers, loops are closed in that model as they are here.
+    Of the model that `to_mjcf` writes, or of the model of the robot that the mechanism was read from: joints of the
+    mechanism by their names, those that follow them, and all others as they are in `qpos`.
+
+    Parameters
+    ----------
+    model : `mujoco.MjModel`, or the path or the text of a model; default what `to_mjcf` writes.
+    qpos : of the joints that the mechanism does not have, (..., nq); default the configuration's.
+    configuration : the mechanism's home in that model: "qpos0", or the name of a keyframe.
+
+    Raises
+    ------
+    UnknownName : a joint of the mechanism that the model does not have.
+    InvalidArgument : a loop of the model that does not close where the mechanism's joints are.
     """
-    return qpos_of(checked_solution(solution).mechanism, solution.q)
+    mechanism, q = checked_solution(solution).mechanism, np.asarray(solution.q)
+    if model is None:
+        return qpos_of(mechanism, q)
+    from .robot_states import RobotStates
+
+    states = RobotStates(mechanism, model, configuration)
+    begin = None
+    if qpos is not None:
+        begin = as_floats("qpos", qpos, f"positions (..., {states.model.nq})")
+        if begin.shape[-1:] != (states.model.nq,) or begin.shape[:-1] not in ((), q.shape[:-1]):
+            raise InvalidArgument("qpos", f"shape {begin.shape}", f"(..., {states.model.nq}), for all or for each")
+    return states.at(q, begin)
 
 
 def qpos_of(mechanism: Mechanism, q: Floats) -> Floats:
-    """The same, (..., nq), at all joint coordinates (..., nq) of a mechanism [rad or length]."""
+    """Joint positions (..., nq) of the model that `to_mjcf` writes, at joint coordinates (..., nq) [rad or length]."""
     metres = metres_of(mechanism.length_unit)
     parts: list[Floats] = []
     for branch in _in_mjcf_order(mechanism, cut_tree(mechanism)):

@@ -20,6 +20,7 @@ from ..tolerances import TOLERANCES
 from .compiled_model import CompiledModel
 from .loops_file import read_loops
 from .mjcf_plain import plain_model
+from .robot_states import matched_names
 from .urdf_plain import plain_robot
 from .urdf_reading import read_description
 from .xml_reading import kind_of, read_xml
@@ -88,11 +89,8 @@ class Original:
 
     def _matched(self) -> Iterator[tuple[int, int]]:
         """Joint of the model -> the column of the coordinate that it is, by their names."""
-        renamed = f"{self.mechanism.end_effector}_joint"
         for each in self.mechanism.coordinates:
-            parts = each.joint.name.split("+")
-            names = [each.name, parts[each.place] if len(parts) == 2 and each.place < 2 else each.name]
-            names += [self.mechanism.end_effector] if each.name == renamed else []
+            names = matched_names(self.mechanism, each)
             match = next((name for name in names if name in self.compiled.joint_names), None)
             if match is not None and each.joint.type != "spherical":
                 yield self.compiled.joint_names.index(match), each.column

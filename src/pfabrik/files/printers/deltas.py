@@ -87,7 +87,9 @@ def rotary_delta(radius: float, arms: Sequence[Mapping[str, float]]) -> Table:
             far = math.hypot(radius, arm["shoulder_height"] - arm["position_endstop"])
             upper_arm, lower_arm = arm["upper_arm_length"], arm["lower_arm_length"]
             if not abs(upper_arm - lower_arm) < far < upper_arm + lower_arm:
-                found = f"{arm['position_endstop']:g}, {far:g} from the shoulder, with arms of {upper_arm:g} and {lower_arm:g}"
+                found = (
+                    f"{arm['position_endstop']:g}, {far:g} from the shoulder of arms {upper_arm:g} and {lower_arm:g}"
+                )
                 raise fault(f"position_endstop of arm {letter}", found, "a height where the arms reach the middle")
             dimensions |= _arm_angle(letter, "highest", height, f"position_endstop_{letter}")
         angle, upper, raised = f"angle_{letter}", f"upper_arm_length_{letter}", f"home_{letter}"
