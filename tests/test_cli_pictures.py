@@ -90,7 +90,6 @@ def test_travel_prints_its_table_and_draws_it() -> None:
         (("plot", "tricept", "--torque-map"), "two angles, or two lengths, for a torque map"),
         (("track", "five_bar", "path.csv", "--animate", "a.png"), "expected a name that ends in .gif or .mp4"),
         (("track", "five_bar", "path.csv", "--plot", "a.gif"), "expected a name that ends in .png, .svg or .pdf"),
-        (("track", "five_bar", "path.csv"), "give -o FILE, -o -, --json, --plot or --animate"),
     ],
 )
 def test_what_cannot_be_written_is_told_in_a_line(words: tuple[str, ...], told: str) -> None:

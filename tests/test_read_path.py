@@ -352,3 +352,53 @@ def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.Monkey
         read(tmp_path, "G1 X1 F1\nX2\n" * 10_000)
     with pytest.raises(InvalidArgument, match="more than 1000 targets"):
         read(tmp_path, "G1 X100000 F1", longest=1.0)
+
+
+SLICED = """; a slicer's beginning and end
+M104 S200
+START_PRINT BED=60 EXTRUDER=200 NAME="a part (1)"
+G28
+G29 P1
+G34
+M420 S1 Z10
+SET_VELOCITY_LIMIT ACCEL=3000
+_CLEAN_NOZZLE
+G21
+G90
+M83
+G92 E0
+G1 Z5 F9000
+G1 X10 Y0 F3000 E0.1
+G1 E-2 F2400
+EXCLUDE_OBJECT_START NAME=part_0
+G2 X0 Y10 I-10 J0 E0.3
+PAUSE
+END_PRINT
+"""
+
+
+def test_what_slicers_write_passes_and_is_named(tmp_path: Path) -> None:
+    moves = "".join(line + "\n" for line in SLICED.splitlines() if line.startswith(("G1 X", "G1 Z", "G2 ")))
+    path, bare = read(tmp_path, SLICED, name="part.gcode"), read(tmp_path, moves, name="bare.gcode")
+    np.testing.assert_array_equal(path.targets, bare.targets)
+    names = "START_PRINT G29 G34 M420 SET_VELOCITY_LIMIT _CLEAN_NOZZLE EXCLUDE_OBJECT_START PAUSE END_PRINT".split()
+    assert path.passed == {name: 1 + [*map(str.split, SLICED.splitlines())].index(line) for name, line in (
+        (name, next(line.split() for line in SLICED.splitlines() if line.split()[0] == name)) for name in names
+    )}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("SET_GCODE_OFFSET Z=0.1", "SET_GCODE_OFFSET, an offset of all positions"),
+        ("RESTORE_GCODE_STATE NAME=x MOVE=1", "a return to modes that were saved"),
+        ("G92 X0", "an offset of all positions"),
+        ("G10 L2 P1 X5", "offsets or tool data that are set"),
+        ("G29 X", "expected words such as X12.5"),
+        ("hello world", "expected words such as X12.5"),
+        ("CALL", "a call of a subroutine"),
+    ],
+)
+def test_what_changes_the_meaning_of_a_path_does_not_pass(line: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match=said):
+        read(tmp_path, f"G1 X10 Y0 F3000\n{line}\nG1 X12\n", name="part.gcode")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gc
+import importlib
 import io
 import json
 import os
@@ -35,6 +36,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
         monkeypatch.setattr(f"pfabrik.paths.{module}.BLOCK", 16)
     for module in ("read_path", "sampling"):
         monkeypatch.setattr(f"pfabrik.paths.{module}.MOST_STEPS", 200)
+    monkeypatch.setattr(importlib.import_module("pfabrik.cli.track"), "MOST_TARGETS", 200)
 
     def run(*line: object, given: str | None = None) -> Result:
         result = CliRunner().invoke(main, [str(word) for word in line], input=given)
@@ -268,6 +270,22 @@ def test_an_endless_path_ends(run: Run, tmp_path: Path) -> None:
     assert (result.exit_code, result.stdout, os.listdir(tmp_path)) == (2, "", [])
     assert "more than 200 targets" in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_a_path_is_summed_up_where_no_answers_are_wanted(run: Run, tmp_path: Path) -> None:
+    lines = ["START_PRINT", "G1 Z10 F3000", *(f"G1 X{k} Y0" for k in range(0, 240, 4)), "G29", "G1 X0"]
+    (tmp_path / "part.gcode").write_text("\n".join(lines))
+    result = run("track", "linear_delta", "part.gcode")
+    answers = pf.track(pf.load("linear_delta"), pf.read_path(tmp_path / "part.gcode", pf.load("linear_delta")).targets)
+    off = np.flatnonzero(answers.status != pf.Status.REACHED)
+    assert (result.exit_code, os.listdir(tmp_path)) == (1, ["part.gcode"])
+    assert (
+        f"{len(answers) - len(off)} reached, {len(off)} projected; first at target {off[0] + 1} (line " in result.stdout
+    )
+    assert (
+        "note: passed over: START_PRINT (line 1), G29 (line 63): levelling and macros are not modelled" in result.stderr
+    )
+    assert "worst step: " in result.stderr
 
 
 def test_failures_are_named(run: Run, tmp_path: Path) -> None:

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from .track_report import Summary
 
 
+MOST_TARGETS = 1_000_000_000
+"""Targets of a path that is followed part by part, at most: what is longer has no end."""
+
+
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
@@ -56,8 +60,8 @@ def track(
 ) -> int:
     """Follow a path of targets.
 
-    Reads the targets from a CSV file or G-code and writes the answers to a CSV file, a part at a time. Each answer
-    starts from the one before.
+    Reads the targets from a CSV file or G-code and writes the answers to a CSV file, a part at a time; without -o it
+    sums them up. Each answer starts from the one before.
 
     PATH is G-code, by its ending (.nc, .ngc, .gcode), or a CSV file: a header line and, in any order, the columns x, y,
     z, roll, pitch, yaw [deg] or roll_rad, pitch_rad, yaw_rad, and t [s] or feed [length/s]; - is standard input.
@@ -69,8 +73,6 @@ def track(
     The exit code is 1 also where an actuator would have to be faster than it may.
     """
     is_drawn = picture_path is not None or film_path is not None
-    if output is None and not as_json and not is_drawn:
-        raise click.UsageError("no place for the answers: give -o FILE, -o -, --json, --plot or --animate")
     refuse_both_on_stdout(output, as_json)
     if mech == str(path) == str(STANDARD):
         raise click.UsageError("MECH and PATH are both standard input: give a file for one of them")
@@ -82,9 +84,10 @@ def track(
     from ..paths.read_path import path_blocks
     from .track_report import Summary
 
-    read = partial(path_blocks, path, mechanism, **sampling)
+    is_whole = as_json or is_drawn
+    read = partial(path_blocks, path, mechanism, most=None if is_whole else MOST_TARGETS, **sampling)
     check = partial(checked, mechanism=mechanism, is_timed=bool(limits))
-    blocks, n_targets = blocks_of(path, read, check, whole=as_json or is_drawn)
+    blocks, n_targets = blocks_of(path if output is not None else STANDARD, read, check, whole=is_whole)
     summary = Summary(mechanism)
     with nullcontext() if output is None else whole_file(output) as handle:
         solution = follow(mechanism, blocks, options, own_limits(mechanism) | limits, handle, summary, n_targets)
@@ -116,7 +119,7 @@ def blocks_of(
 ) -> tuple[Iterable[paths.Path], int | None]:
     """The parts of a path, all in one if it is wanted whole, and how many targets there are, where that is known.
 
-    A path that can be read twice is checked to its end before the first answer; others part by part.
+    A path that can be read twice is checked to its end before the first answer is written; others part by part.
     """
     from ..paths.path import joined
 
@@ -134,7 +137,7 @@ def checked(blocks: Iterable[paths.Path], mechanism: pf.Mechanism, is_timed: boo
 
     from ..paths.csv_table import NUMERIC
 
-    is_set = np.zeros((4, 4), bool)
+    is_set, passed = np.zeros((4, 4), bool), ""
     for number, block in enumerate(blocks):
         if number == 0:
             if is_timed and block.times is None:
@@ -144,7 +147,10 @@ def checked(blocks: Iterable[paths.Path], mechanism: pf.Mechanism, is_timed: boo
                 if hint:
                     note(f"column '{name}' goes out as it came in{hint}")
         is_set |= (block.targets != mechanism.home_pose).any(axis=0)
+        passed = ", ".join(f"{name} (line {line})" for name, line in block.passed.items())
         yield block
+    if passed:
+        note(f"passed over: {passed}: levelling and macros are not modelled")
     check_columns(is_set, mechanism)
 
 

@@ -152,8 +152,12 @@ class Worst:
         known = np.where(np.isnan(values), -np.inf, values)
         row = int(known.argmax())
         if known[row] > self.value:
-            self.value, self.name, line = float(known[row]), names[row], lines[row]
-            self.place = f"target {begin + row} ({f'line {line}' if line else 'home'})"
+            self.value, self.name = float(known[row]), names[row]
+            self.place = _place(begin + row, lines[row])
+
+
+def _place(number: int, line: int) -> str:
+    return f"target {number} ({f'line {line}' if line else 'home'})"
 
 
 NEARLY_KEPT = 0.99
@@ -169,6 +173,7 @@ class Summary:
         self._n_targets = 0
         self._farthest = 0.0
         self._failed, self._jumps, self._near = TargetNumbers(), TargetNumbers(), TargetNumbers()
+        self._first_off = ""
         self._nearest = math.inf
         self._too_fast = {name: TargetNumbers() for name in mechanism.actuator_names}
         self._fastest = dict.fromkeys(mechanism.actuator_names, 0.0)
@@ -179,6 +184,9 @@ class Summary:
         track, new, begin = part.track, slice(part.first, None), self._n_targets + 1
         status = track.status[new]
         self._counts += Counter(map(pf.Status, status.tolist()))
+        off = np.flatnonzero(status != pf.Status.REACHED)
+        if len(off) and not self._first_off:
+            self._first_off = _place(begin + int(off[0]), part.path.lines[part.first + int(off[0])])
         self._farthest = max(self._farthest, float(track.position_error[new].max()))
         self._failed.add((begin + np.flatnonzero(status >= pf.Status.FAILED)).tolist())
         self._jumps.add((begin + np.flatnonzero(track.jumps[new])).tolist())
@@ -214,7 +222,8 @@ class Summary:
         if self._failed.count:
             parts.append(f"failed at {self._failed}")
         if counts[pf.Status.PROJECTED]:
-            parts.append(f"farthest from its target {self._farthest:.3g} {self._mechanism.length_unit}")
+            farthest = f"farthest from its target {self._farthest:.3g} {self._mechanism.length_unit}"
+            parts.append(f"first at {self._first_off}; {farthest}")
         if self._jumps.count:
             parts.append(f"{counted(self._jumps.count, 'jump')} ({self._jumps})")
         if self._near.count:

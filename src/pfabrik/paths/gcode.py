@@ -31,6 +31,12 @@ OTHER_AXES = "UVW"
 CODE = re.compile(r"(?:N\s*\d+\s*)?M\s*(\d{1,9})(?![\d.])")
 """The beginning of a line whose first code is an M code."""
 
+LEVELLING = (29, 34)
+"""Codes of printers that measure the bed or turn it level: they end where they begin."""
+
+MACRO = re.compile(r"(_?[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*)((?:\s+\w+=(?:\"[^\"]*\"|'[^']*'|[^\s\"']*))*)\s*")
+"""A command by its name, with parameters: `START_PRINT BED=60`."""
+
 MESSAGES = (117, 118)
 """Codes followed by words for people."""
 
@@ -68,6 +74,7 @@ class ModalState:
     place : x, y, z [length of the machine], and a, b, c [deg].
     unit : of the program's lengths, in those of the machine.
     has_number : True once the program has given its number.
+    passed : levelling and macros so far, with the first line of each.
     feed : as the program gives it, per minute; NaN before it does.
     """
 
@@ -79,9 +86,17 @@ class ModalState:
     feed: float = math.nan
     has_number: bool = False
     units: dict[int, float] = field(default_factory=dict)
+    passed: dict[str, int] = field(default_factory=dict)
 
 
-def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: float, longest: float) -> Iterator[Move]:
+def steps_of(
+    lines: Iterable[str],
+    home: Floats,
+    length_unit: str,
+    tolerance: float,
+    longest: float,
+    passed: dict[str, int] | None = None,
+) -> Iterator[Move]:
     """The steps of a program, the first at home.
 
     Parameters
@@ -90,13 +105,15 @@ def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: fl
     length_unit : of the machine; one that is not known counts as millimetres.
     tolerance : how far chords may be off their arc [length].
     longest : of a straight part of a move [length].
+    passed : levelling and macros are added, with the first line of each.
     """
     unit = METRES.get(length_unit.strip(), METRES["mm"])
     inches, millimetres = METRES["in"] / unit, METRES["mm"] / unit
     state = ModalState(np.array(home, dtype=float), millimetres, units={20: inches, 21: millimetres})
+    state.passed = {} if passed is None else passed
     yield Move(state.place.copy(), math.nan, 0)
     for number, text in enumerate(lines, 1):
-        words = _words(text, number)
+        words = _words(text, number, state.passed)
         _obey(state, words, number)
         moves = any(letter in words for letter in AXES)
         if state.motion is None and moves:
@@ -107,14 +124,19 @@ def steps_of(lines: Iterable[str], home: Floats, length_unit: str, tolerance: fl
             return
 
 
-def _words(text: str, number: int) -> dict[str, list[float]]:
+def _words(text: str, number: int, passed: dict[str, int]) -> dict[str, list[float]]:
     """The words of a line by their letter."""
     plain = COMMENT.sub(" ", text).strip().upper()
     if plain.startswith(("%", "/")) or _is_setting(plain):
+        if plain.startswith("M420"):
+            passed.setdefault("M420", number)
         return {}
     refuse_steering(plain, number)
     words: dict[str, list[float]] = {}
     unread = WORD.sub(" ", plain).split()
+    if unread and _is_macro(plain, number):
+        passed.setdefault(plain.split()[0], number)
+        return {}
     if unread:
         raise WrongPath(f"line {number}: found '{unread[0][:20]}'; expected words such as X12.5")
     for letter, value in WORD.findall(plain):
@@ -126,6 +148,16 @@ def _words(text: str, number: int) -> dict[str, list[float]]:
             raise WrongPath(f"line {number}: found {letter} twice; expected one place")
         words.setdefault(letter, []).append(float(value))
     return words
+
+
+def _is_macro(plain: str, number: int) -> bool:
+    """True for a command by its name, that of a macro: of parts, with parameters, or one that is known."""
+    match = MACRO.fullmatch(plain)
+    if match is None or not ("_" in match[1] or match[2] or match[1] in ("PAUSE", "RESUME")):
+        return False
+    if match[1] in CODES:
+        refuse_code(match[1], number)
+    return True
 
 
 def _is_setting(plain: str) -> bool:
@@ -158,6 +190,8 @@ def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None
             continue  # a dwell
         elif code in RETRACTS and not has_offset(f"G{code:g}", words, AXES):
             continue
+        elif code in LEVELLING:
+            state.passed.setdefault(f"G{code:g}", number)
         elif code == 28 and state.motion is None:
             continue  # homing, before anything else
         elif code not in IGNORED:

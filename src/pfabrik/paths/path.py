@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..arrays import Floats, Ints
 from ..poses import between
 
 MOST_STEPS = 1_000_000
-"""Steps of a path at most: what is longer is read in parts."""
+"""Steps of a path that is held whole, at most."""
 
 BLOCK = 4096
 """Steps that are read, answered and written at a time."""
@@ -35,6 +36,7 @@ class Path(NamedTuple):
     lines : of the file that each comes from, (n,), counted from 1.
     others : further columns by name, the cells as they were, n each.
     angle_units : of roll, pitch and yaw, as the file has them.
+    passed : what a program has that moves nothing of the path as it is here, levelling and macros, and its first line.
     """
 
     targets: Floats
@@ -43,6 +45,7 @@ class Path(NamedTuple):
     lines: list[int]
     others: Mapping[str, Sequence[str]]
     angle_units: tuple[AngleUnit, AngleUnit, AngleUnit]
+    passed: Mapping[str, int] = MappingProxyType({})
 
     @classmethod
     def of(cls, targets: Floats) -> Path:
@@ -88,4 +91,5 @@ def joined(blocks: Iterable[Path]) -> Path:
         feeds=np.concatenate([each.feeds for each in parts]),
         lines=[line for each in parts for line in each.lines],
         others={name: [cell for each in parts for cell in each.others[name]] for name in first.others},
+        passed=parts[-1].passed,
     )

@@ -33,9 +33,6 @@ CHORD, LONGEST = 1e-5, 1e-2
 LONGEST_LINE = 100_000
 """Characters of a line at most; a file with a longer one is not the text of a path."""
 
-MOST_LINES = 10 * MOST_STEPS
-"""Lines of a file at most, blank ones and comments included."""
-
 FIRST_WORD = re.compile(r"\s*([%/]|[A-Z]\s*[-+.\d])", re.IGNORECASE)
 """The beginning of a line of G-code."""
 
@@ -88,13 +85,16 @@ def path_blocks(
     rate: float | None = None,
     rapid: float | None = None,
     sample_time: float | None = None,
+    most: int | None = None,
 ) -> Iterator[Path]:
     """The path of `read_path` in parts; times are NaN from the first step on whose time is not known.
 
     Parameters
     ----------
     sample_time : from one target to the next [s], in place of the times of the path.
+    most : targets at most; default a million.
     """
+    most = MOST_STEPS if most is None else most
     length = checked_mechanism(mechanism).characteristic_length
     chord = CHORD * length if tolerance is None else require_positive("tolerance", tolerance)
     lengths_and_times = {"longest": longest, "rate": rate, "rapid": rapid, "sample_time": sample_time}
@@ -105,19 +105,20 @@ def path_blocks(
     name = "standard input" if str(file) == "-" else str(file)
     try:
         with _opened(file) as handle:
-            is_table, lines = _begun(_text(handle), file.suffix.lower())
+            is_table, lines = _begun(_text(handle, 10 * most), file.suffix.lower())
             if is_table:
                 table = CsvTable(lines, mechanism)
-                blocks, has_times = _counted(table.blocks()), table.has_times
+                blocks, has_times = _counted(table.blocks(), most), table.has_times
                 if longest is not None:
                     blocks = divided(blocks, longest)
             else:
                 step = LONGEST * length if longest is None else longest
-                program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step)
-                blocks, has_times = _program(program), True
+                passed: dict[str, int] = {}
+                program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed)
+                blocks, has_times = _program(program, passed, most), True
             if has_times or sample_time is not None or rate is not None:
                 blocks = timed(blocks, sample_time, rapid)
-            yield from _counted(blocks if rate is None else at_rate(blocks, rate))
+            yield from _counted(blocks if rate is None else at_rate(blocks, rate), most)
     except WrongPath as error:
         found, _, expected = str(error).partition("; expected ")
         raise InvalidArgument(name, found, expected or "CSV or G-code that can be followed") from None
@@ -145,15 +146,15 @@ def _opened(path: FilePath) -> Iterator[TextIO]:
             raw.detach()
 
 
-def _text(handle: TextIO) -> Iterator[str]:
-    """Lines, none of them endless."""
+def _text(handle: TextIO, most: int) -> Iterator[str]:
+    """Lines, up to as many as a file may have, blank ones and comments included, and none of them endless."""
     number = 0
     while line := handle.readline(LONGEST_LINE):
         number += 1
         if len(line) == LONGEST_LINE or "\0" in line:
             raise WrongPath(f"line {number}: no text of a path; expected CSV or G-code")
-        if number > MOST_LINES:
-            raise WrongPath(f"more than {MOST_LINES} lines; expected a shorter path, or parts of it")
+        if number > most:
+            raise WrongPath(f"more than {most} lines; expected a shorter path, or parts of it")
         yield line
 
 
@@ -182,32 +183,32 @@ def _home(mechanism: Mechanism) -> Floats:
     return np.concatenate([pose_at_home[:3, 3], np.degrees(to_rpy(pose_at_home[:3, :3]))])
 
 
-def _program(steps: Iterator[Move]) -> Iterator[Path]:
-    """The steps of a program, in parts."""
+def _program(steps: Iterator[Move], passed: dict[str, int], most: int) -> Iterator[Path]:
+    """The steps of a program, in parts, each with what was passed over so far."""
     count = 0
     while part := list(islice(steps, BLOCK)):
         count += len(part)
-        _require_few(count, [step.line for step in part])
+        _require_few(count, [step.line for step in part], most)
         if count < 2:
             break
         places = np.array([step.place for step in part])
         targets = pose(places[:, :3], rpy=places[:, 3:], degrees=True)
         feeds, lines = np.array([step.feed for step in part]), [step.line for step in part]
-        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"))
+        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"), dict(passed))
     if count < 2:
         raise WrongPath("no moves; expected CSV or G-code")
 
 
-def _counted(blocks: Iterable[Path]) -> Iterator[Path]:
+def _counted(blocks: Iterable[Path], most: int) -> Iterator[Path]:
     """Blocks, up to as many steps as a path may have."""
     count = 0
     for block in blocks:
         count += len(block.lines)
-        _require_few(count, block.lines)
+        _require_few(count, block.lines, most)
         yield block
 
 
-def _require_few(count: int, lines: Sequence[int]) -> None:
-    if count > MOST_STEPS:
-        found = f"line {lines[MOST_STEPS - count]}: more than {MOST_STEPS} targets"
+def _require_few(count: int, lines: Sequence[int], most: int) -> None:
+    if count > most:
+        found = f"line {lines[most - count]}: more than {most} targets"
         raise WrongPath(f"{found}; expected a shorter path, parts of it, or longer steps")

@@ -56,7 +56,9 @@ CODES: dict[str, tuple[str, str]] = {
     "G93": ("feeds as shares of a move", "feeds per minute (G94)"),
     "G95": ("feeds per turn of a spindle", "feeds per minute (G94)"),
     "M72": ("a return to modes that were saved", IN_ONE_PROGRAM),
-    **dict.fromkeys(("M206", "M428"), ("an offset of all positions", WITHOUT_OFFSETS)),
+    **dict.fromkeys(("M206", "M428", "SET_GCODE_OFFSET"), ("an offset of all positions", WITHOUT_OFFSETS)),
+    "RESTORE_GCODE_STATE": ("a return to modes that were saved", IN_ONE_PROGRAM),
+    "SET_KINEMATIC_POSITION": ("an offset of all positions", WITHOUT_OFFSETS),
 }
 """Codes that change the meaning of later words, or where they lead."""
 
