@@ -218,7 +218,7 @@ def test_what_is_written_is_the_same_machine(name: str, form: str, tmp_path: Pat
         (
             "[printer]\nkinematics: rotary_delta\nshoulder_radius: 30\nshoulder_height: 300\n[stepper_a]\n"
             "upper_arm_length: 100\nlower_arm_length: 200\nposition_endstop: 250\n",
-            "position_endstop of arm a: found 250, 58.3095 from the axis",
+            "position_endstop of arm a: found 250, 58.3095 from the shoulder",
         ),
         ("[include other.cfg]\n[printer]\nkinematics: delta\n", r"\[include other.cfg\]: found no such file"),
         ("M669 K1\nM92 X80\n", "found K1, a printer without closed loops"),

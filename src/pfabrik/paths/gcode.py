@@ -34,7 +34,7 @@ CODE = re.compile(r"(?:N\s*\d+\s*)?M\s*(\d{1,9})(?![\d.])")
 LEVELLING = (29, 34)
 """Codes of printers that measure the bed or turn it level: they end where they begin."""
 
-MACRO = re.compile(r"(_?[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*)((?:\s+\w+=(?:\"[^\"]*\"|'[^']*'|[^\s\"']*))*)\s*")
+MACRO = re.compile(r"(_?[A-Z]{2}[A-Z0-9]*(?:_[A-Z0-9]+)*)((?:\s+\w+=(?:\"[^\"]*\"|'[^']*'|[^\s\"']*))*)\s*")
 """A command by its name, with parameters: `START_PRINT BED=60`."""
 
 MESSAGES = (117, 118)
