@@ -9,7 +9,6 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from .rod_lengths import uneven_rods, with_lengths
 from ..errors import UnsupportedMechanism
 from ..files.printers.deltas import TOWERS
 from ..files.printers.m_codes import ROTARY_ANGLES
@@ -17,6 +16,7 @@ from ..files.printers.marlin import ANGLES
 from ..tolerances import TOLERANCES
 from .fits import Thigh, Tower, angle_of, thighs_of, towers_of
 from .machine_data import Machine
+from .rod_lengths import uneven_rods, with_lengths
 from .wording import comment
 
 

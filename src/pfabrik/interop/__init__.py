@@ -12,6 +12,7 @@ from .mjcf_writing import to_mjcf
 from .notes import Note
 from .opened import Loop, OpenMechanism
 from .urdf_reading import from_sdf, from_urdf
+from .urdf_writing import to_urdf
 from .verifying import AgainstOriginal, Verification, verify
 from .xml_reading import kind_of
 
@@ -29,5 +30,6 @@ __all__ = [
     "kind_of",
     "qpos",
     "to_mjcf",
+    "to_urdf",
     "verify",
 ]

@@ -128,7 +128,7 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
         attributes = {
             "name": each.name,
             "type": "hinge" if turning else "slide",
-            "axis": vector(_axes(mechanism, joint)[each.place] * (1.0 if branch.forward else -1.0)),
+            "axis": vector(axes_of(mechanism, joint)[each.place] * (1.0 if branch.forward else -1.0)),
         }
         if each.home:
             attributes["ref"] = repr(each.home * unit)
@@ -137,7 +137,7 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
         yield attributes | as_attributes(physics.joint(turning, each.place in joint.driven))
 
 
-def _axes(mechanism: Mechanism, joint: Joint) -> Floats:
+def axes_of(mechanism: Mechanism, joint: Joint) -> Floats:
     """The axes of a joint's coordinates at home, (coordinates, 3)."""
     if joint.type == "universal":
         return universal_axes(mechanism, joint)
