@@ -25,7 +25,7 @@ ROD = """
 name = "Upper{side}"
 type = "spherical"
 connects = ["carriage", "rod{side}"]
-at = ["radius + offset", "{sign}half_gap", "clearance"]
+at = ["delta_radius + offset", "{sign}half_gap", "clearance"]
 {cone}copies = {{ count = 3, axis = [0, 0, 1] }}
 
 [[joint]]
@@ -46,11 +46,11 @@ task = ["x", "y", "z"]
 
 [dimensions]
 rod = 250
-radius = 124
+delta_radius = 124
 offset = 35
 half_gap = 20
 top = 480
-clearance = "sqrt(rod**2 - radius**2)"
+clearance = "sqrt(rod**2 - delta_radius**2)"
 
 [[joint]]
 name = "Tower"
@@ -62,7 +62,7 @@ home = "clearance"
 range = [60, "top"]
 copies = { count = 3, axis = [0, 0, 1] }
 """
-CONE = 'cone = { axis = ["-radius", 0, "-clearance"], half_angle = 40, fixed_to = "carriage" }\n'
+CONE = 'cone = { axis = ["-delta_radius", 0, "-clearance"], half_angle = 40, fixed_to = "carriage" }\n'
 left, right = ROD.format(side="L", sign="", cone=CONE), ROD.format(side="R", sign="-", cone="")
 Path("printer.toml").write_text(PRINTER + left + right)
 printer = pf.load("printer.toml")
@@ -77,7 +77,7 @@ print(answer.status.name, answer.actuators.round(3))
 
 # The textbook formula gives the same: each carriage is as far above the nozzle as its rod reaches.
 towers = np.radians([0, 120, 240])
-across = printer.dimensions["radius"] * np.stack([np.cos(towers), np.sin(towers)], axis=1) - [40, 20]
+across = printer.dimensions["delta_radius"] * np.stack([np.cos(towers), np.sin(towers)], axis=1) - [40, 20]
 print((10 + np.sqrt(250**2 - (across**2).sum(axis=1))).round(3))
 
 # And back: from the heights of the carriages to the nozzle.
