@@ -21,15 +21,16 @@ SHOWN = 0.2
 
 Table = dict[str, Any]
 
+Three = Mapping[str, Sequence[float]]
+"""A number of each of three towers, or arms, by name."""
+
 
 def fault(place: str, found: str, expected: str) -> InvalidMechanism:
     """The error of one wrong setting."""
     return InvalidMechanism([Fault(place, found, expected)])
 
 
-def linear_delta(
-    radius: float, towers: Sequence[Mapping[str, float]], lowest: float = 0.0, *, from_endstops: bool = False
-) -> Table:
+def linear_delta(radius: float, towers: Three, lowest: float = 0.0, *, from_endstops: bool = False) -> Table:
     """Carriages on upright towers, with the nozzle at the origin at home.
 
     A carriage at (r cos angle, r sin angle) is at sqrt(arm_length² - (x - its x)² - (y - its y)²) + z.
@@ -38,59 +39,48 @@ def linear_delta(
     ----------
     radius : from the middle to the joints of a tower, less the platform's [mm].
     towers : "angle" [deg], "arm_length" and "position_endstop" [mm], of the nozzle in the middle with this carriage at
-        its endstop; "radius_trim" [mm], what the tower is farther out.
+        its endstop; "radius_trim" [mm], what the tower is farther out, if any is.
     lowest : of carriages [mm].
     from_endstops : count carriages from their endstops, as steps are counted, in place of from the bed.
     """
     dimensions: Table = {"delta_radius": radius} | _drawn(radius)
     joints: list[Table] = []
-    has_trims = any(tower.get("radius_trim") for tower in towers)
-    for letter, tower in zip(TOWERS, towers, strict=True):
-        names = ("angle", "arm_length", "position_endstop", *(("radius_trim",) if has_trims else ()))
-        dimensions |= {f"{name}_{letter}": float(tower.get(name, 0.0)) for name in names}
-        out = f"(delta_radius + radius_trim_{letter})" if has_trims else "delta_radius"
-        dimensions[f"height_{letter}"] = f"sqrt(arm_length_{letter}**2 - {out}**2)"
-        stop = f"position_endstop_{letter}"
-        rail = {"home": f"height_{letter}", "range": [lowest, f"height_{letter} + {stop}"]}
+    for k, letter in enumerate(TOWERS):
+        dimensions |= {f"{name}_{letter}": float(values[k]) for name, values in towers.items()}
+        out = f"(delta_radius + radius_trim_{letter})" if "radius_trim" in towers else "delta_radius"
+        height, stop = f"height_{letter}", f"position_endstop_{letter}"
+        dimensions[height] = f"sqrt(arm_length_{letter}**2 - {out}**2)"
+        rail = {"home": height, "range": [lowest, f"{height} + {stop}"]}
         if from_endstops:
-            rail = {"home": f"-{stop}", "range": [f"{lowest:.17g} - height_{letter} - {stop}", 0]}
-        joints.append(
-            {"name": f"carriage_{letter}", "type": "prismatic", "actuated": True}
-            | {"connects": ["base", f"slide_{letter}"], "axis": [0, 0, 1]}
-            | rail
-        )
-        joints += _pair(letter, f"slide_{letter}", (f"({out} + platform_radius)", f"height_{letter}"), "0")
+            rail = {"home": f"-{stop}", "range": [f"{lowest:.17g} - {height} - {stop}", 0]}
+        carriage = {"type": "prismatic", "actuated": True, "connects": ["base", f"slide_{letter}"], "axis": [0, 0, 1]}
+        joints.append({"name": f"carriage_{letter}"} | carriage | rail)
+        joints += _pair(letter, f"slide_{letter}", (f"({out} + platform_radius)", height), "0")
     return _machine("Delta printer", dimensions, joints, 0)
 
 
-def rotary_delta(radius: float, arms: Sequence[Mapping[str, float]]) -> Table:
+def rotary_delta(radius: float, arms: Three) -> Table:
     """Arms that turn about level axes, counted upward from level, with the nozzle in the middle at home.
 
     Parameters
     ----------
     radius : from the middle to an arm's axis, less the platform's [mm].
     arms : "angle" [deg], "upper_arm_length", "lower_arm_length", "shoulder_height" [mm]; "position_endstop", of the
-        nozzle in the middle with this arm at its endstop [mm], or "highest", the arm's angle there [deg]; "lowest"
-        [deg].
+        nozzle in the middle with this arm at its endstop [mm], or "lowest" and "highest", of the arm's angle [deg].
     """
     dimensions: Table = {"shoulder_radius": radius} | _drawn(radius)
-    shared = "shoulder_height" if len({arm["shoulder_height"] for arm in arms}) == 1 else None
+    shared = "shoulder_height" if len(set(arms["shoulder_height"])) == 1 else None
     if shared:
-        dimensions[shared] = arms[0]["shoulder_height"]
-    dimensions["home_height"] = _level_height(radius, arms[0])
+        dimensions[shared] = arms[shared][0]
+    first = {name: values[0] for name, values in arms.items()}
+    dimensions["home_height"] = _level_height(radius, first)
     joints: list[Table] = []
-    for letter, arm in zip(TOWERS, arms, strict=True):
-        dimensions |= {f"{name}_{letter}": float(value) for name, value in arm.items() if name != shared}
+    for k, letter in enumerate(TOWERS):
+        dimensions |= {f"{name}_{letter}": float(values[k]) for name, values in arms.items() if name != shared}
         height = shared or f"shoulder_height_{letter}"
         dimensions |= _arm_angle(letter, "home", height, "home_height")
-        if "position_endstop" in arm:
-            far = math.hypot(radius, arm["shoulder_height"] - arm["position_endstop"])
-            upper_arm, lower_arm = arm["upper_arm_length"], arm["lower_arm_length"]
-            if not abs(upper_arm - lower_arm) < far < upper_arm + lower_arm:
-                found = (
-                    f"{arm['position_endstop']:g}, {far:g} from the shoulder of arms {upper_arm:g} and {lower_arm:g}"
-                )
-                raise fault(f"position_endstop of arm {letter}", found, "a height where the arms reach the middle")
+        if "position_endstop" in arms:
+            _require_reach(radius, letter, {name: values[k] for name, values in arms.items()})
             dimensions |= _arm_angle(letter, "highest", height, f"position_endstop_{letter}")
         angle, upper, raised = f"angle_{letter}", f"upper_arm_length_{letter}", f"home_{letter}"
         out = "(shoulder_radius + platform_radius)"
@@ -99,11 +89,19 @@ def rotary_delta(radius: float, arms: Sequence[Mapping[str, float]]) -> Table:
             | {"connects": ["base", f"upper_arm_{letter}"]}
             | {"at": [f"{out}*cos({angle})", f"{out}*sin({angle})", height]}
             | {"axis": [f"sin({angle})", f"-cos({angle})", 0], "home": raised}
-            | {"range": [arm.get("lowest", -180.0), f"highest_{letter}"]}
+            | {"range": [f"lowest_{letter}" if "lowest" in arms else -180, f"highest_{letter}"]}
         )
         elbow = (f"({out} + {upper}*cos({raised}))", f"{height} + {upper}*sin({raised})")
         joints += _pair(letter, f"upper_arm_{letter}", elbow, "home_height")
     return _machine("Rotary delta printer", dimensions, joints, "home_height")
+
+
+def _require_reach(radius: float, letter: str, arm: Mapping[str, float]) -> None:
+    upper, lower, top = (arm[name] for name in ("upper_arm_length", "lower_arm_length", "position_endstop"))
+    far = math.hypot(radius, arm["shoulder_height"] - top)
+    if not abs(upper - lower) < far < upper + lower:
+        found = f"{top:g}, {far:g} from the shoulder of arms {upper:g} and {lower:g}"
+        raise fault(f"position_endstop of arm {letter}", found, "a height where the arms reach the middle")
 
 
 def _drawn(radius: float) -> Table:

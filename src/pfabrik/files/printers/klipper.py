@@ -95,29 +95,22 @@ def klipper_table(text: str, folder: Path | None) -> Table:
 def delta_of(settings: KlipperSettings, *, from_endstops: bool = False) -> Table:
     """The machine of kinematics delta; see `linear_delta`."""
     radius = settings.number("printer", "delta_radius", above=0.0)
-    values = {
+    towers = {
         "angle": settings.of_towers("angle", (210.0, 330.0, 90.0)),
         "arm_length": settings.of_towers("arm_length", above=radius),
-        "position_endstop": _endstops(settings),
+        "position_endstop": settings.of_towers("position_endstop"),
     }
     lowest = settings.number("printer", "minimum_z_position", 0.0)
-    return linear_delta(radius, _by_tower(values), lowest, from_endstops=from_endstops)
+    return linear_delta(radius, towers, lowest, from_endstops=from_endstops)
 
 
 def _rotary_delta_of(settings: KlipperSettings) -> Table:
-    values = {
+    radius = settings.number("printer", "shoulder_radius", above=0.0)
+    arms = {
         "angle": settings.of_towers("angle", (30.0, 150.0, 270.0)),
         "upper_arm_length": settings.of_towers("upper_arm_length", above=0.0),
         "lower_arm_length": settings.of_towers("lower_arm_length", above=0.0),
         "shoulder_height": [settings.number("printer", "shoulder_height", above=0.0)] * len(TOWERS),
-        "position_endstop": _endstops(settings),
+        "position_endstop": settings.of_towers("position_endstop"),
     }
-    return rotary_delta(settings.number("printer", "shoulder_radius", above=0.0), _by_tower(values))
-
-
-def _endstops(settings: KlipperSettings) -> list[float]:
-    return settings.of_towers("position_endstop")
-
-
-def _by_tower(values: dict[str, list[float]]) -> list[dict[str, float]]:
-    return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+    return rotary_delta(radius, arms)

@@ -67,14 +67,8 @@ def _marlin(codes: list[tuple[int, Words]]) -> Table:
     if missing:
         raise fault("M665", f"no {', '.join(missing)}", "L, R and H: rod, radius and height")
     rod, radius, height = three(665, "LRH")
-    return marlin_delta(
-        rod,
-        radius,
-        height - said[851].get("Z", [0.0])[0],
-        adjustments=three(666, "XYZ"),
-        angle_trims=three(665, "XYZ"),
-        rod_trims=three(665, "ABC"),
-    )
+    trims = {"angle_trims": three(665, "XYZ"), "rod_trims": three(665, "ABC")}
+    return marlin_delta(rod, radius, height - three(851, "Z")[0], adjustments=three(666, "XYZ"), **trims)
 
 
 def _reprap(codes: list[tuple[int, Words]]) -> Table:
@@ -94,40 +88,26 @@ def _reprap(codes: list[tuple[int, Words]]) -> Table:
         found = "no M665 with L, and no M669 with K" if kind is None else f"K{kind}, {LOOPLESS}"
         raise fault("M669", found, "M665 of a linear delta, or M669 K10 of a rotary one")
     corrections, adjustments = ([given.get(axis, [0.0])[0] for axis in "XYZ"] for given in (said, adjusted))
+    nominal = ROTARY_ANGLES if kind == _ROTARY else ANGLES
+    angles = [angle + correction for angle, correction in zip(nominal, corrections, strict=True)]
     if kind == _ROTARY:
-        return _rotary(_ROTARY_DEFAULTS | said, corrections, adjustments)
+        return _rotary(_ROTARY_DEFAULTS | said, angles, adjustments)
     said = _LINEAR_DEFAULTS | said
     tilts = [f"{axis}{adjusted[axis][0]:g}" for axis in "AB" if adjusted.get(axis, [0.0])[0] != 0.0]
     if tilts:
         raise fault("M666", f"{' '.join(tilts)}, which shears z", "A0 B0: a bed's tilt is no part of a machine")
-    rods = _three("M665 L", said["L"])
-    towers = [
-        {
-            "angle": ANGLES[k] + corrections[k],
-            "arm_length": rods[k],
-            "position_endstop": said["H"][0] + adjustments[k],
-        }
-        for k in range(3)
-    ]
+    ends = [said["H"][0] + adjustment for adjustment in adjustments]
+    towers = {"angle": angles, "arm_length": _three("M665 L", said["L"]), "position_endstop": ends}
     return linear_delta(said["R"][0], towers)
 
 
-def _rotary(said: Words, corrections: list[float], adjustments: list[float]) -> Table:
+def _rotary(said: Words, angles: list[float], adjustments: list[float]) -> Table:
     upper, lower, heights = (_three(f"M669 {letter}", said[letter]) for letter in "ULH")
     if len(said["A"]) != 2:
         raise fault("M669 A", ":".join(map(str, said["A"])), "the least and the largest angle, such as A-45:45")
-    arms = [
-        {
-            "angle": ROTARY_ANGLES[k] + corrections[k],
-            "upper_arm_length": upper[k],
-            "lower_arm_length": lower[k],
-            "shoulder_height": heights[k],
-            "highest": said["A"][1] + adjustments[k],
-            "lowest": said["A"][0],
-        }
-        for k in range(3)
-    ]
-    return rotary_delta(said["R"][0], arms)
+    arms = {"angle": angles, "upper_arm_length": upper, "lower_arm_length": lower, "shoulder_height": heights}
+    ends = {"lowest": said["A"][:1] * 3, "highest": [said["A"][1] + adjustment for adjustment in adjustments]}
+    return rotary_delta(said["R"][0], arms | ends)
 
 
 def _three(place: str, values: list[float]) -> list[float]:

@@ -45,16 +45,12 @@ def marlin_delta(
 
     A carriage goes from its endstop by its adjustment, which is not positive, to where the homed height is.
     """
-    towers = [
-        {
-            "angle": ANGLES[k] + angle_trims[k],
-            "arm_length": rod + rod_trims[k],
-            "position_endstop": height - adjustments[k],
-            "radius_trim": radius_trims[k],
-        }
-        for k in range(3)
-    ]
-    return linear_delta(radius, towers)
+    towers = {
+        "angle": [angle + trim for angle, trim in zip(ANGLES, angle_trims, strict=True)],
+        "arm_length": [rod + trim for trim in rod_trims],
+        "position_endstop": [height - adjustment for adjustment in adjustments],
+    }
+    return linear_delta(radius, towers | ({"radius_trim": [*radius_trims]} if any(radius_trims) else {}))
 
 
 def marlin_table(text: str, folder: Path | None) -> Table:
