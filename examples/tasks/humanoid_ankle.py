@@ -89,7 +89,7 @@ print(np.degrees(hull.polygon()).round(1).tolist())
 # ## States to start from
 #
 # A simulation with closed loops must start closed, with all passive joints where they belong. `sample` gives such
-# states, as MuJoCo's `qpos` of the exported model.
+# states, as MuJoCo's `qpos` of the exported model; with `model="g1.xml"` of the robot it came from.
 sample = a.sample(1000, seed=0)
 model = mujoco.MjModel.from_xml_path("robot.xml")
 data = mujoco.MjData(model)
