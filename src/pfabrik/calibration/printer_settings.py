@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -28,6 +29,7 @@ DISTANCE_WEIGHT = 0.5
 """Weight of all distances together beside that of all heights, as Klipper's delta_calibrate has it."""
 
 
+@dataclass(frozen=True)
 class KlipperDelta:
     """A delta printer as Klipper calibrates it.
 
@@ -39,13 +41,15 @@ class KlipperDelta:
     mechanism : the machine, with Klipper's settings as dimensions: delta_radius, and for each tower angle_a,
         arm_length_a and position_endstop_a.
     measurements : what DELTA_CALIBRATE and DELTA_ANALYZE stored; None if nothing.
-    free : the dimensions that these determine: BASIC, or EXTENDED with distances.
     """
 
-    def __init__(self, mechanism: Mechanism, measurements: Measurements | None) -> None:
-        self.mechanism, self.measurements = mechanism, measurements
-        has_distances = measurements is not None and len(measurements.distances) > 0
-        self.free = EXTENDED if has_distances else BASIC
+    mechanism: Mechanism
+    measurements: Measurements | None
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """The dimensions that the measurements determine: BASIC, or EXTENDED with distances."""
+        return EXTENDED if self.measurements is not None and len(self.measurements.distances) else BASIC
 
 
 def read_klipper(path: str | PathLike[str]) -> KlipperDelta:
