@@ -12,7 +12,7 @@ from ..errors import Fault, near_miss
 from .body_shapes import Shape
 from .coercion import numbers, unit_vector
 from .form_faults import direction_faults, is_name, is_pair_of_names, is_point, shown, table_faults
-from .joints import Cone, Joint, Vector
+from .joints import Joint, Vector
 
 MOST_COPIES = 100
 """Most copies of one joint: a typing error beyond it, and a file of one line must not ask for a million joints."""
@@ -180,31 +180,26 @@ def turned(joint: Joint, axis: Vector, step: int, steps: int) -> Joint:
     """The joint turned by `step` of `steps` equal parts of a full turn; by none, it is the same to the last bit."""
     if step == 0:
         return joint
-
-    def turn(vector: Any) -> Any:
-        return rotated(vector, axis, step, steps) if is_point(vector) else vector
-
-    axes: Any = tuple(map(turn, joint.axes)) if isinstance(joint.axes, tuple) else joint.axes
-    cone = joint.cone and Cone(turn(joint.cone.axis), joint.cone.half_angle, joint.cone.fixed_to)
-    return dataclasses.replace(joint, at=turn(joint.at), axis=turn(joint.axis), axes=axes, cone=cone)
+    at, along, axes = (_turned(value, axis, step, steps) for value in (joint.at, joint.axis, joint.axes))
+    cone = joint.cone and dataclasses.replace(joint.cone, axis=_turned(joint.cone.axis, axis, step, steps))
+    return dataclasses.replace(joint, at=at, axis=along, axes=axes, cone=cone)
 
 
 def _turned_shape(shape: Shape, axis: Vector, step: int, steps: int) -> Shape:
     """The shape turned by `step` of `steps` equal parts of a full turn."""
     if step == 0:
         return shape
+    at_home = {field: getattr(shape, field) for field in ("at", "axis", "ends", "axes")}
+    if shape.kind in ("box", "mesh") and shape.axes is None:
+        at_home["axes"] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    return dataclasses.replace(shape, **{field: _turned(each, axis, step, steps) for field, each in at_home.items()})
 
-    def turn(value: Any) -> Any:
-        if is_point(value):
-            return rotated(value, axis, step, steps)
-        return tuple(map(turn, value)) if isinstance(value, tuple) else value
 
-    directions: Any = shape.axes
-    if shape.kind in ("box", "mesh") and directions is None:
-        directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    return dataclasses.replace(
-        shape, at=turn(shape.at), axis=turn(shape.axis), ends=turn(shape.ends), axes=turn(directions)
-    )
+def _turned(value: Any, axis: Vector, step: int, steps: int) -> Any:
+    """A vector, or those in a tuple, turned; anything else as it is."""
+    if is_point(value):
+        return rotated(value, axis, step, steps)
+    return tuple(_turned(each, axis, step, steps) for each in value) if isinstance(value, tuple) else value
 
 
 def rotated(vector: Vector, axis: Vector, step: int, steps: int) -> Vector:
