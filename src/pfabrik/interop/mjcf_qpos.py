@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution, checked_solution
+from ..arguments import as_floats
 from ..arrays import Floats
 from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..motion.displacements import columns
-from ..poses import as_floats
 from ..rotations import to_quaternion
 from .cuts import Branch, CutTree, cut_tree
 from .mjcf_bodies import si_unit
