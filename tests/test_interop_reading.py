@@ -18,7 +18,7 @@ import pfabrik as pf
 from in_mujoco import Model, mujoco
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
-from pfabrik.interop import Imported, Loop, OpenMechanism, assemble, from_mjcf, from_urdf, verify
+from pfabrik.interop import Imported, Loop, NoEndEffector, OpenMechanism, assemble, from_mjcf, from_urdf, verify
 from pfabrik.interop.driving import Rates
 from pfabrik.interop.robots import Robot, mechanism_of
 
@@ -126,7 +126,7 @@ def test_names_that_do_not_exist_come_with_those_that_do() -> None:
             from_mjcf(FIVE_BAR, **{"end_effector": "fore_left", **wrong})
     with pytest.raises(UnknownName, match="known: qpos0, up"):
         from_mjcf(FIVE_BAR, end_effector="fore_left", configuration="down")
-    with pytest.raises(InvalidArgument, match="end_effector: found none"):
+    with pytest.raises(NoEndEffector, match="such as 'fore_left' against 'frame'"):
         from_mjcf(FIVE_BAR, base="frame")
     with pytest.raises(InvalidArgument, match="a list of names"):
         from_mjcf(FIVE_BAR, end_effector="fore_left", actuated="qL")
@@ -232,9 +232,7 @@ def test_a_delta_with_five_closures_and_a_wrist() -> None:
     assert pf.mobility(found.mechanism).platform == 4
     assert found.mechanism.actuator_names == ("q0", "q1", "q2", "wrist")  # as in its actuators
     agrees(found, Model.of(text), "tool", [(0.1, 0.5, -0.1, 0.2), (0.3, 0.0, 0.25, 0.2), (-0.2, -0.4, 0.1, 0.1)])
-    plate = from_mjcf(text, task=["x", "y", "z"])
-    assert plate.mechanism.end_effector == "plate"
-    assert "taken for the end effector" in notes_of(plate)
+    plate = from_mjcf(text, end_effector="plate", task=["x", "y", "z"])
     assert "wrist" in notes_of(plate)
     assert pf.solve_ik(plate.mechanism, np.array(plate.mechanism.reference_point) + [0.02, 0.01, -0.03])
 

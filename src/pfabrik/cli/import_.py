@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,23 +13,30 @@ import click
 import pfabrik as pf
 
 from ..errors import PfabrikError
-from .arguments import comma_separated
+from .arguments import Finite, comma_separated
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
-from .printing import complain, json_option, note, print_json
+from .printing import complain, json_option, note, print_json, print_text
 
 if TYPE_CHECKING:
-    from ..interop import Imported
+    from ..interop import Choice, Imported, NoEndEffector
+
+DEFAULTS = ("qpos0", "m", (), [])
+"""Values of options that need not be said."""
 
 
 @click.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--base", metavar="BODY", help="The body that rests. Default: the world, or the root link.")
-@click.option("--end-effector", metavar="NAME", help="A body, a site, or a joint. Default: where most joints meet.")
+@click.option("--end-effector", metavar="NAME", help="A body, a site, or a joint. Without it: what there is.")
 @click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of a URDF, and its motors.")
 @click.option(
     "--actuated", metavar="A,B,...", callback=comma_separated, help="Joints that are driven. Default: as the file says."
 )
 @click.option("--fixed", metavar="A,B,...", callback=comma_separated, help="Joints to hold where they are.")
+@click.option("--within", type=Finite(), metavar="D", help="Make parallel, meet or equal what is off by less [m, rad].")
+@click.option(
+    "--leave-out", multiple=True, metavar="NAME", help="A loop, or a joint that follows, not to bind. May be repeated."
+)
 @click.option(
     "--task",
     metavar="A,B,...",
@@ -42,14 +51,23 @@ if TYPE_CHECKING:
 def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any) -> int:
     """Turn a MuJoCo model (MJCF), a URDF or an SDF into a mechanism file.
 
-    FILE is the model. Of a robot, what the end effector does not depend on is left out; loops that are open are closed;
+    FILE is the model. Without --end-effector, its loops are listed, with what they move, and commands to go on with.
+    Of a robot, what the end effector does not depend on is left out; loops that are open are closed;
     collision geometry becomes shapes of bodies.
     All that is left out or changed is told on stderr, by name, with the remarks of `check` on what came out.
     """
     refuse_existing(output, force)
     check_outputs([("-o", output)], [file])
+    from ..interop import NoEndEffector
+
     try:
         model = imported(file, **choices)
+    except NoEndEffector as error:
+        if as_json:
+            print_json({"choices": [choice_as_object(each, file, choices) for each in error.choices]})
+        elif error.choices:
+            print_text(listing(error, file, choices), to_stderr=True)
+        raise
     except PfabrikError as error:
         for remark in getattr(error, "__notes__", []):
             complain(remark)
@@ -75,6 +93,33 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
         if output != STANDARD:
             click.echo(f"wrote {output}; next: pfabrik info {output}", err=True)
     return 0
+
+
+def listing(error: NoEndEffector, file: Path, given: Mapping[str, Any]) -> str:
+    """The choices that there are, each with commands that make a mechanism of it."""
+    parts = ["\n".join([str(each), *commands(each, file, given)]) for each in error.choices]
+    return "\n\n".join(parts) + "\n"
+
+
+def commands(choice: Choice, file: Path, given: Mapping[str, Any]) -> list[str]:
+    """The command that makes a mechanism of a choice, with the options that were given; none of a refused one."""
+    if not choice.options:
+        return []
+    words = ["pfabrik", "import", str(file), *choice.options]
+    for name in ("loops", "actuated", "fixed", "configuration", "unit", "within", "leave_out", "task"):
+        option, value = f"--{name.replace('_', '-')}", given.get(name)
+        if value is None or option in words or value in DEFAULTS:
+            continue
+        if name == "leave_out":
+            words += [word for each in value for word in (option, each)]
+        else:
+            words += [option, ",".join(value) if isinstance(value, list) else str(value)]
+    return [shlex.join([*words, "-o", f"{choice.end_effector}.toml".replace("/", "_")])]
+
+
+def choice_as_object(choice: Choice, file: Path, given: Mapping[str, Any]) -> dict[str, object]:
+    """A choice, with its command."""
+    return {**dataclasses.asdict(choice), "commands": commands(choice, file, given)}
 
 
 def as_object(model: Imported, text: str) -> dict[str, object]:

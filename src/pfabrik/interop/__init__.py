@@ -6,6 +6,7 @@ pf.interop.verify(m)                         # with MuJoCo as the referee
 """
 
 from .assembling import Imported, assemble
+from .choices import Choice, Moved, NoEndEffector
 from .mjcf_qpos import qpos
 from .mjcf_reading import from_mjcf
 from .mjcf_writing import to_mjcf
@@ -18,8 +19,11 @@ from .xml_reading import kind_of
 
 __all__ = [
     "AgainstOriginal",
+    "Choice",
     "Imported",
     "Loop",
+    "Moved",
+    "NoEndEffector",
     "Note",
     "OpenMechanism",
     "Verification",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
+from ..files.units import metres_of
 from ..motion.displacements import centres, columns, displacements, screws
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, ClosedHome, OpenLoops, close_home
@@ -27,6 +29,9 @@ from .notes import Note, noting
 from .opened import ROWS, OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies, with_cones
 from .straighten import straighten
+
+MENDED = 0.1
+"""Gap [L or rad] up to which closing a loop midway is proposed: more is another machine."""
 
 
 @dataclass(frozen=True)
@@ -129,21 +134,39 @@ def _outside(loops: OpenLoops, q: Floats) -> list[str]:
 def _rounding(opened: OpenMechanism, loops: OpenLoops) -> float:
     """How far the digits of a file let its loops be open [L or rad], where these are known."""
     digits = worst(opened.roundings.values())
-    return min(digits.length / loops.length + digits.angle, TOLERANCES.file_digits)
+    most = np.inf if opened.is_asked else TOLERANCES.file_digits
+    return float(min(digits.length / loops.length + digits.angle, most))
 
 
 def _faults(opened: OpenMechanism, loops: OpenLoops, home: ClosedHome, largest: float) -> list[Fault]:
-    """The loops that stay open, the worst first."""
+    """The loops that stay open, the worst first, each with its gap and with what would go on."""
     unit, faults = opened.length_unit, []
     openings = zip(loops.openings(np.zeros_like(loops.low)), loops.openings(home.q), strict=True)
+    enough = up_to_digit(home.gap * loops.length * metres_of(unit))
     for loop, (before, after) in zip(opened.loops, openings, strict=True):
         distance, angle = (float(np.linalg.norm(part)) for part in after)
-        if max(distance, angle) > largest:
-            begin = float(np.linalg.norm(before[0])) * loops.length
-            by = f"{distance * loops.length:.3g} {unit} and {np.degrees(angle):.3g} deg"
-            text = f"open by {by} at best, from {begin:.3g} {unit}"
-            faults.append((distance + angle, Fault(f"loop '{loop.name}'", text, "bodies that its joints let meet")))
+        if max(distance, angle) <= largest:
+            continue
+        gap = after[0] * loops.length
+        begin = float(np.linalg.norm(before[0])) * loops.length
+        vector = ", ".join(f"{value:.3g}" for value in gap.round(9) + 0.0)
+        by = f"{distance * loops.length:.3g} {unit} and {np.degrees(angle):.3g} deg"
+        text = f"open by {by} at best, from {begin:.3g} {unit}; the gap is ({vector}) {unit}"
+        ways = [f"--leave-out {loop.name} reads the rest"]
+        if loops.is_along_pin(loop, home.q, gap):
+            text += ", along the pin"
+            ways.insert(0, "`type: pin` in a file of loops, with `axis` along this gap, leaves it")
+        if max(distance, angle) <= MENDED:
+            ways.insert(0, f"--within {enough:g} closes it midway")
+        expected = f"bodies that its joints let meet; to go on: {'; '.join(ways)}"
+        faults.append((distance + angle, Fault(f"loop '{loop.name}'", text, expected)))
     return [fault for _, fault in sorted(faults, key=lambda each: -each[0])]
+
+
+def up_to_digit(value: float) -> float:
+    """The least number of one digit that is not below a value."""
+    digit = 10.0 ** math.floor(math.log10(value))
+    return float(math.ceil(value / digit) * digit)
 
 
 def _note_gaps(opened: OpenMechanism, loops: OpenLoops, gap: float, home: ClosedHome, notes: list[Note]) -> None:

@@ -82,6 +82,13 @@ class OpenLoops:
         bodies = displacements(self.tree, q[None])
         return [(point.mean(axis=0), frames[0]) for point, frames in (_sides(loop, bodies) for loop in self.loops)]
 
+    def is_along_pin(self, loop: Loop, q: Floats, gap: Floats) -> bool:
+        """True if the hinges around a loop are all parallel, nothing else moves it, and its gap (3,) is along them."""
+        one, other = (self._paths[body] for body in loop.connects)
+        turns = screws(self.tree, q[None])[0][one != other][:, :3]
+        off = np.linalg.norm(np.cross(turns, gap), axis=1) > TOLERANCES.file_angle * np.linalg.norm(gap)
+        return bool(len(turns) and not off.any() and turns.any(axis=1).all())
+
     def linearised(self, q: Floats) -> tuple[Floats, Floats]:
         """Loop errors (rows,) [L and rad], and their slopes by the rates of `screws` (rows, c)."""
         bodies, twists = displacements(self.tree, q[None]), screws(self.tree, q[None])[0]

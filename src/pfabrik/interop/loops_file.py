@@ -40,6 +40,7 @@ KINDS: dict[str, LoopType] = {
     "3d": "spherical",
     "hinge": "revolute",
     "revolute": "revolute",
+    "pin": "revolute",
     "weld": "fixed",
     "fixed": "fixed",
     "6d": "fixed",
@@ -60,6 +61,7 @@ class LinkLoop:
     ----------
     links : the two.
     points : the point on each, (2, 3) [m].
+    is_pin : the two may be apart along the axis, as far as they are at home.
     axes : the axis of a hinge on each, of any length, (2, 3).
     turns : the rotation on each that a weld holds, (2, 3, 3).
     """
@@ -70,6 +72,7 @@ class LinkLoop:
     points: Floats
     axes: Floats
     turns: Floats = field(default_factory=lambda: np.array([np.eye(3)] * 2))
+    is_pin: bool = False
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,9 @@ def placed_loops(loops: Iterable[LinkLoop], frames: Mapping[str, Floats]) -> lis
         sides = [frames[link] for link in loop.links]
         points = [side[:3, :3] @ point + side[:3, 3] for side, point in zip(sides, loop.points, strict=True)]
         turned = np.array([side[:3, :3] for side in sides])
+        if loop.is_pin:
+            axis = sides[0][:3, :3] @ loop.axes[0] / np.linalg.norm(loop.axes[0])
+            points[1] = points[1] - (points[1] - points[0]) @ axis * axis
         turned = turned @ (np.array([*map(frame_along, loop.axes)]) if loop.type == "revolute" else loop.turns)
         placed.append(Loop(loop.name, loop.type, loop.links, points, None if loop.type == "spherical" else turned))
     return placed
@@ -218,7 +224,8 @@ def _loop(number: int, entry: Mapping[str, Any], link_at: Mapping[str, str]) -> 
     points = np.array(entry.get("at", np.zeros((2, 3))), dtype=float)
     axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
     name = str(entry.get("name", f"closure_{number + 1}"))
-    return LinkLoop(name, KINDS[entry.get("type", "ball")], (one, other), points, axes)
+    kind = entry.get("type", "ball")
+    return LinkLoop(name, KINDS[kind], (one, other), points, axes, kind == "pin")
 
 
 def _faults(number: int, entry: Mapping[str, Any], links: Iterable[str], link_of: Mapping[str, str]) -> Iterator[Fault]:

@@ -37,6 +37,8 @@ def from_mjcf(
     configuration: str = "qpos0",
     length_unit: str = "m",
     task: Sequence[str] | None = None,
+    within: float | None = None,
+    leave_out: Iterable[str] = (),
 ) -> Imported:
     """The mechanism in a MuJoCo model.
 
@@ -52,7 +54,7 @@ def from_mjcf(
     source : the path of a model, or its text. Files that it includes must be in its folder; no other is opened.
     base : the body that rests. Default: the one that the file names if this library wrote it, else the world.
     end_effector : a body, a site (which is then the reference point), or a joint or equality (whose centre is moved).
-        Default: the one that the file names, else the body at which most joints and equalities meet.
+        Default: the one that the file names; else the error has the choices that there are.
     actuated : names of the joints that are driven, in the order of the actuators. Default: those that an actuator
         drives, in the order of these.
     fixed : names of joints to hold where they are.
@@ -60,6 +62,9 @@ def from_mjcf(
     length_unit : the unit of the mechanism: "mm", "m", ...; a model has metres.
     task : what targets set, as of a `Mechanism`. Default: that of the file, else everything or, where the end effector
         has fewer freedoms, as much of it as can be set independently.
+    within : how far what was meant to be parallel, to meet, or to be equal may be off [m and rad], and is made so.
+        Default: as far as the digits of the file explain.
+    leave_out : names of loops, and of joints that follow others, to read as if they were not bound.
 
     Returns
     -------
@@ -71,7 +76,7 @@ def from_mjcf(
     InvalidMechanism : no model, or one that cannot be closed or asks for too much, with what and where; joints that
         follow others where both are there; nothing that is driven. All errors carry the notes so far as `__notes__`.
     UnknownName : a body, joint or keyframe that the model does not have.
-    InvalidArgument : no end effector given, and none that is evident.
+    NoEndEffector : none is given; an `InvalidArgument` that carries the `choices`: what loops move, by which drives.
     """
     require("reading a MuJoCo model", "mujoco", "mujoco")
     root = read_xml(source, "mjcf")
@@ -80,7 +85,7 @@ def from_mjcf(
         model = MjcfModel(plain_model(root, notes), configuration)
         robot = _robot(root, model, notes)
         held = [*require_names("fixed", fixed), *model.held(notes)]
-        return mechanism_of(robot, notes, base, end_effector, actuated, held, length_unit, task)
+        return mechanism_of(robot, notes, base, end_effector, actuated, held, length_unit, task, within, leave_out)
 
 
 def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:

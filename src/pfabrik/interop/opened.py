@@ -97,6 +97,7 @@ class OpenMechanism:
     roundings : joint or loop -> how far its digits put it from what was meant, at most [length, rad]; those that are
         not named are as the worst of those that are. Empty where nothing is known.
     collision : the collision geometry [length].
+    is_asked : these roundings are asked for, and not read off the digits of a file.
     """
 
     name: str
@@ -110,6 +111,7 @@ class OpenMechanism:
     cones: Mapping[str, Cone] = field(default_factory=dict)
     roundings: Mapping[str, Rounding] = field(default_factory=dict)
     collision: Collision = NO_COLLISION
+    is_asked: bool = False
 
     def tree(self) -> Structure:
         """The joints alone, as a structure that can be moved."""

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import require_names
+from ..checks import require_names, require_positive
 from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
-from ..errors import InvalidArgument, UnknownName
+from ..description.mechanism import Mechanism
+from ..errors import PfabrikError, UnknownName, counted
 from ..files.units import metres_of
+from ..motion.mobility import generic_of
 from .assembling import Imported, closed
+from .choices import NoEndEffector, choices_of
 from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
@@ -27,6 +30,9 @@ from .notes import Note
 from .opened import Loop, OpenMechanism
 from .simplify import merged_bodies, merged_pair, prune
 from .tasks import with_task
+
+PROPOSED = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
+"""Values of `within` [m and rad] that are tried, where loops all but move, to propose the least that lets them."""
 
 
 @dataclass(frozen=True)
@@ -73,31 +79,72 @@ def mechanism_of(
     fixed: Iterable[str],
     length_unit: str,
     task: Sequence[str] | None,
+    within: float | None = None,
+    leave_out: Iterable[str] = (),
 ) -> Imported:
     """The mechanism between the base and the end effector of a robot, its loops closed; arguments as of `from_mjcf`."""
-    metres = metres_of(length_unit)
+    metres_of(length_unit)
     chosen = None if actuated is None else require_names("actuated", actuated)
-    robot = _with_drives(_with_held(robot, fixed), chosen)
+    robot = _with_drives(_with_held(_without(robot, leave_out, notes), fixed), chosen)
     base = _base(robot, base)
-    end_effector = _end_effector(robot, end_effector, base, notes)
+    end_effector = _end_effector(robot, end_effector, base)
+    if task is not None:
+        task = require_names("task", task)
+    if within is not None:
+        within = require_positive("within", within)
+    found = _between(robot, base, end_effector, chosen, length_unit, task, within, notes)
+    if within is None:
+        plain = dataclasses.replace(robot, collision=NO_COLLISION)
+
+        def made(within: float) -> Mechanism:
+            return _between(plain, base, end_effector, chosen, length_unit, task, within, []).mechanism
+
+        notes += _proposals(found.mechanism, made)
+    return dataclasses.replace(found, notes=tuple(notes))
+
+
+def _between(
+    robot: Robot,
+    base: str,
+    end_effector: str,
+    chosen: Sequence[str] | None,
+    length_unit: str,
+    task: Sequence[str] | None,
+    within: float | None,
+    notes: list[Note],
+) -> Imported:
+    """The mechanism between two bodies of a robot with drives."""
     tip, point = _place(robot, end_effector)
     if tip != base and merged_bodies(robot.joints, base)[1].get(tip) == base:
         raise InvalidArgument("end_effector", f"'{tip}', which is fixed to '{base}'", "a body that moves")
     rigid = _with_merged_bodies(robot, base, tip)
     if point is not None:
         rigid = _without_joint_named(tip, rigid, notes)
-    if task is not None:
-        task = require_names("task", task)
-    elif (base, end_effector) == (robot.base, robot.end_effector):
+    if task is None and (base, end_effector) == (robot.base, robot.end_effector):
         task = robot.task
-    opened = prune(_opened(rigid, base, tip, point, length_unit, task), notes)
+    opened = prune(_opened(rigid, base, tip, point, length_unit, task, within), notes)
     opened = with_coupled_drives(opened, rigid.joints, rigid.couplings, chosen or (), notes)
     require_drives(opened, robot.joints, robot.undriven)
     home = closed(opened, notes)
-    mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres)
+    mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres_of(length_unit))
     mechanism = with_task(mechanism, task is not None, notes)
     mechanism = with_collision(mechanism, home.collision, notes)
     return Imported(mechanism, home.gap, tuple(notes))
+
+
+def _proposals(mechanism: Mechanism, made: Callable[[float], Mechanism]) -> Iterator[Note]:
+    """The least `within` that gives a mechanism more motions, where its loops all but let it have them."""
+    counts = generic_of(mechanism).mobility
+    if not counts.nearly_free and counts.platform > 0:
+        return
+    for within in PROPOSED:
+        with suppress(PfabrikError):
+            more = generic_of(made(within)).mobility.platform
+            if more > counts.platform:
+                wins = f"{counted(more, 'freedom')} of the end effector for {counts.platform}"
+                what = f"the loops lock by little: making what is off by less parallel, equal, or meet gives {wins}"
+                yield Note(f"{what}: try --within {within:g}")
+                return
 
 
 def _require_known(argument: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
@@ -107,6 +154,20 @@ def _require_known(argument: str, names: Iterable[str], known: Iterable[str]) ->
         if name not in known:
             raise UnknownName(f"joint to be {argument}", name, known)
     return set(names)
+
+
+def _without(robot: Robot, names: Iterable[str], notes: list[Note]) -> Robot:
+    """Without the loops of these names, and the couplings of joints of these names."""
+    known = [*(loop.name for loop in robot.loops), *(each.follower for each in robot.couplings)]
+    omitted = require_names("leave_out", names)
+    for name in omitted:
+        if name not in known:
+            raise UnknownName("loop, or joint that follows another, to leave out", name, known)
+    if omitted:
+        notes.append(Note("left out as asked for", tuple(omitted)))
+    loops = [loop for loop in robot.loops if loop.name not in omitted]
+    couplings = [each for each in robot.couplings if each.follower not in omitted]
+    return dataclasses.replace(robot, loops=loops, couplings=couplings)
 
 
 def _with_held(robot: Robot, fixed: Iterable[str]) -> Robot:
@@ -145,8 +206,8 @@ def _base(robot: Robot, base: str | None) -> str:
     return base
 
 
-def _end_effector(robot: Robot, end_effector: str | None, base: str, notes: list[Note]) -> str:
-    """The given end effector, else that of the file, else the one body at which most joints and loops meet."""
+def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
+    """The given end effector, else that of the file; else the error has what may be chosen."""
     if end_effector is not None:
         known = [*robot.places, *_joint_names(robot)]
         if not isinstance(end_effector, str) or end_effector not in known:
@@ -154,16 +215,13 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str, notes: list
         return end_effector
     if robot.end_effector is not None:
         return robot.end_effector
-    rigid = _with_merged_bodies(robot, base, base)
-    pairs = [joint.connects for joint in rigid.joints] + [loop.connects for loop in rigid.loops]
-    joints_at = Counter(body for pair in pairs for body in pair if body != base)
-    counts = joints_at.most_common()
-    if not rigid.loops or len(counts) < 2 or counts[0][1] == counts[1][1]:
-        raise InvalidArgument(
-            "end_effector", "none, and no body where most legs meet", f"one of {', '.join(joints_at)} (--end-effector)"
-        )
-    notes.append(Note("taken for the end effector, for most joints meet there", (counts[0][0],)))
-    return counts[0][0]
+    rigid = _with_merged_bodies(dataclasses.replace(robot, collision=NO_COLLISION), base, base)
+
+    def build(base: str, end_effector: str, drives: Sequence[str] | None) -> Mechanism:
+        driven = _with_drives(rigid, drives)
+        return _between(driven, base, end_effector, drives, "m", None, None, []).mechanism
+
+    raise NoEndEffector(choices_of(rigid.joints, rigid.loops, base, build))
 
 
 def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
@@ -208,11 +266,19 @@ def _without_joint_named(tip: str, robot: Robot, notes: list[Note]) -> Robot:
 
 
 def _opened(
-    robot: Robot, base: str, tip: str, point: Floats | None, length_unit: str, task: Sequence[str] | None
+    robot: Robot,
+    base: str,
+    tip: str,
+    point: Floats | None,
+    length_unit: str,
+    task: Sequence[str] | None,
+    within: float | None,
 ) -> OpenMechanism:
     """The robot in the unit of the mechanism."""
     metres = metres_of(length_unit)
     roundings = dict(robot.roundings)
+    if within is not None:
+        roundings = dict.fromkeys([joint.name for joint in robot.joints], Rounding(within, within))
     if roundings:
         coarsest = worst(roundings.values())
         roundings = {loop.name: coarsest for loop in robot.loops} | roundings
@@ -228,6 +294,7 @@ def _opened(
         robot.cones,
         {name: Rounding(each.length / metres, each.angle) for name, each in roundings.items()},
         robot.collision.in_unit(metres),
+        within is not None,
     )
 
 

@@ -53,7 +53,8 @@ def straighten(
         return joints
     size = _size(joints)
     known = dict(opened.roundings) | dict(_roundings_of_hinges(opened, joints))
-    roundings = _roundings(joints, known, size, unclear_joints(structure(joints)))
+    locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(structure(joints))
+    roundings = _roundings(joints, known, size, locked)
     exact, exact_notes = _made_exact(joints, roundings, slack, size, opened.length_unit)
     exact_unclear = unclear_conditions(structure(exact))
     before, after = _severity(unclear), _severity(exact_unclear)

@@ -43,6 +43,8 @@ def from_urdf(
     fixed: Iterable[str] = (),
     length_unit: str = "m",
     task: Sequence[str] | None = None,
+    within: float | None = None,
+    leave_out: Iterable[str] = (),
 ) -> Imported:
     """The mechanism in a robot description, with the loops that URDF cannot express.
 
@@ -58,10 +60,10 @@ def from_urdf(
         `name_mot`). Frames that are called `closing_<name>_1` and `closing_<name>_2` meet in balls, or in hinges where
         there are frames of the same names with `_z` behind them, unless this file says how they meet.
     base : the link that rests. Default: the root.
-    end_effector : a link, or a joint or loop (whose centre is moved). Default: the link at which most joints meet.
+    end_effector : a link, or a joint or loop (whose centre is moved).
     actuated : names of the joints that are driven, in the order of the actuators; a `velocity` that is not 0 is their
         highest speed. Default: those of `loops`, else those with a transmission.
-    fixed, length_unit, task : as of `from_mjcf`.
+    fixed, length_unit, task, within, leave_out : as of `from_mjcf`.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def from_urdf(
     ------
     MissingLibrary : PyYAML is not installed, and `loops` is a file.
     InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found; else as of `from_mjcf`.
-    UnknownName, InvalidArgument : as of `from_mjcf`.
+    UnknownName, NoEndEffector : as of `from_mjcf`.
     """
     notes: list[Note] = []
     with noting(notes):
@@ -83,7 +85,7 @@ def from_urdf(
         robot = replace(_robot(links, link_loops, loops_file, notes), collision=read_collision(element, links, notes))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
         drives = motors if chosen is None else chosen
-        return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task)
+        return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task, within, leave_out)
 
 
 from_sdf = from_urdf
