@@ -8,7 +8,6 @@ is moved by itself, no further than rounding may have put it.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
@@ -18,13 +17,20 @@ from ..arrays import Floats
 from ..description.home_mobility import unclear_conditions, unclear_joints
 from ..description.joints import Joint, Vector
 from ..description.structure import Structure
+from ..motion.joint_rates import loop_errors_here
 from ..tolerances import TOLERANCES
-from .axis_directions import ROUNDED, Axis, Bundle, bundles_of
-from .axis_points import Meeting, meetings_of, moved_points
 from .digits import NOTHING, Rounding, worst
-from .nearest_moving import nearest_moving
+from .nearest_geometry import Kept, Moving, nearest_geometry, walked
 from .notes import Note
 from .opened import OpenMechanism
+from .relations import ROUNDED, axes_of, directions, meetings
+
+OPEN = 3e-13
+"""Largest loop error with which the machine found counts as one that moves [L and rad]."""
+
+MARGIN, CLEAR = 3.0, 5e-3
+"""Factor on what rounding can do to first order to a singular value, and the value [L and rad] from which a condition is
+one, whatever the digits of a file."""
 
 NOT_NOTED = 1e-12
 """Angle [rad] or share of the size by which what is moved is not worth a note: what closing the loops leaves."""
@@ -33,7 +39,7 @@ NOT_NOTED = 1e-12
 def straighten(
     joints: Sequence[Joint], opened: OpenMechanism, reference: Floats | None, slack: float, notes: list[Note]
 ) -> Sequence[Joint]:
-    """The joints with exact geometry where their roundings allow it: first axis by axis, then the nearest that moves.
+    """The joints with exact geometry where their roundings allow it: what axes were meant to be, then what moves.
 
     Joints of loops that all but lock are moved as far as rounding may have put them; others no further than what counts
     as parallel or aligned anyway, or, where nothing is known of the digits, not at all.
@@ -43,36 +49,54 @@ def straighten(
     reference : the reference point [length].
     slack : by how much closing the loops may have moved joints out of place, besides [rad or size].
     """
-
-    def structure(joints: Sequence[Joint]) -> Structure:
-        point: Any = None if reference is None else tuple(reference)
-        return Structure(opened.name, tuple(joints), opened.end_effector, point, opened.base)
-
-    has_roundings, unclear = bool(opened.roundings), unclear_conditions(structure(joints))
+    point: Any = None if reference is None else tuple(reference)
+    given = Structure(opened.name, tuple(joints), opened.end_effector, point, opened.base)
+    has_roundings, unclear = bool(opened.roundings), unclear_conditions(given)
     if not has_roundings and not unclear:
         return joints
-    size = _size(joints)
+    size, more = _size(joints), slack + ROUNDED
     known = dict(opened.roundings) | dict(_roundings_of_hinges(opened, joints))
-    locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(structure(joints))
+    locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(given)
     roundings = _roundings(joints, known, size, locked)
-    exact, exact_notes = _made_exact(joints, roundings, slack, size, opened.length_unit)
-    exact_unclear = unclear_conditions(structure(exact))
-    before, after = _severity(unclear), _severity(exact_unclear)
+    allowed = [Rounding(each.length + more * size, each.angle + more) for each in roundings]
+    kept: Kept = [(each, None) for each in directions(axes_of(joints, roundings), more)]
+    exact, kept = nearest_geometry(given, allowed, kept)
+    kept += meetings(axes_of(exact.joints, roundings), more * size)
+    exact, kept = nearest_geometry(given, allowed, kept)
+    why = "as asked for" if opened.is_asked else "within the digits of the file"
+    before, after = _severity(unclear), _severity(unclear_conditions(exact))
     if after < before or (after == before and has_roundings):
-        notes += exact_notes
+        notes += _notes(given, exact, kept, size, f"{opened.length_unit}", why)
     else:
-        exact, exact_unclear = list(joints), unclear
-    if not exact_unclear:
-        return exact
+        exact, kept = given, []
+    if not unclear_conditions(exact):
+        return exact.joints
     if not has_roundings:
         default = Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment)
-        roundings = [default if each.angle > 0.0 else each for each in roundings]
-    allowed = [Rounding(each.length + slack * size, each.angle + slack) for each in roundings]
-    moving = nearest_moving(structure(exact), allowed)
+        allowed = [default if each.angle > more else each for each in allowed]
+    moving = _moving(exact, allowed, kept)
     if moving is None:
-        return exact
-    notes.append(_note_of_moving(exact, moving, opened.length_unit))
-    return moving
+        return exact.joints
+    notes.append(_note_of_moving(exact.joints, moving.joints, opened.length_unit))
+    return moving.joints
+
+
+def _moving(structure: Structure, allowed: Sequence[Rounding], kept: Kept) -> Structure | None:
+    """The nearest machine that moves, to one whose loops all but lock; None where rounding does not explain it."""
+    length = structure.characteristic_length
+    most = np.sqrt(3.0 * sum(each.angle**2 + (each.length / length) ** 2 for each in allowed))
+    threshold = min(MARGIN * float(most), CLEAR)
+    before = unclear_conditions(structure)
+    if not any(value <= threshold for value in before):
+        return None
+    for relations in (kept, []):
+        moving = Moving(structure, threshold)
+        found = nearest_geometry(structure, allowed, relations, moving)
+        if found is not None and len(unclear_conditions(found[0])) < len(before):
+            elsewhere = walked(found[0], moving.rank, 1)
+            if np.abs(loop_errors_here(found[0], elsewhere)).max() <= OPEN:
+                return found[0]
+    return None
 
 
 def _severity(unclear: Sequence[float]) -> tuple[int, float]:
@@ -108,73 +132,33 @@ def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: flo
     return roundings
 
 
-def _made_exact(
-    joints: Sequence[Joint], roundings: Sequence[Rounding], slack: float, size: float, unit: str
-) -> tuple[list[Joint], list[Note]]:
-    """Axes parallel and square to each other where they are up to rounding, then meeting, or on one line."""
-    axes = list(_axes(joints, roundings))
-    bundles = bundles_of(axes, slack + ROUNDED)
-    for bundle in bundles:
-        for index in bundle.members:
-            axes[index].turn_to(bundle.along)
-    slack_length = (slack + ROUNDED) * size
-    points, meetings = moved_points(axes, meetings_of(axes, bundles, slack_length), slack_length)
-    exact = []
-    for index, joint in enumerate(joints):
-        along = [axis.along for axis in axes if axis.joint == index]
-        changes: dict[str, Any] = {"at": points[index]} if index in points else {}
-        if joint.axis is not None:
-            changes["axis"] = along[0]
-        if joint.axes is not None:
-            changes["axes"] = along
-        exact.append(dataclasses.replace(joint, **changes))
-    notes = [*_notes_of_turns(joints, axes, bundles), *_notes_of_moves(joints, axes, meetings, points, size, unit)]
-    return exact, notes
-
-
-def _axes(joints: Sequence[Joint], roundings: Sequence[Rounding]) -> Iterator[Axis]:
-    for index, (joint, rounding) in enumerate(zip(joints, roundings, strict=True)):
-        if joint.type == "fixed" or (joint.type == "prismatic" and joint.axis is None):
-            continue
-        at = None if joint.type == "prismatic" or joint.at is None else np.array(joint.at)
-        for along in [joint.axis] if joint.axis is not None else [*(joint.axes or [None])]:
-            direction = None if along is None else np.array(along)
-            yield Axis(index, direction, at, rounding, frozenset(joint.connects))
-
-
-def _notes_of_turns(joints: Sequence[Joint], axes: Sequence[Axis], bundles: Sequence[Bundle]) -> Iterator[Note]:
-    """Which axes were turned, and by how much: with those that they are parallel to, or else square."""
+def _notes(given: Structure, exact: Structure, kept: Kept, size: float, unit: str, why: str) -> Iterator[Note]:
+    """Which axes were turned, with those that they are parallel to or else square, and which joints were moved."""
+    joints, nothing = given.joints, [NOTHING] * len(given.joints)
+    old, new = axes_of(joints, nothing), axes_of(exact.joints, nothing)
     square: dict[str, float] = {}
-    for bundle in bundles:
-        turn = max(_apart(axes[index].given, axes[index].along) for index in bundle.members)
-        if turn <= NOT_NOTED:
+    for relation, point in kept:
+        names = tuple(dict.fromkeys(joints[old[index].joint].name for index in relation.members))
+        if point is not None:
+            shift = max(_apart(old[index].at, new[index].at) for index in relation.members)
+            if shift > NOT_NOTED * size:
+                what = "meet in one point" if relation.line is None else "be on one line"
+                yield Note(f"made to {what} {why}, moved by up to {shift:.1g} {unit}", names)
             continue
-        names = tuple(dict.fromkeys(joints[axes[index].joint].name for index in bundle.members))
-        if len(names) > 1:
-            yield Note(f"axes made parallel within the digits of the file, turned by up to {turn:.1g} rad", names)
+        turns = {
+            joints[old[index].joint].name: _apart(old[index].along, new[index].along) for index in relation.members
+        }
+        turned = {name: turn for name, turn in turns.items() if turn > NOT_NOTED}
+        if turned and relation.kind == "parallel" and len(names) > 1:
+            yield Note(f"axes made parallel {why}, turned by up to {max(turned.values()):.1g} rad", names)
         else:
-            square[names[0]] = turn
+            square |= turned
+    parallel = {
+        old[i].joint for each, _ in kept if each.kind == "parallel" and len(each.members) > 1 for i in each.members
+    }
+    square = {name: turn for name, turn in square.items() if name not in {joints[index].name for index in parallel}}
     if square:
-        most = max(square.values())
-        yield Note(f"axes made square to others within the digits of the file, by up to {most:.1g} rad", tuple(square))
-
-
-def _notes_of_moves(
-    joints: Sequence[Joint],
-    axes: Sequence[Axis],
-    meetings: Sequence[Meeting],
-    points: Mapping[int, Floats],
-    size: float,
-    unit: str,
-) -> Iterator[Note]:
-    """Which joints were moved to meet in a point or to be on one line, and by how much."""
-    for meeting in meetings:
-        members = sorted({axes[index].joint for index in meeting.members})
-        shift = max(_apart(points[joint], joints[joint].at) for joint in members)
-        if shift > NOT_NOTED * size:
-            what = "meet in one point" if meeting.along is None else "be on one line"
-            names = tuple(joints[joint].name for joint in members)
-            yield Note(f"made to {what} within the digits of the file, moved by up to {shift:.1g} {unit}", names)
+        yield Note(f"axes made square to others {why}, by up to {max(square.values()):.1g} rad", tuple(square))
 
 
 def _note_of_moving(joints: Sequence[Joint], moving: Sequence[Joint], unit: str) -> Note:
