@@ -20,13 +20,14 @@ from ..description.structure import Structure
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..files.units import metres_of
 from ..motion.displacements import centres, columns, displacements, screws
+from ..motion.joint_rates import loop_slopes
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, ClosedHome, OpenLoops, close_home
 from .collision import Collision
 from .digits import worst
 from .imported_shapes import with_collision
 from .notes import Note, noting
-from .opened import ROWS, OpenMechanism
+from .opened import OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies, with_cones
 from .straighten import straighten
 
@@ -89,8 +90,8 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     loops = OpenLoops(opened)
     gap = loops.gap(np.zeros(len(loops.low)))
     home, opened = _closed_home(opened, loops, notes)
-    _note_gaps(opened, loops, gap, home, notes)
     joints = [*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home)]
+    _note_gaps(opened, loops, gap, home, _implied(dataclasses.replace(loops.tree, joints=joints), loops), notes)
     reference = _moved_reference(opened, loops.tree, home)
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
     rigid, stands_for = merged_bodies(merged_balls(joints), opened.base, opened.end_effector)
@@ -169,11 +170,12 @@ def up_to_digit(value: float) -> float:
     return float(math.ceil(value / digit) * digit)
 
 
-def _note_gaps(opened: OpenMechanism, loops: OpenLoops, gap: float, home: ClosedHome, notes: list[Note]) -> None:
+def _note_gaps(
+    opened: OpenMechanism, loops: OpenLoops, gap: float, home: ClosedHome, implied: tuple[str, ...], notes: list[Note]
+) -> None:
     """Note how far the loops were open, which of them are redundant, and how far they stay open."""
     if gap > CLOSED:
         notes.append(Note(f"loops were open by {gap * loops.length:.3g} {opened.length_unit}, and are closed"))
-    implied = _implied(loops, home)
     if implied:
         notes.append(Note("some of what these ask for follows from the others", implied))
     if home.gap > CLOSED:
@@ -182,14 +184,13 @@ def _note_gaps(opened: OpenMechanism, loops: OpenLoops, gap: float, home: Closed
         notes.append(Note(what))
 
 
-def _implied(loops: OpenLoops, home: ClosedHome) -> tuple[str, ...]:
+def _implied(structure: Structure, loops: OpenLoops) -> tuple[str, ...]:
     """Names of the loops with more conditions than they add to the rank of those before them."""
-    _, slopes = loops.linearised(home.q)
-    rank, end, names = 0, 0, []
-    for loop in loops.loops:
-        begin, end = end, end + ROWS[loop.type]
-        new_rank = int(np.linalg.matrix_rank(slopes[:end], TOLERANCES.alignment))
-        names += [loop.name] if new_rank - rank < end - begin else []
+    slopes = loop_slopes(structure, np.zeros((1, len(structure.coordinates))))[0]
+    rank, names = 0, []
+    for number, loop in enumerate(loops.loops):
+        new_rank = int(np.linalg.matrix_rank(slopes[: 6 * number + 6], TOLERANCES.alignment))
+        names += [loop.name] if new_rank - rank < 6 else []
         rank = new_rank
     return tuple(names)
 

@@ -1,32 +1,36 @@
 """The closed home of an open machine: its joints moved until all loops meet, within their ranges.
 
-Here the bodies that close a loop may be far apart, and joints on either side may be anywhere within their ranges; the
-solver of `closure` begins with a `Mechanism`, whose loops are closed at home.
+The solver of `closure` begins with loops that are closed at home. So between the two sides of a loop that is open, a
+slide and a hinge of no other use bridge the gap; locked where this is gone, they leave the loop to the joints.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import cast
 
 import numpy as np
 
 from ..arrays import Floats, Mask
+from ..closure.close import close, platform_poses
 from ..description.graph import tree_of
-from ..description.home_mobility import body_twist, column_joints
+from ..description.home_mobility import column_joints
+from ..description.joint_types import JointType
+from ..description.joints import Joint
+from ..description.mechanism import Mechanism
 from ..description.structure import Structure
-from ..motion.displacements import displacements, home_coordinates, rate_units, screws, stepped
-from ..rotations import angles_and_sines, square_to
+from ..motion.closure import Closure, closure_of
+from ..motion.displacements import columns, displacements, home_coordinates, rate_units, screws
+from ..rotations import angles_and_sines
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism
-
-STEPS = 200
-"""Most steps of one attempt; a dozen are usual."""
 
 CLOSED = 1e-13
 """Gap that counts as none [L and rad]: rounding."""
 
-STALLED = 1.0 - 1e-9
-"""Share of the sum of squares that a step leaves where there is nothing left to gain."""
+BRIDGE = "bridge of loop"
+"""What bodies and joints in the gap of a loop are called."""
 
 STARTS, STRAY = 6, 0.3
 """Attempts from elsewhere, where the first ends open, and how far off they start [rad or L]: legs that are stretched
@@ -64,7 +68,28 @@ class OpenLoops:
         self.low, self.high = limits - home_coordinates(self.tree)
         self.length = _radius(opened)
         self._paths = {body: path[column_joints(self.tree)] for body, path in tree_of(self.tree).paths.items()}
-        self._relative_length = self.length / self.tree.characteristic_length
+
+    @cached_property
+    def bridged(self) -> tuple[Closure, dict[int, float]]:
+        """The machine with bridges in its open loops, compiled, and column -> the coordinate that closes each."""
+        joints, values = list(self.tree.joints), {}
+        openings = self.openings(np.zeros_like(self.low))
+        for number, (loop, (gap, turn)) in enumerate(zip(self.loops, openings, strict=True)):
+            first, second = loop.connects
+            at = loop.at[1]
+            for kind, vector in (("prismatic", gap * self.length), ("revolute", turn)):
+                size = float(np.linalg.norm(vector))
+                if size > 0.0:
+                    name = f"{BRIDGE} {number} {kind}"
+                    point = None if kind == "prismatic" else at
+                    joints.append(Joint(name, cast(JointType, kind), (first, name), point, vector / size))
+                    values[name], first = size, name
+            axis = loop.turned[1][:, 2] if loop.type == "revolute" else None
+            joints.append(Joint(f"{BRIDGE} {number}", loop.type, (first, second), at, axis))
+        body = next(body for body in self.loops[0].connects if body != self.tree.base)
+        bridged = replace(self.tree, joints=tuple(joints), end_effector=body)
+        closure = closure_of(cast(Mechanism, bridged), whole=True)
+        return closure, {columns(bridged)[name].start: value for name, value in values.items()}
 
     def openings(self, q: Floats) -> list[tuple[Floats, Floats]]:
         """For every loop, at coordinates (c,): distance (3,) [L], and angle (3,) [rad] between its two sides."""
@@ -88,26 +113,6 @@ class OpenLoops:
         turns = screws(self.tree, q[None])[0][one != other][:, :3]
         off = np.linalg.norm(np.cross(turns, gap), axis=1) > TOLERANCES.file_angle * np.linalg.norm(gap)
         return bool(len(turns) and not off.any() and turns.any(axis=1).all())
-
-    def linearised(self, q: Floats) -> tuple[Floats, Floats]:
-        """Loop errors (rows,) [L and rad], and their slopes by the rates of `screws` (rows, c)."""
-        bodies, twists = displacements(self.tree, q[None]), screws(self.tree, q[None])[0]
-        twists = np.concatenate([twists[:, :3], twists[:, 3:] / self._relative_length], axis=1)
-        errors, slopes = [np.zeros(0)], [np.zeros((0, len(self.low)))]
-        for loop in self.loops:
-            points, frames = _sides(loop, bodies)
-            turning, moving = [], []
-            for body, point in zip(loop.connects, points, strict=True):
-                twist = body_twist(self._paths[body], twists)
-                turning.append(twist[:3])
-                moving.append(twist[3:] + np.cross(twist[:3], point / self.length, axis=0))
-            errors.append((points[0] - points[1]) / self.length)
-            slopes.append(moving[0] - moving[1])
-            if loop.type != "spherical":
-                across = np.eye(3) if loop.type == "fixed" else square_to(frames[0][:, 2])
-                errors.append(across @ _turn(loop, frames))
-                slopes.append(across @ (turning[0] - turning[1]))
-        return np.concatenate(errors), np.concatenate(slopes)
 
 
 def _radius(opened: OpenMechanism) -> float:
@@ -147,40 +152,24 @@ def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> Close
     free : the coordinates that may move, (c,); the others stay at home.
     low, high : bounds of the coordinates as deviations from home, (c,) [rad or length].
     """
-    units = rate_units(loops.tree)
-    rng = np.random.default_rng(0)
     home = np.where(free, np.clip(0.0, low, high), 0.0)
-    best = _descend(loops, home, free, low, high)
-    for _ in range(STARTS):
-        if best.gap <= TOLERANCES.file_gap:
-            break
-        start = np.where(free, np.clip(home + rng.uniform(-STRAY, STRAY, len(home)) * units, low, high), home)
-        trial = _descend(loops, start, free, low, high)
-        best = trial if trial.gap < 0.5 * best.gap else best
+    if not loops.loops:
+        return ClosedHome(home, 0.0)
+    closure, bridges = loops.bridged
+    rng, units = np.random.default_rng(0), rate_units(loops.tree)
+    strays = rng.uniform(-STRAY, STRAY, (STARTS, len(home))) * units
+    has_limits = bool(np.isfinite([low, high]).any())
+    locked = frozenset([*np.flatnonzero(~free).tolist(), *bridges])
+    best = ClosedHome(home, np.inf)
+    for starts in (home[None], np.where(free, np.clip(home + strays, low, high), home)):
+        coordinates = np.zeros((len(starts), len(closure.scale)))
+        coordinates[:, : len(home)], coordinates[:, list(bridges)] = starts, list(bridges.values())
+        poses = platform_poses(closure.mechanism, coordinates)
+        for limits in (False, True)[: 1 + has_limits]:
+            ends = close(closure, coordinates, poses, locked=locked, limits=limits, closeness=0.1 * CLOSED)
+            for q in np.clip(ends.coordinates[:, : len(home)], low, high):
+                trial = ClosedHome(q, loops.gap(q))
+                best = trial if trial.gap < 0.5 * best.gap else best
+            if best.gap <= TOLERANCES.file_gap:
+                return best
     return best
-
-
-def _descend(loops: OpenLoops, q: Floats, free: Mask, low: Floats, high: Floats) -> ClosedHome:
-    """Levenberg and Marquardt's method, its steps cut at the bounds."""
-    damping = 1e-3
-    errors, slopes = loops.linearised(q)
-    for _ in range(STEPS):
-        if np.abs(errors).max(initial=0.0) <= CLOSED or damping > 1e12:
-            break
-        gradient = slopes.T @ errors
-        is_stuck = ((q <= low) & (gradient > 0.0)) | ((q >= high) & (gradient < 0.0))
-        moving = np.flatnonzero(free & ~is_stuck)
-        damped = np.sqrt(damping * (errors @ errors)) * np.eye(len(moving))
-        matrix = np.concatenate([slopes[:, moving], damped])
-        step = np.zeros(len(q))
-        step[moving] = -np.linalg.lstsq(matrix, np.concatenate([errors, np.zeros(len(moving))]), rcond=None)[0]
-        trial = np.clip(stepped(loops.tree, q[None], step[None])[0], low, high)
-        trial_errors, trial_slopes = loops.linearised(trial)
-        remaining = (trial_errors @ trial_errors) / (errors @ errors)
-        if remaining < 1.0:
-            q, errors, slopes, damping = trial, trial_errors, trial_slopes, max(0.1 * damping, 1e-9)
-        else:
-            damping *= 10.0
-        if STALLED < remaining < 1.0:
-            break
-    return ClosedHome(q, loops.gap(q))

@@ -29,8 +29,8 @@ OPEN = 3e-13
 """Largest loop error with which the machine found counts as one that moves [L and rad]."""
 
 MARGIN, CLEAR = 3.0, 5e-3
-"""Factor on what rounding can do to first order to a singular value, and the value [L and rad] from which a condition is
-one, whatever the digits of a file."""
+"""Factor on what rounding can do to first order to a singular value, and the value [L and rad] from which a condition
+is one, whatever the digits of a file."""
 
 NOT_NOTED = 1e-12
 """Angle [rad] or share of the size by which what is moved is not worth a note: what closing the loops leaves."""
