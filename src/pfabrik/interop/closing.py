@@ -22,12 +22,15 @@ from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from ..motion.closure import Closure, closure_of
 from ..motion.displacements import columns, displacements, home_coordinates, rate_units, screws
-from ..rotations import angles_and_sines
+from ..rotations import shortest_turns, to_rotvec
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism
 
 CLOSED = 1e-13
 """Gap that counts as none [L and rad]: rounding."""
+
+POLISH = 10
+"""Newton's steps at the end, where least squares stall: those of a closed loop end at rounding."""
 
 BRIDGE = "bridge of loop"
 """What bodies and joints in the gap of a loop are called."""
@@ -136,12 +139,9 @@ def _turn(loop: Loop, frames: Floats) -> Floats:
     if loop.type == "spherical":
         return np.zeros(3)
     if loop.type == "revolute":
-        axes = frames[:, :, 2]
-        sine = np.cross(axes[1], axes[0])
-        size = float(np.linalg.norm(sine))
-        return np.asarray(sine * (np.arctan2(size, axes[0] @ axes[1]) / size if size else 1.0))
-    angle, sines = angles_and_sines(frames[0] @ frames[1].T)
-    return np.asarray(sines / np.sinc(angle / np.pi))
+        one, other = frames[:, :, 2]  # of a hinge, either way along its line
+        return to_rotvec(shortest_turns(np.copysign(1.0, one @ other) * other[None], one[None])[0])
+    return to_rotvec(frames[0] @ frames[1].T)
 
 
 def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> ClosedHome:
@@ -167,7 +167,8 @@ def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> Close
         poses = platform_poses(closure.mechanism, coordinates)
         for limits in (False, True)[: 1 + has_limits]:
             ends = close(closure, coordinates, poses, locked=locked, limits=limits, closeness=0.1 * CLOSED)
-            for q in np.clip(ends.coordinates[:, : len(home)], low, high):
+            exact = close(closure, ends.coordinates, ends.poses, locked=locked, undamped=True, max_iterations=POLISH)
+            for q in np.clip(np.concatenate([exact.coordinates, ends.coordinates])[:, : len(home)], low, high):
                 trial = ClosedHome(q, loops.gap(q))
                 best = trial if trial.gap < 0.5 * best.gap else best
             if best.gap <= TOLERANCES.file_gap:

@@ -141,10 +141,12 @@ def _least(
             rows.append(np.hstack([by_joints, np.zeros((len(value), points.size))]))
             residuals.append(moving.gap)
         largest = max(residuals)
-        if largest <= EXACT or HOLDS >= largest >= 0.5 * before:
+        if largest <= EXACT or (largest >= 0.5 * before and (moving is None or largest <= HOLDS)):
             break
         before, matrix = largest, np.concatenate(rows)
-        step = np.linalg.lstsq(matrix * units, matrix @ x - np.concatenate(values), rcond=WEAKEST)[0] * units
+        step, free = np.zeros_like(x), units > 0.0
+        wanted = matrix @ x - np.concatenate(values)
+        step[free] = np.linalg.lstsq(matrix[:, free] * units[free], wanted, rcond=WEAKEST)[0] * units[free]
         if moving:
             moving.follow(trial, (step - x)[:n])
         x = step

@@ -62,7 +62,7 @@ def straighten(
     kept: Kept = [(each, None) for each in directions(axes_of(joints, roundings), more)]
     exact, kept = nearest_geometry(given, allowed, kept)
     kept += meetings(axes_of(exact.joints, roundings), more * size)
-    exact, kept = nearest_geometry(given, allowed, kept)
+    exact, kept = nearest_geometry(exact, [each._replace(angle=0.0) for each in allowed], kept)
     why = "as asked for" if opened.is_asked else "within the digits of the file"
     before, after = _severity(unclear), _severity(unclear_conditions(exact))
     if after < before or (after == before and has_roundings):
