@@ -15,12 +15,12 @@ import pfabrik as pf
 from ..errors import PfabrikError
 from .arguments import Finite, comma_separated
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
-from .printing import complain, json_option, note, print_json, print_text
+from .printing import complain, json_option, note, print_json
 
 if TYPE_CHECKING:
     from ..interop import Choice, Imported, NoEndEffector
 
-DEFAULTS = ("qpos0", "m", (), [])
+DEFAULTS: tuple[object, ...] = ("qpos0", "m", (), [])
 """Values of options that need not be said."""
 
 
@@ -66,7 +66,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
         if as_json:
             print_json({"choices": [choice_as_object(each, file, choices) for each in error.choices]})
         elif error.choices:
-            print_text(listing(error, file, choices), to_stderr=True)
+            click.echo(listing(error, file, choices), err=True)
         raise
     except PfabrikError as error:
         for remark in getattr(error, "__notes__", []):
@@ -114,7 +114,7 @@ def commands(choice: Choice, file: Path, given: Mapping[str, Any]) -> list[str]:
             words += [word for each in value for word in (option, each)]
         else:
             words += [option, ",".join(value) if isinstance(value, list) else str(value)]
-    return [shlex.join([*words, "-o", f"{choice.end_effector}.toml".replace("/", "_")])]
+    return [shlex.join([*words, "-o", f"{choice.base}-{choice.end_effector}.toml".replace("/", "_")])]
 
 
 def choice_as_object(choice: Choice, file: Path, given: Mapping[str, Any]) -> dict[str, object]:

@@ -31,6 +31,9 @@ from .opened import OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies, with_cones
 from .straighten import straighten
 
+SHOWN = 0.01
+"""Share of the largest component of a gap from which another is shown."""
+
 MENDED = 0.1
 """Gap [L or rad] up to which closing a loop midway is proposed: more is another machine."""
 
@@ -91,7 +94,7 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     gap = loops.gap(np.zeros(len(loops.low)))
     home, opened = _closed_home(opened, loops, notes)
     joints = [*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home)]
-    _note_gaps(opened, loops, gap, home, _implied(dataclasses.replace(loops.tree, joints=joints), loops), notes)
+    _note_gaps(opened, loops, gap, home, _implied(dataclasses.replace(loops.tree, joints=tuple(joints)), loops), notes)
     reference = _moved_reference(opened, loops.tree, home)
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
     rigid, stands_for = merged_bodies(merged_balls(joints), opened.base, opened.end_effector)
@@ -150,7 +153,7 @@ def _faults(opened: OpenMechanism, loops: OpenLoops, home: ClosedHome, largest: 
             continue
         gap = after[0] * loops.length
         begin = float(np.linalg.norm(before[0])) * loops.length
-        vector = ", ".join(f"{value:.3g}" for value in gap.round(9) + 0.0)
+        vector = ", ".join(f"{value:.3g}" for value in np.where(np.abs(gap) > SHOWN * np.abs(gap).max(), gap, 0.0))
         by = f"{distance * loops.length:.3g} {unit} and {np.degrees(angle):.3g} deg"
         text = f"open by {by} at best, from {begin:.3g} {unit}; the gap is ({vector}) {unit}"
         ways = [f"--leave-out {loop.name} reads the rest"]

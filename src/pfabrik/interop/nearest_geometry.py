@@ -86,10 +86,10 @@ class Moving:
 
 def nearest_geometry(
     structure: Structure, roundings: Sequence[Rounding], relations: Kept, moving: Moving | None = None
-) -> tuple[Structure, Kept] | None:
+) -> tuple[Structure, Kept]:
     """The nearest geometry in which relations hold, and those of them that could be kept.
 
-    None if the loops are to close away from home, and rounding does not explain that.
+    The geometry as it is, if the loops are to close away from home, and rounding does not explain that.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ def nearest_geometry(
         if max(residuals) <= HOLDS and not far:
             return _aligned(trial, kept), kept
         if moving:
-            return None
+            break
         loose = [n for n, (relation, _) in enumerate(kept) if relation.kind != "parallel"] or range(len(kept))
         wrong = [n for n in loose if far & {axes[index].joint for index in kept[n][0].members}]
         wrong = sorted(wrong or [int(np.argmax(residuals))], key=lambda n: len(kept[n][0].members))
         given_up = set(wrong[: max(1, len(wrong) // AT_ONCE)])
         kept = [each for n, each in enumerate(kept) if n not in given_up]
-    return structure, kept
+    return structure, []
 
 
 def _least(
@@ -175,9 +175,8 @@ def _aligned(structure: Structure, relations: Kept) -> Structure:
             own, first = axes[index], axes[relation.members[0]].along
             along = first if relation.along is None else relation.along
             if joints[own.joint].axis is not None and along is not None and own.along is not None:
-                joints[own.joint] = dataclasses.replace(
-                    joints[own.joint], axis=np.sign(own.along @ along) * along + 0.0
-                )
+                axis: Any = np.sign(own.along @ along) * along + 0.0
+                joints[own.joint] = dataclasses.replace(joints[own.joint], axis=axis)
     return dataclasses.replace(structure, joints=tuple(joints))
 
 

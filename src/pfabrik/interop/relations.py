@@ -104,10 +104,8 @@ def equations(
     first, *others = relation.members
     if relation.kind == "parallel":
         if relation.along is not None:
-            yield (
-                np.cross(_along(axes[first]), relation.along),
-                [(axes[first].joint, False, _tilt(axes[first], relation.along))],
-            )
+            slopes: list[Slope] = [(axes[first].joint, False, _tilt(axes[first], relation.along))]
+            yield np.cross(_along(axes[first]), relation.along), slopes
         for other in others:
             one, axis = axes[first], axes[other]
             slopes = [(axis.joint, False, _tilt(axis, _along(one))), (one.joint, False, -_tilt(one, _along(axis)))]
@@ -116,14 +114,15 @@ def equations(
         along = [_along(axes[index]) for index in relation.members]
         slopes = []
         for place, index in enumerate(relation.members):
-            one, *two = along[:place] + along[place + 1 :]
-            normal = (-1.0) ** place * np.cross(one, two[0]) if two else one
+            rest = along[:place] + along[place + 1 :]
+            normal = (-1.0) ** place * np.cross(rest[0], rest[1]) if len(rest) == 2 else rest[0]
             slopes.append((axes[index].joint, False, np.cross(along[place], normal)[None]))
-        yield np.array([along[0] @ (np.cross(*along[1:]) if len(along) == 3 else along[1])]), slopes
+        normal = np.cross(along[1], along[2]) if len(along) == 3 else along[1]
+        yield np.array([along[0] @ normal]), slopes
     else:
         for index in relation.members:
             axis = axes[index] if relation.line is None else axes[relation.line]
-            offset = axes[index].point / length - centre
+            offset = axes[index].point / length - np.asarray(centre)
             across = np.eye(3) if axis.along is None else _cross(axis.along)
             slopes = [(axes[index].joint, True, across), (-1, True, -across)]
             if axis.along is not None:
@@ -137,7 +136,8 @@ def _along(axis: Axis) -> Floats:
 
 def _cross(vector: Floats) -> Floats:
     """The matrix of a cross product with a vector from the left."""
-    return np.cross(np.eye(3), vector)
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _tilt(axis: Axis, vector: Floats) -> Floats:

@@ -91,11 +91,11 @@ def _moving(structure: Structure, allowed: Sequence[Rounding], kept: Kept) -> St
         return None
     for relations in (kept, []):
         moving = Moving(structure, threshold)
-        found = nearest_geometry(structure, allowed, relations, moving)
-        if found is not None and len(unclear_conditions(found[0])) < len(before):
-            elsewhere = walked(found[0], moving.rank, 1)
-            if np.abs(loop_errors_here(found[0], elsewhere)).max() <= OPEN:
-                return found[0]
+        found, _ = nearest_geometry(structure, allowed, relations, moving)
+        if len(unclear_conditions(found)) < len(before):
+            elsewhere = walked(found, moving.rank, 1)
+            if np.abs(loop_errors_here(found, elsewhere)).max() <= OPEN:
+                return found
     return None
 
 
