@@ -12,10 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 import pfabrik as pf
+from in_mujoco import Model
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import NoEndEffector, from_mjcf, from_urdf
-from rounded_files import LINKAGES, model_text
+from rounded_files import LINKAGES, model_text, planar_four_bar
 from test_interop_reading import ANKLE, FIVE_BAR, MIMIC, URDF, delta
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -185,3 +186,22 @@ def test_a_wide_gap_across_the_pin_is_no_pin() -> None:
     with pytest.raises(InvalidMechanism) as caught:
         from_urdf(PARALLELOGRAM.format(drives=DRIVEN), loop(height=0.9), end_effector="upper")
     assert "along the pin" not in str(caught.value) and "--within" not in str(caught.value)
+
+
+@pytest.mark.parametrize("by", [1e-5, 1e-4])
+def test_an_axis_that_leans_by_more_than_its_digits_moves_with_the_value_that_is_proposed(by: float) -> None:
+    linkage = planar_four_bar()
+    lean = linkage.hinges[1].axis + by * np.cross(linkage.hinges[1].axis, [0.3, 0.2, -0.9])
+    linkage.hinges[1] = linkage.hinges[1]._replace(axis=lean / np.linalg.norm(lean))
+    text, asked = model_text(linkage), {"base": "world", "end_effector": linkage.end_effector}
+    locked = from_mjcf(text, **asked)
+    assert pf.mobility(locked.mechanism).platform == 0
+    within = proposed("\n".join(map(str, locked.notes)))
+    assert 0.1 * by <= within <= 10.0 * by
+    moving = from_mjcf(text, within=within, **asked)
+    assert pf.mobility(moving.mechanism).platform == 1
+    straight = Model.of(model_text(planar_four_bar()))
+    straight.lead(linkage.drives, np.zeros(1))
+    straight.lead(linkage.drives, np.array([0.3]))
+    position, _ = straight.pose(linkage.end_effector)
+    assert np.linalg.norm(pf.solve_fk(moving.mechanism, [0.3]).pose[:3, 3] - position) <= 10.0 * by
