@@ -98,8 +98,8 @@ def choices_of(joints: Sequence[Joint], loops: Sequence[Loop], base: str, build:
     depth = {body: int(np.count_nonzero(path)) for body, path in tree.paths.items()}
     found = []
     for block in _blocks(tree):
-        inside = sorted({body for index in block for body in edges[index].bodies}, key=depth.__getitem__)
-        names = tuple(edges[index].joint.name for index in block if edges[index].joint.name in {x.name for x in loops})
+        inside = sorted(dict.fromkeys(body for index in block for body in edges[index].bodies), key=depth.__getitem__)
+        names = tuple(edges[index].joint.name for index in block if index >= len(joints))
         ends = sorted(inside[1:], key=lambda body: (-degrees[body], -depth[body]))
         found.append(_choice(inside[0], ends, [edges[index].joint for index in block], names, build))
     start = _start(edges, base, {index for block in _blocks(tree) for index in block})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +22,7 @@ from .names import unique
 from .notes import Note
 
 LoopType = Literal["spherical", "revolute", "fixed"]
-ROWS: dict[LoopType, int] = {"spherical": 3, "revolute": 5, "fixed": 6}
-"""Joint types that may close a loop, and the number of conditions of each."""
+"""Joint types that may close a loop."""
 
 CLOSING = re.compile(r"(closing_.+)_([12])")
 """The name of a frame that meets another: the loop's name, and which of its two sides it is."""
@@ -49,8 +48,8 @@ class Loop:
 
     def __post_init__(self) -> None:
         place = f"loop '{self.name}'"
-        if self.type not in ROWS:
-            raise InvalidArgument(f"{place}: type", repr(self.type), f"one of {', '.join(ROWS)}")
+        if self.type not in get_args(LoopType):
+            raise InvalidArgument(f"{place}: type", repr(self.type), f"one of {', '.join(get_args(LoopType))}")
         _set(self, "points", self.points, (2, 3), place)
         if self.type != "spherical":
             _set(self, "frames", self.frames, (2, 3, 3), place)
