@@ -145,15 +145,14 @@ def _tilt(axis: Axis, vector: Floats) -> Floats:
     return _cross(vector) @ _cross(_along(axis))
 
 
-def directions(axes: Sequence[Axis], slack: float) -> list[Relation]:
+def directions(axes: Sequence[Axis], slack: float, most: float = TOLERANCES.alignment) -> list[Relation]:
     """Axes that are parallel, and of these those along an axis of the base, square to others, or in a plane of slides.
-
-    A bundle turns onto an axis of the base, along which targets count, by no more than counts as parallel: so it is not
-    turned against what else its body carries.
 
     Parameters
     ----------
     slack : what two directions may differ by besides their roundings [rad].
+    most : turn [rad] by which axes are put along one of the base, along which targets count. By no more than counts as
+        parallel they are not turned against what else their bodies carry.
     """
     lists: list[list[int]] = []
     for index in sorted(range(len(axes)), key=lambda index: axes[index].rounding.angle):
@@ -167,7 +166,7 @@ def directions(axes: Sequence[Axis], slack: float) -> list[Relation]:
                 break
         else:
             lists.append([index])
-    bundles = [_bundle(axes, members, slack) for members in lists]
+    bundles = [_bundle(axes, members, slack, most) for members in lists]
     means = [_mean(axes, each) if each.along is None else each.along for each in bundles]
     square = []
     for one, other in combinations(range(len(bundles)), 2):
@@ -194,14 +193,14 @@ def _mean(axes: Sequence[Axis], bundle: Relation) -> Floats:
     return along[0] if len(along) == 1 else np.asarray(mean / np.linalg.norm(mean))
 
 
-def _bundle(axes: Sequence[Axis], members: list[int], slack: float) -> Relation:
+def _bundle(axes: Sequence[Axis], members: list[int], slack: float, most: float) -> Relation:
     """Parallel axes, and the axis of the base that they are along, if any."""
     angles = [axes[index].rounding.angle for index in members]
     bundle = Relation("parallel", tuple(members), max(angles))
     mean = _mean(axes, bundle)
     place = int(np.abs(mean).argmax())
     axis = np.sign(mean[place]) * np.eye(3)[place] + 0.0
-    is_along = np.linalg.norm(mean - axis) <= min(min(angles), TOLERANCES.alignment) + slack
+    is_along = np.linalg.norm(mean - axis) <= min(*angles, most) + slack
     return bundle._replace(along=axis if is_along else None)
 
 

@@ -59,14 +59,15 @@ def straighten(
     locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(given)
     roundings = _roundings(joints, known, size, locked)
     allowed = [Rounding(each.length + more * size, each.angle + more) for each in roundings]
-    kept: Kept = [(each, None) for each in directions(axes_of(joints, roundings), more)]
+    most = np.inf if opened.is_asked else TOLERANCES.alignment
+    kept: Kept = [(each, None) for each in directions(axes_of(joints, roundings), more, most)]
     exact, kept = nearest_geometry(given, allowed, kept)
     kept += meetings(axes_of(exact.joints, roundings), more * size)
     exact, kept = nearest_geometry(exact, [each._replace(angle=0.0) for each in allowed], kept)
     why = "as asked for" if opened.is_asked else "within the digits of the file"
     before, after = _severity(unclear), _severity(unclear_conditions(exact))
     if after < before or (after == before and has_roundings):
-        notes += _notes(given, exact, kept, size, f"{opened.length_unit}", why)
+        notes += _notes(given, exact, kept, size, opened.length_unit, why)
     else:
         exact, kept = given, []
     if not unclear_conditions(exact):
