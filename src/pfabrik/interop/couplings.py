@@ -163,8 +163,7 @@ def _ratios_of_loops(opened: OpenMechanism, leader: str, names: Sequence[str]) -
     step = OFF_HOME * rate_units(loops.tree)[at]
     low[at] = high[at] = step if step <= high[at] else max(-step, low[at])
     home = close_home(loops, np.ones(len(low), bool), low, high)
-    slopes = loops.linearised(home.q)[1]
-    _, sizes, directions = np.linalg.svd(slopes)
+    _, sizes, directions = np.linalg.svd(loops.slopes(home.q))
     motions = directions[(sizes > SAME_ROW * sizes.max(initial=0.0)).sum() :].T
     if home.gap > TOLERANCES.file_digits or not motions[at].any():
         return {}

@@ -15,7 +15,7 @@ from ..checks import require_names, require_positive
 from ..description.joint_types import KINDS
 from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
-from ..errors import PfabrikError, UnknownName, counted
+from ..errors import InvalidArgument, PfabrikError, UnknownName, counted
 from ..files.units import metres_of
 from ..motion.mobility import generic_of
 from .assembling import Imported, closed
