@@ -225,7 +225,7 @@ def _loop(number: int, entry: Mapping[str, Any], link_at: Mapping[str, str]) -> 
     axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
     name = str(entry.get("name", f"closure_{number + 1}"))
     kind = entry.get("type", "ball")
-    return LinkLoop(name, KINDS[kind], (one, other), points, axes, kind == "pin")
+    return LinkLoop(name, KINDS[kind], (one, other), points, axes, is_pin=kind == "pin")
 
 
 def _faults(number: int, entry: Mapping[str, Any], links: Iterable[str], link_of: Mapping[str, str]) -> Iterator[Fault]:
