@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,37 +33,62 @@ def array(
     what, note : the sentence says that `what` is expected, then the shape, then the note, a unit for example.
     holds : which values may be.
     """
-    shapes, shown = _shapes(shape)
-    expected = f"{what} of shape {shown}{note}"
+    shapes = _shapes(shape)
+    expected = f"{what} of shape {shapes[0].shown}{note}"
     found = as_floats(name, value, expected)
-    core = next((each for each in shapes if _fits(found.shape, each)), None)
-    if core is None:
+    for form in shapes:
+        if form.fits(found.shape):
+            break
+    else:
         raise InvalidArgument(name, f"shape {found.shape}", expected)
     good = holds(found)
     if not good.all():
         words = reprlib.repr(found.tolist()) if np.isfinite(found[~good]).all() else "a number that is not finite"
-        n_free = found.ndim - sum(each not in ("...", "n") for each in core)
-        bad = np.flatnonzero(~good.reshape(*found.shape[:n_free], -1).all(axis=-1))
-        raise InvalidArgument(name, words, expected, rows=bad[:5].tolist() if n_free else ())
+        batch = found.shape[: found.ndim - form.n_of_row]
+        bad = np.flatnonzero(~good.reshape(*batch, -1).all(axis=-1))
+        raise InvalidArgument(name, words, expected, rows=bad[:5].tolist() if batch else ())
     return found
 
 
+class _Shape(NamedTuple):
+    """A shape that an array may have.
+
+    Attributes
+    ----------
+    is_open : True if any axes may come before.
+    sizes : of its axes; None for those that are free.
+    n_of_row : number of axes that are not those of a batch.
+    shown : what a sentence says of it, and of others that may be too.
+    """
+
+    is_open: bool
+    sizes: tuple[int | None, ...]
+    n_of_row: int
+    shown: str
+
+    def fits(self, shape: tuple[int, ...]) -> bool:
+        """True if an array's shape is such a one."""
+        inner = shape[max(len(shape) - len(self.sizes), 0) :] if self.is_open else shape
+        if inner == self.sizes or len(inner) != len(self.sizes):
+            return inner == self.sizes
+        return all(known in (None, size) for size, known in zip(inner, self.sizes, strict=True))
+
+
 @cache
-def _shapes(text: str) -> tuple[list[tuple[str, ...]], str]:
-    """The shapes that a text stands for, and what a sentence says of them."""
-    shapes = [tuple(each.strip("() ").split()) for each in text.split("|")]
-    shown = (f"({', '.join(each)}{',' if len(each) == 1 and each != ('...',) else ''})" for each in shapes)
-    return shapes, " or ".join(shown)
-
-
-def _fits(found: tuple[int, ...], shape: tuple[str, ...]) -> bool:
-    """True if an array's shape is one that a text stands for."""
-    if shape[:1] == ("...",):
-        shape = shape[1:]
-        found = found[max(len(found) - len(shape), 0) :]
-    return len(found) == len(shape) and all(
-        size == int(each) for size, each in zip(found, shape, strict=True) if each.isdigit()
-    )
+def _shapes(text: str) -> list[_Shape]:
+    """The shapes that a text stands for."""
+    words = [each.strip("() ").split() for each in text.split("|")]
+    shown = (f"({', '.join(each)}{',' if len(each) == 1 and each != ['...'] else ''})" for each in words)
+    sentence = " or ".join(shown)
+    return [
+        _Shape(
+            each[:1] == ["..."],
+            tuple(int(size) if size.isdigit() else None for size in each if size != "..."),
+            sum(size not in ("...", "n") for size in each),
+            sentence,
+        )
+        for each in words
+    ]
 
 
 def as_floats(name: str, value: Any, expected: str) -> Floats:
