@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from pfabrik.arguments import array, is_positive
 from pfabrik.checks import put_limits, require_finite, require_names, require_path, require_positive
 from pfabrik.errors import InvalidArgument, PfabrikError, UnknownName
 
@@ -48,6 +49,34 @@ def test_what_are_no_names_is_refused_by_name(value: Any) -> None:
     assert require_names("over", np.array(["a", "b"])) == require_names("over", iter("ab")) == ("a", "b")
     with pytest.raises(InvalidArgument, match=r"over: found .*; expected a list of names"):
         require_names("over", value)
+
+
+@pytest.mark.parametrize(("shape", "fits", "others"), [
+    ("... 3", [(3,), (2, 3), (0, 4, 3)], [(), (2,), (3, 2)]),
+    ("n 3 | 3", [(3,), (5, 3)], [(), (2, 5, 3), (3, 5)]),
+    ("() | 6", [(), (6,)], [(1,), (6, 1)]),
+    ("2 n", [(2, 0), (2, 7)], [(3, 2), (2,)]),
+    ("...", [(), (2, 3)], []),
+])  # fmt: skip
+def test_arrays_are_of_the_shape_that_is_asked_for(shape: str, fits: list[Any], others: list[Any]) -> None:
+    for each in fits:
+        assert array("x", np.ones(each, int), shape).shape == each
+    for each in others:
+        with pytest.raises(InvalidArgument) as caught:
+            array("x", np.ones(each), shape, "lengths", " [mm]")
+        assert caught.value.found == f"shape {each}" and caught.value.expected.startswith("lengths of shape (")
+        assert caught.value.expected.endswith(" [mm]")
+
+
+def test_values_that_may_not_be_are_told_by_their_rows() -> None:
+    values = np.ones((2, 3, 4))
+    values[0, 2, 1] = values[1, 1, 3] = np.nan
+    with pytest.raises(InvalidArgument, match="a number that is not finite") as caught:
+        array("x", values, "... 4")
+    assert caught.value.rows == (2, 4)
+    with pytest.raises(InvalidArgument, match=r"x: found \[1.0, 0.0\]; expected positive") as caught:
+        array("x", [1, 0], "2", "positive numbers", holds=is_positive)
+    assert caught.value.rows == ()
 
 
 ARRAY = np.zeros((0, 3))

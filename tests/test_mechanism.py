@@ -464,6 +464,10 @@ class TestFaults:
         else:
             assert "parallel" in faults_of(joints, "platform", reference_point=(0, 0, 150))["joint[0].axes"]
 
+    def test_what_only_follows_from_a_fault_is_not_reported_beside_it(self):
+        cone = Cone((0, 0, 0), 4, "x")
+        assert list(faults_of(changed(five_bar(), "a", cone=cone))) == ["joint[0].cone"]
+
     def test_all_faults_come_in_one_go_and_in_the_order_of_the_description(self):
         joints = changed(five_bar(), "a", at=None)
         joints = changed(joints, "b", type="revolve", axis=(0, 0, 0))
