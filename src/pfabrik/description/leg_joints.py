@@ -37,34 +37,26 @@ class LegJoint:
     places: Mapping[str, str]
 
 
-OF_LEGS = (
-    form("chain", chain_faults),
-    wrong("name", lambda v, _: not isinstance(v, str), "a text"),
-    wrong("connects?", lambda v, _: not is_pair_of_names(v), "the names of two bodies"),
-)
-
-
 class LegMaker:
     """Makes the joints of one description of legs, and notes its faults."""
 
     def __init__(self, leg: Leg, place: str, ends: tuple[str, str], faults: list[Fault]) -> None:
         self.leg, self.place, self.ends, self.faults = leg, place, ends, faults
         self.steps = read_chain(leg.chain)
-        faults += faults_by(OF_LEGS, place, leg)
+        self.slides = [step.letter for step in self.steps if not step.centred]
+        self.ranges = ", ".join(f"{letter}.range" for letter in self.slides)
+        self.said = self._said()
+        faults += faults_by(OF_LEGS, place, leg, self)
         self.points = leg_points(leg, self.steps, place, faults)
         self.legs = len(self.points[0]) if self.points else 1
         copies = None if leg.copies is None else read_copies(f"{place}.copies", leg.copies, faults)
         self.turns, self.about = copies or (1, PLACEHOLDER)
         self.count = self.legs * self.turns if self.steps else 0
         self.centres = dict(zip((step.letter for step in self.steps if step.centred), self.points, strict=True))
-        self.said = self._said()
-        self.ranges = self._ranges()
 
     def joints(self, number: int) -> Iterator[LegJoint]:
         """The joints of all legs, of which the first has this number."""
         patterns = [self._pattern(index) for index in range(len(self.steps))]
-        if self.leg.axis is not None and self.steps and not any(map(self._takes_axis, range(len(self.steps)))):
-            self.faults.append(Fault(f"{self.place}.axis", shown(self.leg.axis), "nothing: no joint needs it"))
         for turn in range(self.turns):
             for leg in range(self.legs):
                 for index, pattern in enumerate(patterns):
@@ -102,33 +94,14 @@ class LegMaker:
             elif actuated in (False, (False, False)):
                 yield Fault(where, shown(actuated), f"what is driven: '{self.leg.chain}' has a `*` behind the joint")
 
-    def _ranges(self) -> dict[str, tuple[Any, str]]:
-        """The range of each joint that has one, and where it is said."""
-        ranges = {
-            letter: (values["range"], f"{self.place}.{letter}.range")
-            for letter, values in self.said.items()
-            if values.get("range") is not None
-        }
-        if self.leg.stroke is None or not self.steps:
-            return ranges
-        place = f"{self.place}.stroke"
-        slides = [step.letter for step in self.steps if not step.centred]
-        if len(slides) != 1:
-            several = f"the ranges of single joints: {', '.join(f'{letter}.range' for letter in slides)}"
-            expected = several if slides else f"nothing: no joint of '{self.leg.chain}' is prismatic"
-            self.faults.append(Fault(place, shown(self.leg.stroke), expected))
-        elif slides[0] in ranges:
-            self.faults.append(Fault(place, f"both `stroke` and `{slides[0]}.range`", "one of them"))
-        else:
-            ranges[slides[0]] = (self.leg.stroke, place)
-        return ranges
-
     def _pattern(self, index: int) -> list[LegJoint]:
         """The joint at one place in the chain, once for each leg, with names that have no number yet."""
         step = self.steps[index]
         said = self.said.get(step.letter, {})
         bodies = self._bodies(index)
-        limits, limits_place = self.ranges.get(step.letter, (None, ""))
+        limits, limits_place = said.get("range"), f"{self.place}.{step.letter}.range"
+        if limits is None and self.slides == [step.letter]:
+            limits, limits_place = self.leg.stroke, f"{self.place}.stroke"
         places = dict.fromkeys(("type", "actuated", "connects"), f"{self.place}.chain")
         places |= {"name": f"{self.place}.name", "range": limits_place}
         if said.get("actuated") is not None:
@@ -174,7 +147,7 @@ class LegMaker:
         around = self.steps[index - 1 : index] + self.steps[index + 1 : index + 2]
         return not self.steps[index].centred and own_axis is None and [each.centred for each in around] == [True, True]
 
-    def _takes_axis(self, index: int) -> bool:
+    def takes_axis(self, index: int) -> bool:
         """True if the leg's own `axis` holds for the joint."""
         step = self.steps[index]
         one = step.type in ("revolute", "prismatic", "cylindrical")
@@ -193,7 +166,7 @@ class LegMaker:
                 each["along"] = (self.steps[index - 1].letter, self.steps[index + 1].letter)
             return
         axis, place = said.get("axis"), f"{self.place}.{step.letter}.axis"
-        if self._takes_axis(index):
+        if self.takes_axis(index):
             if self.leg.axis is None:
                 self.faults.append(Fault(place, f"nothing, for a {step.type} joint", EXPECTED))
                 axis = PLACEHOLDER
@@ -259,6 +232,21 @@ class LegMaker:
             cone = dataclasses.replace(cone, fixed_to=fixed_to)
         changed = dataclasses.replace(joint, name=name(joint.name), connects=(first, second), along=along, cone=cone)
         return dataclasses.replace(part, joint=changed, leg=number)
+
+
+OF_LEGS = (
+    form("chain", chain_faults),
+    wrong("name", lambda v, *_: not isinstance(v, str), "a text"),
+    wrong("connects?", lambda v, *_: not is_pair_of_names(v), "the names of two bodies"),
+    wrong("axis?", lambda v, _, maker: maker.steps and not any(map(maker.takes_axis, range(len(maker.steps)))),
+          "nothing: no joint needs it"),
+    wrong("stroke?", lambda v, _, maker: maker.steps and not maker.slides,
+          "nothing: no joint of '{0.chain}' is prismatic"),
+    wrong("stroke?", lambda v, _, maker: len(maker.slides) > 1, "the ranges of single joints: {1.ranges}"),
+    wrong("stroke?", lambda v, _, maker: maker.slides and maker.said.get(maker.slides[0], {}).get("range") is not None
+          and f"both `stroke` and `{maker.ranges}`", "one of them"),
+)  # fmt: skip
+"""Of legs, and of what makes their joints."""
 
 
 def _line(start: Vector | None, end: Vector | None) -> Vector:
