@@ -377,7 +377,7 @@ def test_actuators_that_do_not_determine_the_joints_are_refused() -> None:
         (lambda: ankle().armature([0.0, 0.0], -1.0), InvalidArgument, "not negative"),
         (lambda: ankle().torques_to_joints([0.0, 0.0], [1.0]), InvalidArgument, "left_motor_joint, right_motor_joint"),
         (lambda: ankle().torques_to_joints(np.zeros((3, 2)), np.zeros((4, 2))), InvalidArgument, "shapes that agree"),
-        (lambda: ankle().sample(0), InvalidArgument, "at least 1"),
+        (lambda: ankle().sample(0), InvalidArgument, "from 1 to"),
         (lambda: ankle().hull([[0.0, 0.0], [0.0, 1.0]]), InvalidArgument, "without an extent"),
     ],
     ids=range(9),
