@@ -1221,7 +1221,7 @@ def test_standard_output_that_is_a_file_is_not_written_twice(tmp_path: Path) -> 
         (["ik", "stewart", *WITHIN_REACH, "--hold", "both"], "orientation"),
         (["ik", "stewart", *WITHIN_REACH, "--all", "--margins"], "--margins is of one answer"),
         (["ik", "stewart", *WITHIN_REACH, "--all", "--force", "0", "0", "1"], "--force and --moment are of one answer"),
-        (["ik", "stewart", *WITHIN_REACH, "--force", "0", "0", "nan"], "numbers that are not finite"),
+        (["ik", "stewart", *WITHIN_REACH, "--force", "0", "0", "nan"], "a number that is not finite"),
         (["ik", "five_bar", "--position", "0", "0", "190", "--moment", "0", "0", "1"], "the end effector is a joint"),
         (["ik", "ankle_ups", "--joint", "pivot"], "found 'pivot'; expected NAME=VALUE"),
         (["ik", "ankle_ups", "--joint", "pivot=5,nan"], "expected NAME=VALUE[,VALUE...] with finite numbers"),
