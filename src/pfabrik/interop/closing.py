@@ -165,7 +165,7 @@ def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> Close
     Parameters
     ----------
     free : the coordinates that may move, (c,); the others stay at home.
-    low, high : bounds of the coordinates as deviations from home, (c,) [rad or length].
+    low, high : bounds of the coordinates as deviations from home, (c,) [rad or length]; equal ones hold a coordinate.
     """
     home = np.where(free, np.clip(0.0, low, high), 0.0)
     if not loops.loops:
@@ -174,7 +174,7 @@ def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> Close
     rng, units = np.random.default_rng(0), rate_units(loops.tree)
     strays = rng.uniform(-STRAY, STRAY, (STARTS, len(home))) * units
     has_limits = bool(np.isfinite([low, high]).any())
-    locked = frozenset([*np.flatnonzero(~free).tolist(), *bridges])
+    locked = frozenset([*np.flatnonzero(~free | (low == high)).tolist(), *bridges])
     best = ClosedHome(home, np.inf)
     for starts in (home[None], np.where(free, np.clip(home + strays, low, high), home)):
         coordinates = np.zeros((len(starts), len(closure.scale)))
