@@ -50,6 +50,10 @@ FILES = {
     "open chain.urdf": (MIMIC.replace("mimic", "x"), None),
     "driven.urdf": (PARALLELOGRAM.format(drives=DRIVEN), loop()),
     "undriven.urdf": (PARALLELOGRAM.format(drives=""), loop()),
+    "undriven, closed by a hinge.urdf": (
+        PARALLELOGRAM.format(drives=""),
+        loop(type="hinge", axis=[[0, 1, 0], [0, 1, 0]]),
+    ),
     "bare.urdf": (URDF, None),
 }
 

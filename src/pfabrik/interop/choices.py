@@ -101,7 +101,8 @@ def choices_of(joints: Sequence[Joint], loops: Sequence[Loop], base: str, build:
         inside = sorted(dict.fromkeys(body for index in block for body in edges[index].bodies), key=depth.__getitem__)
         names = tuple(edges[index].joint.name for index in block if index >= len(joints))
         ends = sorted(inside[1:], key=lambda body: (-degrees[body], -depth[body]))
-        found.append(_choice(inside[0], ends, [edges[index].joint for index in block], names, build))
+        drivable = [edges[index].joint for index in block if index < len(joints)]
+        found.append(_choice(inside[0], ends, drivable, names, build))
     start = _start(edges, base, {index for block in _blocks(tree) for index in block})
     ends = [each.end_effector for each in found if each.end_effector and each.base != start]
     ends += [body for body in tree.paths if degrees[body] == 1 and body not in (base, start)]
