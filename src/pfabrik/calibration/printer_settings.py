@@ -13,10 +13,10 @@ from ..arrays import Floats
 from ..checks import require_path
 from ..description.mechanism import Mechanism
 from ..errors import InvalidMechanism
-from ..files import text_of
 from ..files.printers.deltas import TOWERS, fault
 from ..files.printers.klipper import KlipperSettings, delta_of
 from ..files.reading import read_mechanism
+from ..files.texts import text_of
 from .measurements import Measurements
 
 BASIC = ("delta_radius", "angle_a", "angle_b", *(f"position_endstop_{letter}" for letter in TOWERS))

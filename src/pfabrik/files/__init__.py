@@ -10,16 +10,14 @@ from typing import Any
 from ..catalog import catalog, catalog_file
 from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import Fault, InvalidArgument, InvalidMechanism, UnknownName
+from ..errors import InvalidArgument, InvalidMechanism, UnknownName
 from ..whole_files import whole_path
 from .printers import printer_table
 from .reading import read_mechanism
+from .texts import LARGEST_FILE, refuse_large, text_of, unusable
 from .writing import dumps
 
 __all__ = ["LARGEST_FILE", "dumps", "load", "loads", "save"]
-
-LARGEST_FILE = 1_000_000
-"""Largest file read [bytes]: a hundred times any machine, and quickly refused when it is something else."""
 
 MOST_DOTS = 200
 """Most dots in one line: no line needs more than a few, and a key of many parts takes the parser quadratic time."""
@@ -81,21 +79,6 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
         part.write_bytes(dumps(mechanism, Path(path).parent).encode())
 
 
-def text_of(path: Path) -> str:
-    """The text of a file that could be a mechanism file; a fault when it cannot be one."""
-    if not path.is_file():
-        raise _unusable("a directory or device", "a mechanism file")
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-        _refuse_large(content)
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise _unusable(f"no UTF-8 text at byte {error.start}", "a text file in UTF-8") from None
-    except OSError as error:
-        raise _unusable(f"a file that cannot be read ({error.strerror})", "a readable file") from None
-
-
 FORMATS = {
     "<mujoco": "a MuJoCo model (MJCF)",
     "<robot": "a robot description (URDF)",
@@ -107,11 +90,11 @@ FORMATS = {
 
 def _parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
     """The table of a text in TOML, or of the settings of a printer, with the folder of files that these include."""
-    _refuse_large(text)
+    refuse_large(text)
     if text.lstrip().startswith("<"):
         form = next(name for tag, name in FORMATS.items() if tag in text)
         hint = ", or `pfabrik import` to make one of it" if form != FORMATS["<"] else ""
-        raise _unusable(form, f"a mechanism file (TOML), as `pfabrik new` writes{hint}")
+        raise unusable(form, f"a mechanism file (TOML), as `pfabrik new` writes{hint}")
     try:
         if max((line.count(".") for line in text.split("\n") if not line.startswith("#")), default=0) > MOST_DOTS:
             raise RecursionError
@@ -123,14 +106,5 @@ def _parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
         if table is not None:
             return table
         if isinstance(error, RecursionError):
-            raise _unusable("values nested too deeply", "tables and lists a few levels deep") from None
-        raise _unusable(f"no TOML: {error}", "TOML") from None
-
-
-def _refuse_large(content: str | bytes) -> None:
-    if len(content) > LARGEST_FILE:
-        raise _unusable(f"more than {LARGEST_FILE} bytes", f"at most {LARGEST_FILE}")
-
-
-def _unusable(found: str, expected: str) -> InvalidMechanism:
-    return InvalidMechanism([Fault("file", found, expected)])
+            raise unusable("values nested too deeply", "tables and lists a few levels deep") from None
+        raise unusable(f"no TOML: {error}", "TOML") from None

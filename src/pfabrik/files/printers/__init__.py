@@ -14,7 +14,7 @@ from .marlin import marlin_table
 _READERS: tuple[tuple[str, Callable[[str, Path | None], dict[str, Any]]], ...] = (
     (r"^\[(printer|stepper_\w+)\]", klipper_table),
     (r"^[ \t]*#define[ \t]+[A-Z]", marlin_table),
-    (r"^[^;\n]*\bM(665|666|669)\b", m_codes_table),
+    (r"^[^;\n]*\bM(665|666|669)\b|^[ \t]*[GM]\d+\b", m_codes_table),
 )
 """Beginnings of lines by which a firmware's file is recognised, and what reads it."""
 

@@ -47,6 +47,7 @@ def linear_delta(radius: float, towers: Three, lowest: float = 0.0, *, from_ends
     joints: list[Table] = []
     for k, letter in enumerate(TOWERS):
         dimensions |= {f"{name}_{letter}": float(values[k]) for name, values in towers.items()}
+        _require_rail(radius, letter, {name: values[k] for name, values in towers.items()}, lowest)
         out = f"(delta_radius + radius_trim_{letter})" if "radius_trim" in towers else "delta_radius"
         height, stop = f"height_{letter}", f"position_endstop_{letter}"
         dimensions[height] = f"sqrt(arm_length_{letter}**2 - {out}**2)"
@@ -78,9 +79,12 @@ def rotary_delta(radius: float, arms: Three) -> Table:
     for k, letter in enumerate(TOWERS):
         dimensions |= {f"{name}_{letter}": float(values[k]) for name, values in arms.items() if name != shared}
         height = shared or f"shoulder_height_{letter}"
+        arm = {name: values[k] for name, values in arms.items()}
+        if "position_endstop" in arms:
+            _require_reach(radius, f"position_endstop of arm {letter}", arm, arm["position_endstop"])
+        _require_reach(radius, f"nozzle's height with arm {letter} at home", arm, dimensions["home_height"])
         dimensions |= _arm_angle(letter, "home", height, "home_height")
         if "position_endstop" in arms:
-            _require_reach(radius, letter, {name: values[k] for name, values in arms.items()})
             dimensions |= _arm_angle(letter, "highest", height, f"position_endstop_{letter}")
         angle, upper, raised = f"angle_{letter}", f"upper_arm_length_{letter}", f"home_{letter}"
         out = "(shoulder_radius + platform_radius)"
@@ -96,12 +100,23 @@ def rotary_delta(radius: float, arms: Three) -> Table:
     return _machine("Rotary delta printer", dimensions, joints, "home_height")
 
 
-def _require_reach(radius: float, letter: str, arm: Mapping[str, float]) -> None:
-    upper, lower, top = (arm[name] for name in ("upper_arm_length", "lower_arm_length", "position_endstop"))
-    far = math.hypot(radius, arm["shoulder_height"] - top)
+def _require_rail(radius: float, letter: str, tower: Mapping[str, float], lowest: float) -> None:
+    out, arm = radius + tower.get("radius_trim", 0.0), tower["arm_length"]
+    if not 0.0 < out < arm:
+        raise fault(f"tower {letter}", f"rods of {arm:g} at a radius of {out:g}", "a radius above 0, and longer rods")
+    height = math.sqrt(arm - out) * math.sqrt(arm + out)
+    top = height + tower["position_endstop"]
+    if not lowest <= height <= top:
+        found = f"a carriage from {lowest:g} to {top:g}, and at {height:g} with the nozzle on the bed"
+        raise fault(f"tower {letter}", found, "an endstop above, and a lowest z below")
+
+
+def _require_reach(radius: float, place: str, arm: Mapping[str, float], nozzle: float) -> None:
+    upper, lower = arm["upper_arm_length"], arm["lower_arm_length"]
+    far = math.hypot(radius, arm["shoulder_height"] - nozzle)
     if not abs(upper - lower) < far < upper + lower:
-        found = f"{top:g}, {far:g} from the shoulder of arms {upper:g} and {lower:g}"
-        raise fault(f"position_endstop of arm {letter}", found, "a height where the arms reach the middle")
+        found = f"{nozzle:g}, {far:g} from the shoulder of arms {upper:g} and {lower:g}"
+        raise fault(place, found, "a height where the arms reach the middle")
 
 
 def _drawn(radius: float) -> Table:

@@ -6,15 +6,18 @@ import configparser
 import math
 import os
 import re
+from collections.abc import Iterator
 from glob import glob
 from pathlib import Path
 
+from ...errors import InvalidMechanism
+from ..texts import text_of
 from .deltas import LOOPLESS, TOWERS, Table, fault, linear_delta, rotary_delta
 
 _INCLUDE = re.compile(r"^\[include +([^\]]+)\]", re.MULTILINE)
 
-_DEEPEST = 10
-"""Files that include one another, at most."""
+_MOST_FILES = 100
+"""Files that are included, at most."""
 
 
 class KlipperSettings:
@@ -28,7 +31,8 @@ class KlipperSettings:
         saved = "\n".join(["", *(line[3:].removeprefix(" ") for line in lines if line.startswith("#*#"))])
         saved = saved[saved.find("\n[") :] if "\n[" in saved else ""
         self._sections = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"))
-        for part in (saved, _included("\n".join(line for line in lines if not line.startswith("#*#")), folder, 0)):
+        above = "\n".join(line for line in lines if not line.startswith("#*#"))
+        for part in (saved, _included(above, folder, iter(range(_MOST_FILES)))):
             try:
                 self._sections.read_string("\n".join(line.partition("#")[0] for line in part.splitlines()))
             except configparser.Error as error:
@@ -61,22 +65,24 @@ class KlipperSettings:
         return values
 
 
-def _included(text: str, folder: Path | None, depth: int) -> str:
-    """A text with the files that it includes in their places."""
+def _included(text: str, folder: Path | None, read: Iterator[int]) -> str:
+    """A text with the files that it includes in their places, each of which takes one of those that may be read."""
 
     def content(match: re.Match[str]) -> str:
         pattern = match[1].strip()
-        try:
-            files = map(Path, sorted(glob(os.path.join(folder or "", pattern))))
-            texts = [_included(file.read_text(encoding="utf-8"), file.parent, depth + 1) for file in files]
-        except (OSError, ValueError) as error:
-            raise fault(f"[include {pattern}]", f"a file that cannot be read ({error})", "settings") from None
+        texts = []
+        for file in map(Path, sorted(glob(os.path.join(folder or "", pattern)))):
+            if next(read, None) is None:
+                raise fault("[include]", f"more than {_MOST_FILES} files", "files that do not include themselves")
+            try:
+                text = text_of(file)
+            except InvalidMechanism as error:
+                raise fault(f"[include {pattern}]", error.faults[0].found, "settings of Klipper") from None
+            texts.append(_included(text, file.parent, read))
         if not texts and not re.search(r"[*?\[]", pattern):
             raise fault(f"[include {pattern}]", "no such file", "settings of Klipper beside this file")
         return "\n".join(texts)
 
-    if depth > _DEEPEST:
-        raise fault("[include]", f"more than {_DEEPEST} files within one another", "files that end")
     return _INCLUDE.sub(content, text)
 
 

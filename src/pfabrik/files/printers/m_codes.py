@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from ..texts import text_of
 from .deltas import LOOPLESS, Table, fault, linear_delta, rotary_delta
 from .marlin import ANGLES, marlin_delta
 
@@ -31,7 +32,7 @@ def m_codes_table(text: str, folder: Path | None) -> Table:
     """The machine of a file with M665, M666 and M669; of Marlin's, if M665 has words that are Marlin's alone."""
     override = (folder or Path()) / _OVERRIDE
     if re.search(r"^\s*M501\b", text, re.MULTILINE) and folder is not None and override.is_file():
-        text = f"{text}\n{override.read_text(encoding='utf-8', errors='replace')}"
+        text = f"{text}\n{text_of(override)}"
     codes = list(_codes(text))
     if any(code == 665 and words.keys() & set("SAC") for code, words in codes):
         return _marlin(codes)
@@ -103,7 +104,7 @@ def _reprap(codes: list[tuple[int, Words]]) -> Table:
 
 def _rotary(said: Words, angles: list[float], adjustments: list[float]) -> Table:
     upper, lower, heights = (_three(f"M669 {letter}", said[letter]) for letter in "ULH")
-    if len(said["A"]) != 2:
+    if len(said["A"]) != 2 or said["A"][0] >= said["A"][1]:
         raise fault("M669 A", ":".join(map(str, said["A"])), "the least and the largest angle, such as A-45:45")
     arms = {"angle": angles, "upper_arm_length": upper, "lower_arm_length": lower, "shoulder_height": heights}
     ends = {"lowest": said["A"][:1] * 3, "highest": [said["A"][1] + adjustment for adjustment in adjustments]}
