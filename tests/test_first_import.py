@@ -97,6 +97,19 @@ def test_what_moves_a_body_and_in_how_many_freedoms_is_counted() -> None:
     assert (foot.freedoms, foot.undriven, foot.actuators) == (2, 1, ("motor_left",))
 
 
+def test_what_moves_the_bodies_of_a_chain_of_a_hundred_joints_is_listed_at_once() -> None:
+    links = "".join(f'<link name="l{k}"/>' for k in range(101))
+    hinge = (
+        '<joint name="j{0}" type="continuous"><parent link="l{0}"/><child link="l{1}"/><axis xyz="0 0 1"/>{2}</joint>'
+    )
+    joints = "".join(hinge.format(k, k + 1, '<origin xyz="1 0 0"/>') for k in range(100))
+    with pytest.raises(NoEndEffector) as caught:
+        from_urdf(f'<robot name="chain">{links}{joints}</robot>')  # minutes, were bodies counted one by one
+    (whole,) = caught.value.choices
+    (end,) = whole.moved
+    assert (end.body, end.freedoms, len(end.actuators)) == ("l100", 3, 100)
+
+
 RODS = """<robot name="rods"><link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="top"/>
   <joint name="A" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>
   <joint name="B" type="continuous"><parent link="base"/><child link="b"/><origin xyz=".03 0 0"/>

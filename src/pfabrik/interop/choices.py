@@ -177,24 +177,27 @@ def moved_bodies(mechanism: Mechanism) -> Iterator[Moved]:
     An actuator moves a body that has more freedoms while this actuator moves and the others rest than with all at rest.
     """
     motions, screws = _motions(mechanism)
-    driven, owners = actuated_columns(mechanism), column_joints(mechanism)
-
-    def freedoms(twist: Floats, resting: Sequence[int]) -> int:
-        return _rank(twist @ motions @ _null_space(motions[resting]))
-
+    drives, owners = motions[actuated_columns(mechanism)], column_joints(mechanism)
+    resting, alone = _null_space(drives), np.linalg.pinv(drives, TOLERANCES.alignment)
+    moves = np.diag(drives @ alone) > 1.0 - TOLERANCES.alignment  # else it rests where the others do
+    alone = np.divide(alone, np.linalg.norm(alone, axis=0), where=moves, out=np.zeros_like(alone))
     for body, path in tree_of(mechanism).paths.items():
-        twist = body_twist(path[owners], screws)
-        alone = [freedoms(twist, [other for other in driven if other != column]) for column in driven]
-        resting = freedoms(twist, driven)
-        by = [name for name, count in zip(mechanism.actuator_names, alone, strict=True) if count > resting]
-        yield Moved(body, freedoms(twist, []), resting, tuple(by))
+        twist = body_twist(path[owners], screws) @ motions
+        at_rest, by_one = twist @ resting, (twist @ alone).T[:, :, None]
+        undriven = _rank(at_rest)
+        counts = [_rank(np.hstack([at_rest, one])) for one in by_one]
+        by = [name for name, count in zip(mechanism.actuator_names, counts, strict=True) if count > undriven]
+        yield Moved(body, _rank(twist), undriven, tuple(by))
 
 
 def _motions(mechanism: Mechanism) -> tuple[Floats, Floats]:
-    """Independent motions (c, k) of all joints at a generic configuration, and the screws (c, 6) there."""
+    """Independent motions (c, k) of all joints at a generic configuration, and the screws (c, 6) there.
+
+    Of configurations that are as good, home comes last: a chain that is straight has fewer freedoms.
+    """
     q = around_home(mechanism)
     closure, _ = first_order(mechanism, q)
-    place = max(range(len(q)), key=lambda row: _rank(closure[row]))
+    place = max(reversed(range(len(q))), key=lambda row: _rank(closure[row]))
     return _null_space(closure[place]), present_screws(mechanism, q)[place]
 
 
