@@ -330,6 +330,20 @@ def test_a_description_in_millimetres_is_asked_for_its_unit() -> None:
     assert "up to 200 m away: a description has metres" in notes_of(from_urdf(far, end_effector="rocker"))
 
 
+def test_drives_that_no_joint_has_and_loops_that_hold_nothing_are_noted() -> None:
+    drives = (
+        '<transmission name="t"><joint name="A"/></transmission><transmission name="u"><joint name="a"/></transmission>'
+    )
+    mistaken = CLOSED.replace("</robot>", f"{drives}</robot>")
+    assert "what the description drives, but no joint of the robot: a" in notes_of(
+        from_urdf(mistaken, end_effector="rocker")
+    )
+    within = {"name": "E", "type": "ball", "links": ["crank", "crank"], "at": [[0, 0, 0], [0, 0, 0]]}
+    assert "loops between bodies that are fixed to each other are left out: E" in notes_of(
+        from_urdf(mistaken, {"loops": [within]}, end_effector="rocker")
+    )
+
+
 def test_an_end_effector_that_is_fixed_to_the_base_is_refused() -> None:
     with pytest.raises(InvalidArgument, match="'rocker', which is fixed to 'ground'"):
         from_urdf(CLOSED.replace('name="D" type="continuous"', 'name="D" type="fixed"'), end_effector="rocker")

@@ -118,6 +118,9 @@ def _between(
     if tip != base and merged_bodies(robot.joints, base)[1].get(tip) == base:
         raise InvalidArgument("end_effector", f"'{tip}', which is fixed to '{base}'", "a body that moves")
     rigid = _with_merged_bodies(robot, base, tip)
+    moving = {loop.name for loop in rigid.loops}
+    if still := tuple(loop.name for loop in robot.loops if loop.name not in moving):
+        notes.append(Note("loops between bodies that are fixed to each other are left out", still))
     if point is not None:
         rigid = _without_joint_named(tip, rigid, notes)
     if task is None and (base, end_effector) == (robot.base, robot.end_effector):

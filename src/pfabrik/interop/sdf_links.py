@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from heapq import heappop, heappush
 from xml.etree import ElementTree as ET
@@ -179,7 +179,7 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     free = next((link for link in links if link not in children), (links or [WORLD])[0])
     base = WORLD if touching[WORLD] else free
     frames = {link: poses[link] for link in (base, *links)}
-    driven = _driven(model, joints)
+    driven = _driven(model)
     begun = [each.get("name", "") for each in model.findall("joint") if number(each, "axis/initial_position")]
     if begun:
         notes.append(Note("initial positions are left out, of", tuple(begun)))
@@ -266,11 +266,11 @@ def _number(element: ET.Element, path: str, default: float, place: str) -> float
     return value
 
 
-def _driven(model: ET.Element, joints: Sequence[UrdfJoint]) -> list[str]:
+def _driven(model: ET.Element) -> list[str]:
     """The joints that plugins name, which drive them, but for those that publish where joints are."""
     plugins = [each for each in model.findall("plugin") if "publisher" not in each.get("name", "").lower()]
     named = [(each.text or "").strip() for plugin in plugins for each in plugin.iter("joint_name")]
-    return [name for name in dict.fromkeys(named) if name in {joint.name for joint in joints}]
+    return [*dict.fromkeys(named)]
 
 
 def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:

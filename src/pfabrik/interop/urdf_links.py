@@ -95,7 +95,7 @@ class UrdfLinks:
     frames : link -> its frame at zero in base coordinates, (4, 4) [m].
     roundings : link -> how exactly the digits of the file place it [m, rad].
     joint_roundings : joint -> the same.
-    driven : names of the joints that the file says are driven.
+    driven : names that the file says are driven, of joints unless it is mistaken.
     loops : those of joints whose child hangs on another joint too.
     frame_joints : joint -> the link whose frame it is, where joints are such frames.
     """
@@ -190,7 +190,7 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
         frames,
         of_links,
         of_joints,
-        [name for name in dict.fromkeys(driven) if name in written],
+        [*dict.fromkeys(driven)],
         frame_joints={joint.name: joint.child for joint in outward},
     )
     return tree.closed_by([(joint, HERE) for joint in second], asked)

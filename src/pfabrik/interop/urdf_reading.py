@@ -168,9 +168,12 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
     """The links as a robot, with its loops."""
     joints = [part for joint in links.joints for part in _parts(joint, links, notes)]
     names = [joint.name for joint in links.joints]
-    unknown = tuple(name for name in (*loops_file.retyped, *loops_file.actuated) if name not in names)
-    if unknown:
-        notes.append(Note("told of in the loops, but no joint of the robot", unknown))
+    for where, said in (
+        ("told of in the loops", [*loops_file.retyped, *loops_file.actuated]),
+        ("what the description drives", links.driven),
+    ):
+        if unknown := tuple(name for name in said if name not in {*names, *(loop.name for loop in links.loops)}):
+            notes.append(Note(f"{where}, but no joint of the robot", unknown))
     loops = placed_loops(link_loops, links.frames)
     places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()}
     frames = {joint: places[link] for joint, link in links.frame_joints.items()} | places
