@@ -370,6 +370,7 @@ G92 E0
 G1 Z5 F9000
 G1 X10 Y0 F3000 E0.1
 G1 E-2 F2400
+EXCLUDE_OBJECT_DEFINE NAME=part_0 CENTER=1.5,-2 POLYGON=[[0,0],[3,-1.5],[1.5,2]]
 EXCLUDE_OBJECT_START NAME=part_0
 G2 X0 Y10 I-10 J0 E0.3
 PAUSE
@@ -382,7 +383,12 @@ def test_what_slicers_write_passes_and_is_named(tmp_path: Path) -> None:
     path, bare = read(tmp_path, SLICED, name="part.gcode"), read(tmp_path, moves, name="bare.gcode")
     np.testing.assert_array_equal(path.targets, bare.targets)
     lines = {"START_PRINT": 3, "G29": 5, "G34": 6, "M420": 7, "SET_VELOCITY_LIMIT": 8, "_CLEAN_NOZZLE": 9}
-    assert path.passed == lines | {"EXCLUDE_OBJECT_START": 17, "PAUSE": 19, "END_PRINT": 20}
+    assert path.passed == lines | {
+        "EXCLUDE_OBJECT_DEFINE": 17,
+        "EXCLUDE_OBJECT_START": 18,
+        "PAUSE": 20,
+        "END_PRINT": 21,
+    }
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,9 @@ OF_PROGRAMS: tuple[tuple[re.Pattern[str], str, str], ...] = (
 )
 """Patterns of lines that steer a program, what each is, and what is expected in its place."""
 
+LABELS = ("EXCLUDE_OBJECT_DEFINE",)
+"""Commands of Klipper whose words are no numbers, and that move nothing: slicers write outlines of parts."""
+
 MAY_STEER = re.compile(r"[O#\[M]|[A-Z]{2}|G ?0*6[56]")
 """Characters that each of these lines has and most others do not."""
 
@@ -66,7 +69,7 @@ CODES: dict[str, tuple[str, str]] = {
 def refuse_steering(plain: str, number: int) -> None:
     """WrongPath for a line that steers a program: subroutines, conditions, variables."""
     spaced = " ".join(plain.split())
-    if MAY_STEER.search(spaced) is None:
+    if MAY_STEER.search(spaced) is None or spaced.startswith(LABELS):
         return
     for pattern, what, expected in OF_PROGRAMS:
         match = pattern.search(spaced)
