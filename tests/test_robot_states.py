@@ -181,5 +181,7 @@ def test_what_cannot_be_known_is_an_error_by_name() -> None:
         qpos(answers, longer)
     with pytest.raises(InvalidArgument, match="qpos: found shape"):
         qpos(answers, ROBOT, qpos=np.zeros(3))
+    with pytest.raises(InvalidArgument, match="qpos: found a value that is not finite"):
+        qpos(answers, ROBOT, qpos=np.full(mujoco.MjModel.from_xml_string(ROBOT).nq, np.nan))
     with pytest.raises(InvalidArgument, match="model: found int"):
         qpos(answers, 3)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from pfabrik.errors import InvalidArgument
 from pfabrik.interop import from_urdf, to_urdf
 
 
@@ -36,6 +37,12 @@ def test_what_is_written_answers_as_the_machine_does(name: str, tmp_path: Path) 
     np.testing.assert_allclose(answers.actuators, from_home, rtol=0, atol=1e-9 * max(size, 1.0))
     for drive, other in zip(machine.drives, again.drives, strict=True):
         np.testing.assert_allclose(other.limits, np.array(drive.limits) - drive.home, rtol=1e-12, atol=1e-12 * size)
+
+
+def test_the_loops_do_not_replace_the_description(tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match=r"loops: found .*, where the description goes"):
+        to_urdf(pf.load("delta"), tmp_path / "same", str(tmp_path / "." / "same"))
+    assert not (tmp_path / "same").exists()
 
 
 def test_the_description_is_a_tree_that_says_what_it_leaves_out() -> None:

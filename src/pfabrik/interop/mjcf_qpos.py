@@ -51,6 +51,8 @@ def qpos(
         begin = as_floats("qpos", qpos, f"positions (..., {states.model.nq})")
         if begin.shape[-1:] != (states.model.nq,) or begin.shape[:-1] not in ((), q.shape[:-1]):
             raise InvalidArgument("qpos", f"shape {begin.shape}", f"(..., {states.model.nq}), for all or for each")
+        if not np.isfinite(begin).all():
+            raise InvalidArgument("qpos", "a value that is not finite", "finite positions")
     return states.at(q, begin)
 
 

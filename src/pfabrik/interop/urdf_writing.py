@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays import Floats
 from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism, checked_mechanism
+from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..motion.displacements import columns
 from ..whole_files import whole_path
@@ -45,6 +46,8 @@ def to_urdf(
     The text of the description, and the content of the file of loops, both as `from_urdf` takes them.
     """
     metres = metres_of(checked_mechanism(mechanism).length_unit)
+    if path is not None and loops is not None and os.path.realpath(path) == os.path.realpath(loops):
+        raise InvalidArgument("loops", f"'{os.fspath(loops)}', where the description goes", "a file of its own")
     description = _Description(mechanism, metres)
     ET.indent(description.root)
     text = ET.tostring(description.root, encoding="unicode") + "\n"
