@@ -199,9 +199,13 @@ def test_what_is_left_out_must_be_there_and_a_mimic_may_be() -> None:
     assert free.mechanism.actuator_names == ("shoulder", "elbow")
 
 
-def test_a_wide_gap_across_the_pin_is_no_pin() -> None:
+TURNED = loop(beside=1e-4, type="hinge", axis=[[0, 1, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("table", [loop(height=0.9), TURNED])
+def test_a_wide_gap_across_the_pin_or_a_quarter_turn_is_no_pin(table: dict[str, object]) -> None:
     with pytest.raises(InvalidMechanism) as caught:
-        from_urdf(PARALLELOGRAM.format(drives=DRIVEN), loop(height=0.9), end_effector="upper")
+        from_urdf(PARALLELOGRAM.format(drives=DRIVEN), table, end_effector="upper")
     assert "along the pin" not in str(caught.value) and "--within" not in str(caught.value)
 
 

@@ -157,7 +157,7 @@ def _faults(opened: OpenMechanism, loops: OpenLoops, home: ClosedHome, largest: 
         by = f"{distance * loops.length:.3g} {unit} and {np.degrees(angle):.3g} deg"
         text = f"open by {by} at best, from {begin:.3g} {unit}; the gap is ({vector}) {unit}"
         ways = [f"--leave-out {loop.name} reads the rest"]
-        if loops.is_along_pin(loop, home.q, gap):
+        if angle <= MENDED and loops.is_along_pin(loop, home.q, gap):
             text += ", along the pin"
             ways.insert(0, "`type: pin` in a file of loops, with `axis` along this gap, leaves it")
         if max(distance, angle) <= MENDED:
