@@ -224,6 +224,10 @@ def test_every_answer_keeps_links_apart(name: str) -> None:
         assert np.max(each.limit_excess) <= 1e-9
         assert set(np.asarray(each.status).tolist()) <= {pf.Status.REACHED, pf.Status.PROJECTED}
         assert np.max(each.residual) <= 1e-8 * machine.characteristic_length
+        limits = each.active_limits  # what is named is at its limit
+        named = [limit for row in limits for limit in row]
+        assert all(abs(limit.value - limit.limit) <= 1e-6 * machine.characteristic_length for limit in named)
+        assert bool(named) == (pf.Status.PROJECTED in each.status)
     kept = np.asarray(pf.clearance(loose).distance) >= least
     np.testing.assert_array_equal(np.asarray(answers.status)[kept], np.asarray(loose.status)[kept])
 

@@ -304,10 +304,11 @@ class LegsEngine(Engine):
             in_lengths(answers.rows.poses[by_legs], scale), answers.q_proximal[by_legs], answers.sides[by_legs]
         )
         weights = limit_multipliers(self._model, targets[by_legs], solutions, way)
-        all_weights = np.empty((len(targets), weights.shape[1]))
-        all_weights[by_legs] = weights
-        if len(by_joints):
-            all_weights[by_joints] = self._joint_space.limit_multipliers(answers.at(by_joints), targets[by_joints], way)
+        if not len(by_joints):
+            return weights
+        others = self._joint_space.limit_multipliers(answers.at(by_joints), targets[by_joints], way)
+        all_weights = np.zeros((len(targets), others.shape[1]))  # only the joints' may have columns for links
+        all_weights[by_legs, : weights.shape[1]], all_weights[by_joints] = weights, others
         return all_weights
 
     def forward(
