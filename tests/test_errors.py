@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from typing import Any
 
 import pytest
 
@@ -42,3 +43,9 @@ def test_a_continuum_says_what_is_given_and_what_still_moves() -> None:
     assert locked in str(errors.ContinuumOfSolutions("m", 2))
     placed = "still moves with its end effector on the target (1 freedom of the actuators j4, j6)"
     assert placed in str(errors.ContinuumOfWorkingModes("m", 1, ["j4", "j6"]))
+
+
+@pytest.mark.parametrize("name", ["a\nb", "x" * 100_000, [10**4000] * 9])
+def test_what_was_found_takes_one_line_however_long_it_is(name: Any) -> None:
+    for error in (errors.UnknownName("joint", name, ["p1"]), errors.InvalidArgument("name", repr(name), "a name")):
+        assert "\n" not in str(error) and len(str(error)) < 500

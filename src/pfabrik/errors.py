@@ -26,6 +26,12 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
+def one_line(text: str, most: int = 300) -> str:
+    """A text as part of a sentence: on one line, cut off where it is longer than any that means something."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else f"{line[:most]}…"
+
+
 def near_miss(name: str, known: Iterable[str], likeness: float = 0.6) -> str:
     """``"; did you mean 'platform'?"`` when a known name is close to `name`, else an empty string.
 
@@ -145,7 +151,7 @@ class InvalidArgument(PfabrikError, ValueError):
 
     def __init__(self, argument: str, found: str, expected: str, rows: Sequence[int] = ()) -> None:
         self.argument = argument
-        self.found = " ".join(found.split())  # arrays are shown on several lines
+        self.found = one_line(found)  # arrays are shown on several lines
         self.expected = expected
         self.rows = tuple(rows)
         where = f" (first bad row{'s' * (len(self.rows) > 1)}: {', '.join(map(str, self.rows))})" if self.rows else ""
@@ -157,9 +163,10 @@ class UnknownName(PfabrikError, KeyError):
 
     def __init__(self, kind: str, name: Any, known: Iterable[str]) -> None:
         self.kind = kind
-        self.name = name if isinstance(name, str) else " ".join(str(name).split())
+        self.name = name if isinstance(name, str) else one_line(str(name))
         self.known = tuple(known)
-        self._text = f"no {kind} named '{self.name}'{near_miss(self.name, self.known)} (known: {', '.join(self.known)})"
+        shown, others = one_line(self.name), ", ".join(self.known)
+        self._text = f"no {kind} named '{shown}'{near_miss(shown, self.known)} (known: {others})"
         super().__init__(self._text)
 
     def __str__(self) -> str:
