@@ -28,8 +28,6 @@ def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
     builder = _Builder(mechanism)
     for path in independent_paths(mechanism, detours=whole):
         builder.add_path(path)
-    for joint in mechanism.joints:
-        builder.add_joint(joint)
     return builder.build()
 
 
@@ -38,13 +36,14 @@ def ways_to(mechanism: Mechanism, bodies: Sequence[str]) -> K.Loops:
     builder, tree = _Builder(mechanism), tree_of(mechanism)
     for body in bodies:
         builder.add_path(tuple(Step(mechanism.joints[index], forward) for index, forward in tree.way(body)))
-    for joint in mechanism.joints:
-        builder.add_joint(joint)
     return builder.build([[path] for path in range(len(bodies))])
 
 
 class _Builder:
-    """A builder of the table: collects unit motions and visits, path by path."""
+    """A builder of the table: the unit motions of all joints, in their order, and visits, path by path.
+
+    All tables of a mechanism number its unit motions alike: one configuration is read by several.
+    """
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -60,28 +59,27 @@ class _Builder:
             for place, joint in enumerate(mechanism.joints)
             if joint.at is not None and not set(ends) & set(joint.connects)
         }
+        for joint in mechanism.joints:
+            self._add_joint(joint)
 
     def add_path(self, path: Path) -> None:
         visits: list[tuple[int, int]] = []
         marks: list[tuple[int, int]] = []
         is_detour = len({step.joint.name for step in path}) < len(path)
         for step in path:
-            units = self.add_joint(step.joint)
+            units = self.units[step.joint.name]
             if units and step.joint.name in self.marked and not is_detour:
                 marks.append((len(visits), self.marked[step.joint.name]))
             visits += [(k, 1) for k in units] if step.forward else [(k, -1) for k in reversed(units)]
         self.paths.append(visits)
         self.marks.append(marks)
 
-    def add_joint(self, joint: Joint) -> list[int]:
-        """Add a joint's unit motions once; their numbers, in the order from its first body to its second."""
-        if joint.name not in self.units:
-            first = self.columns[joint.name].start
-            motions = _motions(self.mechanism, joint)
-            self.units[joint.name] = list(range(len(self.records), len(self.records) + len(motions)))
-            point = np.zeros(3) if joint.at is None else np.array(joint.at) / self.length
-            self.records += [(kind, axis, point, first + place) for place, (kind, axis) in enumerate(motions)]
-        return self.units[joint.name]
+    def _add_joint(self, joint: Joint) -> None:
+        """Add a joint's unit motions, in the order from its first body to its second."""
+        first, motions = self.columns[joint.name].start, _motions(self.mechanism, joint)
+        self.units[joint.name] = list(range(len(self.records), len(self.records) + len(motions)))
+        point = np.zeros(3) if joint.at is None else np.array(joint.at) / self.length
+        self.records += [(kind, axis, point, first + place) for place, (kind, axis) in enumerate(motions)]
 
     def build(self, groups: list[list[int]] | None = None) -> K.Loops:
         """The table; groups of paths, in their order, are those that share joints unless they are given."""
