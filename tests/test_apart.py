@@ -232,6 +232,36 @@ def test_every_answer_keeps_links_apart(name: str) -> None:
     np.testing.assert_array_equal(np.asarray(answers.status)[kept], np.asarray(loose.status)[kept])
 
 
+def test_links_beyond_balls_are_where_joints_have_them_whatever_bodies_have_links() -> None:
+    """Links that are reached in another order than the loops reach them: a box on a carriage, rods, a platform."""
+    machine = pf.load("prs")
+    length, point = machine.characteristic_length, np.array(machine.reference_point)
+    boxes = [
+        ("carriage2", np.array(machine.joint("B2").at)),
+        ("platform", point),
+        ("base", point + [0, 0, 0.3 * length]),
+    ]
+    shapes = [pf.Shape(body, "box", at=at, size=[0.1 * length] * 3) for body, at in boxes]
+    rods = [pf.Shape(f"rod{k}", thickness=0.02 * length) for k in (1, 2, 3)]
+    machine = machine.with_shapes(shapes + rods).with_clearance(0.15 * length)
+    loose = pf.solve_ik(machine.with_clearance(None), around(machine, COUNT, 0.3, 0.5), options=FREE)
+    near = pf.clearance(loose).distance < 0.15 * length  # type: ignore[operator]
+    assert near.any() and not near.all()
+    found = ClosureEngine(model_of(machine)).too_near(loose._configurations)
+    np.testing.assert_array_equal(found, np.flatnonzero(near))
+
+
+def test_actuators_that_lead_past_a_dead_point_keep_links_apart() -> None:
+    """Carriages on upright rails, far from home: what another assembly mode is replaced by keeps links apart too."""
+    base = [[89, 4, 26], [31, 84, 26], [-42, 79, 26], [-89, -2, 26], [-38, -81, 26], [18, -88, 26]]
+    platform = [[43, 15, 118], [27, 36, 118], [-9, 45, 118], [-43, -14, 118], [-7, -43, 118], [5, -47, 118]]
+    legs = {"stroke": (-60, 80), "thickness": 8, "A": {"axis": "vertical"}, "clearance": 2}
+    machine = pf.Mechanism.from_legs("P*-S-S", base=base, platform=platform, reference_point=(0, 0, 118), **legs)
+    answers = pf.solve_fk(machine, 50 * np.random.default_rng(0).normal(size=(60, 6)))
+    assert np.asarray(pf.clearance(answers).distance).min() >= 2 - 1e-9 * machine.characteristic_length
+    assert np.max(answers.limit_excess) <= 1e-9
+
+
 def obstructed_five_bar() -> pf.Mechanism:
     """A five-bar with a post beside one elbow: some targets are free of it with the elbow on the other side only."""
     machine = pf.load("five_bar").without_limits()
