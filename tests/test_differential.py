@@ -670,6 +670,17 @@ class TestSingularity:
         assert near.kinds == (("serial",) if factor < 1 else ())
 
 
+def test_an_arm_of_fewer_joints_than_directions_loses_those_along_and_about_its_line_when_stretched() -> None:
+    bodies, axes = ("base", "l1", "l2", "l3", "l4", "tool"), ((0, 1, 0), (0, 0, 1))
+    joints = [
+        Joint(f"j{k}", "revolute", bodies[k : k + 2], at=(k, 0, 0), axis=axes[k % 2], actuated=True) for k in range(5)
+    ]
+    machine = Mechanism("stretched arm", joints, "tool", reference_point=(5, 0, 0), task=("x", "y", "z"))
+    near = pf.singularity(pf.solve_ik(machine, machine.home_pose))
+    assert "serial" in near.kinds
+    np.testing.assert_allclose(near.lost[[1, 2, 4, 5]], 0.0, atol=1e-12)  # rounding
+
+
 def test_mobility_is_the_same_in_every_call_and_warns_of_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -51,7 +51,7 @@ class FirstOrderScratch(NamedTuple):
     conditions: Floats  # (rank, conditions)
     resisted: Floats  # (rank, conditions + width)
     across: Floats  # (directions, motions + twists)
-    sizes: Floats  # (columns,)
+    sizes: Floats  # (columns,), or of the directions where these are more
 
 
 def new_first_order_scratch(loops: Loops, plan: FirstOrderPlan) -> FirstOrderScratch:
@@ -66,7 +66,7 @@ def new_first_order_scratch(loops: Loops, plan: FirstOrderPlan) -> FirstOrderScr
         (plan.rank, m),
         (plan.rank, m + width),
         (directions, n - plan.rank + twists),
-        (n,),
+        (max(n, directions),),
     )
     return FirstOrderScratch(new_state(loops), new_equations(loops, LAYOUT), *(np.zeros(shape) for shape in shapes))
 
