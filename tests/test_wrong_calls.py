@@ -114,6 +114,7 @@ TABLE: list[Case] = [
       ({"resolution": 0.0}, "resolution"), ({"resolution": NAN}, "resolution"), ({"fixed": {"w": 1.0}}, "coordinate"),
       ({"fixed": {"z": np.inf}}, "fixed"), ({"fixed": 3}, "fixed"), ({"over": ["x"]}, "over"),
       ({"over": ["x", "x"]}, "over"), ({"over": ["x", "y"], "fixed": {"x": 1.0}}, "over"), ({"tilt": -1.0}, "tilt"),
+      ({"tilt": 10**400}, "tilt"),
       ({"orientation": "all"}, "orientation"), ({"orientation": np.ones((3, 3))}, "orientation"),
       ({"tilt": 0.1, "orientation": "any"}, "tilt"), ({"within": {"x": (1.0, 0.0)}}, "within"),
       ({"within": {"yaw": (0.0, 1.0)}}, "coordinate"), ({"start": np.zeros(3)}, "start"))),

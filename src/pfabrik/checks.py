@@ -37,6 +37,10 @@ def _is_finite(value: Real) -> bool:
         return False
 
 
+def _is_angle(value: Real) -> bool:
+    return _is_finite(value) and 0.0 <= float(value) <= math.pi
+
+
 def require_finite(name: str, value: Any) -> float:
     """A number of any type that is, as a float, finite; InvalidArgument for anything else."""
     if isinstance(value, bool) or not isinstance(value, Real) or not _is_finite(value):
@@ -53,7 +57,7 @@ def require_count(name: str, value: Any, least: int = 1, most: int = 1_000_000) 
 
 def require_angle(name: str, value: Any) -> float:
     """An angle from 0 to pi [rad]; InvalidArgument for anything else."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 <= float(value) <= math.pi:
+    if isinstance(value, bool) or not isinstance(value, Real) or not _is_angle(value):
         raise InvalidArgument(name, reprlib.repr(value), "an angle from 0 to pi [rad]")
     return float(value)
 
