@@ -259,7 +259,7 @@ def assemble_row(
     links, is_known = scratch.nearest.search.links, question["first"] > BY_LEGS and answer.status[0] == TOO_NEAR
     links.kept[0] = 0
     status = assemble_anyhow(tables, scratch, start, values, question, is_known, answer)
-    is_found = status == REACHED or status == PROJECTED
+    is_found = status == REACHED or answer.status[0] == PROJECTED
     if is_found and not are_apart(tables, scratch, answer.poses[0], answer.sides[0]):
         status = answer.status[0] = TOO_NEAR
     if status == TOO_NEAR and question["last"] > BY_LEGS:
