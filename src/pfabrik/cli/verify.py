@@ -48,7 +48,7 @@ def verify(
 
     At random poses that are reached, MuJoCo says how far our loops are open, by its own constraint rows; then it closes
     the loops by itself, from elsewhere, and the poses are compared. With --original, the file that MECH was imported
-    from is led to the same poses too, by the names of its joints.
+    from closes its own loops there too, from its joints put by their names.
 
     Exit code 0 if all agree, 1 if some do not, none was found, or all are too near to home to say anything.
     """

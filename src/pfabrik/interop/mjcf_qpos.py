@@ -43,9 +43,9 @@ def qpos(
     mechanism, q = checked_solution(solution).mechanism, np.asarray(solution.q)
     if model is None:
         return qpos_of(mechanism, q)
-    from .robot_states import RobotStates
+    from .robot_in_mujoco import RobotInMujoco
 
-    states = RobotStates(mechanism, model, configuration)
+    states = RobotInMujoco(mechanism, model, configuration)
     begin = None
     if qpos is not None:
         begin = as_floats("qpos", qpos, f"positions (..., {states.model.nq})")

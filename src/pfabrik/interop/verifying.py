@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from ..answers.solution import Solution
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
+from ..files.units import metres_of
 from ..tolerances import TOLERANCES
-from .imported_again import changes_of_import
-from .original import Original
-from .referee import Referee
+from .original import Original, OriginalFile
+from .referee import on_export
 from .referee_configurations import Travelled, reached_at_random, travelled
 
 FAR = 0.25
@@ -103,7 +102,7 @@ def verify(
 
     The mechanism is written as a MuJoCo model. At each answer MuJoCo's constraint rows say how far the loops are open;
     then the passive joints are moved off, and Newton's method on these rows closes the loops again, with the actuated
-    joints held: that must lead to the same pose. An original is led from home to each answer, by the names of joints.
+    joints held: that must lead to the same pose. An original closes its own loops, from its joints put there by name.
 
     Parameters
     ----------
@@ -116,7 +115,7 @@ def verify(
     ------
     MissingLibrary : MuJoCo is not installed.
     InvalidArgument : less than one pose.
-    UnknownName : an actuator or end effector that the original does not have.
+    UnknownName : an actuator, a joint or the end effector, where the original does not have it.
     """
     checked_mechanism(mechanism)
     counts: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))
@@ -124,25 +123,18 @@ def verify(
         if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
             raise InvalidArgument(name, reprlib.repr(value), f"an integer from {least} on")
     rng = np.random.default_rng(seed)
-    referee = Referee(mechanism)
-    file = None if original is None else Original(mechanism, original, loops, configuration)
+    metres, size = metres_of(mechanism.length_unit), mechanism.characteristic_length
+    file = None if original is None else OriginalFile(original, loops, configuration)
+    robot = None if file is None else Original(mechanism, file)
     solutions = reached_at_random(mechanism, poses, rng)
-    tolerance = TOLERANCES.position * mechanism.characteristic_length
+    tolerance = TOLERANCES.position * size
     if not solutions:
         return Verification(0, np.nan, np.nan, np.nan, tolerance, Travelled({}, {}, 0.0, 0.0))
-    gap, position, rotation = np.max([referee.compare(each, rng) for each in solutions], axis=0).tolist()
-    against = None
-    if file is not None:
-        assert original is not None
-        against = _against(file, solutions, changes_of_import(file, original, loops, configuration, solutions))
+    units, against = np.array([metres, metres, 1.0]), None
+    gap, position, rotation = (on_export(mechanism, solutions, rng) / units).tolist()
+    if robot is not None and file is not None:
+        open_by, apart, turned = (np.max([robot.compare(each) for each in solutions], axis=0) / units).tolist()
+        changed = robot.changes_of_import(file, solutions) / units
+        nearest = float(max(changed[:2])) + tolerance
+        against = AgainstOriginal(open_by, apart, turned, nearest, float(changed[2]) + TOLERANCES.rotation)
     return Verification(len(solutions), gap, position, rotation, tolerance, travelled(mechanism, solutions), against)
-
-
-def _against(file: Original, solutions: Sequence[Solution], changed: tuple[float, float, float]) -> AgainstOriginal:
-    """The comparison of solutions with the original file, in the mechanism's unit; import alone has changed so much."""
-    gap, position, rotation = np.max([file.compare(each) for each in solutions], axis=0).tolist()
-    rounding = TOLERANCES.position * file.mechanism.characteristic_length
-    nearest = max(changed[:2]) / file.metres + rounding
-    return AgainstOriginal(
-        gap / file.metres, position / file.metres, rotation, nearest, changed[2] + TOLERANCES.rotation
-    )
