@@ -26,7 +26,7 @@ from .closing import CLOSED, ClosedHome, OpenLoops, close_home
 from .collision import Collision
 from .digits import worst
 from .imported_shapes import with_collision
-from .notes import Note, noting
+from .notes import Note, note_names, noting
 from .opened import OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies, with_cones
 from .straighten import straighten
@@ -93,11 +93,11 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     loops = OpenLoops(opened)
     gap = loops.gap(np.zeros(len(loops.low)))
     home, opened = _closed_home(opened, loops, notes)
-    joints = [*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home)]
-    _note_gaps(opened, loops, gap, home, _implied(dataclasses.replace(loops.tree, joints=tuple(joints)), loops), notes)
+    structure = closed_structure(opened, loops, home)
+    _note_gaps(opened, loops, gap, home, _implied(structure, loops), notes)
     reference = _moved_reference(opened, loops.tree, home)
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
-    rigid, stands_for = merged_bodies(merged_balls(joints), opened.base, opened.end_effector)
+    rigid, stands_for = merged_bodies(merged_balls(structure.joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
     simple = with_cones(combined(exact, {opened.base, opened.end_effector}, notes), opened.cones)
     collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
@@ -108,9 +108,7 @@ def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> 
     """Home with closed loops, and the machine without the ranges that cannot be kept there."""
     low, high = loops.low, loops.high
     is_driven = np.array([joint.actuated for joint in opened.joints])[column_joints(loops.tree)]
-    outside = _outside(loops, np.zeros_like(low))
-    if outside:
-        notes.append(Note("home was outside the range, and is moved into it", tuple(outside)))
+    note_names(notes, "home was outside the range, and is moved into it", _outside(loops, np.zeros_like(low)))
     rounding = _rounding(opened, loops)
     largest = max(rounding, TOLERANCES.file_gap)
     homes = [close_home(loops, ~is_driven | (low > 0.0) | (high < 0.0), low, high)]
@@ -123,8 +121,7 @@ def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> 
     if best.gap > largest:
         raise InvalidMechanism(_faults(opened, loops, best, largest))
     beyond = _outside(loops, best.q)
-    if beyond:
-        notes.append(Note("home is outside the range, which is left out", tuple(sorted(beyond))))
+    note_names(notes, "home is outside the range, which is left out", sorted(beyond))
     joints = [dataclasses.replace(each, range=None) if each.name in beyond else each for each in opened.joints]
     return best, dataclasses.replace(opened, joints=tuple(joints))
 
@@ -179,8 +176,7 @@ def _note_gaps(
     """Note how far the loops were open, which of them are redundant, and how far they stay open."""
     if gap > CLOSED:
         notes.append(Note(f"loops were open by {gap * loops.length:.3g} {opened.length_unit}, and are closed"))
-    if implied:
-        notes.append(Note("some of what these ask for follows from the others", implied))
+    note_names(notes, "some of what these ask for follows from the others", implied)
     if home.gap > CLOSED:
         remaining = f"{home.gap * loops.length:.2g} {opened.length_unit}"
         what = f"the digits of the file do not fit together: joints are put midway in gaps of up to {remaining}"
@@ -196,6 +192,12 @@ def _implied(structure: Structure, loops: OpenLoops) -> tuple[str, ...]:
         names += [loop.name] if new_rank - rank < 6 else []
         rank = new_rank
     return tuple(names)
+
+
+def closed_structure(opened: OpenMechanism, loops: OpenLoops, home: ClosedHome) -> Structure:
+    """The tree's joints where they are at a closed home, then the loops as joints."""
+    joints = (*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home))
+    return dataclasses.replace(loops.tree, joints=joints)
 
 
 def _moved_joints(opened: OpenMechanism, tree: Structure, home: ClosedHome) -> list[Joint]:

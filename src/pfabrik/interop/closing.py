@@ -15,14 +15,14 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..closure.close import close, platform_poses
 from ..description.graph import tree_of
-from ..description.home_mobility import body_twist, column_joints
+from ..description.home_mobility import column_joints
 from ..description.joint_types import JointType
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from ..motion.closure import Closure, closure_of
 from ..motion.displacements import columns, displacements, home_coordinates, rate_units, screws
-from ..rotations import shortest_turns, square_to, to_rotvec
+from ..rotations import shortest_turns, to_rotvec
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism
 
@@ -70,7 +70,6 @@ class OpenLoops:
         limits = np.reshape([each.limits for each in self.tree.coordinates], (-1, 2)).T
         self.low, self.high = limits - home_coordinates(self.tree)
         self.length = _radius(opened)
-        self._paths = {body: path[column_joints(self.tree)] for body, path in tree_of(self.tree).paths.items()}
 
     @cached_property
     def bridged(self) -> tuple[Closure, dict[int, float]]:
@@ -110,24 +109,9 @@ class OpenLoops:
         bodies = displacements(self.tree, q[None])
         return [(point.mean(axis=0), frames[0]) for point, frames in (_sides(loop, bodies) for loop in self.loops)]
 
-    def slopes(self, q: Floats) -> Floats:
-        """Slopes of the loops' errors [L and rad] by the rates of `screws`, at coordinates (c,) that close them."""
-        bodies, twists = displacements(self.tree, q[None]), screws(self.tree, q[None])[0]
-        twists[:, 3:] *= self.tree.characteristic_length / self.length
-        slopes = [np.zeros((0, len(self.low)))]
-        for loop in self.loops:
-            points, frames = _sides(loop, bodies)
-            one, other = (body_twist(self._paths[body], twists) for body in loop.connects)
-            relative = one - other
-            slopes.append(relative[3:] + np.cross(relative[:3], points[0] / self.length, axis=0))
-            if loop.type != "spherical":
-                across = np.eye(3) if loop.type == "fixed" else square_to(frames[0][:, 2])
-                slopes.append(across @ relative[:3])
-        return np.concatenate(slopes)
-
     def is_along_pin(self, loop: Loop, q: Floats, gap: Floats) -> bool:
         """True if the hinges around a loop are all parallel, nothing else moves it, and its gap (3,) is along them."""
-        one, other = (self._paths[body] for body in loop.connects)
+        one, other = (tree_of(self.tree).paths[body][column_joints(self.tree)] for body in loop.connects)
         turns = screws(self.tree, q[None])[0][one != other][:, :3]
         off = np.linalg.norm(np.cross(turns, gap), axis=1) > TOLERANCES.file_angle * np.linalg.norm(gap)
         return bool(len(turns) and not off.any() and turns.any(axis=1).all())

@@ -13,9 +13,11 @@ from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
 from ..motion.displacements import columns, rate_units
+from ..motion.joint_rates import graph_of, loop_slopes, right_singular
 from ..tolerances import TOLERANCES
+from .assembling import closed_structure
 from .closing import OpenLoops, close_home
-from .notes import Note
+from .notes import Note, note_names
 from .opened import OpenMechanism
 
 OFF_HOME = 0.1
@@ -108,9 +110,8 @@ def with_coupled_drives(
     if faults:
         raise InvalidMechanism(faults)
     omitted += [each for each in couplings if not all(name in moving for name in each.names)]
-    if omitted:
-        what = "couplings of joints that are held, or that do not matter to the end effector, are left out"
-        notes.append(Note(what, tuple(map(str, omitted))))
+    what = "couplings of joints that are held, or that do not matter to the end effector, are left out"
+    note_names(notes, what, omitted)
     return dataclasses.replace(opened, joints=tuple(machine.values()))
 
 
@@ -163,8 +164,10 @@ def _ratios_of_loops(opened: OpenMechanism, leader: str, names: Sequence[str]) -
     step = OFF_HOME * rate_units(loops.tree)[at]
     low[at] = high[at] = step if step <= high[at] else max(-step, low[at])
     home = close_home(loops, np.ones(len(low), bool), low, high)
-    _, sizes, directions = np.linalg.svd(loops.slopes(home.q))
-    motions = directions[(sizes > SAME_ROW * sizes.max(initial=0.0)).sum() :].T
+    structure = closed_structure(opened, loops, home)
+    sizes, directions = right_singular(loop_slopes(structure, np.zeros((1, len(structure.coordinates)))))
+    free = directions[0, (sizes > SAME_ROW * sizes.max(initial=0.0)).sum() :]
+    motions = graph_of(structure).rates.T @ free.T
     if home.gap > TOLERANCES.file_digits or not motions[at].any():
         return {}
     ratios = {name: motions[row] @ motions[at] / (motions[at] @ motions[at]) for name, row in place.items()}

@@ -13,7 +13,7 @@ from ..description.mechanism import Mechanism
 from ..description.shape_faults import MOST_SHAPES, form_of_shapes, shape_faults
 from ..description.structure import Structure
 from .collision import Collision, Solid
-from .notes import Note
+from .notes import Note, note_names
 
 Pair = frozenset[str]
 NamedPair = tuple[str, str]
@@ -53,8 +53,7 @@ def _unchecked(structure: Structure, **changes: Any) -> Structure:
 def _solids_of(mechanism: Mechanism, solids: Sequence[Solid], notes: list[Note]) -> list[Solid]:
     """The solids that a mechanism can have; notes name the bodies that joints have swallowed."""
     lost = dict.fromkeys(each.shape.body for each in solids if each.shape.body not in mechanism.bodies)
-    if lost:
-        notes.append(Note("collision geometry of bodies within a joint is left out, of", tuple(lost)))
+    note_names(notes, "collision geometry of bodies within a joint is left out, of", lost)
     on_bodies = [each for each in solids if each.shape.body not in lost]
     sound = [each for each in on_bodies if _is_sound(mechanism, each.shape)]
     if len(sound) < len(on_bodies):

@@ -14,7 +14,7 @@ from ..arrays import Floats
 from .collision import EVERYTHING, MOST_SOLIDS, Collision, Solid, solid_shape
 from .mjcf_model import MjcfModel
 from .mjcf_plain import PLACE
-from .notes import Note
+from .notes import Note, counted_names, note_names
 from .xml_reading import number
 
 SOLIDS = ("sphere", "capsule", "box", "cylinder")
@@ -75,9 +75,7 @@ def read_collision(root: ET.Element, model: MjcfModel, is_ours: bool, notes: lis
     if len(colliding) < len(geoms) and not is_ours:
         notes.append(Note(f"geoms that touch nothing are left out ({len(geoms) - len(colliding)})"))
     other = Counter(geom.kind for geom in colliding if geom.kind not in SOLIDS)
-    if other:
-        counts = tuple(f"{kind} ({count})" for kind, count in sorted(other.items()))
-        notes.append(Note("geoms of types that have no shape here are left out", counts))
+    note_names(notes, "geoms of types that have no shape here are left out", counted_names(other))
     chosen = {id(geom.element) for geom in colliding if geom.kind in SOLIDS}
     count = sum(geom.copies for geom in colliding if geom.kind in SOLIDS)
     if count > MOST_SOLIDS:

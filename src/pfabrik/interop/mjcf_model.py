@@ -15,7 +15,7 @@ from .compiled_model import CompiledModel
 from .couplings import Coupling
 from .digits import ModelDigits, Rounding, worst
 from .names import unique
-from .notes import Note
+from .notes import Note, note_names
 from .opened import Loop
 from .xml_reading import fault
 
@@ -80,8 +80,7 @@ class MjcfModel(CompiledModel):
             between = [unique(f"{body}:{part['name']}", self._bodies) for part in parts[:-1]]
             for part, connects in zip(parts, pairwise([parent, *between, body]), strict=True):
                 yield Joint(connects=connects, **part)
-        if limited_balls:
-            notes.append(Note("a ball's range is no limit here: it is left out", tuple(limited_balls)))
+        note_names(notes, "a ball's range is no limit here: it is left out", limited_balls)
 
     def _parts(self, index: int) -> Iterator[dict[str, Any]]:
         """Yield the fields of the joints that one of the model is in series: a free joint, three slides and a ball."""
@@ -108,9 +107,7 @@ class MjcfModel(CompiledModel):
 
     def loops(self, notes: list[Note]) -> list[Loop]:
         """Every active equality of two points, or two frames, that are to meet."""
-        inactive = tuple(loop.name for loop in self.inactive_loops())
-        if inactive:
-            notes.append(Note("an equality that is not active is left out", inactive))
+        note_names(notes, "an equality that is not active is left out", (each.name for each in self.inactive_loops()))
         return list(self._loops(active=True))
 
     def inactive_loops(self) -> list[Loop]:
@@ -166,14 +163,12 @@ class MjcfModel(CompiledModel):
                 yield Coupling(self.joint(follower), self.joint(leader), (begin, *factors[1:]))
             elif not is_active:
                 inactive += [self.joint(joint) for joint in (follower, leader) if joint >= 0]
-        if inactive:
-            notes.append(Note("an equality that is not active is left out, of", tuple(inactive)))
+        note_names(notes, "an equality that is not active is left out, of", inactive)
 
     def held(self, notes: list[Note]) -> list[str]:
         """Joints that an equality keeps where they are."""
         names = [self.joint(joint) for joint, leader, _, active in self._joint_equalities() if leader < 0 and active]
-        if names:
-            notes.append(Note("an equality holds these where they are", tuple(names)))
+        note_names(notes, "an equality holds these where they are", names)
         return names
 
     def _joint_equalities(self) -> Iterator[tuple[int, int, tuple[float, ...], bool]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
 from ..errors import InvalidMechanism
-from .notes import Note
+from .notes import Note, counted_names, note_names
 from .told_loops import unread_loops
 from .xml_reading import fault, number
 
@@ -70,9 +70,8 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
             for child in others if section.tag == "tendon" else []:
                 _require_unlimited(child, root)
             nameless = Counter(child.tag for child in others if not child.get("name"))
-            names = (*filter(None, (child.get("name") for child in others)), *_counted(nameless))
-            if names:
-                notes.append(Note(f"{section.tag}s are left out", names))
+            names = (*filter(None, (child.get("name") for child in others)), *counted_names(nameless))
+            note_names(notes, f"{section.tag}s are left out", names)
         elif section.tag == "asset":
             omitted.update(child.tag for child in section)
         elif section.tag not in STILL:
@@ -80,18 +79,11 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
             for each in unread_loops(section, bodies, "world", (), "connect, weld or joint of an equality"):
                 raise InvalidMechanism([each])
     compiler.attrib |= {"boundmass": "1", "boundinertia": "1"}  # what moves has a mass; which one does not matter
-    counted = _counted(Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED}))
-    if counted:
-        notes.append(Note("left out, for they do not move anything", tuple(counted)))
-    springs = tuple(joint.get("name", "a joint") for joint in root.iter("joint") if number(joint, "stiffness"))
-    if springs:
-        notes.append(Note("springs are left out, of", springs))
+    noted = Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED})
+    note_names(notes, "left out, for they do not move anything", counted_names(noted))
+    springs = (joint.get("name", "a joint") for joint in root.iter("joint") if number(joint, "stiffness"))
+    note_names(notes, "springs are left out, of", springs)
     return plain
-
-
-def _counted(tags: Counter[str]) -> list[str]:
-    """Elements that have no names, or too many: ``geom (30)``."""
-    return [f"{tag} ({count})" for tag, count in sorted(tags.items())]
 
 
 def _kept(element: ET.Element, omitted: Counter[str], tags: Sequence[str] = tuple(KEPT), copies: int = 1) -> ET.Element:

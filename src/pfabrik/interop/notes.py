@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -18,6 +19,17 @@ class Note:
 
     def __str__(self) -> str:
         return f"{self.what}: {', '.join(self.names)}" if self.names else self.what
+
+
+def note_names(notes: list[Note], what: str, names: Iterable[object]) -> None:
+    """Add a note of some names, unless there are none."""
+    if texts := tuple(map(str, names)):
+        notes.append(Note(what, texts))
+
+
+def counted_names(counts: Counter[str]) -> list[str]:
+    """Things that have no names, or too many: ``geom (30)``."""
+    return [f"{name} ({count})" for name, count in sorted(counts.items())]
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from ..tolerances import TOLERANCES
 from .collision import NO_COLLISION, Collision
 from .digits import Rounding
 from .names import unique
-from .notes import Note
+from .notes import Note, note_names
 
 LoopType = Literal["spherical", "revolute", "fixed"]
 """Joint types that may close a loop."""
@@ -139,8 +139,7 @@ def loops_by_name(
         if match:
             sides.setdefault(match[1], {})[match[2]] = frame
     single = tuple(frame for pair in sides.values() if len(pair) == 1 for frame in pair.values())
-    if single:
-        notes.append(Note("a closing frame without the other one closes no loop", single))
+    note_names(notes, "a closing frame without the other one closes no loop", single)
     names, loops = set(taken), []
     for name, pair in sides.items():
         if len(pair) == 2:
@@ -148,8 +147,7 @@ def loops_by_name(
             loops += [] if any(_is_same(loop, other) for other in known) else [loop]
     for kind, plural in (("spherical", "balls"), ("revolute", "hinges")):
         of_kind = tuple(loop.name for loop in loops if loop.type == kind)
-        if of_kind:
-            notes.append(Note(f"loops that closing frames tell of, as {plural}", of_kind))
+        note_names(notes, f"loops that closing frames tell of, as {plural}", of_kind)
     return loops
 
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from .digits import Rounding, worst
 from .driving import Rates, require_drives, with_actuators
 from .imported_shapes import with_collision
 from .names import unique
-from .notes import Note
+from .notes import Note, note_names
 from .opened import Loop, OpenMechanism
 from .simplify import merged_bodies, merged_pair, prune
 from .tasks import with_task
@@ -70,49 +70,45 @@ class Robot:
     collision: Collision = NO_COLLISION
 
 
+class Asked(NamedTuple):
+    """What is asked of an import, besides its ends; as of `from_mjcf`."""
+
+    actuated: Sequence[str] | None = None
+    length_unit: str = "m"
+    task: Sequence[str] | None = None
+    within: float | None = None
+
+
 def mechanism_of(
     robot: Robot,
-    notes: list[Note],
     base: str | None,
     end_effector: str | None,
-    actuated: Iterable[str] | None,
-    fixed: Iterable[str],
-    length_unit: str,
-    task: Sequence[str] | None,
-    within: float | None = None,
+    asked: Asked,
+    notes: list[Note],
+    fixed: Iterable[str] = (),
     leave_out: Iterable[str] = (),
 ) -> Imported:
     """The mechanism between the base and the end effector of a robot, its loops closed; arguments as of `from_mjcf`."""
-    metres_of(length_unit)
-    chosen = None if actuated is None else require_names("actuated", actuated)
-    robot = _with_drives(_with_held(_without(robot, leave_out, notes), fixed), chosen)
+    metres_of(asked.length_unit)
+    robot = _with_drives(_with_held(_without(robot, leave_out, notes), fixed), asked.actuated)
     base = _base(robot, base)
     end_effector = _end_effector(robot, end_effector, base)
-    if task is not None:
-        task = require_names("task", task)
-    if within is not None:
-        within = require_positive("within", within)
-    found = _between(robot, base, end_effector, chosen, length_unit, task, within, notes)
-    if within is None:
+    if asked.task is not None:
+        asked = asked._replace(task=require_names("task", asked.task))
+    if asked.within is not None:
+        asked = asked._replace(within=require_positive("within", asked.within))
+    found = _between(robot, base, end_effector, asked, notes)
+    if asked.within is None:
         plain = dataclasses.replace(robot, collision=NO_COLLISION)
 
         def made(within: float) -> Mechanism:
-            return _between(plain, base, end_effector, chosen, length_unit, task, within, []).mechanism
+            return _between(plain, base, end_effector, asked._replace(within=within), []).mechanism
 
         notes += _proposals(found.mechanism, made)
     return dataclasses.replace(found, notes=tuple(notes))
 
 
-def _between(
-    robot: Robot,
-    base: str,
-    end_effector: str,
-    chosen: Sequence[str] | None,
-    length_unit: str,
-    task: Sequence[str] | None,
-    within: float | None,
-    notes: list[Note],
-) -> Imported:
+def _between(robot: Robot, base: str, end_effector: str, asked: Asked, notes: list[Note]) -> Imported:
     """The mechanism between two bodies of a robot with drives."""
     tip, point = _place(robot, end_effector)
     if tip != base and merged_bodies(robot.joints, base)[1].get(tip) == base:
@@ -123,14 +119,14 @@ def _between(
         notes.append(Note("loops between bodies that are fixed to each other are left out", still))
     if point is not None:
         rigid = _without_joint_named(tip, rigid, notes)
-    if task is None and (base, end_effector) == (robot.base, robot.end_effector):
-        task = robot.task
-    opened = prune(_opened(rigid, base, tip, point, length_unit, task, within), notes)
-    opened = with_coupled_drives(opened, rigid.joints, rigid.couplings, chosen or (), notes)
+    if asked.task is None and (base, end_effector) == (robot.base, robot.end_effector):
+        asked = asked._replace(task=robot.task)
+    opened = prune(_opened(rigid, base, tip, point, asked), notes)
+    opened = with_coupled_drives(opened, rigid.joints, rigid.couplings, asked.actuated or (), notes)
     require_drives(opened, robot.joints, robot.undriven)
     home = closed(opened, notes)
-    mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres_of(length_unit))
-    mechanism = with_task(mechanism, task is not None, notes)
+    mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres_of(asked.length_unit))
+    mechanism = with_task(mechanism, asked.task is not None, notes)
     mechanism = with_collision(mechanism, home.collision, notes)
     return Imported(mechanism, home.gap, tuple(notes))
 
@@ -166,8 +162,7 @@ def _without(robot: Robot, names: Iterable[str], notes: list[Note]) -> Robot:
     for name in omitted:
         if name not in known:
             raise UnknownName("loop, or joint that follows another, to leave out", name, known)
-    if omitted:
-        notes.append(Note("left out as asked for", tuple(omitted)))
+    note_names(notes, "left out as asked for", omitted)
     loops = [loop for loop in robot.loops if loop.name not in omitted]
     couplings = [each for each in robot.couplings if each.follower not in omitted]
     return dataclasses.replace(robot, loops=loops, couplings=couplings)
@@ -222,7 +217,7 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
 
     def build(base: str, end_effector: str, drives: Sequence[str] | None) -> Mechanism:
         driven = _with_drives(rigid, drives)
-        return _between(driven, base, end_effector, drives, "m", None, None, []).mechanism
+        return _between(driven, base, end_effector, Asked(drives), []).mechanism
 
     raise NoEndEffector(choices_of(rigid.joints, rigid.loops, base, build))
 
@@ -268,17 +263,9 @@ def _without_joint_named(tip: str, robot: Robot, notes: list[Note]) -> Robot:
     )
 
 
-def _opened(
-    robot: Robot,
-    base: str,
-    tip: str,
-    point: Floats | None,
-    length_unit: str,
-    task: Sequence[str] | None,
-    within: float | None,
-) -> OpenMechanism:
+def _opened(robot: Robot, base: str, tip: str, point: Floats | None, asked: Asked) -> OpenMechanism:
     """The robot in the unit of the mechanism."""
-    metres = metres_of(length_unit)
+    metres, within = metres_of(asked.length_unit), asked.within
     roundings = dict(robot.roundings)
     if within is not None:
         roundings = dict.fromkeys([joint.name for joint in robot.joints], Rounding(within, within))
@@ -292,8 +279,8 @@ def _opened(
         tip,
         None if point is None else tuple((point / metres).tolist()),
         base,
-        length_unit,
-        None if task is None else tuple(task),
+        asked.length_unit,
+        None if asked.task is None else tuple(asked.task),
         robot.cones,
         {name: Rounding(each.length / metres, each.angle) for name, each in roundings.items()},
         robot.collision.in_unit(metres),

@@ -15,7 +15,7 @@ from ..errors import Fault, InvalidMechanism, near_miss
 from ..rotations import from_quaternion
 from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
-from .notes import Note
+from .notes import Note, note_names
 from .told_loops import named_in
 from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, require_few
 from .xml_reading import fault, number, numbers_in
@@ -181,8 +181,7 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     frames = {link: poses[link] for link in (base, *links)}
     driven = _driven(model)
     begun = [each.get("name", "") for each in model.findall("joint") if number(each, "axis/initial_position")]
-    if begun:
-        notes.append(Note("initial positions are left out, of", tuple(begun)))
+    note_names(notes, "initial positions are left out, of", begun)
     named = {*driven, *asked, *(joint.name for joint in joints if joint.limits is not None or joint.mimic is not None)}
     costs = [0 if joint.name in named else CUT_LAST.get(joint.type, 0) for joint in joints]
     reached, outward = {base: -1}, []
@@ -287,8 +286,7 @@ def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
             raise fault(f"model '{models[0].get('name', '')}'", f"<{tag}> '{name}' within it", flat)
     beside = [each.get("name", "") for each in every if each is not models[0]]
     beside += [(each.findtext("uri") or "").strip() for each in root.findall("world/include")]
-    if beside:
-        notes.append(Note("what the world has beside the model is left out", tuple(beside)))
+    note_names(notes, "what the world has beside the model is left out", beside)
     if pose_in(models[0].find("pose"), "pose of the model").tolist() != HERE.tolist():
         notes.append(Note("base coordinates are those of the model: its own pose in the world is left out"))
     return models[0]

@@ -16,7 +16,7 @@ from ..description.graph import Edge, spanning_tree, welded
 from ..description.joint_types import JointType
 from ..description.joints import Cone, Joint
 from ..tolerances import TOLERANCES
-from .notes import Note
+from .notes import Note, note_names
 from .opened import OpenMechanism
 
 SKEW = 0.1
@@ -32,8 +32,7 @@ def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
     kept = _sharing_loops([*edges, Edge(Joint("", "fixed", (opened.base, body)), (opened.base, body))], opened.base)
     names = {edges[index].joint.name for index in kept if index < len(edges)} | {edge.joint.name for edge in tips}
     omitted = tuple(edge.joint.name for edge in edges if edge.joint.name not in names)
-    if omitted:
-        notes.append(Note("left out, for the end effector does not depend on them", omitted))
+    note_names(notes, "left out, for the end effector does not depend on them", omitted)
     joints = tuple(joint for joint in opened.joints if joint.name in names)
     loops = tuple(loop for loop in opened.loops if loop.name in names)
     return dataclasses.replace(opened, joints=joints, loops=loops)
@@ -115,8 +114,7 @@ def combined(joints: Sequence[Joint], kept: set[str], notes: list[Note]) -> list
             made = {name: one if each is first else each for name, each in made.items() if each is not second}
             if one.name not in (_stem(first), _stem(second)):
                 crossing.append(one.name)
-    if crossing:
-        notes.append(Note("hinges whose axes cross are a universal joint", tuple(crossing)))
+    note_names(notes, "hinges whose axes cross are a universal joint", crossing)
     return list(made.values())
 
 

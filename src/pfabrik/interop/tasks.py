@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..description.mechanism import Mechanism
 from ..motion.fitting_task import AXES, FittingTask, fitting_tasks, has_dependent_coordinates, task_remark
 from ..motion.mobility import generic_of
-from .notes import Note
+from .notes import Note, note_names
 
 MOST_TASKS, WELL_CONDITIONED = 4, 0.1
 """Most other tasks in the note, and the least conditioning of those [L and rad]."""
@@ -28,9 +28,8 @@ def with_task(mechanism: Mechanism, is_asked_for: bool, notes: list[Note]) -> Me
     fits, *alternatives = tasks
     has = f"the end effector has {freedoms} freedom{'s' * (freedoms != 1)} of {whole}"
     notes.append(Note(f"{has}: targets set {' '.join(fits.words)}, as with `--task {fits}`"))
-    choices = [task for task in alternatives if _is_choice(task, fits)]
-    if choices:
-        notes.append(Note("other tasks that it can do", tuple(f"--task {task}" for task in choices[:MOST_TASKS])))
+    choices = [f"--task {task}" for task in alternatives if _is_choice(task, fits)]
+    note_names(notes, "other tasks that it can do", choices[:MOST_TASKS])
     return mechanism._with(task=fits.words)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import InvalidMechanism
 from .collision import MOST_SOLIDS, Collision, Solid, solid_shape
-from .notes import Note
+from .notes import Note, counted_names, note_names
 from .sdf_links import pose_in
 from .urdf_links import UrdfLinks, origin_of
 from .xml_reading import numbers_in
@@ -45,9 +45,7 @@ def read_collision(root: ET.Element, links: UrdfLinks, notes: list[Note]) -> Col
             left_out[kind] += 1
         else:
             solids.append(Solid(solid_shape(name, kind, size, links.frames[name] @ local), name))
-    if left_out:
-        counts = tuple(f"{kind} ({count})" for kind, count in sorted(left_out.items()))
-        notes.append(Note("collision geometry that has no shape here is left out", counts))
+    note_names(notes, "collision geometry that has no shape here is left out", counted_names(left_out))
     return Collision(tuple(solids))
 
 

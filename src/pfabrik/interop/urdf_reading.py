@@ -20,9 +20,9 @@ from ..errors import Fault, InvalidMechanism
 from .assembling import Imported
 from .driving import Rates
 from .loops_file import LinkLoop, LoopsFile, placed_loops, read_loops, roundings_of_loops
-from .notes import Note, noting
+from .notes import Note, note_names, noting
 from .opened import loops_by_name
-from .robots import Robot, mechanism_of
+from .robots import Asked, Robot, mechanism_of
 from .sdf_links import Poses, closing, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
@@ -84,8 +84,8 @@ def from_urdf(
         links, link_loops = read_description(element, loops_file, asked, notes)
         robot = replace(_robot(links, link_loops, loops_file, notes), collision=read_collision(element, links, notes))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
-        drives = motors if chosen is None else chosen
-        return mechanism_of(robot, notes, base, end_effector, drives, fixed, length_unit, task, within, leave_out)
+        wanted = Asked(motors if chosen is None else chosen, length_unit, task, within)
+        return mechanism_of(robot, base, end_effector, wanted, notes, fixed, leave_out)
 
 
 from_sdf = from_urdf
@@ -107,9 +107,8 @@ def read_description(
     links = links.closed_by(list(_told_joints(root, links, known, notes)), asked)
     told = [loop for loop in links.loops if frozenset(loop.links) not in known]
     for kind, plural in (("spherical", "balls"), ("revolute", "hinges"), ("fixed", "welds")):
-        of_kind = tuple(loop.name for loop in told if loop.type == kind)
-        if of_kind:
-            notes.append(Note(f"loops that the description tells, as {plural}", of_kind))
+        of_kind = (loop.name for loop in told if loop.type == kind)
+        note_names(notes, f"loops that the description tells, as {plural}", of_kind)
     counts = Counter([*(joint.name for joint in links.joints), *(loop.name for loop in (*written, *told))])
     for name in (name for name, count in counts.items() if count > 1):
         raise fault(f"loop '{name}'", "a name that a joint or another loop has too", "a name of its own")
@@ -157,23 +156,21 @@ def _told_joints(
             faults += error.faults
     if faults:
         raise InvalidMechanism(faults[:MOST_FAULTS])
-    for what, left_out in (
-        ("springs between links are left out", springs),
-        ("loops that the file of loops tells too, which counts", twice),
-    ):
-        notes += [Note(what, tuple(left_out))] if left_out else []
+    note_names(notes, "springs between links are left out", springs)
+    note_names(notes, "loops that the file of loops tells too, which counts", twice)
 
 
 def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFile, notes: list[Note]) -> Robot:
     """The links as a robot, with its loops."""
     joints = [part for joint in links.joints for part in _parts(joint, links, notes)]
     names = [joint.name for joint in links.joints]
+    known = {*names, *(loop.name for loop in links.loops)}
     for where, said in (
         ("told of in the loops", [*loops_file.retyped, *loops_file.actuated]),
         ("what the description drives", links.driven),
     ):
-        if unknown := tuple(name for name in said if name not in {*names, *(loop.name for loop in links.loops)}):
-            notes.append(Note(f"{where}, but no joint of the robot", unknown))
+        unknown = tuple(name for name in said if name not in known)
+        note_names(notes, f"{where}, but no joint of the robot", unknown)
     loops = placed_loops(link_loops, links.frames)
     places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()}
     frames = {joint: places[link] for joint, link in links.frame_joints.items()} | places
