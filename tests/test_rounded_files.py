@@ -152,12 +152,12 @@ def test_machines_of_the_catalogue_in_six_digits_answer_as_they_are(name: str, t
     ],
 )
 def test_the_last_digit_of_a_file_is_found(texts: list[str], value: float, error: float) -> None:
-    assert digits_of(texts).errors([value])[0] == pytest.approx(error, abs=1e-16)
+    assert digits_of(texts).error([value]) == pytest.approx(error, abs=1e-16)
 
 
 def test_a_quarter_turn_in_radians_is_rounded_wherever_it_stands() -> None:
     digits = digits_of(["0.123456789012345 1.1234567890123456", "1.5708"])
-    assert digits.errors([1.5708], 3)[0] == pytest.approx(0.5e-4)
+    assert digits.error([1.5708], 3) == pytest.approx(0.5e-4)
 
 
 def spoiled(by: float) -> pf.Mechanism:

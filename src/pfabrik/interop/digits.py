@@ -53,16 +53,15 @@ class Digits:
     significant: int = 17
     decimals: int | None = None
 
-    def errors(self, values: ArrayLike, fewest: int | None = None) -> Floats:
-        """The largest error of numbers from their rounding, in their shape.
+    def error(self, values: ArrayLike, fewest: int | None = None) -> float:
+        """The largest error of numbers together, the norm of theirs, from their rounding.
 
         Parameters
         ----------
         fewest : significant digits from which a number counts as rounded at its own last digit, even where others of
             the file have more; None where it does not.
         """
-        flat = [self._error(float(value), fewest) for value in np.ravel(values)]
-        return np.reshape(np.array(flat), np.shape(values))
+        return math.hypot(*(self._error(float(value), fewest) for value in np.ravel(values)))
 
     def _error(self, value: float, fewest: int | None) -> float:
         if self.decimals is not None:
@@ -140,13 +139,13 @@ class ModelDigits:
         return self.bodies[body].on(offset, 0.0, 0.0) if is_computed else self._placed(self.bodies[body], offset, 0.0)
 
     def _placed(self, body: Rounding, offset: ArrayLike, angle: float) -> Rounding:
-        return body.on(offset, float(np.linalg.norm(self._length.errors(offset))), angle)
+        return body.on(offset, self._length.error(offset), angle)
 
     def _turned(self, quat: Floats) -> float:
         """The error of the rotation of a body or site in its parent [rad]."""
         if abs(quat[0]) >= 1.0 - STRAIGHT:
             return 0.0
-        return max(self._turn, 2.0 * float(np.linalg.norm(self._quat.errors(quat))))
+        return max(self._turn, 2.0 * self._quat.error(quat))
 
 
 def _texts(plain: ET.Element, *keys: str) -> Iterator[str]:
@@ -162,7 +161,7 @@ def _turns(plain: ET.Element) -> Iterator[float]:
     euler, about = list(_texts(plain, "euler")), list(_texts(plain, "axisangle"))
     for texts in (euler, [" ".join(text.split()[3:]) for text in about]):
         digits = digits_of(texts, fewest)
-        yield from (unit * float(np.linalg.norm(digits.errors(_numbers(text), fewest))) for text in texts)
+        yield from (unit * digits.error(_numbers(text), fewest) for text in texts)
     yield from _of_vectors([" ".join(text.split()[:3]) for text in about])
     yield from _of_vectors(list(_texts(plain, "zaxis")))
     both = list(_texts(plain, "xyaxes"))
@@ -174,7 +173,7 @@ def _of_vectors(texts: list[str]) -> Iterator[float]:
     digits = digits_of(texts)
     for vector in map(_numbers, texts):
         if np.count_nonzero(vector) > 1:
-            yield float(np.linalg.norm(digits.errors(vector)) / np.linalg.norm(vector))
+            yield digits.error(vector) / float(np.linalg.norm(vector))
 
 
 def _numbers(text: str) -> Floats:

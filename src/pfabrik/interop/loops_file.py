@@ -60,18 +60,14 @@ class LinkLoop:
     Attributes
     ----------
     links : the two.
-    points : the point on each, (2, 3) [m].
+    sides : the frame on each, (2, 4, 4) [m]; a hinge's axis is its third column.
     is_pin : the two may be apart along the axis, as far as they are at home.
-    axes : the axis of a hinge on each, of any length, (2, 3).
-    turns : the rotation on each that a weld holds, (2, 3, 3).
     """
 
     name: str
     type: LoopType
     links: tuple[str, str]
-    points: Floats
-    axes: Floats
-    turns: Floats = field(default_factory=lambda: np.array([np.eye(3)] * 2))
+    sides: Floats
     is_pin: bool = False
 
 
@@ -114,24 +110,21 @@ def placed_loops(loops: Iterable[LinkLoop], frames: Mapping[str, Floats]) -> lis
     """
     placed = []
     for loop in loops:
-        sides = [frames[link] for link in loop.links]
-        points = [side[:3, :3] @ point + side[:3, 3] for side, point in zip(sides, loop.points, strict=True)]
-        turned = np.array([side[:3, :3] for side in sides])
+        sides = np.array([frames[link] for link in loop.links]) @ loop.sides
+        points, turned = sides[:, :3, 3], sides[:, :3, :3]
         if loop.is_pin:
-            axis = sides[0][:3, :3] @ loop.axes[0] / np.linalg.norm(loop.axes[0])
-            points[1] = points[1] - (points[1] - points[0]) @ axis * axis
-        turned = turned @ (np.array([*map(frame_along, loop.axes)]) if loop.type == "revolute" else loop.turns)
+            points[1] -= (points[1] - points[0]) @ turned[0, :, 2] * turned[0, :, 2]
         placed.append(Loop(loop.name, loop.type, loop.links, points, None if loop.type == "spherical" else turned))
     return placed
 
 
 def roundings_of_loops(loops: Sequence[LinkLoop], of_links: Mapping[str, Rounding]) -> dict[str, Rounding]:
     """Loop -> how exactly the worse of its sides is placed [m, rad], on links that are placed so exactly."""
-    digits = digits_of(repr(float(value)) for loop in loops for value in loop.points.ravel())
+    digits = digits_of(repr(float(value)) for loop in loops for value in loop.sides[:, :3, 3].ravel())
     return {
         loop.name: worst(
-            of_links[link].on(point, float(np.linalg.norm(digits.errors(point))), 0.0)
-            for link, point in zip(loop.links, loop.points, strict=True)
+            of_links[link].on(point, digits.error(point), 0.0)
+            for link, point in zip(loop.links, loop.sides[:, :3, 3], strict=True)
         )
         for loop in loops
     }
@@ -221,11 +214,12 @@ def _gepetto(table: Mapping[str, Any]) -> LoopsFile:
 def _loop(number: int, entry: Mapping[str, Any], link_at: Mapping[str, str]) -> LinkLoop:
     """One entry without faults; `link_at` has the link of every name that an end may have."""
     one, other = (link_at[end] for end in entry.get("links") or entry["frames"])
-    points = np.array(entry.get("at", np.zeros((2, 3))), dtype=float)
-    axes = np.array(entry.get("axis", [[0, 0, 1]] * 2), dtype=float)
+    sides, kind = np.array([np.eye(4)] * 2), entry.get("type", "ball")
+    sides[:, :3, 3] = entry.get("at", 0.0)
+    if KINDS[kind] == "revolute":
+        sides[:, :3, :3] = [frame_along(np.array(axis, float)) for axis in entry.get("axis", [[0, 0, 1]] * 2)]
     name = str(entry.get("name", f"closure_{number + 1}"))
-    kind = entry.get("type", "ball")
-    return LinkLoop(name, KINDS[kind], (one, other), points, axes, is_pin=kind == "pin")
+    return LinkLoop(name, KINDS[kind], (one, other), sides, is_pin=kind == "pin")
 
 
 def _faults(number: int, entry: Mapping[str, Any], links: Iterable[str], link_of: Mapping[str, str]) -> Iterator[Fault]:

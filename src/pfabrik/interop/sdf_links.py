@@ -104,12 +104,9 @@ class Poses:
             pose = element.find("pose")
             local = pose_in(pose, f"pose of '{each}'")
             turn = [] if pose is None else [float(word) for word in (pose.text or "").split()[3:]]
-            length, angle = self._lengths.errors(local[:3, 3]), self._turns.errors(turn, FEWEST - 1)
-            unit = np.pi / 180.0 if _is_in_degrees(pose) else 1.0
-            rounding = self.roundings[name].on(
-                local[:3, 3], float(np.linalg.norm(length)), unit * float(np.linalg.norm(angle))
-            )
-            self.frames[each], self.roundings[each] = self.frames[name] @ local, rounding
+            angle = self._turns.error(turn, FEWEST - 1) * (np.pi / 180.0 if _is_in_degrees(pose) else 1.0)
+            self.roundings[each] = self.roundings[name].on(local[:3, 3], self._lengths.error(local[:3, 3]), angle)
+            self.frames[each] = self.frames[name] @ local
             name = each
         return self.frames[name]
 

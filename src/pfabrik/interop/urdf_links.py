@@ -17,7 +17,7 @@ from ..rotations import from_rpy, square_to
 from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .loops_file import LinkLoop
-from .opened import LoopType
+from .opened import LoopType, frame_along
 from .xml_reading import fault, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
@@ -131,14 +131,15 @@ class UrdfLinks:
             elif parts not in (["spherical"], ["fixed"]):
                 twin, offset = f"{joint.child}:{joint.name}", on_parent[:3, 3]
                 digits = digits_of([number_text(offset)])
-                rounding = self.roundings[joint.parent].on(offset, float(np.linalg.norm(digits.errors(offset))), 0.0)
+                rounding = self.roundings[joint.parent].on(offset, digits.error(offset), 0.0)
                 roundings[twin] = joint_roundings.setdefault(joint.name, rounding)
                 frames[twin] = frames[joint.parent] @ on_parent
                 tree.append(replace(joint, child=twin))
                 on_parent, name, links = HERE, f"{joint.name}:weld", (twin, joint.child)
-            turns = np.array([on_parent[:3, :3], on_child[:3, :3]])
-            points = np.array([on_parent[:3, 3], on_child[:3, 3]])
-            loops.append(LinkLoop(name, kind, links, points, turns @ joint.axes[0], turns))
+            sides = np.array([on_parent, on_child])
+            if kind == "revolute":
+                sides[:, :3, :3] = [frame_along(axis) for axis in sides[:, :3, :3] @ joint.axes[0]]
+            loops.append(LinkLoop(name, kind, links, sides))
         placed = replace(self, frames=frames, roundings=roundings, joint_roundings=joint_roundings)
         return replace(placed, joints=tree, loops=loops)
 
@@ -293,12 +294,10 @@ def _roundings(
     of_links, of_joints = {root: NOTHING}, {}
     for joint in (*outward, *closing):
         offset, axis = joint.frame[:3, 3], joint.axes[0]
-        length = float(np.linalg.norm(lengths.errors(offset)))
-        rpy = vector_in(written[joint.name].find("origin"), "rpy")
-        angle = float(np.linalg.norm(turns.errors(rpy, FEWEST - 1)))
-        rounding = of_links[joint.parent].on(offset, length, angle)
+        angle = turns.error(vector_in(written[joint.name].find("origin"), "rpy"), FEWEST - 1)
+        rounding = of_links[joint.parent].on(offset, lengths.error(offset), angle)
         of_links.setdefault(joint.child, rounding)
-        skew = np.linalg.norm(axes.errors(axis)) / np.linalg.norm(axis) if np.count_nonzero(axis) > 1 else 0.0
+        skew = axes.error(axis) / np.linalg.norm(axis) if np.count_nonzero(axis) > 1 else 0.0
         of_joints[joint.name] = rounding._replace(angle=rounding.angle + float(skew))
     return of_links, of_joints
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from .loops_file import LinkLoop
 from .urdf_links import UrdfJoint, UrdfLinks, number_text, placed_at
 
@@ -25,11 +23,11 @@ def plain_robot(links: UrdfLinks, loops: Iterable[LinkLoop]) -> ET.Element:
     for joint in links.joints:
         bodies[joint.child] = _body(bodies[joint.parent], joint)
     for number, loop in enumerate(loops):
-        steps = loop.axes / np.linalg.norm(loop.axes, axis=1, keepdims=True)
         for part in range(2 if loop.type == "revolute" else 1):  # of a hinge, a second pair of points along its axis
             sites = [f"loop {number} {part} {side}" for side in range(2)]
-            for link, site, point, turn in zip(loop.links, sites, loop.points + part * steps, loop.turns, strict=True):
-                ET.SubElement(bodies[link], "site", {"name": site, **placed_at(point, turn)})
+            for link, site, side in zip(loop.links, sites, loop.sides, strict=True):
+                place = placed_at(side[:3, 3] + part * side[:3, 2], side[:3, :3])
+                ET.SubElement(bodies[link], "site", {"name": site, **place})
             tag = "weld" if loop.type == "fixed" else "connect"
             ET.SubElement(equality, tag, site1=sites[0], site2=sites[1])
     return plain
