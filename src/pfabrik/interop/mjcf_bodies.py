@@ -21,6 +21,7 @@ from .cuts import Branch, CutTree
 from .mjcf_struts import Half, halves_of, struts_of
 from .names import unique
 from .physics import Physics
+from .xml_reading import number_text
 
 REFERENCE_POINT = "reference_point"
 """Name of the site that targets place."""
@@ -53,11 +54,6 @@ def names_of(mechanism: Mechanism, tree: CutTree) -> Names:
     return Names(ends, unique(REFERENCE_POINT, taken))
 
 
-def vector(values: Floats) -> str:
-    """Numbers as an attribute, each the shortest that reads back as it is."""
-    return " ".join(repr(float(value) + 0.0) for value in values)
-
-
 def si_unit(coordinate: JointCoordinate, metres: float) -> float:
     """The unit of a coordinate [rad or m]."""
     return 1.0 if coordinate.kind == "angle" else metres
@@ -77,7 +73,7 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
     for branch in tree.branches:
         parent, at = origins[branch.parent], branch.joint.at
         origin = parent if at is None else np.array(at) * metres
-        body = ET.SubElement(elements[branch.parent], "body", name=branch.body, pos=vector(origin - parent))
+        body = ET.SubElement(elements[branch.parent], "body", name=branch.body, pos=number_text(origin - parent))
         elements[branch.body], origins[branch.body] = body, origin
         for attributes in _joints(mechanism, branch, metres, physics):
             ET.SubElement(body, "joint", attributes)
@@ -88,7 +84,7 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
     for half in halves_of(mechanism):
         elements[half.body].append(_half(half, origins[half.body], metres))
     for site, body_name, point in _sites(mechanism, tree, names, metres):
-        place = vector(point - origins[body_name])
+        place = number_text(point - origins[body_name])
         ET.SubElement(elements[body_name], "site", name=site, pos=place, size=repr(2.0 * THICKNESS * physics.length))
     return world
 
@@ -128,12 +124,12 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
         attributes = {
             "name": each.name,
             "type": "hinge" if turning else "slide",
-            "axis": vector(axes_of(mechanism, joint)[each.place] * (1.0 if branch.forward else -1.0)),
+            "axis": number_text(axes_of(mechanism, joint)[each.place] * (1.0 if branch.forward else -1.0)),
         }
         if each.home:
             attributes["ref"] = repr(each.home * unit)
         if joint.range is not None:
-            attributes["range"] = vector(np.array(each.limits) * unit)
+            attributes["range"] = number_text(np.array(each.limits) * unit)
         yield attributes | as_attributes(physics.joint(turning, each.place in joint.driven))
 
 
@@ -156,32 +152,32 @@ def _thick(mechanism: Mechanism, body: str, origin: Floats, metres: float) -> It
         if shape.body != body or k in struts or shape.kind == "mesh":
             continue
         places, size = links.places[k], np.array([0.5 * metres])
-        attributes = {"pos": vector(places[0] * metres - origin)}
+        attributes = {"pos": number_text(places[0] * metres - origin)}
         if shape.kind == "capsule":
-            attributes = {"fromto": vector((places[:2] * metres - origin).ravel())}
+            attributes = {"fromto": number_text((places[:2] * metres - origin).ravel())}
             size = size * shape.thickness
         elif shape.kind == "sphere":
             size = size * (shape.diameter or 0.0)
         elif shape.kind == "box":
-            attributes["xyaxes"] = vector(places[1:3].ravel())
+            attributes["xyaxes"] = number_text(places[1:3].ravel())
             size = size * np.array(shape.size)
         else:
-            attributes["zaxis"] = vector(places[1])
+            attributes["zaxis"] = number_text(places[1])
             size = size * [shape.diameter or 0.0, shape.thickness]
         kind = "cylinder" if shape.kind == "disc" else shape.kind
-        yield ET.Element("geom", {"type": kind, **attributes, "size": vector(size), **UNTOUCHED})
+        yield ET.Element("geom", {"type": kind, **attributes, "size": number_text(size), **UNTOUCHED})
 
 
 def _half(half: Half, origin: Floats, metres: float) -> ET.Element:
     """The part of a strut that moves with one body, as a geom."""
-    ends, radius = vector((half.ends * metres - origin).ravel()), repr(half.radius * metres)
+    ends, radius = number_text((half.ends * metres - origin).ravel()), repr(half.radius * metres)
     return ET.Element("geom", {"name": half.name, "type": "capsule", "fromto": ends, "size": radius, **UNTOUCHED})
 
 
 def _inertial(body: str, points: list[Floats], origin: Floats, physics: Physics) -> ET.Element:
     mass, centre, moment = physics.inertia(body, np.array(points))
-    place = vector(centre - origin)
-    return ET.Element("inertial", mass=repr(mass), pos=place, diaginertia=vector(np.full(3, moment)))
+    place = number_text(centre - origin)
+    return ET.Element("inertial", mass=repr(mass), pos=place, diaginertia=number_text(np.full(3, moment)))
 
 
 def _drawn(points: list[Floats], origin: Floats, physics: Physics) -> Iterator[ET.Element]:
@@ -190,6 +186,6 @@ def _drawn(points: list[Floats], origin: Floats, physics: Physics) -> Iterator[E
     radius = THICKNESS * physics.length
     for point in points:
         if np.linalg.norm(point - middle) > radius:
-            ends = vector(np.concatenate([middle - origin, point - origin]))
+            ends = number_text(np.concatenate([middle - origin, point - origin]))
             through = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "1"}
             yield ET.Element("geom", {"type": "capsule", "fromto": ends, "size": repr(radius), **through})

@@ -15,9 +15,10 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..files.units import metres_of
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit, vector
+from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit
 from .mjcf_struts import strut_notes
 from .physics import STEP, Physics, physics
+from .xml_reading import number_text
 
 NOTE = "pfabrik."
 """Prefix of the names of custom elements, which hold what MuJoCo has no word for."""
@@ -78,7 +79,7 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
         root.append(ET.Comment(f" {comment} ".replace("--", "- -")))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(
-        root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=vector(gravity)
+        root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=number_text(gravity)
     )
     custom = ET.SubElement(root, "custom")
     for name, text in _notes(mechanism, names, metres):
@@ -123,7 +124,7 @@ def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[
     for joint in mechanism.joints:
         if joint.cone is not None:
             cone = joint.cone
-            yield f"cone.{joint.name}", f"{vector(np.array(cone.axis))} {cone.half_angle!r} {cone.fixed_to}"
+            yield f"cone.{joint.name}", f"{number_text(np.array(cone.axis))} {cone.half_angle!r} {cone.fixed_to}"
     if mechanism.clearance is not None:
         yield "clearance", repr(mechanism.clearance * metres)
     yield from strut_notes(mechanism, metres)
@@ -150,5 +151,5 @@ def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element
         gains = as_attributes(physics.servo(drive.kind == "angle"))
         servo = ET.SubElement(actuator, "position", {"name": drive.name, "joint": drive.name, **gains})
         if np.isfinite(drive.limits).all():
-            servo.set("ctrlrange", vector(np.array(drive.limits) * si_unit(drive, metres)))
+            servo.set("ctrlrange", number_text(np.array(drive.limits) * si_unit(drive, metres)))
     return actuator

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from heapq import heappop, heappush
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from ..arrays import Floats
+from ..description.graph import Edge, spanning_tree
+from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism, near_miss
 from ..rotations import from_quaternion
 from .couplings import Coupling
@@ -38,10 +39,11 @@ CUT_LAST = {"BALL": 2, "REVOLUTE": 1, "CONTINUOUS": 1}
 """Joint types -> how much rather than others they close a loop: those whose coordinates nobody asks for."""
 
 
-def hung(joint: UrdfJoint, parent: str, child: str, frames: Mapping[str, Floats]) -> UrdfJoint:
-    """A joint that is placed in the model as one that hangs a link on another, whichever is its child there."""
+def hung(joint: UrdfJoint, forward: bool, frames: Mapping[str, Floats]) -> UrdfJoint:
+    """A joint that is placed in the model as one that hangs a link on another: its child on its parent, if forward."""
+    parent, child = (joint.parent, joint.child) if forward else (joint.child, joint.parent)
     frame, inward = _within(frames[parent], frames[child]), _within(frames[child], HERE)
-    axes = joint.axes if child == joint.child else -joint.axes[:: -1 if joint.type == "UNIVERSAL" else 1]
+    axes = joint.axes if forward else -joint.axes[:: -1 if joint.type == "UNIVERSAL" else 1]
     point, axes = (inward @ joint.frame)[:3, 3], axes @ inward[:3, :3].T
     return replace(joint, parent=parent, child=child, frame=frame, point=point, axes=axes)
 
@@ -168,34 +170,22 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     if faults:
         raise InvalidMechanism(faults[:MOST_FAULTS])
     links = [link.get("name", "") for link in model.findall("link")]
-    touching: dict[str, list[int]] = {link: [] for link in (WORLD, *links)}
-    for index, joint in enumerate(joints):
-        touching[joint.parent].append(index)
-        touching[joint.child].append(index)
     children = {joint.child for joint in joints}
     free = next((link for link in links if link not in children), (links or [WORLD])[0])
-    base = WORLD if touching[WORLD] else free
+    base = WORLD if any(WORLD in (joint.parent, joint.child) for joint in joints) else free
     frames = {link: poses[link] for link in (base, *links)}
     driven = _driven(model)
     begun = [each.get("name", "") for each in model.findall("joint") if number(each, "axis/initial_position")]
     note_names(notes, "initial positions are left out, of", begun)
     named = {*driven, *asked, *(joint.name for joint in joints if joint.limits is not None or joint.mimic is not None)}
-    costs = [0 if joint.name in named else CUT_LAST.get(joint.type, 0) for joint in joints]
-    reached, outward = {base: -1}, []
-    nearest = [(costs[index], index, base) for index in touching[base]]
-    while nearest:  # Prim's tree of least cost
-        _, index, link = heappop(nearest)
-        joint = joints[index]
-        other = joint.child if joint.parent == link else joint.parent
-        if other not in reached:
-            reached[other] = index
-            outward.append(hung(joint, link, other, frames))
-            for index in touching[other]:
-                heappush(nearest, (costs[index], index, other))
-    apart = [link for link in links if link not in reached]
+    kept_first = sorted(joints, key=lambda joint: 0 if joint.name in named else CUT_LAST.get(joint.type, 0))
+    grown = spanning_tree([_edge(joint) for joint in kept_first], base)
+    apart = [link for link in links if link not in grown.paths]
     if apart:
         found = f"links that no joint connects with '{base}' ({', '.join(apart[:5])})"
         raise fault(place, found, "joints between all links")
+    hanging = [(kept_first[index], forward) for index, forward in grown.steps]
+    outward = [hung(joint, forward, frames) for joint, forward in hanging]
     for each in (element.get("name", "") for element in model.findall("frame")):
         link = poses.link(each, f"frame '{each}'")
         frames[each] = poses[each]
@@ -203,9 +193,14 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     of_joints = {joint.name: poses.roundings[joint.name] for joint in joints}
     of_links = {link: poses.roundings[link] for link in frames}
     tree = UrdfLinks(name, base, outward, frames, of_links, of_joints, driven)
-    used = set(reached.values())
-    loops = [closing(joint, frames) for index, joint in enumerate(joints) if index not in used]
+    used = {joint.name for joint, _ in hanging}
+    loops = [closing(joint, frames) for joint in joints if joint.name not in used]
     return tree.closed_by(loops, asked)
+
+
+def _edge(joint: UrdfJoint) -> Edge:
+    links = (joint.parent, joint.child)
+    return Edge(Joint(joint.name, "fixed", links), links)
 
 
 def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint:

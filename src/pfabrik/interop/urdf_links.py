@@ -18,7 +18,7 @@ from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .loops_file import LinkLoop
 from .opened import LoopType, frame_along
-from .xml_reading import fault, numbers_in
+from .xml_reading import fault, number_text, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
 """Joint types that are read: those of URDF, and those that Drake and MuJoCo add."""
@@ -221,16 +221,6 @@ def frame_at(xyz: Floats, rpy: Floats) -> Floats:
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = from_rpy(rpy), xyz
     return frame
-
-
-def placed_at(point: Floats, turn: Floats) -> Mapping[str, str]:
-    """A place (3,) [m] and a rotation (3, 3) as attributes of MuJoCo."""
-    return {"pos": number_text(point), "xyaxes": number_text(turn[:, :2].T.ravel())}
-
-
-def number_text(values: Iterable[float]) -> str:
-    """Numbers as a file has them, with all their digits."""
-    return " ".join(repr(float(value)) for value in values)
 
 
 def vector_in(element: ET.Element | None, key: str, default: str = ZERO) -> Floats:

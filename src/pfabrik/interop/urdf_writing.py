@@ -19,8 +19,9 @@ from ..files.units import metres_of
 from ..motion.displacements import columns
 from ..whole_files import whole_path
 from .cuts import Branch, cut_tree
-from .mjcf_bodies import axes_of, si_unit, vector
+from .mjcf_bodies import axes_of, si_unit
 from .names import unique
+from .xml_reading import number_text
 
 Table = dict[str, Any]
 
@@ -124,7 +125,7 @@ class _Description:
         element = ET.SubElement(self.root, "joint", name=name, type=kind)
         ET.SubElement(element, "parent", link=parent)
         ET.SubElement(element, "child", link=child)
-        ET.SubElement(element, "origin", xyz=vector(origin - self._origins[parent]), rpy="0 0 0")
+        ET.SubElement(element, "origin", xyz=number_text(origin - self._origins[parent]), rpy="0 0 0")
         self._link(child, origin)
         return element
 
@@ -136,7 +137,7 @@ class _Description:
     def _move(self, element: ET.Element, coordinate: JointCoordinate, branch: Branch) -> None:
         """The axis and the limits of a joint, counted from home."""
         axis = axes_of(self.mechanism, branch.joint)[coordinate.place] * (1.0 if branch.forward else -1.0)
-        ET.SubElement(element, "axis", xyz=vector(axis))
+        ET.SubElement(element, "axis", xyz=number_text(axis))
         unit, limit = si_unit(coordinate, self.metres), {"effort": "0"}
         if branch.joint.range is not None:
             lower, upper = (np.array(coordinate.limits) - coordinate.home) * unit

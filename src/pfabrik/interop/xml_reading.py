@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree as ET
@@ -77,6 +78,11 @@ def numbers_in(text: str, count: int) -> Floats | None:
     except ValueError:
         return None
     return values if values.shape == (count,) and np.isfinite(values).all() else None
+
+
+def number_text(values: Iterable[float]) -> str:
+    """Numbers as an attribute, each the shortest that reads back as it is."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
 
 
 def number(element: ET.Element, key: str) -> float:
