@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
-from ..description.graph import Edge, Tree, spanning_tree, tree_of
+from ..description.graph import Edge, spanning_tree, tree_of
 from ..description.home_mobility import body_twist, column_joints
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
@@ -18,6 +18,7 @@ from ..motion.joint_rates import actuated_columns, first_order, present_screws, 
 from ..motion.walks import around_home
 from ..tolerances import TOLERANCES
 from .opened import Loop
+from .simplify import edges_between, loop_blocks
 
 MOST_TRIED = 2
 """Most bodies of a part that are tried as its end effector: where its loops do not close, none does."""
@@ -91,19 +92,19 @@ def choices_of(joints: Sequence[Joint], loops: Sequence[Loop], base: str, build:
     ----------
     joints, loops : between bodies of which those welded to each other are one.
     """
-    edges = [Edge(joint, joint.connects) for joint in joints]
-    edges += [Edge(Joint(loop.name, loop.type, loop.connects), loop.connects) for loop in loops]
+    edges = edges_between(joints, loops)
     tree = spanning_tree(edges, base)
+    blocks = loop_blocks(tree)
     degrees = {body: sum(body in edge.bodies for edge in edges) for body in tree.paths}
     depth = {body: int(np.count_nonzero(path)) for body, path in tree.paths.items()}
     found = []
-    for block in _blocks(tree):
+    for block in blocks:
         inside = sorted(dict.fromkeys(body for index in block for body in edges[index].bodies), key=depth.__getitem__)
         names = tuple(edges[index].joint.name for index in block if index >= len(joints))
         ends = sorted(inside[1:], key=lambda body: (-degrees[body], -depth[body]))
         drivable = [edges[index].joint for index in block if index < len(joints)]
         found.append(_choice(inside[0], ends, drivable, names, build))
-    start = _start(edges, base, {index for block in _blocks(tree) for index in block})
+    start = _start(edges, base, {index for block in blocks for index in block})
     ends = [each.end_effector for each in found if each.end_effector and each.base != start]
     ends += [body for body in tree.paths if degrees[body] == 1 and body not in (base, start)]
     ways = {end: {index for index, _ in tree.way(end)} for end in ends}
@@ -111,18 +112,6 @@ def choices_of(joints: Sequence[Joint], loops: Sequence[Loop], base: str, build:
     for end in sorted(last, key=lambda body: -depth[body])[:MOST_WHOLE]:
         found.append(_choice(start, [end], joints, (), build))
     return [each for each in found if each.end_effector] or found
-
-
-def _blocks(tree: Tree) -> list[list[int]]:
-    """Edges that share loops, directly or through others."""
-    blocks: list[set[int]] = []
-    for loop in tree.loops:
-        block = set(np.flatnonzero(loop).tolist())
-        for other in [each for each in blocks if each & block]:
-            blocks.remove(other)
-            block |= other
-        blocks.append(block)
-    return [sorted(block) for block in blocks]
 
 
 def _start(edges: Sequence[Edge], base: str, looped: set[int]) -> str:

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..description.graph import Edge, spanning_tree, welded
+from ..description.graph import Edge, Tree, spanning_tree, welded
 from ..description.joint_types import JointType
 from ..description.joints import Cone, Joint
 from ..tolerances import TOLERANCES
 from .notes import Note, note_names
-from .opened import OpenMechanism
+from .opened import Loop, OpenMechanism
 
 SKEW = 0.1
 """Least sine between the axes of a universal joint."""
@@ -25,11 +25,12 @@ SKEW = 0.1
 
 def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
     """The machine with only those joints and loops on which the end effector's motion against the base depends."""
-    edges = [Edge(joint, joint.connects) for joint in opened.joints]
-    edges += [Edge(Joint(loop.name, loop.type, loop.connects), loop.connects) for loop in opened.loops]
+    edges = edges_between(opened.joints, opened.loops)
     tips = [edge for edge in edges if edge.joint.name == opened.end_effector]
     body = tips[0].bodies[0] if tips else opened.end_effector
-    kept = _sharing_loops([*edges, Edge(Joint("", "fixed", (opened.base, body)), (opened.base, body))], opened.base)
+    through = Edge(Joint("", "fixed", (opened.base, body)), (opened.base, body))
+    blocks = loop_blocks(spanning_tree([*edges, through], opened.base))
+    kept = next((block for block in blocks if len(edges) in block), [])
     names = {edges[index].joint.name for index in kept if index < len(edges)} | {edge.joint.name for edge in tips}
     omitted = tuple(edge.joint.name for edge in edges if edge.joint.name not in names)
     note_names(notes, "left out, for the end effector does not depend on them", omitted)
@@ -38,16 +39,22 @@ def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
     return dataclasses.replace(opened, joints=joints, loops=loops)
 
 
-def _sharing_loops(edges: list[Edge], base: str) -> set[int]:
-    """The edges that share a loop with the last one, or with one that does, and so on."""
-    loops = spanning_tree(edges, base).loops != 0.0
-    kept = np.zeros(len(edges), bool)
-    kept[-1] = True
-    while True:
-        touched = loops[(loops & kept).any(axis=1)].any(axis=0) | kept
-        if (touched == kept).all():
-            return set(np.flatnonzero(kept).tolist())
-        kept = touched
+def edges_between(joints: Sequence[Joint], loops: Sequence[Loop]) -> list[Edge]:
+    """Joints, then loops, between their bodies."""
+    every = [*joints, *(Joint(loop.name, loop.type, loop.connects) for loop in loops)]
+    return [Edge(joint, joint.connects) for joint in every]
+
+
+def loop_blocks(tree: Tree) -> list[list[int]]:
+    """Edges that share loops, directly or through others."""
+    blocks: list[set[int]] = []
+    for loop in tree.loops:
+        block = set(np.flatnonzero(loop).tolist())
+        for other in [each for each in blocks if each & block]:
+            blocks.remove(other)
+            block |= other
+        blocks.append(block)
+    return [sorted(block) for block in blocks]
 
 
 def merged_bodies(joints: Sequence[Joint], *kept: str) -> tuple[list[Joint], dict[str, str]]:
