@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Floats
 from .collision import EVERYTHING, MOST_SOLIDS, Collision, Solid, solid_shape
 from .mjcf_model import MjcfModel
-from .mjcf_plain import PLACE
+from .mjcf_plain import IN_BODIES, kept
 from .notes import Note, counted_names, note_names
 from .xml_reading import number
 
@@ -25,18 +25,6 @@ UNBOUNDED = ("plane", "hfield")
 
 OWN_GROUP = 3
 """The group of geoms that `to_mjcf` writes shapes in, and in which others keep what collides, too."""
-
-GEOM = ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *PLACE)
-KEPT: dict[str, tuple[str, ...]] = {
-    "compiler": ("angle", "eulerseq"),
-    "default": ("class",),
-    "worldbody": (),
-    "body": ("name", "childclass", *PLACE),
-    "frame": ("name", "childclass", *PLACE),
-    "replicate": ("count", "offset", "euler", "sep", "childclass"),
-    "geom": GEOM,
-}
-"""Elements of a model of geoms alone -> their attributes that are kept."""
 
 
 class Geom(NamedTuple):
@@ -110,7 +98,7 @@ def _geoms(root: ET.Element, paired: set[str]) -> Iterator[Geom]:
                 bits = [given.get(key, "1").strip() for key in ("contype", "conaffinity")]
                 touches = bits != ["0", "0"] or given.get("name", "") in paired
                 yield Geom(child, kind, touches, given.get("group", "0").strip(), copies)
-            elif child.tag in ("body", "frame", "replicate"):
+            elif child.tag in IN_BODIES:
                 waiting.append((child, child.get("childclass", class_), copies))
 
 
@@ -125,24 +113,17 @@ def _read_classes(section: ET.Element, parent: str, classes: dict[str, Mapping[s
         _read_classes(inner, name, classes)
 
 
-def _copied(element: ET.Element, chosen: set[int], in_defaults: bool = False) -> ET.Element:
-    """An element of a model of geoms alone, with its descendants."""
-    known = KEPT[element.tag]
-    copy = ET.Element(element.tag, {key: value for key, value in element.attrib.items() if key in known})
-    for child in element:
-        if child.tag == "geom":
-            if in_defaults or id(child) in chosen:
-                copy.append(_copied(child, chosen))
-        elif child.tag in KEPT:
-            copy.append(_copied(child, chosen, in_defaults))
-    return copy
-
-
 def _solids(root: ET.Element, chosen: set[int], model: MjcfModel, notes: list[Note]) -> Iterator[Solid]:
     """Yield the chosen geoms as solids: MuJoCo places them on their bodies, in a model without joints and meshes."""
     mujoco = model.mujoco
     plain = ET.Element("mujoco")
-    plain.extend(_copied(each, chosen, each.tag == "default") for each in root if each.tag in KEPT)
+
+    def is_kept(each: ET.Element, in_defaults: bool) -> bool:
+        return each.tag in ("default", "geom") if in_defaults else each.tag in IN_BODIES or id(each) in chosen
+
+    for section in root:
+        if section.tag in ("compiler", "default", "worldbody"):
+            plain.append(kept(section, Counter(), is_kept))
     try:
         geoms: Any = mujoco.MjModel.from_xml_string(ET.tostring(plain, encoding="unicode"))
     except ValueError as error:

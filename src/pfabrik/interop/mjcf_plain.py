@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable
 from xml.etree import ElementTree as ET
 
 from ..errors import InvalidMechanism
@@ -20,15 +20,17 @@ KEPT: dict[str, tuple[str, ...]] = {
     "replicate": ("count", "offset", "euler", "sep", "childclass"),
     "joint": ("name", "class", "type", "pos", "axis", "range", "limited", "ref"),
     "freejoint": ("name",),
+    "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *PLACE),
     "site": ("name", "class", "type", "size", "fromto", *PLACE),
     "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
     "weld": ("name", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
     "joint of equality": ("name", "joint1", "joint2", "polycoef", "active"),
     "key": ("name", "qpos"),
 }
-"""Elements of the kinematics -> their attributes that are."""
+"""Elements of the kinematics, and geoms -> their attributes that are kept."""
 
 IN_DEFAULTS = ("default", "joint", "site")
+IN_BODIES = ("body", "frame", "replicate")
 REFUSED = {
     "attach": "a model that attaches others",
     "composite": "a composite body",
@@ -57,10 +59,8 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     for section in root:
         if section.tag == "compiler":
             compiler.attrib.update(_attributes(section))
-        elif section.tag == "default":
-            plain.append(_kept(section, omitted, IN_DEFAULTS))
-        elif section.tag in ("worldbody", "keyframe"):
-            plain.append(_kept(section, omitted))
+        elif section.tag in ("default", "worldbody", "keyframe"):
+            plain.append(kept(section, omitted, _is_kinematic))
         elif section.tag == "equality":
             plain.append(_equalities(section, notes))
         elif section.tag == "actuator":
@@ -86,21 +86,33 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     return plain
 
 
-def _kept(element: ET.Element, omitted: Counter[str], tags: Sequence[str] = tuple(KEPT), copies: int = 1) -> ET.Element:
-    """An element, with its attributes and descendants that belong to the kinematics."""
+def kept(
+    element: ET.Element, omitted: Counter[str], is_kept: Callable[[ET.Element, bool], bool], copies: int = 1
+) -> ET.Element:
+    """An element, with its attributes that are known and those of its descendants that are kept.
+
+    Parameters
+    ----------
+    omitted : the others, which are counted.
+    is_kept : of an element, and whether it is one of defaults.
+    """
     if element.tag == "replicate":
         copies *= max(1, int(number(element, "count")))
         if copies > MOST_COPIES:
             raise fault("replicate", f"{copies} copies", f"at most {MOST_COPIES}")
-    kept = ET.Element(element.tag, _attributes(element))
+    copy = ET.Element(element.tag, _attributes(element))
     for child in element:
         if child.tag in REFUSED:
             raise fault(str(child.tag), REFUSED[child.tag], "bodies one by one, as MuJoCo saves a compiled model")
-        if child.tag in tags:
-            kept.append(_kept(child, omitted, tags, copies))
-        elif tags != IN_DEFAULTS:
+        if is_kept(child, element.tag == "default"):
+            copy.append(kept(child, omitted, is_kept, copies))
+        elif element.tag != "default":
             omitted[child.tag] += 1
-    return kept
+    return copy
+
+
+def _is_kinematic(element: ET.Element, in_defaults: bool) -> bool:
+    return element.tag in (IN_DEFAULTS if in_defaults else KEPT) and element.tag != "geom"
 
 
 def _attributes(element: ET.Element, kind: str | None = None) -> dict[str, str]:
