@@ -47,6 +47,11 @@ class CompiledModel:
         """Compute everything that follows from the coordinates."""
         self.mujoco.mj_fwdPosition(self.model, self.data)
 
+    def take(self, qpos: ArrayLike) -> None:
+        """Take a state (nq,)."""
+        self.data.qpos[:] = qpos
+        self.update()
+
     def move(self, motion: ArrayLike) -> None:
         """Move the joints by (nv,) [rad or m]."""
         self.mujoco.mj_integratePos(self.model, self.data.qpos, motion, 1.0)

@@ -45,7 +45,7 @@ def qpos(
         return qpos_of(mechanism, q)
     from .robot_in_mujoco import RobotInMujoco
 
-    states = RobotInMujoco(mechanism, model, configuration)
+    states = RobotInMujoco(mechanism, model, configuration, is_whole=True)
     begin = None
     if qpos is not None:
         begin = as_floats("qpos", qpos, f"positions (..., {states.model.nq})")

@@ -128,12 +128,18 @@ class Original:
         return largest
 
     def _leave_out_loops(self) -> None:
-        """Let go of loops with joints that the mechanism has not which stay open at home: they are not its own."""
+        """Let go of loops that stay open at home and have joints that the mechanism has not: they are not its own.
+
+        A joint that was held when the mechanism was imported is in loops of the mechanism, which close without it; one
+        that was left out, for the end effector does not depend on it, is in loops that do not.
+        """
         robot = self.robot
         largest = TOLERANCES.file_gap * robot.mechanism.characteristic_length * robot.metres
-        if robot.gap()[0] > largest:
+        while robot.gap()[0] > largest:
             errors, jacobian, equalities = robot.rows()
             is_doubtful = jacobian[:, robot.unknown].any(axis=1) & (np.abs(errors) > largest)
+            if not is_doubtful.any():
+                return
             robot.data.eq_active[np.unique(equalities[is_doubtful])] = 0
             robot.put_home()
 

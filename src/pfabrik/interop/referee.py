@@ -33,8 +33,7 @@ def on_export(mechanism: Mechanism, solutions: Iterable[Solution], rng: np.rando
     units = np.where(slides, robot.metres * mechanism.characteristic_length, 1.0) * robot.passive
     largest = np.zeros(3)
     for solution in solutions:
-        robot.data.qpos[:] = qpos_of(mechanism, solution.q)
-        robot.update()
+        robot.take(qpos_of(mechanism, solution.q))
         gap, _ = robot.gap()
         if is_determined:
             robot.move(rng.uniform(-APART, APART, robot.model.nv) * units)

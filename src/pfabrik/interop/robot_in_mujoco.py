@@ -45,6 +45,7 @@ class RobotInMujoco(CompiledModel):
     model : compiled, or the path or the text of one.
     configuration : the mechanism's home in it.
     same_row : as of `SAME_ROW`.
+    is_whole : joints that the mechanism has not, and nothing drives, move too, where that is what closes loops.
 
     Attributes
     ----------
@@ -52,7 +53,9 @@ class RobotInMujoco(CompiledModel):
     passive, unknown : the degrees of freedom of the mechanism's passive joints, and of joints that it has not, (nv,).
     """
 
-    def __init__(self, mechanism: Mechanism, model: Any, configuration: str, same_row: float = SAME_ROW) -> None:
+    def __init__(
+        self, mechanism: Mechanism, model: Any, configuration: str, same_row: float = SAME_ROW, is_whole: bool = False
+    ) -> None:
         require("a robot in MuJoCo", "mujoco", "mujoco")
         super().__init__(_compiled(model))
         self.put_configuration(configuration)
@@ -69,15 +72,16 @@ class RobotInMujoco(CompiledModel):
         known = {*self._scalars, *self._balls, *(n for n, name in enumerate(self.joint_names) if name in names)}
         self.unknown: Mask = np.array([joint not in known for joint in joint_of], bool)
         self.passive: Mask = ~self.unknown & [self._scalars.get(joint) not in driven for joint in joint_of]
-        self._idle: Mask = self.unknown & ~np.isin(joint_of, self.model.actuator_trnid[:, 0])
-        self._homes = {joint: (np.eye(3), self._quaternion(joint).copy()) for joint in self._balls}
+        self._idle: Mask = self.unknown & ~np.isin(joint_of, self.model.actuator_trnid[:, 0]) & is_whole
         self.put_home()
-        self._homes = {joint: (self._frame_before(joint), self._quaternion(joint).copy()) for joint in self._balls}
 
     def put_home(self) -> None:
-        """Take the mechanism's home, closed."""
+        """Take the mechanism's home, closed, from which its balls turn."""
+        self.take(self.begin)
+        self._homes = {joint: (np.eye(3), self._quaternion(joint).copy()) for joint in self._balls}
         self.put(np.array([each.home for each in self.mechanism.coordinates]))
         self.close()
+        self._homes = {joint: (self._frame_before(joint), self._quaternion(joint).copy()) for joint in self._balls}
 
     def at(self, q: Floats, begin: Floats | None) -> Floats:
         """States (..., nq of the model) at joint coordinates (..., nq of the mechanism) [rad or length].
@@ -118,18 +122,19 @@ class RobotInMujoco(CompiledModel):
     def close(self) -> tuple[float, str]:
         """Close the loops that move with the mechanism; the gap that is left, as of `gap`, and whose.
 
-        Passive joints of the mechanism move; where this does not do, those too that nothing drives or knows.
+        Passive joints of the mechanism move; where this does not do, those of others too that may.
         """
         begin = self.data.qpos.copy()
         gap, name = self._newton(self.passive)
         if gap <= self._largest or not self._idle.any():
             return gap, name
         midway = self.data.qpos.copy()
-        for state, free in ((begin, self.passive | self._idle), (midway, None)):
-            self.data.qpos[:] = state
-            self.update()
-            if free is not None and (closed := self._newton(free))[0] <= self._largest:
-                return closed
+        self.take(begin)
+        self._newton(self._idle)
+        closed, other = self._newton(self.passive | self._idle)
+        if closed <= self._largest:
+            return closed, other
+        self.take(midway)
         return gap, name
 
     def gap(self) -> tuple[float, str]:
@@ -203,8 +208,7 @@ class RobotInMujoco(CompiledModel):
         self.data.qpos[later] = self.model.qpos0[later]
         self.update()
         frame: Floats = self.data.xmat[body].reshape(3, 3).copy()
-        self.data.qpos[:] = state
-        self.update()
+        self.take(state)
         return frame
 
     def _follow(self) -> None:
