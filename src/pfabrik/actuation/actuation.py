@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -219,7 +219,7 @@ class Actuation:
         """
         return feasible_hull(self._placer, box, seed)
 
-    def sample(self, n: int, seed: int = 0, *, box: ArrayLike | None = None, model: Any = None) -> Sample:
+    def sample(self, n: int, seed: int = 0, *, box: ArrayLike | None = None, model: object = None) -> Sample:
         """Feasible configurations, uniform in the joint coordinates: coordinates, Solution, and MuJoCo's `qpos`.
 
         Parameters

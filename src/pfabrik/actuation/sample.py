@@ -31,7 +31,7 @@ class Sample(NamedTuple):
 
     q: Floats
     solution: Solution
-    model: Any = None
+    model: object = None
 
     @property
     def qpos(self) -> Floats:
@@ -39,7 +39,7 @@ class Sample(NamedTuple):
         return qpos(self.solution, self.model)
 
 
-def sample_feasible(placer: Placer, n: int, seed: int, box: Any, model: Any) -> Sample:
+def sample_feasible(placer: Placer, n: int, seed: int, box: Any, model: object) -> Sample:
     """Draw coordinates within a box until n are reached.
 
     Raises

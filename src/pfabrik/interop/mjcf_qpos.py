@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +21,7 @@ from .mjcf_bodies import si_unit
 
 
 def qpos(
-    solution: Solution, model: Any = None, qpos: ArrayLike | None = None, *, configuration: str = "qpos0"
+    solution: Solution, model: object = None, qpos: ArrayLike | None = None, *, configuration: str = "qpos0"
 ) -> Floats:
     """MuJoCo's joint positions of configurations, (..., nq) [rad, m; quaternions w, x, y, z], with the loops closed.
 
