@@ -62,7 +62,7 @@ QUICK = [("stewart", "double"), ("delta", "float"), ("five_bar", "double")]
 LONG = [("stewart", "float"), ("delta", "double"), ("five_bar", "float")]
 LONG += [(name, precision) for name in ("orthoglide", "rps") for precision in ("double", "float")]
 SLOW = [pytest.param(*each, marks=pytest.mark.campaign) for each in LONG]
-SANITIZED = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DCHECKED")
+SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DCHECKED")
 
 
 class Said(NamedTuple):
