@@ -327,6 +327,12 @@ def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(tmp_path: Pa
 
 
 @needs_compiler
+def test_a_machine_without_any_limit_has_a_file_that_compiles_and_checks_itself(tmp_path: Path) -> None:
+    program = compiled(tmp_path, c_source(pf.load("servo_hexapod").without_limits()), COMPILERS[0], driver=None)
+    assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
+
+
+@needs_compiler
 def test_a_self_test_says_so_where_nothing_can_be_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(self_test, "N_POSES", 0)
     program = compiled(tmp_path, c_source(machine("tricept_of_legs")), COMPILERS[0], driver=None)

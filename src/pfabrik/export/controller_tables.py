@@ -109,7 +109,7 @@ def _reaching(machine: Machine, model: Model, parts: Sequence[str]) -> Reaching:
         begin=np.zeros(n),
         sides=np.zeros(n),
         turn=np.zeros(3),
-        slack=np.zeros(2 * len(table.limited) + len(table.cones)),
+        slack=np.zeros(max(1, 2 * len(table.limited) + len(table.cones))),  # C has no empty arrays
         distance=np.zeros(1),
     )
 
