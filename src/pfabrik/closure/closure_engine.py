@@ -13,6 +13,7 @@ from ..derived import derived
 from ..kernels.closure.joint_tables import ANSWER, EXPECTED, NEAREST, REACH, STEP, JointQuestion
 from ..kernels.handle import Handle
 from ..kernels.rows import (
+    EXCEEDED,
     FAILED,
     HOLD,
     HOLD_NOTHING,
@@ -220,7 +221,9 @@ class ClosureEngine(Engine):
         if not len(rows):
             return answers
         begin = start if start is None or len(start) == 1 else start.at(rows)
-        return answers.with_rows(rows, self.nearest_forward(values[rows], begin, tolerance))
+        found = self.nearest_forward(values[rows], begin, tolerance)
+        found.rows.status[found.rows.status == EXCEEDED] = FAILED
+        return answers.with_rows(rows, found)
 
     def nearest_forward(self, values: Floats, start: Configurations | None, tolerance: float) -> Configurations:
         """The feasible configurations whose actuators are nearest to values (n, n_a) that searches find."""
