@@ -255,9 +255,8 @@ def test_actuators_that_lead_past_a_dead_point_keep_links_apart() -> None:
     """Far from home: what another assembly mode is replaced by keeps links apart too."""
     base = [[89, 4, 26], [31, 84, 26], [-42, 79, 26], [-89, -2, 26], [-38, -81, 26], [18, -88, 26]]
     platform = [[43, 15, 118], [27, 36, 118], [-9, 45, 118], [-43, -14, 118], [-7, -43, 118], [5, -47, 118]]
-    machine = pf.Mechanism.from_legs(
-        *("P*-S-S", base, platform), reference_point=(0, 0, 118), stroke=(-60, 80), thickness=8, A={"axis": "vertical"}
-    ).with_clearance(2)
+    legs = {"stroke": (-60, 80), "thickness": 8, "A": {"axis": "vertical"}, "clearance": 2}
+    machine = pf.Mechanism.from_legs("P*-S-S", base=base, platform=platform, reference_point=(0, 0, 118), **legs)
     answers = pf.solve_fk(machine, 50 * np.random.default_rng(0).normal(size=(60, 6)))
     assert np.asarray(pf.clearance(answers).distance).min() >= 2 - 1e-9 * machine.characteristic_length
     assert np.max(answers.limit_excess) <= 1e-9
