@@ -199,13 +199,20 @@ def test_what_is_left_out_must_be_there_and_a_mimic_may_be() -> None:
     assert free.mechanism.actuator_names == ("shoulder", "elbow")
 
 
-TURNED = loop(beside=1e-4, type="hinge", axis=[[0, 1, 0], [0, 0, 1]])
+TURNED = PARALLELOGRAM.replace('xyz="-.08 0 .02"', 'xyz=".3 0 0" rpy="1.5707963 0 0"').replace("0 1 0", "0 0 -1")
+TURNED = TURNED.replace("0 0 -1", "0 1 0", 2)  # the rod's own frame alone is turned, and its hinge in it
 
 
-@pytest.mark.parametrize("table", [loop(height=0.9), TURNED])
-def test_a_wide_gap_across_the_pin_or_a_quarter_turn_is_no_pin(table: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    ("text", "table"),
+    [
+        (PARALLELOGRAM, loop(height=0.9)),
+        (TURNED, loop(type="hinge", axis=[[0, 1, 0]] * 2, at=[[0, 0.3, 0], [0.3, 0.001, 0]])),
+    ],
+)
+def test_a_wide_gap_across_the_pin_or_an_axis_that_is_turned_is_no_pin(text: str, table: dict[str, object]) -> None:
     with pytest.raises(InvalidMechanism) as caught:
-        from_urdf(PARALLELOGRAM.format(drives=DRIVEN), table, end_effector="upper")
+        from_urdf(text.format(drives=DRIVEN), table, end_effector="upper")
     assert "along the pin" not in str(caught.value) and "--within" not in str(caught.value)
 
 
