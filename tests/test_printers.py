@@ -268,3 +268,15 @@ def test_every_command_takes_a_printer(tmp_path: Path, monkeypatch: pytest.Monke
     run("workspace", printer, "--fix", "z=0")
     run("new", "--from", other, "-o", "my.toml")
     assert pf.load(tmp_path / "my.toml") == pf.load(other)
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+def test_no_height_is_reached_with_carriages_below_the_platform_or_elbows_inside(name: str) -> None:
+    """A firmware knows one place of each carriage or arm: far above the endstops nothing is within reach."""
+    firmware, _, _ = PRINTERS[name]
+    heights, unit = np.linspace(-1000.0, 2000.0, 61), np.degrees if isinstance(firmware, Arms) else np.asarray
+    places = [(0.0, 0.0, height) for height in heights]
+    answers = pf.solve_ik(pf.load(FILES / name), places)
+    reached = np.flatnonzero(answers.status == pf.Status.REACHED)
+    expected = [firmware(*places[row]) for row in reached]
+    np.testing.assert_allclose(unit(answers.actuators[reached]), expected, rtol=0, atol=EXACT)

@@ -96,7 +96,8 @@ def rotary_delta(radius: float, arms: Three) -> Table:
             | {"range": [f"lowest_{letter}" if "lowest" in arms else -180, f"highest_{letter}"]}
         )
         elbow = (f"({out} + {upper}*cos({raised}))", f"{height} + {upper}*sin({raised})")
-        joints += _pair(letter, f"upper_arm_{letter}", elbow, "home_height")
+        across = [f"sin({raised})*cos({angle})", f"sin({raised})*sin({angle})", f"-cos({raised})"]
+        joints += _pair(letter, f"upper_arm_{letter}", elbow, "home_height", across)
     return _machine("Rotary delta printer", dimensions, joints, "home_height")
 
 
@@ -145,8 +146,17 @@ def _arm_angle(letter: str, name: str, height: str, nozzle: str) -> Table:
     }
 
 
-def _pair(letter: str, carrier: str, knee: tuple[str, str], foot: str) -> Iterator[Table]:
-    """Two parallel rods from a carrier, at a radius and a height, to the platform, at a height."""
+def _pair(
+    letter: str, carrier: str, knee: tuple[str, str], foot: str, below: list[Any] | None = None
+) -> Iterator[Table]:
+    """Two parallel rods from a carrier, at a radius and a height, to the platform, at a height.
+
+    A firmware knows one of the places that a carrier may have: the rods stand on the platform, at one side of an arm.
+
+    Parameters
+    ----------
+    below : direction square to an arm, towards the side of its rods.
+    """
     angle = f"angle_{letter}"
     for side, along_x, along_y in (("l", "-", "+"), ("r", "+", "-")):
         places = [
@@ -158,8 +168,10 @@ def _pair(letter: str, carrier: str, knee: tuple[str, str], foot: str) -> Iterat
             for radius, height in (knee, ("platform_radius", foot))
         ]
         rod = f"rod_{letter}{side}"
-        yield {"name": f"upper_{letter}{side}", "type": "spherical", "connects": [carrier, rod], "at": places[0]}
-        yield {"name": f"lower_{letter}{side}", "type": "spherical", "connects": [rod, "platform"], "at": places[1]}
+        upper = {"name": f"upper_{letter}{side}", "type": "spherical", "connects": [carrier, rod], "at": places[0]}
+        lower = {"name": f"lower_{letter}{side}", "type": "spherical", "connects": [rod, "platform"], "at": places[1]}
+        yield upper | ({"cone": {"axis": below, "half_angle": 90, "fixed_to": carrier}} if below else {})
+        yield lower | {"cone": {"axis": [0, 0, 1], "half_angle": 90, "fixed_to": "platform"}}
 
 
 def _machine(name: str, dimensions: Table, joints: list[Table], height: object) -> Table:
