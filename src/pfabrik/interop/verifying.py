@@ -34,7 +34,7 @@ class AgainstOriginal:
     position_difference, rotation_difference : between our pose and the file's, with the actuated joints where we have
         them [length], [rad].
     position_tolerance, rotation_tolerance : how far what import changes within the digits of the file puts poses off
-        [length], [rad], as found by importing it again; and rounding.
+        [length], [rad], as found by importing it again, up to what digits explain; and rounding.
     """
 
     loop_gap: float
@@ -134,7 +134,8 @@ def verify(
     gap, position, rotation = (on_export(mechanism, solutions, rng) / units).tolist()
     if robot is not None and file is not None:
         open_by, apart, turned = (np.max([robot.compare(each) for each in solutions], axis=0) / units).tolist()
-        changed = robot.changes_of_import(file, solutions) / units
+        explained = TOLERANCES.file_digits * np.array([size, size, 1.0])
+        changed = np.minimum(robot.changes_of_import(file, solutions) / units, explained)
         nearest = float(max(changed[:2])) + tolerance
         against = AgainstOriginal(open_by, apart, turned, nearest, float(changed[2]) + TOLERANCES.rotation)
     return Verification(len(solutions), gap, position, rotation, tolerance, travelled(mechanism, solutions), against)
