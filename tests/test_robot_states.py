@@ -11,7 +11,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument, UnknownName
-from pfabrik.interop import from_mjcf, qpos
+from pfabrik.interop import from_mjcf, qpos, verify
 
 ROBOT = """
 <mujoco model="walker">
@@ -160,6 +160,14 @@ def test_a_free_joint_in_the_mechanism_is_its_place_and_turn() -> None:
         assert np.linalg.norm(data.site(f"top{k}").xpos - data.site(f"at{k}").xpos) < 1e-9
     np.testing.assert_allclose(data.body("plate").xpos, pose[:3, 3] * 1e-3, atol=1e-9)
     np.testing.assert_allclose(data.body("plate").xmat.reshape(3, 3), pose[:3, :3], atol=1e-9)
+
+
+def test_loops_that_are_not_the_mechanism_s_do_not_hold_it_in_its_original(tmp_path: Any) -> None:
+    """The ankle without its rods, whose loops are closed at home: the robot would not move with them."""
+    (tmp_path / "robot.xml").write_text(ROBOT)
+    ankle = from_mjcf(ROBOT, base="shin", end_effector="foot", actuated=["pitch", "roll"], leave_out=LOOPS).mechanism
+    against = verify(ankle, poses=3, original=tmp_path / "robot.xml").original
+    assert against and max(against.position_tolerance, against.rotation_tolerance) <= 1e-8
 
 
 def test_samples_are_states_of_the_robot() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -87,7 +87,7 @@ class Original:
 
     def __init__(self, mechanism: Mechanism, file: OriginalFile) -> None:
         self.robot = RobotInMujoco(mechanism, file.model(mechanism.actuator_names), file.configuration)
-        self._leave_out_loops()
+        self._close(self.robot.put_home)
         tips = [mechanism.end_effector]
         if mechanism.end_effector_is_joint:
             tips = [*mechanism.joint(mechanism.end_effector).connects]
@@ -100,8 +100,7 @@ class Original:
 
     def compare(self, solution: Solution) -> tuple[float, float, float]:
         """Gap of the loops where an answer's drives are [m], and how far its pose is from ours [m], [rad]."""
-        self.robot.put(np.asarray(solution.q))
-        gap, _ = self.robot.close()
+        gap = self._close(lambda: self.robot.put(np.asarray(solution.q)))
         begin, turned_at_home = self._home
         turn = self._body.xmat.reshape(3, 3) @ turned_at_home.T
         point = np.array(solution.mechanism.reference_point) * self.robot.metres
@@ -127,21 +126,23 @@ class Original:
                 largest = np.maximum(largest, other.compare(answer))
         return largest
 
-    def _leave_out_loops(self) -> None:
-        """Let go of loops that stay open at home and have joints that the mechanism has not: they are not its own.
+    def _close(self, put: Callable[[], None]) -> float:
+        """Put joints, close the loops, and let go of those that stay open and have joints that the mechanism has not.
 
         A joint that was held when the mechanism was imported is in loops of the mechanism, which close without it; one
-        that was left out, for the end effector does not depend on it, is in loops that do not.
+        that was left out, for the end effector does not depend on it, is in loops that do not. The gap is left [m].
         """
+        put()
         robot = self.robot
         largest = TOLERANCES.file_gap * robot.mechanism.characteristic_length * robot.metres
-        while robot.gap()[0] > largest:
+        while (gap := robot.close()[0]) > largest:
             errors, jacobian, equalities = robot.rows()
             is_doubtful = jacobian[:, robot.unknown].any(axis=1) & (np.abs(errors) > largest)
             if not is_doubtful.any():
-                return
+                break
             robot.data.eq_active[np.unique(equalities[is_doubtful])] = 0
-            robot.put_home()
+            put()
+        return gap
 
 
 def _add_named_loops(plain: ET.Element) -> None:
