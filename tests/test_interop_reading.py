@@ -20,7 +20,7 @@ from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import Imported, Loop, NoEndEffector, OpenMechanism, assemble, from_mjcf, from_urdf, verify
 from pfabrik.interop.driving import Rates
-from pfabrik.interop.robots import Asked, Robot, mechanism_of
+from pfabrik.interop.robots import ImportOptions, Robot, mechanism_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -376,7 +376,7 @@ def test_actuators_come_in_the_order_of_the_file_as_fast_as_it_says() -> None:
     rates = {"C[0]": Rates(2.0, 3.0), "C[1]": Rates(0.5), "last": Rates(None, 7.0)}
     places = {"on last": ("on last", np.zeros(3))}
     robot = Robot("arm", joints, [], "base", places, order=("last", "C[0]", "C[1]"), rates=rates)
-    found = mechanism_of(robot, None, "on last", Asked(length_unit="mm"), []).mechanism
+    found = mechanism_of(robot, None, "on last", ImportOptions(length_unit="mm"), []).mechanism
     assert [joint.name for joint in found.joints] == ["A", "last", "C", "turn"]
     assert found.actuator_names == ("last", "C[0]", "C[1]", "turn")
     assert (found.joint("C").max_speed, found.joint("C").max_acceleration) == ((2.0, 500.0), None)

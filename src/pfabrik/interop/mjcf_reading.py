@@ -23,7 +23,7 @@ from .mjcf_struts import is_half, read_struts
 from .mjcf_writing import NOTE
 from .notes import Note, noting
 from .opened import loops_by_name
-from .robots import Asked, Robot, mechanism_of
+from .robots import ImportOptions, Robot, mechanism_of
 from .xml_reading import fault, read_xml
 
 
@@ -86,7 +86,7 @@ def from_mjcf(
         robot = _robot(root, model, notes)
         held = [*require_names("fixed", fixed), *model.held(notes)]
         drives = None if actuated is None else require_names("actuated", actuated)
-        asked = Asked(drives, length_unit, task, within)
+        asked = ImportOptions(drives, length_unit, task, within)
         return mechanism_of(robot, base, end_effector, asked, notes, held, leave_out)
 
 

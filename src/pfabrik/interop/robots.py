@@ -70,8 +70,8 @@ class Robot:
     collision: Collision = NO_COLLISION
 
 
-class Asked(NamedTuple):
-    """What is asked of an import, besides its ends; as of `from_mjcf`."""
+class ImportOptions(NamedTuple):
+    """What an import makes of a robot, besides its ends; as of `from_mjcf`."""
 
     actuated: Sequence[str] | None = None
     length_unit: str = "m"
@@ -83,7 +83,7 @@ def mechanism_of(
     robot: Robot,
     base: str | None,
     end_effector: str | None,
-    asked: Asked,
+    asked: ImportOptions,
     notes: list[Note],
     fixed: Iterable[str] = (),
     leave_out: Iterable[str] = (),
@@ -108,7 +108,7 @@ def mechanism_of(
     return dataclasses.replace(found, notes=tuple(notes))
 
 
-def _between(robot: Robot, base: str, end_effector: str, asked: Asked, notes: list[Note]) -> Imported:
+def _between(robot: Robot, base: str, end_effector: str, asked: ImportOptions, notes: list[Note]) -> Imported:
     """The mechanism between two bodies of a robot with drives."""
     tip, point = _place(robot, end_effector)
     if tip != base and merged_bodies(robot.joints, base)[1].get(tip) == base:
@@ -217,7 +217,7 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
 
     def build(base: str, end_effector: str, drives: Sequence[str] | None) -> Mechanism:
         driven = _with_drives(rigid, drives)
-        return _between(driven, base, end_effector, Asked(drives), []).mechanism
+        return _between(driven, base, end_effector, ImportOptions(drives), []).mechanism
 
     raise NoEndEffector(choices_of(rigid.joints, rigid.loops, base, build))
 
@@ -263,7 +263,7 @@ def _without_joint_named(tip: str, robot: Robot, notes: list[Note]) -> Robot:
     )
 
 
-def _opened(robot: Robot, base: str, tip: str, point: Floats | None, asked: Asked) -> OpenMechanism:
+def _opened(robot: Robot, base: str, tip: str, point: Floats | None, asked: ImportOptions) -> OpenMechanism:
     """The robot in the unit of the mechanism."""
     metres, within = metres_of(asked.length_unit), asked.within
     roundings = dict(robot.roundings)

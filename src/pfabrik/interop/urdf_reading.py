@@ -22,7 +22,7 @@ from .driving import Rates
 from .loops_file import LinkLoop, LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, note_names, noting
 from .opened import loops_by_name
-from .robots import Asked, Robot, mechanism_of
+from .robots import ImportOptions, Robot, mechanism_of
 from .sdf_links import Poses, closing, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision
@@ -84,7 +84,7 @@ def from_urdf(
         links, link_loops = read_description(element, loops_file, asked, notes)
         robot = replace(_robot(links, link_loops, loops_file, notes), collision=read_collision(element, links, notes))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
-        wanted = Asked(motors if chosen is None else chosen, length_unit, task, within)
+        wanted = ImportOptions(motors if chosen is None else chosen, length_unit, task, within)
         return mechanism_of(robot, base, end_effector, wanted, notes, fixed, leave_out)
 
 
