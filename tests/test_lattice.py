@@ -7,9 +7,9 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pfabrik.workspace.lattice import codes, offsets, places_of
 from pfabrik.workspace.numbering import Numbering
 from pfabrik.workspace.parts import connected
-from pfabrik.workspace.sampled_lattice import codes, offsets, places_of
 
 
 @pytest.mark.parametrize("d", [2, 3])

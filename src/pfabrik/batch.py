@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar, cast
+
+import numpy as np
 
 Batch = TypeVar("Batch", bound=tuple[Any, ...])
 """A NamedTuple of arrays, or of such NamedTuples. Arrays without rows say nothing, whichever rows are taken."""
@@ -29,3 +32,9 @@ def put(batch: Batch, places: Any, source: Batch, source_places: Any = slice(Non
             put(item, places, source_item, source_places)
         elif len(item):
             item[places] = source_item[source_places]
+
+
+def joined(batches: Sequence[Batch]) -> Batch:
+    """The rows of batches one after the other."""
+    make = cast(Any, batches[0])._make
+    return cast(Batch, make(np.concatenate(arrays) for arrays in zip(*batches, strict=True)))

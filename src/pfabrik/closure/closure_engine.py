@@ -12,6 +12,7 @@ from ..batch import put
 from ..derived import derived
 from ..kernels.closure.joint_tables import ANSWER, EXPECTED, NEAREST, REACH, STEP, JointQuestion
 from ..kernels.handle import Handle
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import (
     EXCEEDED,
     FAILED,
@@ -33,7 +34,7 @@ from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .assemble import assemble, forward_answers, nearest_values
 from .attempts import Attempt, attempts_of
-from .close import HELD, Closing, close, measure_configurations
+from .close import HELD, Closing, close, in_lengths, measure_configurations
 from .configurations import (
     Configurations,
     coordinates_for,
@@ -42,7 +43,7 @@ from .configurations import (
     steps_of,
     write_closing,
 )
-from .engine_contract import Engine
+from .engine_contract import Counted, Engine
 from .joint_answers import answer_rows, logged, near_rows, question_of
 from .link_distances import clearance_excess
 from .placed_links import placed_at
@@ -136,12 +137,20 @@ class ClosureEngine(Engine):
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         return self._answer(targets, start.coordinates, USUAL, question_of(REACH, True, True))
 
-    def step(self, targets: Floats, start: Configurations) -> Configurations:
-        """Move as many configurations to nearby targets (n, 4, 4) in one step each; FAILED where not reached.
+    def grows(self, counted: Counted) -> bool:
+        """True where whole poses count: a target out of reach costs a hundred times as much as one within."""
+        return counted == "orientation"
 
-        Cheaper than `advance` if many are not reached, for which `advance` tries continuation.
-        """
-        return self._answer(targets, start.coordinates, USUAL, question_of(STEP, True, True))
+    def known(self, start: Configurations | None) -> Starts:
+        """As `Engine.known`: by joint coordinates."""
+        poses = self.model.mechanism.home_pose[None] if start is None else start.rows.poses
+        coordinates = start_coordinates(self.model, None) if start is None else start.coordinates
+        return Starts(in_lengths(poses, 1.0 / self.model.length), coordinates, np.zeros((0, 0)))
+
+    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
+        """As `Engine.grow`: in one step, `anew` by continuation; FAILED where not reached."""
+        begin = np.repeat(known.q, len(targets), axis=0) if len(known.q) == 1 else known.q
+        return self._answer(targets, begin, USUAL, question_of(REACH if anew else STEP, True, True))
 
     def close_as_expected(
         self, targets: Floats, start: Configurations | None, options: Options, *, leg_by_leg: bool

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from typing import Literal
 
 from ..arrays import Floats
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import Rows
 from ..options import Options
 from .attempts import Attempt
@@ -15,6 +17,9 @@ from .projection import ProjectionMode
 
 OnProgress = Callable[[int, int], None]
 """Called with the number of targets solved, and of all."""
+
+Counted = Literal["orientation", "position"]
+"""What counts of targets: their orientation too, or the position alone."""
 
 Prepared = tuple[Callable[[], int], object]
 """A call prepared for one row, which returns 0 if it solves that row, and what must be kept alive for it."""
@@ -71,6 +76,24 @@ class Engine(InverseEngine):
     @abstractmethod
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
+
+    def grows(self, counted: Counted) -> bool:
+        """True if known configurations lead to nearby targets in far less time than targets are answered anew."""
+        return False
+
+    def known(self, start: Configurations | None) -> Starts:
+        """Configurations as what others grow from; None for home."""
+        raise NotImplementedError
+
+    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
+        """Move known configurations, one or as many, to nearby targets (n, 4, 4); PROJECTED where the nearest is found.
+
+        Parameters
+        ----------
+        anew : targets may be far, and are searched for from the machine's seeds too, where it has any.
+        keep_mode : stay in the working modes of the known configurations.
+        """
+        raise NotImplementedError
 
     def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
         """Answers whose projections have their redundant joints as near to those of the start as their poses let them.

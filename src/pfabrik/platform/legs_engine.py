@@ -14,13 +14,24 @@ from ..closure.attempts import Attempt
 from ..closure.close import Closing, in_lengths
 from ..closure.closure_engine import ClosureEngine
 from ..closure.configurations import Configurations, new_rows, steps_of
-from ..closure.engine_contract import Engine, Prepared
+from ..closure.engine_contract import Counted, Engine, Prepared
 from ..closure.link_distances import too_near
 from ..closure.parasitic import has_other_assemblies
 from ..closure.projection import ProjectionMode
 from ..kernels.handle import Handle
 from ..kernels.platform.search_records import Starts
-from ..kernels.rows import FAILED, PENDING, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, UNSURE, Rows
+from ..kernels.rows import (
+    FAILED,
+    LIMIT_EXCESS,
+    PENDING,
+    POSITION_ERROR,
+    PROJECTED,
+    REACHED,
+    RESIDUAL,
+    ROTATION_ERROR,
+    UNSURE,
+    Rows,
+)
 from ..model import Model
 from ..motion.outward import centres_at
 from ..options import Options
@@ -32,8 +43,8 @@ from .folds import home_answer, starts_beside
 from .forward import forward_kinematics
 from .keep import kept
 from .leg_attempts import attempts
-from .links_of_legs import links_of_legs
-from .nearest import limit_multipliers
+from .links_of_legs import keeps_links, links_of_legs
+from .nearest import limit_multipliers, nearest_positions
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, rest_redundant, turns_repeatedly
 from .rows_one_by_one import Answers, mark_near, request_from
@@ -279,6 +290,28 @@ class LegsEngine(Engine):
             put(rows, unsolved, fallback.rows)
             coordinates[unsolved] = fallback.coordinates
         answers = Configurations(rows, coordinates)
+        rows.status[too_near(self, model.mechanism, answers)] = FAILED
+        return answers
+
+    def grows(self, counted: Counted) -> bool:
+        """True where positions alone count, if one assembly has all targets and searches keep links apart."""
+        return counted == "position" and self._searches and keeps_links(self._model)
+
+    def known(self, start: Configurations | None) -> Starts:
+        """As `Engine.known`: by poses and sides."""
+        poses = self._model.mechanism.home_pose[None] if start is None else start.rows.poses
+        return starts_at(self._model, poses, self._sides_of(start))
+
+    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
+        """As `Engine.grow`, for the positions of targets: the orientation follows."""
+        model, length = self._model, self._model.length
+        found = nearest_positions(model, targets, known, seeds=anew, keep_mode=keep_mode)
+        rows = Rows(found.status, found.counters, found.poses, found.actuators, found.measures)
+        is_closed = rows.measures[:, RESIDUAL] <= TOLERANCES.position * length
+        is_feasible = is_closed & (rows.measures[:, LIMIT_EXCESS] <= TOLERANCES.limit) & (found.distances < np.inf)
+        rows.status[:] = np.where(is_feasible, np.where(found.status == REACHED, REACHED, PROJECTED), FAILED)
+        rows.measures[:, POSITION_ERROR] = found.distances * length
+        answers = leg_answers(model, rows, found.sides, found.q, None, found.sides)
         rows.status[too_near(self, model.mechanism, answers)] = FAILED
         return answers
 

@@ -11,13 +11,14 @@ from ..arrays import Floats
 from ..closure.attempts import Attempt
 from ..closure.close import Closing, platform_poses
 from ..closure.configurations import Configurations
-from ..closure.engine_contract import Engine
+from ..closure.engine_contract import Counted, Engine
 from ..closure.link_distances import too_near
 from ..closure.projection import ProjectionMode
 from ..derived import derived
 from ..description.geometry import home_numbers, with_numbers
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
+from ..kernels.platform.search_records import Starts
 from ..kernels.rows import FAILED, INVALID
 from ..model import Model
 from ..options import Options
@@ -110,6 +111,18 @@ class TipEngine(Engine):
         answers = self._with_rotations(self.at_tip.advance(targets, at_start))
         answers.rows.status[too_near(self, self.model.mechanism, answers)] = FAILED
         return answers
+
+    def grows(self, counted: Counted) -> bool:
+        """As `Engine.grows`: by the usual engine, where positions alone count."""
+        return counted == "position" and self.usual.grows(counted)
+
+    def known(self, start: Configurations | None) -> Starts:
+        """As `Engine.known`, by the usual engine."""
+        return self.usual.known(start)
+
+    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
+        """As `Engine.grow`, by the usual engine."""
+        return self.usual.grow(known, targets, anew=anew, keep_mode=keep_mode)
 
     def forward(
         self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True

@@ -78,7 +78,7 @@ def workspace(
     certified : True to enclose the size between two proved bounds too, `Workspace.enclosure`, to 0.1 %; or the share to
         which it is to be enclosed. For closed forms, in home's working mode.
     executor : of `concurrent.futures`, or one like it, that measures points; default: here, on all cores. Without
-        closed forms, points are explored here, each from one within reach; a separate component is found if one of 96
+        closed forms, points are explored, each from one within reach; a separate component is found if one of 96
         samples, spread over the points not yet reached, is within it.
     on_progress : called with (points done, points in all, about); default: a bar on a terminal, if it takes more than
         two seconds.

@@ -12,11 +12,10 @@ from ..arrays import Floats
 from ..checks import require_positive
 from ..errors import InvalidArgument
 from ..telling import telling
+from .lattice import Lattice
 from .measuring import Measure
 from .parts import Parts
-from .position_lattice import PositionLattice
 from .refining import refined
-from .sampled_lattice import Lattice
 from .surface import BorderMesh, mesh_of
 from .verdicts import MapQuestion
 
@@ -33,7 +32,7 @@ FIRST_REACH = {True: 2.5, False: 1.5}
 def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[BorderMesh, Parts]:
     """The border at cells of size `step`, (d,), and the connected parts."""
     space, exact = question.space, question.has_margins
-    lattice = (PositionLattice if question.follows_positions else Lattice)(space.start, step, measure)
+    lattice = Lattice(space.start, step, measure)
     unit = np.where(space.is_angle, 1.0, question.mechanism.characteristic_length)
     widest = float((step / unit).max())
     levels = max(1, round(math.log2(FIRST_CELLS[len(step), exact] / widest)))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .lattice import codes, corners
 from .numbering import Numbering
 from .refining import Cells
 from .result import Workspace
-from .sampled_lattice import codes, corners
 from .surface import crossed_edges
 
 HALVINGS = 10

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..batch import take, take_each
+from ..batch import joined, take, take_each
 from ..checks import require_method
 from ..kernels.platform.search_records import Starts
 from ..telling import OnProgress
@@ -45,37 +45,26 @@ class Measure:
         if executor is not None:
             require_method("executor", executor, "submit", "an executor of concurrent.futures, or None")
         self._executor, self._on_progress = executor, on_progress
-        self._explorer = question.explorer()
-        self._sent = b"" if executor is None or self._explorer is not None else pickle.dumps(question)
+        self._sent = b"" if executor is None else pickle.dumps(question)
         slower = 1 if question.has_margins else SLOWER
         self._points_a_block = max(1, POSES_A_BLOCK // (slower * len(question.turns)))
 
-    def __call__(self, points: Floats) -> tuple[Floats, Ints]:
-        """Margins and bindings of points (n, d), as of `MapQuestion.measure`."""
-        if self._explorer is not None:
-            return self.question.explored(points, self._explorer, self._report)
-        blocks = [(points[block],) for block in self._blocks(len(points))]
-        margins, bindings = [np.zeros(0)], [np.zeros(0, np.int64)]
-        for margin, binding in self._measured(MapQuestion.measure, blocks):
-            margins.append(margin)
-            bindings.append(binding)
-        return np.concatenate(margins), np.concatenate(bindings)
+    def __call__(
+        self, points: Floats, known: Starts | None = None, *, anew: bool = False
+    ) -> tuple[Floats, Ints, Starts]:
+        """Margins and bindings of points (n, d), and configurations at or nearest to them, as of `MapQuestion.look`."""
+        known = self.question.first_start if known is None else known
+        blocks = [(points[block], take_each(known, block), anew) for block in self._blocks(len(points))]
+        parts = self._measured(MapQuestion.look, blocks)
+        if not parts:
+            return np.zeros(0), np.zeros(0, np.int64), take(known, slice(0))
+        margins, bindings, ends = zip(*parts, strict=True)
+        return np.concatenate(margins), np.concatenate(bindings), joined(ends)
 
-    def approach(self, points: Floats, starts: Starts, *, seeds: bool) -> tuple[Floats, Starts]:
-        """Margins of points (n, d), and configurations nearest to them, (n,); as of `MapQuestion.approach`."""
-        blocks = [(points[block], take_each(starts, block), seeds) for block in self._blocks(len(points))]
-        margins, ends = [np.zeros(0)], [take(starts, slice(0))]
-        for margin, _, end in self._measured(MapQuestion.approach, blocks):
-            margins.append(margin)
-            ends.append(end)
-        return np.concatenate(margins), Starts(*map(np.concatenate, zip(*ends, strict=True)))
-
-    def name_limits_near(self, points: Floats, starts: Starts) -> Ints:
-        """The limits that positions (n, d) just beyond the border exceed, as of `MapQuestion.name_limits_near`."""
-        blocks = [(points[block], take(starts, block)) for block in self._blocks(len(points))]
-        return np.concatenate(
-            [np.zeros(0, np.int64), *self._measured(MapQuestion.name_limits_near, blocks, counts=False)]
-        )
+    def name_limits(self, points: Floats, known: Starts) -> Ints:
+        """The limits that points (n, d) just beyond the border exceed, as of `MapQuestion.name_limits`."""
+        blocks = [(points[block], take_each(known, block)) for block in self._blocks(len(points))]
+        return np.concatenate([np.zeros(0, np.int64), *self._measured(MapQuestion.name_limits, blocks, counts=False)])
 
     def expect(self, cells: int, width: int, d: int) -> None:
         """Update the estimate of the total, given the number and width of the cells at the border."""
@@ -107,10 +96,6 @@ class Measure:
         finally:
             for future in futures:
                 future.cancel()
-
-    def name_limits(self, points: Floats) -> Ints:
-        """The limits that points (n, d) just beyond the border exceed, as of `MapQuestion.name_limits`."""
-        return self.question.name_limits(points, self._explorer)
 
     def _counted(self, measured: Result, n: int) -> Result:
         self._report(n)

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
+from .lattice import Lattice, codes, corners
 from .numbering import Numbering
 from .refining import Cells, Refined
-from .sampled_lattice import Lattice, codes, corners
 from .verdicts import MapQuestion
 
 
@@ -18,7 +18,7 @@ class Parts:
 
     def __init__(self, lattice: Lattice, cells: Refined) -> None:
         self._origin, self._step, self._points = lattice.origin, lattice.step, lattice.points
-        self._neighbours = lattice.neighbours
+        self._known = lattice.known
         self._cells = sorted((*cells.within, cells.border), key=lambda each: each.width)
 
     @cached_property
@@ -40,7 +40,7 @@ class Parts:
         return int(self.labels.max(initial=-1)) + 1
 
     @cached_property
-    def _known(self) -> list[Numbering]:
+    def _numberings(self) -> list[Numbering]:
         """The codes of all cells, by their sizes."""
         known = [Numbering() for _ in self._cells]
         for cells, numbering in zip(self._cells, known, strict=True):
@@ -53,23 +53,24 @@ class Parts:
         return np.where(nearest >= 0, self.labels[nearest], -1)
 
     def reached(self, question: MapQuestion, points: Floats) -> Mask:
-        """Mask (n,) of points (n, d) within reach; positions are searched for from near configurations too."""
-        reached = np.asarray(question.measure(points)[0] >= 0.0)
-        if self._neighbours is None or not len(self._neighbours.at_border.poses):
-            return reached
+        """Mask (n,) of points (n, d) within reach; where the map was grown, from near configurations too."""
+        if not question.is_grown:
+            return np.asarray(question.measure(points)[0] >= 0.0)
+        nearest = self._nearest(points)
+        reached = question.look(points, self._known.at(nearest), False)[0] >= 0.0
         rows = np.flatnonzero(~reached)
-        starts = self._neighbours.at(self._nearest(points[rows]))
-        reached[rows] = question.approach(points[rows], starts, False)[0] >= 0.0
+        reached[rows] = question.measure(points[rows])[0] >= 0.0
         rows = np.flatnonzero(~reached)
-        places = question.space.poses(points[rows])[:, :3, 3] / question.mechanism.characteristic_length
-        reached[rows] = question.approach(points[rows], self._neighbours.of_border(places), False)[0] >= 0.0
-        return reached
+        if question.is_quick_anew and len(self._known.at_border.poses):
+            places = question.space.poses(points[rows])[:, :3, 3] / question.mechanism.characteristic_length
+            reached[rows] = question.look(points[rows], self._known.of_border(places), False)[0] >= 0.0
+        return np.asarray(reached)
 
     def _nearest(self, points: Floats) -> Ints:
         """The number of the nearest corner within reach of the cell that each of points (n, d) is in, (n,); or -1."""
         d, places = len(self._step), (points - self._origin) / self._step
         nearest = np.full(len(points), -1)
-        for cells, known in zip(self._cells, self._known, strict=True):
+        for cells, known in zip(self._cells, self._numberings, strict=True):
             width = cells.width
             rows = np.flatnonzero(nearest < 0)
             low = np.floor(places[rows] / width).astype(np.int64) * width

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
+from .lattice import MIDDLE, Lattice, codes, corners, offsets
 from .numbering import Numbering
-from .sampled_lattice import MIDDLE, Lattice, codes, corners, offsets
 
 GROWS = 0.5
 """Share of its size by which a box grows to a side that the workspace touches."""

@@ -21,11 +21,11 @@ from ..ik import solve_ik
 from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
+from .lattice import codes
 from .locus import drawn_to_border, locus
 from .numbering import Numbering
 from .parts import connected
 from .result import Workspace
-from .sampled_lattice import codes
 from .singular_picture import plot_map, plot_track
 
 if TYPE_CHECKING:

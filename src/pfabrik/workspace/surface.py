@@ -15,8 +15,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
+from .lattice import Lattice
 from .refining import Cells
-from .sampled_lattice import Lattice
 from .verdicts import MapQuestion
 
 CLOSE, CLOSE_ONE_BY_ONE = 1e-3, 1e-2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -11,24 +12,21 @@ from ..answers.active_limits import active_limits
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
-from ..batch import take
-from ..chains.chain_engine import ChainEngine
-from ..closure.closure_engine import ClosureEngine
+from ..batch import put, take_each
+from ..closure.configurations import Configurations
+from ..closure.engine_contract import Engine
 from ..closure.link_distances import pair_names
-from ..configuration import configuration
 from ..description.mechanism import Mechanism
 from ..engine import engine_of
 from ..feasibility import feasibility
 from ..ik import solve_ik
 from ..kernels.platform.search_records import Starts
+from ..kernels.rows import POSITION_ERROR
 from ..model import model_of
-from ..motion.displacements import home_coordinates
 from ..options import Options
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
-from .exploring import Explorer, Tell
 from .orientations import least_of_all
-from .reachable_positions import coordinates_nearest, follows_positions, reach_positions, start_at
 from .space import Space
 
 Limits: TypeAlias = tuple[tuple[str, str], ...]
@@ -75,65 +73,70 @@ class MapQuestion:
         limits = _known_limits(self.mechanism, self.has_margins)
         return limits + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
 
-    def explorer(self) -> Explorer | None:
-        """An explorer that begins at the start, where points are solved one by one by the closure engine; else None."""
-        engine = engine_of(self.mechanism.with_clearance(None))
-        if self.has_margins or self.hold == "position" or len(self.turns) > 1:
-            return None
-        if not isinstance(engine, ClosureEngine | ChainEngine):
-            return None
-        home = home_coordinates(self.mechanism)
-        start = (
-            configuration(self.mechanism, home)._configurations if self.start is None else self.start._configurations
-        )
-        at = self.space.start
-        return Explorer(self.mechanism, engine, start, self.space.poses(at[None])[0], at / self._lengths)
+    @cached_property
+    def _engine(self) -> Engine:
+        return engine_of(self.mechanism)
 
-    def explored(self, points: Floats, explorer: Explorer, tell: Tell) -> tuple[Floats, Ints]:
-        """Margins and bindings as of `measure`, by an explorer, from configurations that were reached before."""
-        reached, _ = explorer.explore(self.space.poses(points), points / self._lengths, tell)
-        margins, bindings = np.where(reached, INSIDE, OUTSIDE), np.full(len(points), self._unknown)
-        return self._cut(points, margins, bindings)
+    @cached_property
+    def is_grown(self) -> bool:
+        """True if known configurations lead from one point to the next; else each point is measured by itself."""
+        return not self.has_margins and len(self.turns) == 1 and self._engine.grows(self.hold)
 
     @property
-    def follows_positions(self) -> bool:
-        """True if positions count in whatever orientation, and configurations lead from one to the next."""
-        return self.hold == "position" and follows_positions(model_of(self.mechanism))
+    def is_quick_anew(self) -> bool:
+        """True if any point may be searched for anew: one out of reach takes about as long as one within."""
+        return self.hold == "position"
 
     @property
     def first_start(self) -> Starts:
-        """The configuration that positions are first searched for from."""
-        return start_at(model_of(self.mechanism), self.start)
+        """The configuration that points are searched for anew from; none if the map is not grown."""
+        if not self.is_grown:
+            return Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
+        return self._engine.known(None if self.start is None else self.start._configurations)
 
-    def approach(self, points: Floats, starts: Starts, seeds: bool) -> tuple[Floats, Ints, Starts]:
-        """Margins and bindings as of `measure`, and configurations at the positions of points, or nearest to them.
+    def look(self, points: Floats, known: Starts, anew: bool) -> tuple[Floats, Ints, Starts]:
+        """Margins and bindings as of `measure`, and configurations at points or nearest to them, if the map is grown.
 
-        Negative margins are distances from these configurations [L].
+        Then negative margins are distances from these configurations [L]; that of a search that fails, which says
+        nothing of what is around a point, is the least that counts as one.
 
         Parameters
         ----------
-        starts, seeds : as of `reach_positions`.
+        known, anew : as of `Engine.grow`.
         """
-        model, targets = model_of(self.mechanism), self.space.poses(points)
-        distances, ends = reach_positions(model, targets, starts, seeds=seeds, keep_mode=self.start is not None)
-        margins, bindings = np.where(distances > 0.0, -distances, INSIDE), np.full(len(points), self._unknown)
-        return (*self._cut(points, margins, bindings), ends)
+        if not self.is_grown:
+            return *self.measure(points), known
+        found = self._grown(points, known, anew)
+        ends = self._engine.known(found)
+        failed = np.flatnonzero(found.rows.status > Status.PROJECTED)
+        put(ends, failed, take_each(known, failed))
+        return *self._cut(points, *self._of_grown(found)), ends
+
+    def _of_grown(self, found: Configurations) -> tuple[Floats, Ints]:
+        status, away = found.rows.status, found.rows.measures[:, POSITION_ERROR] / self.mechanism.characteristic_length
+        away = np.where(status == Status.PROJECTED, np.maximum(away, TOLERANCES.position), TOLERANCES.position)
+        return np.where(status == Status.REACHED, INSIDE, -away), np.full(len(status), self._unknown)
+
+    def _grown(self, points: Floats, known: Starts, anew: bool) -> Configurations:
+        targets = np.require(self.space.poses(points), requirements=["C", "W"])
+        keeps = self.hold == "orientation" or self.start is not None
+        return self._engine.grow(known, targets, anew=anew, keep_mode=keeps)
 
     def measure(self, points: Floats) -> tuple[Floats, Ints]:
         """Margins (n,) of points (n, d), negative beyond reach, and which of `limits` each is of; -1 for none."""
-        if self.follows_positions:
-            return self.approach(points, self.first_start, True)[:2]
+        if self.is_grown and self.is_quick_anew:
+            return self.look(points, self.first_start, True)[:2]
         return self._cut(points, *least_of_all(self.turns, self.space.poses(points), self._of_poses))
 
     @property
-    def _lengths(self) -> Floats:
+    def lengths(self) -> Floats:
         """The unit of each coordinate, (d,) [length or rad]: L for a length, 1 for an angle."""
         return np.where(self.space.is_angle, 1.0, self.mechanism.characteristic_length)
 
     def _cut(self, points: Floats, margins: Floats, bindings: Ints) -> tuple[Floats, Ints]:
         """Margins and bindings with the ends of the map as limits too."""
         n_limits = len(_known_limits(self.mechanism, self.has_margins))
-        lengths = self._lengths
+        lengths = self.lengths
         for axis, column in enumerate(points.T):
             for side, end in enumerate((self.lowest[axis], self.highest[axis])):
                 if np.isfinite(end):
@@ -165,29 +168,24 @@ class MapQuestion:
     def _unknown(self) -> int:
         return len(_known_limits(self.mechanism, self.has_margins)) - 1
 
-    def name_limits(self, points: Floats, explorer: Explorer | None = None) -> Ints:
-        """Which of `limits` points (n, d) just beyond the border are beyond, (n,)."""
-        margins, bindings = self.measure(points) if explorer is None else self.explored(points, explorer, _no_progress)
+    def name_limits(self, points: Floats, known: Starts) -> Ints:
+        """Which of `limits` points (n, d) just beyond the border are beyond, (n,).
+
+        Parameters
+        ----------
+        known : configurations near them, (n,), if the map is grown.
+        """
+        if self.is_grown:
+            found = self._grown(points, known, False)
+            bindings = self._cut(points, *self._of_grown(found))[1]
+        else:
+            bindings = self.measure(points)[1]
         if self.has_margins or len(self.turns) > 1:
             return bindings
-        rows = np.flatnonzero((margins < 0.0) & (bindings == self._unknown))
-        poses = self.space.poses(points[rows])
-        if explorer is None:
-            coordinates = self._answers(poses)[0]._coordinates
-        else:
-            coordinates = explorer.explore(poses, points[rows] / self._lengths, _no_progress)[1]
-        bindings[rows] = self._active(coordinates)
-        return bindings
-
-    def name_limits_near(self, points: Floats, starts: Starts) -> Ints:
-        """As `name_limits`, of positions (n, d) just beyond the border, from configurations (n,) nearest to them."""
-        model, targets = model_of(self.mechanism), self.space.poses(points)
-        offsets = targets[:, :3, 3] / model.length - starts.poses[:, :3, 3]
-        bindings = self._cut(points, -np.linalg.norm(offsets, axis=1), np.full(len(points), self._unknown))[1]
         rows = np.flatnonzero(bindings == self._unknown)
-        starts = take(starts, rows)
-        coordinates = coordinates_nearest(model, targets[rows], starts, keep_mode=self.start is not None)
-        bindings[rows] = self._active(coordinates)
+        if not self.is_grown:
+            found = self._answers(self.space.poses(points[rows]))[0]._configurations
+        bindings[rows] = self._active(found.at(rows).coordinates if self.is_grown else found.coordinates)
         return bindings
 
     def _active(self, coordinates: Floats) -> Ints:
@@ -197,10 +195,6 @@ class MapQuestion:
         return np.array(
             [place[limits[0].joint, limits[0].bound] if limits else self._unknown for limits in held], np.int64
         )
-
-
-def _no_progress(done: int) -> None:
-    """Report no progress: these points were counted before."""
 
 
 def _known_limits(mechanism: Mechanism, has_margins: bool) -> Limits:
