@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pfabrik.workspace.lattice import codes, offsets, places_of
+from pfabrik.workspace.lattice_points import codes, offsets, places_of
 from pfabrik.workspace.numbering import Numbering
 from pfabrik.workspace.parts import connected
 

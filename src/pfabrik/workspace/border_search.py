@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..checks import require_positive
 from ..errors import InvalidArgument
 from ..telling import telling
-from .lattice import Lattice
+from .lattice_points import Lattice
 from .measuring import Measure
 from .parts import Parts
 from .refining import refined

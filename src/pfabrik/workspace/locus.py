@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .lattice import codes, corners
+from .lattice_points import codes, corners
 from .numbering import Numbering
 from .refining import Cells
 from .result import Workspace

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from .lattice import Lattice, codes, corners
+from .lattice_points import Lattice, codes, corners
 from .numbering import Numbering
 from .refining import Cells, Refined
 from .verdicts import MapQuestion

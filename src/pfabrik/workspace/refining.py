@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from .lattice import MIDDLE, Lattice, codes, corners, offsets
+from .lattice_points import MIDDLE, Lattice, codes, corners, offsets
 from .numbering import Numbering
 
 GROWS = 0.5

@@ -21,7 +21,7 @@ from ..ik import solve_ik
 from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..telling import OnProgress, telling
-from .lattice import codes
+from .lattice_points import codes
 from .locus import drawn_to_border, locus
 from .numbering import Numbering
 from .parts import connected

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from .lattice import Lattice
+from .lattice_points import Lattice
 from .refining import Cells
 from .verdicts import MapQuestion
 
