@@ -14,7 +14,6 @@ from .answers.status import Status
 from .answers.tracked import Track, pace_of
 from .arrays import Floats, Mask
 from .batch import put
-from .checks import require_callable
 from .closure.close import measure_configurations
 from .closure.configurations import Configurations
 from .closure.continuation import continued
@@ -22,7 +21,7 @@ from .closure.engine_contract import InverseEngine, OnProgress
 from .description.mechanism import Mechanism
 from .description.task import task_of
 from .engine import engine_of
-from .errors import InvalidArgument
+from .errors import InvalidArgument, counted
 from .kernels.rows import POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
 from .model import model_of
 from .motion.singularities import assembly_signs
@@ -30,6 +29,7 @@ from .options import Options, checked_options
 from .poses import between
 from .rotations import whole_turns
 from .targets import Target, as_targets, refuse_invalid
+from .telling import telling
 from .tolerances import TOLERANCES
 
 LEAST_STEP = 1e-13
@@ -56,7 +56,8 @@ def track(
     ----------
     targets : as of `solve_ik`, with one batch axis: poses (n, 4, 4), positions (n, 3), joint coordinates.
     start : a single Solution or joint vector q to start from; default home.
-    on_progress : called with (steps done, steps in all) every few steps.
+    on_progress : called with (steps done, steps in all) every few steps; default: a line on a terminal, if it takes
+        more than two seconds.
     sample_time : from one target to the next [s].
     times : in place of `sample_time`, the time of each target, (n,) [s], as `read_path` returns them: never falling;
         equal where the machine waits, NaN where unknown.
@@ -74,10 +75,10 @@ def track(
     As `solve_ik`; also InvalidArgument for targets that are no path, and for options that change the working mode.
     """
     options = checked_options(options)
-    require_callable("on_progress", on_progress)
     poses = as_path(mechanism, targets, options)
     pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
-    solutions, request = follow_by(engine_of(mechanism), mechanism, poses, start, options, on_progress)
+    with telling(f"tracking {counted(len(poses), 'target')}", on_progress) as tell:
+        solutions, request = follow_by(engine_of(mechanism), mechanism, poses, start, options, tell)
     return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
 
 

@@ -112,7 +112,7 @@ class Certificate:
             return False
         budget = REPLAYED_HALVINGS * len(cells)  # bounds of a cell may be a little worse than those of its whole
         again = Subdividing(model_of(self.mechanism), self._parameters, cells[:, :PROVED_LEGS], math.inf, budget, 0)
-        if again.proceed() != DONE:
+        if again.proceed(None) != DONE:
             return False
         poses = self._random_poses(np.random.default_rng(0))
         return not len(poses) or bool((np.asarray(solve_ik(self.mechanism, poses).status) == Status.REACHED).all())

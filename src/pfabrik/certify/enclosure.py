@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -16,6 +17,7 @@ from ..kernels.certify.prove import ENCLOSE
 from ..kernels.certify.subdivision import HALF, N_COLUMNS
 from ..model import Model
 from ..rotations import to_rotvec
+from ..telling import OnProgress
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .reach_box import reach_box
 from .subdividing import Enclosing
@@ -73,6 +75,7 @@ def enclose(
     *,
     accuracy: float,
     budget: int,
+    tell: OnProgress | None = None,
 ) -> Enclosure:
     """Enclose the size of the workspace over some coordinates.
 
@@ -83,6 +86,7 @@ def enclose(
     ends : least and greatest value of each of `names`, (d,) [length or rad]; infinite where only reach ends them.
     accuracy : gap between both bounds at which the search stops, as a share of the lower one.
     budget : cells to look at, at most.
+    tell : called with (cells looked at, cells in all, about).
 
     Raises
     ------
@@ -121,7 +125,7 @@ def enclose(
     first[0, :HALF] = middle / scale
     first[0, axes] = 0.5 * (low + high) / units
     first[0, [HALF + axis for axis in axes]] = 0.5 * (high - low) / units
-    return _refine(Enclosing(model, parameters), first, axes, units, tuple(names), accuracy, budget)
+    return _refine(Enclosing(model, parameters), first, axes, units, tuple(names), accuracy, budget, tell)
 
 
 def _refine(
@@ -132,6 +136,7 @@ def _refine(
     names: tuple[str, ...],
     accuracy: float,
     budget: int,
+    tell: OnProgress | None,
 ) -> Enclosure:
     """Halve the cells with the largest gaps until the sum of all gaps is small, or the budget is spent."""
     halves = [HALF + axis for axis in axes]
@@ -152,6 +157,8 @@ def _refine(
         lower, gap = settled + float(shares[:, 0] @ volumes), float(gaps.sum())
         if gap <= accuracy * lower or n_cells >= budget or not len(cells):
             break
+        if tell is not None and lower > 0.0:  # halving cells at the border halves the gap
+            tell(n_cells, math.ceil(min(budget, n_cells * (gap / (accuracy * lower)) ** (len(axes) - 1))))
         order = np.argsort(-gaps)
         n_split = int(np.searchsorted(np.cumsum(gaps[order]), SPLIT * gap)) + 1
         chosen, kept = order[:n_split], order[n_split:]

@@ -25,6 +25,7 @@ from ..model import Model, model_of
 from ..poses import are_poses
 from ..rotations import to_rotvec
 from ..targets import Target, as_targets
+from ..telling import OnProgress, telling
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .links_over_cells import bounded_pairs, links_without_bounds
@@ -49,6 +50,7 @@ def certify(
     tolerance: float | None = None,
     budget: int = BUDGET,
     uncertain: float = 0.0,
+    on_progress: OnProgress | None = None,
 ) -> Certificate:
     """Prove that `solve_ik` reaches every pose of a region, find a pose that it does not reach, or say what is open.
 
@@ -65,6 +67,8 @@ def certify(
     budget : number of cells to look at, at most.
     uncertain : radius of a ball about each joint's point that its true place may be anywhere in [length]: proved for
         all machines with such points and directions of axes as described.
+    on_progress : called with (cells looked at, cells in all, about); default: a line on a terminal, if it takes more
+        than two seconds.
 
     Raises
     ------
@@ -86,7 +90,8 @@ def certify(
         assert poses is not None
         parameters = track_parameters(model, poses, uncertain)
     ask = _RegionQuestion(model, region if isinstance(region, PoseRegion) else None, poses, parameters)
-    return ask.answer(gap, budget)
+    with telling("certify", on_progress) as tell:
+        return ask.answer(gap, budget, tell)
 
 
 class _RegionQuestion:
@@ -97,13 +102,13 @@ class _RegionQuestion:
     ) -> None:
         self.model, self.region, self.poses, self.parameters = model, region, poses, parameters
 
-    def answer(self, gap: float, budget: int) -> Certificate:
+    def answer(self, gap: float, budget: int, tell: OnProgress | None) -> Certificate:
         """Subdivide until there is a verdict."""
         first = first_cells(self.parameters)
         subdividing = Subdividing(self.model, self.parameters, first, gap, budget)
         work, n_doubts, reason = subdividing.work, 0, self._restriction()
         while True:
-            result = subdividing.proceed()
+            result = subdividing.proceed(tell)
             if result != BROKEN:
                 break
             refutation = self._refuted(work.pose.copy(), int(work.counters[LIMIT]))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..arrays import Floats
 from ..kernels.certify.link_rows import new_cell_links
 from ..kernels.certify.pose_cells import BALL, BOX, CYLINDER, ROTATION_VECTOR, STEPS, TILT, CellParameters
-from ..kernels.certify.prove import ENCLOSE, prove
+from ..kernels.certify.prove import ENCLOSE, SPENT, prove
 from ..kernels.certify.subdivision import (
     BUDGET,
     GAP,
@@ -23,11 +25,15 @@ from ..kernels.handle import Handle
 from ..model import Model
 from ..platform.table import kernel_table, table_handle
 from ..rotations import from_rotvec, to_rotvec
+from ..telling import OnProgress
 from .links_over_cells import cell_links
 from .pose_region import PoseRegion
 
 DEPTH = 256
 """Cells on the stack beside those that it begins with: two for each halving of six parameters down to the smallest."""
+
+CELLS_A_REPORT = 20_000
+"""Cells between two reports of progress."""
 
 MOST_PROVED, MOST_LEFT = 100_000, 256
 """Proved cells that are kept, and cells too small to be halved that may be left open before a proof is given up."""
@@ -112,13 +118,28 @@ class Subdividing:
         )
         self.work.stack[: len(cells), :PROVED_LEGS] = cells
         self.work.stack[: len(cells), PROVED_LEGS] = 0.0
-        self.work.counters[N_STACK], self.work.counters[BUDGET] = len(cells), budget
+        self.work.counters[N_STACK], self._budget, self._n_first = len(cells), budget, len(cells)
+        self._whole = cells[0, HALF:PROVED_LEGS].copy()
         self.work.measures[GAP] = gap
         self._legs, self._handle = table_handle(table), Handle(self.work)
 
-    def proceed(self) -> int:
+    def proceed(self, tell: OnProgress | None) -> int:
         """Go on until the stack is empty, a pose breaks a limit, or the budget is spent; as `kernels.certify.prove`."""
-        return int(prove(self._legs.address, self._handle.address))
+        counters = self.work.counters
+        while True:
+            counters[BUDGET] = self._budget if tell is None else min(self._budget, self.n_cells + CELLS_A_REPORT)
+            result = int(prove(self._legs.address, self._handle.address))
+            if tell is not None:
+                share = max(1.0 - self._open_share(), self.n_cells / self._budget)
+                tell(self.n_cells, math.ceil(self.n_cells / max(share, 1e-9)))
+            if result != SPENT or self.n_cells >= self._budget:
+                return result
+
+    def _open_share(self) -> float:
+        """The share of the cells that it began with that is still on the stack, by their size."""
+        stack = self.work.stack[: int(self.work.counters[N_STACK])]
+        sides = HALF + np.flatnonzero(self._whole)
+        return float(np.prod(stack[:, sides] / self._whole[sides - HALF], axis=1).sum()) / self._n_first
 
     @property
     def n_cells(self) -> int:

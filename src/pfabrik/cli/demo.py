@@ -17,7 +17,6 @@ import pfabrik as pf
 
 from ..answers.aligned_text import aligned, error_text
 from ..extras import require
-from ..telling import telling
 from .outputs import check_outputs, new_folder, picture, real, whole_folder
 from .printing import print_text
 
@@ -88,10 +87,9 @@ def follow(key: str, targets: Floats) -> Run:
     """Track one circle, and time it without the compilation of the kernels."""
     mechanism, steps = pf.load(key), len(targets)
     pf.track(mechanism, targets[:: max(1, steps // 12)])  # inside and outside: each has kernels of its own
-    with telling(f"{mechanism.name}: {steps} steps") as on_progress:
-        start = time.perf_counter()
-        solution = pf.track(mechanism, targets, on_progress=on_progress)
-        seconds = time.perf_counter() - start
+    start = time.perf_counter()
+    solution = pf.track(mechanism, targets)
+    seconds = time.perf_counter() - start
     return Run(key, targets, solution, seconds)
 
 

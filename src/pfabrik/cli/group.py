@@ -16,6 +16,7 @@ import click
 
 from ..errors import PfabrikError, near_miss
 from ..kernels import NoKernels
+from ..telling import lines_on_pipes
 from .printing import complain
 from .stops import Stops
 
@@ -81,10 +82,11 @@ class CommandGroup(click.Group):
     ) -> Any:
         """Run a command line; in standalone mode, exit with the code that the subcommand returned."""
         run = partial(super().main, args, prog_name or "pfabrik", complete_var, standalone_mode=False, **extra)
-        if not standalone_mode:
-            return run()
-        take_closed_places()
-        return leave(exit_code(run))
+        with lines_on_pipes():
+            if not standalone_mode:
+                return run()
+            take_closed_places()
+            return leave(exit_code(run))
 
 
 def take_closed_places() -> None:

@@ -11,7 +11,6 @@ import pfabrik as pf
 
 from ..answers.aligned_text import aligned
 from ..errors import counted
-from ..telling import telling
 from .arguments import FINITE, MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
 from .printing import json_option, print_answer
@@ -56,8 +55,7 @@ def time(
     highest_accelerations = speed_limits(mechanism, accelerations, "--acceleration") or None
     targets = pf.read_path(path, mechanism).targets
     with nullcontext() if output is None else whole_file(output) as handle:
-        with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
-            solution = pf.track(mechanism, targets, on_progress=on_progress)
+        solution = pf.track(mechanism, targets)
         timed = pf.time_path(
             solution,
             speed=highest_speeds,

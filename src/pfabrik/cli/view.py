@@ -10,8 +10,6 @@ import click
 import pfabrik as pf
 
 from ..checks import require_ending
-from ..errors import counted
-from ..telling import telling
 from .arguments import MECH, STANDARD_INPUT, load
 from .outputs import check_outputs
 from .printing import note
@@ -39,9 +37,7 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     if mech == STANDARD_INPUT or path is not None:
         shown = mechanism = load(mech)
     if path is not None:
-        targets = pf.read_path(path, mechanism).targets
-        with telling(f"tracking {counted(len(targets), 'target')}") as on_progress:
-            shown = pf.track(mechanism, targets, on_progress=on_progress)
+        shown = pf.track(mechanism, pf.read_path(path, mechanism).targets)
     with pf.view(shown, port=port, host=host) as viewer:
         if html is not None:
             viewer.save(html)

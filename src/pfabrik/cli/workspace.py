@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,17 +18,13 @@ from ..extras import require
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, Triple, load, rpy_option
 from .outputs import check_outputs, picture
-from .printing import complain, json_option, note, print_answer
+from .printing import json_option, note, print_answer
 
 if TYPE_CHECKING:
-    from ..telling import OnProgress
     from ..workspace.inscribed import Kind
 
 MOST_LIMITS = 12
 """Limits that form the border in a table, at most."""
-
-SECONDS_A_LINE = 5.0
-"""Time between two lines on the progress."""
 
 
 @click.command()
@@ -105,7 +99,6 @@ def workspace(
         within={name: (low, high) for name, (low, high) in pairs("--within", within, 2).items()} or None,
         resolution=None if resolution is None else in_its_unit(mechanism, names, held, resolution),
         certified=certified,
-        on_progress=None if sys.stderr.isatty() else lines_of_progress(),
     )
     middle = None if centre is None else point(space, centre)
     shape = None if largest is None else space.inscribed(largest, middle)
@@ -123,19 +116,6 @@ def note_slow(mechanism: pf.Mechanism) -> None:
     reason = measured(model_of(mechanism)).why_poses_do_not_suffice
     if reason:
         note(f"no closed forms, {reason}: points are tried one by one, for about a minute")
-
-
-def lines_of_progress() -> OnProgress:
-    """A progress function for streams without a bar: a line on stderr every few seconds."""
-    last = time.monotonic()
-
-    def print_line(done: int, total: int) -> None:
-        nonlocal last
-        if time.monotonic() - last >= SECONDS_A_LINE:
-            last = time.monotonic()
-            complain(f"workspace: {done} of about {total} points")
-
-    return print_line
 
 
 def pairs(option: str, words: Sequence[str], n: int) -> dict[str, list[float]]:

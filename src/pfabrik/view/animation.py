@@ -51,7 +51,7 @@ def animate(
     path : of the film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
     seconds : how long it runs; default: as long as the path takes if the track has a `sample_time`, else a
         twentieth of a second a step. There are 20 frames a second, each the step that is due.
-    on_progress : called with (frames done, frames in all); default: a bar on a terminal, if it takes more than two
+    on_progress : called with (frames done, frames in all); default: a line on a terminal, if it takes more than two
         seconds.
 
     Raises

@@ -33,7 +33,7 @@ from .verdicts import MapQuestion
 FEWEST_CELLS = 24
 """Cells across the shortest side of a workspace; where the default resolution gives fewer, it is halved."""
 
-MOST_HALVINGS = 6
+MOST_HALVINGS = 5
 
 ENCLOSED, MOST_CELLS = 1e-3, 1_000_000
 """Gap between both bounds of an enclosed size, as a share of it, and the most cells that are looked at for it."""
@@ -80,8 +80,8 @@ def workspace(
     executor : of `concurrent.futures`, or one like it, that measures points; default: here, on all cores. Without
         closed forms, points are explored, each from one within reach; a separate component is found if one of 96
         samples, spread over the points not yet reached, is within it.
-    on_progress : called with (points done, points in all, about); default: a bar on a terminal, if it takes more than
-        two seconds.
+    on_progress : called with (points done, points in all, about): their ratio is the share of the time, and never
+        falls. Default: a line on a terminal, if it takes more than two seconds.
 
     Returns
     -------
@@ -106,7 +106,8 @@ def workspace(
     with telling("workspace", on_progress) as tell:
         space_found = _refined_workspace(question, resolution, executor, tell)
     if accuracy > 0.0:
-        space_found.enclosure = _enclosure(question, accuracy)
+        with telling("enclosure of the size", on_progress) as tell:
+            space_found.enclosure = _enclosure(question, accuracy, tell)
     return space_found
 
 
@@ -124,28 +125,31 @@ def _accuracy(question: MapQuestion, certified: Any) -> float:
     return accuracy
 
 
-def _enclosure(question: MapQuestion, accuracy: float) -> Enclosure:
+def _enclosure(question: MapQuestion, accuracy: float, tell: OnProgress | None) -> Enclosure:
     """The size of a workspace between two proved bounds."""
     model, space = model_of(question.mechanism), question.space
     if model.why_poses_do_not_suffice:
         reason = f"no legs in closed form, {model.why_poses_do_not_suffice}"
         raise UnsupportedMechanism(question.mechanism.name, [reason], "enclosed")
     ends = question.lowest, question.highest
-    return enclose(model, space.names, space.held, space.rotation, ends, accuracy=accuracy, budget=MOST_CELLS)
+    return enclose(
+        model, space.names, space.held, space.rotation, ends, accuracy=accuracy, budget=MOST_CELLS, tell=tell
+    )
 
 
 def _refined_workspace(
     question: MapQuestion, resolution: float | None, executor: Executor | None, tell: OnProgress | None
 ) -> Workspace:
     """The workspace at a resolution; by default one that is refined until enough cells span its shortest side."""
-    step = step_of(question, resolution)
-    for _ in range(MOST_HALVINGS):
-        space = Workspace(question, step, *searched(question, step, Measure(question, executor, tell)))
-        cells = np.ptp(space.bounds, axis=0) / step if len(space.faces) else np.inf
-        if resolution is not None or np.min(cells) >= FEWEST_CELLS:
-            break
-        step = 0.5 * step
-    return space
+    measure = Measure(question, executor, tell, FEWEST_CELLS if resolution is None else 0)
+    step, left = step_of(question, resolution), MOST_HALVINGS
+    while True:
+        space = Workspace(question, step, *searched(question, step, measure))
+        halvings = min(measure.halvings(np.ptp(space.bounds, axis=0) / step), left) if len(space.faces) else 0
+        if not halvings:
+            measure.progress.end()
+            return space
+        step, left = step * 0.5**halvings, left - halvings
 
 
 def _start(mechanism: Mechanism, start: Start | None) -> Solution | None:

@@ -67,4 +67,7 @@ def sliced(
     )
     step = resolution[kept] if isinstance(resolution, np.ndarray) else step_of(slice_question, resolution)
     with telling("slice") as tell:
-        return slice_question, step, *searched(slice_question, step, Measure(slice_question, None, tell))
+        measure = Measure(slice_question, None, tell)
+        answer = slice_question, step, *searched(slice_question, step, measure)
+        measure.progress.end()
+    return answer

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -16,6 +18,7 @@ from ..certify.question import certify
 from ..checks import require_known, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, PfabrikError
+from ..telling import OnProgress, telling
 from .ask import workspace
 
 Kind = Literal["box", "cylinder", "ball"]
@@ -62,6 +65,7 @@ def largest(
     tilt: float | None = None,
     yaw: ArrayLike = 0.0,
     accuracy: float = 0.005,
+    on_progress: OnProgress | None = None,
 ) -> Largest:
     """The largest shape of positions, with all orientations of a range, that is proved to be within reach.
 
@@ -76,6 +80,8 @@ def largest(
         equal.
     rotation, tilt, yaw : the orientations at each position, as of `PoseRegion.box`.
     accuracy : share of its size up to which it is found.
+    on_progress : called with (thousandths of proofs done, those in all, about); default: a line on a terminal, if it
+        takes more than two seconds.
 
     Raises
     ------
@@ -88,7 +94,7 @@ def largest(
     if certified is False:
         return Largest(kind, middle, 2.0 * half, None)
 
-    def attempt(scale: float) -> Certificate:
+    def attempt(scale: float, tell: OnProgress) -> Certificate:
         turns: dict[str, Any] = {"rotation": rotation, "tilt": tilt, "yaw": yaw}
         size = scale * half
         if kind == "box":
@@ -97,19 +103,29 @@ def largest(
             region = PoseRegion.ball(middle, size[0], **turns)
         else:
             region = PoseRegion.cylinder(middle, size[0], 2.0 * size[2], **turns)
-        return certify(mechanism, region, budget=BUDGET)
+        return certify(mechanism, region, budget=BUDGET, on_progress=tell)
 
-    scale, best = _bisected(attempt, step)
+    with telling(f"largest {kind}", on_progress) as tell:
+        scale, best = _bisected(attempt, step, tell)
     extents_found = 2.0 * scale * half
     extents_found.setflags(write=False)
     return Largest(kind, middle, extents_found, best)
 
 
-def _bisected(attempt: Any, step: float) -> tuple[float, Certificate]:
+def _bisected(
+    attempt: Callable[[float, OnProgress], Certificate], step: float, tell: OnProgress | None
+) -> tuple[float, Certificate]:
     """The largest scale that is proved, to a share of itself, and its certificate."""
     low, high, best, scale = 0.0, np.inf, None, 1.0
-    for _ in range(MOST_ATTEMPTS):
-        certificate = attempt(scale)
+    for count in range(MOST_ATTEMPTS):
+        gap = (high - low) / (max(low, 0.01) * step) if high < np.inf else 1.0 / step
+        ahead = math.ceil(math.log2(max(gap, 1.0)))
+
+        def report(done: int, total: int, count: int = count, ahead: int = ahead) -> None:
+            if tell is not None:
+                tell(1000 * count + 1000 * done // total, 1000 * (count + 1 + ahead))
+
+        certificate = attempt(scale, report)
         if certificate:
             low, best = scale, certificate
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -15,6 +16,7 @@ from ..batch import joined, take, take_each
 from ..checks import require_method
 from ..kernels.platform.search_records import Starts
 from ..telling import OnProgress
+from .progress import MapProgress
 from .verdicts import MapQuestion
 
 POSES_A_BLOCK = 1 << 14
@@ -26,8 +28,8 @@ SLOWER = 64
 Result = TypeVar("Result")
 """What a method of a question gives for a block."""
 
-LOOKS = 4
-"""Approximate number of points that locate the crossings of the border in each of its cells."""
+LOOKS, LOOKS_GROWN, LOOKS_ONE_BY_ONE = 0.25, 0.75, 1.5
+"""Time to locate the border in a cell, as a share of that to halve one: by margins, by searches, by answers."""
 
 
 class Measure:
@@ -35,16 +37,19 @@ class Measure:
 
     Attributes
     ----------
-    total : estimate of the number of points in all.
+    progress : how far the map is.
+    fewest : number of cells across the shortest side of the map that is wanted, at least.
     """
 
-    def __init__(self, question: MapQuestion, executor: Executor | None, on_progress: OnProgress | None) -> None:
-        self.question = question
-        self.total = 0
-        self._done = 0
+    def __init__(
+        self, question: MapQuestion, executor: Executor | None, on_progress: OnProgress | None, fewest: int = 0
+    ) -> None:
+        self.question, self.fewest = question, fewest
+        looks = LOOKS if question.has_margins else LOOKS_GROWN if question.is_grown else LOOKS_ONE_BY_ONE
+        self.progress = MapProgress(on_progress, len(question.space.names), looks)
         if executor is not None:
             require_method("executor", executor, "submit", "an executor of concurrent.futures, or None")
-        self._executor, self._on_progress = executor, on_progress
+        self._executor = executor
         self._sent = b"" if executor is None else pickle.dumps(question)
         slower = 1 if question.has_margins else SLOWER
         self._points_a_block = max(1, POSES_A_BLOCK // (slower * len(question.turns)))
@@ -66,12 +71,9 @@ class Measure:
         blocks = [(points[block], take_each(known, block)) for block in self._blocks(len(points))]
         return np.concatenate([np.zeros(0, np.int64), *self._measured(MapQuestion.name_limits, blocks, counts=False)])
 
-    def expect(self, cells: int, width: int, d: int) -> None:
-        """Update the estimate of the total, given the number and width of the cells at the border."""
-        ahead, points = 0, cells * 2**d
-        while width > 1:
-            ahead, points, width = ahead + points, points * 2 ** (d - 1), width // 2
-        self.total = self._done + ahead + LOOKS * points // 2**d
+    def halvings(self, across: Floats) -> int:
+        """How often cells must be halved for enough of them, where there are so many along each coordinate, (d,)."""
+        return max(0, math.ceil(math.log2(self.fewest / float(across.min())))) if self.fewest else 0
 
     def _blocks(self, n: int) -> list[slice]:
         """Slices of n points, each of as many as are worth sending to another process."""
@@ -98,14 +100,8 @@ class Measure:
                 future.cancel()
 
     def _counted(self, measured: Result, n: int) -> Result:
-        self._report(n)
+        self.progress.add(n)
         return measured
-
-    def _report(self, n: int) -> None:
-        """Report that n more points are known."""
-        self._done += n
-        if self._on_progress is not None:
-            self._on_progress(self._done, max(self._done, self.total))
 
 
 def measure_block(sent: bytes, method: Callable[..., Result], *block: Any) -> Result:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from .lattice_points import MIDDLE, Lattice, codes, corners, offsets
+from .lattice_points import MIDDLE, Lattice, codes, corners, offsets, places_of
 from .numbering import Numbering
 
 GROWS = 0.5
@@ -82,19 +82,37 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
     levels : how often the first cells are halved.
     reach : number of the first cells to each side of the start in the first grid.
     """
+    progress = lattice.measure.progress
+    progress.begin((2 * reach + 1) ** lattice.d, _guessed_cells(lattice, levels), levels)
     cells = _first(lattice, levels, reach)
     within: list[Cells] = []
     while True:
         cells = _with_neighbours(lattice, cells.at(cells.touched | cells.thin))
         inside = cells.inside
         crossed = cells.touched & ~inside
+        divided = ~inside | cells.thin
+        _report(lattice, cells, int(crossed.sum()), int(divided.sum()))
         if cells.width == 1:
             return Refined(cells.at(crossed), (*within, cells.at(inside)))
-        divided = ~inside
-        divided[inside] = cells.at(inside).thin
         within.append(cells.at(~divided))
-        lattice.measure.expect(int(crossed.sum()), cells.width, lattice.d)
         cells = _divided(lattice, cells.at(divided))
+
+
+def _guessed_cells(lattice: Lattice, levels: int) -> float:
+    """The number of the first cells at the border of a workspace as large as the machine: of a ball of radius L."""
+    radius = 1.0 / float((2**levels * lattice.step / lattice.measure.question.lengths).max())
+    return 2.0 * np.pi * radius if lattice.d == 2 else 4.0 * np.pi * radius**2
+
+
+def _report(lattice: Lattice, cells: Cells, crossed: int, divided: int) -> None:
+    """Report how many cells are at the border, and are to be halved at this level and those ahead."""
+    halved, growth, width = [float(divided)], 1 << (lattice.d - 1), cells.width
+    while width > 2:
+        width //= 2
+        halved.append(halved[-1] * growth if width >= THIN else crossed * growth ** len(halved))
+    across = np.ptp(places_of(cells.codes, lattice.d), axis=0) if crossed else np.full(lattice.d, np.inf)
+    halvings = lattice.measure.halvings(np.maximum(across, 1.0))
+    lattice.measure.progress.expect(crossed, halved if cells.width > 1 else [], halvings)
 
 
 def _first(lattice: Lattice, levels: int, reach: int) -> Cells:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import reprlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast, overload
@@ -184,10 +185,12 @@ def singularity_map(
     step = _step(over, resolution)
     places = _places(over, step)
     with telling("singularities", on_progress) as tell:
-        reached, measures, signs = _measured(over, places * step + question.space.start, tell)
+        d, n = len(step), len(places)
+        total = n + math.ceil(2 * d * n ** (1.0 - 1.0 / d))  # as many beyond a cube's sides as on them
+        reached, measures, signs = _measured(over, places * step + question.space.start, tell, 0, total)
         places = places[reached]
         outer, border = drawn_to_border(over, places, step)
-        at_border, measures_there, signs_there = _measured(over, border, None)
+        at_border, measures_there, signs_there = _measured(over, border, tell, n, n + len(border))
     points, signed = places * step + question.space.start, _signed(measures, signs)
     vertices, faces = locus(
         np.concatenate([places, outer[at_border]]),
@@ -249,7 +252,9 @@ def _places(over: Workspace, step: Floats) -> Ints:
     return np.asarray(places[inside])
 
 
-def _measured(over: Workspace, points: Floats, tell: OnProgress | None) -> tuple[Ints, Singularity, Floats]:
+def _measured(
+    over: Workspace, points: Floats, tell: OnProgress | None, done: int, total: int
+) -> tuple[Ints, Singularity, Floats]:
     """Rows of the points that are reached in the question's working mode, and their measures and signs."""
     question, options = over._question, Options(working_mode="keep", on_invalid="mark")
     rows, blocks, signs = [np.zeros(0, np.int64)], [], [np.zeros(0)]
@@ -262,7 +267,7 @@ def _measured(over: Workspace, points: Floats, tell: OnProgress | None) -> tuple
         blocks.append(measures)
         signs.append(sign)
         if tell is not None:
-            tell(begin + len(poses), len(points))
+            tell(done + begin + len(poses), total)
     return np.concatenate(rows), _joined(blocks), np.concatenate(signs)
 
 
