@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +74,7 @@ def test_what_makes_no_sense_is_told_in_a_line(words: list[str], told: str) -> N
 def test_a_machine_without_closed_forms_is_told_of_at_once_and_how_far_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(importlib.import_module("pfabrik.cli.workspace"), "SECONDS_A_LINE", 0.0)
+    monkeypatch.setattr("pfabrik.telling.PATIENCE", 0.0)
     machine = closure.with_hinges_apart(pf.load("delta").without_limits())
     pf.save(machine, tmp_path / "apart.toml")
     asked = ["--fix", "z=-200", "--within", "x=-60:60", "--within", "y=-60:60", "--resolution", "30", "--json"]
@@ -82,4 +82,6 @@ def test_a_machine_without_closed_forms_is_told_of_at_once_and_how_far_it_is(
     assert result.exit_code == 0 and json.loads(result.stdout)["size"] == pytest.approx(120.0**2)
     first, *lines = result.stderr.splitlines()
     assert "no closed forms, " in first and "points are tried one by one" in first
-    assert any("workspace: " in line and " of about " in line for line in lines)
+    shares = [int(line.partition("workspace: ")[2].partition("%")[0]) for line in lines]
+    assert shares and all(after // 10 > before // 10 for before, after in pairwise(shares))  # a line in ten per cent
+    assert all(line.endswith(" left") for line in lines)

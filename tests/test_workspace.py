@@ -11,7 +11,9 @@ from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -412,13 +414,16 @@ def test_who_interrupts_leaves_nothing_behind(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("name", "orientation"), [("five_bar", None), ("rpr", "any")])
-def test_progress_counts_up_to_all(name: str, orientation: str | None) -> None:
+@pytest.mark.parametrize(
+    ("name", "asked"), [("five_bar", {}), ("rpr", {"orientation": "any"}), ("panda", {"over": ["x", "z"]})]
+)
+def test_the_share_done_never_falls_and_ends_at_all(name: str, asked: dict[str, Any]) -> None:
     told: list[tuple[int, int]] = []
-    pf.workspace(pf.load(name), orientation=orientation, on_progress=lambda done, total: told.append((done, total)))
+    pf.workspace(pf.load(name), **asked, on_progress=lambda done, total: told.append((done, total)))
     assert len(told) > 4
+    assert all(x * n <= y * m for (x, m), (y, n) in pairwise(told))
     assert [done for done, _ in told] == sorted(done for done, _ in told)
-    assert all(done <= total for done, total in told)
+    assert told[-1][0] == told[-1][1]
 
 
 def test_what_is_saved_can_be_read_again(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ SLOWER = 64
 Result = TypeVar("Result")
 """What a method of a question gives for a block."""
 
-LOOKS, LOOKS_GROWN, LOOKS_ONE_BY_ONE = 0.25, 0.75, 1.5
+LOOKS, LOOKS_GROWN, LOOKS_ONE_BY_ONE = 0.25, 0.75, 3.0
 """Time to locate the border in a cell, as a share of that to halve one: by margins, by searches, by answers."""
 
 
@@ -73,7 +73,7 @@ class Measure:
 
     def halvings(self, across: Floats) -> int:
         """How often cells must be halved for enough of them, where there are so many along each coordinate, (d,)."""
-        return max(0, math.ceil(math.log2(self.fewest / float(across.min())))) if self.fewest else 0
+        return math.ceil(math.log2(max(self.fewest / float(across.min()), 1.0)))
 
     def _blocks(self, n: int) -> list[slice]:
         """Slices of n points, each of as many as are worth sending to another process."""

@@ -27,6 +27,10 @@ THIN = 4
 """Width in steps of the smallest cells that are searched for a border that shows at no corner."""
 
 
+GUESSED = 0.7
+"""Radius of a workspace that is taken for progress until its first cells are known [L or rad]."""
+
+
 class Cells(NamedTuple):
     """Cells of one size.
 
@@ -99,8 +103,8 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
 
 
 def _guessed_cells(lattice: Lattice, levels: int) -> float:
-    """The number of the first cells at the border of a workspace as large as the machine: of a ball of radius L."""
-    radius = 1.0 / float((2**levels * lattice.step / lattice.measure.question.lengths).max())
+    """The number of the first cells at the border of a workspace that is a ball of `GUESSED` size."""
+    radius = GUESSED / float((2**levels * lattice.step / lattice.measure.question.lengths).max())
     return 2.0 * np.pi * radius if lattice.d == 2 else 4.0 * np.pi * radius**2
 
 
