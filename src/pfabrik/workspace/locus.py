@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .lattice_points import codes, corners
+from .lattice_points import codes, corners, places_around
 from .numbering import Numbering
 from .refining import Cells
 from .result import Workspace
@@ -23,8 +23,7 @@ def drawn_to_border(over: Workspace, places: Ints, step: Floats) -> tuple[Ints, 
     """
     d, start, numbering = len(step), over._question.space.start, Numbering()
     numbering.number(codes(places))
-    ways = np.indices((3,) * d).reshape(d, -1).T - 1
-    ways = ways[np.argsort((ways**2).sum(axis=1), kind="stable")[1:]]
+    ways = places_around(d)
     around = (places[:, None] + ways).reshape(-1, d)
     around = around[numbering.find(codes(around)) < 0]
     outer = around[np.unique(codes(around), return_index=True)[1]]

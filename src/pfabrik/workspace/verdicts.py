@@ -73,7 +73,7 @@ class MapQuestion:
         limits = _known_limits(self.mechanism, self.has_margins)
         return limits + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
 
-    @cached_property
+    @property
     def _engine(self) -> Engine:
         return engine_of(self.mechanism)
 
@@ -183,9 +183,11 @@ class MapQuestion:
         if self.has_margins or len(self.turns) > 1:
             return bindings
         rows = np.flatnonzero(bindings == self._unknown)
-        if not self.is_grown:
-            found = self._answers(self.space.poses(points[rows]))[0]._configurations
-        bindings[rows] = self._active(found.at(rows).coordinates if self.is_grown else found.coordinates)
+        if self.is_grown:
+            ended = found.at(rows)
+        else:
+            ended = self._answers(self.space.poses(points[rows]))[0]._configurations
+        bindings[rows] = self._active(ended.coordinates)
         return bindings
 
     def _active(self, coordinates: Floats) -> Ints:
