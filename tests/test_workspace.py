@@ -660,7 +660,7 @@ def test_a_map_that_explores_without_closed_forms_goes_round_an_obstacle() -> No
     distance = np.linalg.norm(at - first - share[:, None] * (second - first), axis=1) - 0.11 * length
     assert (distance > 0.02 * length - 1e-6).all()
     assert np.median(distance) == pytest.approx(0.02 * length, abs=1e-3 * length)
-    assert distance.max() < 0.07 * length  # a cell: the arm is redundant, and answers may have another elbow
+    assert np.quantile(distance, 0.9) < 0.07 * length  # a cell: the arm is redundant, and some have another elbow
     assert not found.contains([406.9, 100.0])
 
 

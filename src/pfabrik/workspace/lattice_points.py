@@ -26,6 +26,9 @@ PLACES_AT_ONCE = 64
 NEAR = 0.25
 """Longest step to a point that is grown from a neighbour [L or rad]: a longer one may cross a singularity unnoticed."""
 
+TRIES = 3
+"""Number of neighbours that a point is grown from, at most, where it is slow to search anew for one out of reach."""
+
 SAMPLES = 96
 """Number of points that are searched for anew where this is slow, spread over those without a neighbour in reach."""
 
@@ -197,7 +200,10 @@ class Lattice:
 
     def _spread(self, new: Ints, tried: Ints, width: int) -> None:
         while True:
-            rows = np.flatnonzero(self.margins[-len(new) :] < 0.0)
+            is_open = self.margins[-len(new) :] < 0.0
+            if not self.measure.question.is_quick_anew:
+                is_open &= sum(tried >> k & 1 for k in range(len(places_around(self.d)))) < TRIES
+            rows = np.flatnonzero(is_open)
             numbers, tried[rows] = self._untried(new[rows], tried[rows], width)
             rows, numbers = rows[numbers >= 0], numbers[numbers >= 0]
             if not len(rows):
