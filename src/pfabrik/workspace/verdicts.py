@@ -183,10 +183,7 @@ class MapQuestion:
         if self.has_margins or len(self.turns) > 1:
             return bindings
         rows = np.flatnonzero(bindings == self._unknown)
-        if self.is_grown:
-            ended = found.at(rows)
-        else:
-            ended = self._answers(self.space.poses(points[rows]))[0]._configurations
+        ended = found.at(rows) if self.is_grown else self._answers(self.space.poses(points[rows]))[0]._configurations
         bindings[rows] = self._active(ended.coordinates)
         return bindings
 
