@@ -21,7 +21,6 @@ from ..closure.projection import ProjectionMode
 from ..closure.stretched import BentConfiguration
 from ..kernels.chains.chain_constants import MET, MOST_BENT
 from ..kernels.handle import Handle
-from ..kernels.platform.search_records import Starts
 from ..kernels.platform.tables import BY_LEGS, Question
 from ..kernels.rows import PROJECTED, REACHED, TOO_NEAR, Rows
 from ..kernels.threads import in_blocks
@@ -201,17 +200,9 @@ class ChainEngine(Engine):
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         return self._joint_space.advance(targets, start)
 
-    def grows(self, counted: Counted) -> bool:
-        """As `ClosureEngine.grows`."""
-        return self._joint_space.grows(counted)
-
-    def known(self, start: Configurations | None) -> Starts:
-        """As `ClosureEngine.known`."""
-        return self._joint_space.known(start)
-
-    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
-        """As `ClosureEngine.grow`."""
-        return self._joint_space.grow(known, targets, anew=anew, keep_mode=keep_mode)
+    def grower(self, counted: Counted) -> Engine | None:
+        """As `ClosureEngine.grower`."""
+        return self._joint_space.grower(counted)
 
     def as_configurations(self, closing: Closing) -> Configurations:
         """The configurations of a closing; their status is PENDING."""

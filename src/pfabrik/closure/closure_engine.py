@@ -137,9 +137,9 @@ class ClosureEngine(Engine):
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         return self._answer(targets, start.coordinates, USUAL, question_of(REACH, True, True))
 
-    def grows(self, counted: Counted) -> bool:
-        """True where whole poses count: a target out of reach costs a hundred times as much as one within."""
-        return counted == "orientation"
+    def grower(self, counted: Counted) -> Engine | None:
+        """Itself where whole poses count: a target out of reach costs a hundred times as much as one within."""
+        return self if counted == "orientation" else None
 
     def known(self, start: Configurations | None) -> Starts:
         """As `Engine.known`: by joint coordinates."""

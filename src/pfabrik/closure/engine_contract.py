@@ -77,9 +77,9 @@ class Engine(InverseEngine):
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
 
-    def grows(self, counted: Counted) -> bool:
-        """True if known configurations lead to nearby targets in far less time than targets are answered anew."""
-        return False
+    def grower(self, counted: Counted) -> Engine | None:
+        """The engine that grows known configurations, where this takes far less time than to answer targets anew."""
+        return None
 
     def known(self, start: Configurations | None) -> Starts:
         """Configurations as what others grow from; None for home."""

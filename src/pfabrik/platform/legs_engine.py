@@ -293,9 +293,9 @@ class LegsEngine(Engine):
         rows.status[too_near(self, model.mechanism, answers)] = FAILED
         return answers
 
-    def grows(self, counted: Counted) -> bool:
-        """True where positions alone count, if one assembly has all targets and searches keep links apart."""
-        return counted == "position" and self._searches and keeps_links(self._model)
+    def grower(self, counted: Counted) -> Engine | None:
+        """Itself where positions alone count, if one assembly has all targets and searches keep links apart."""
+        return self if counted == "position" and self._searches and keeps_links(self._model) else None
 
     def known(self, start: Configurations | None) -> Starts:
         """As `Engine.known`: by poses and sides."""

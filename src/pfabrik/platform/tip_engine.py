@@ -18,7 +18,6 @@ from ..derived import derived
 from ..description.geometry import home_numbers, with_numbers
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from ..kernels.platform.search_records import Starts
 from ..kernels.rows import FAILED, INVALID
 from ..model import Model
 from ..options import Options
@@ -112,17 +111,9 @@ class TipEngine(Engine):
         answers.rows.status[too_near(self, self.model.mechanism, answers)] = FAILED
         return answers
 
-    def grows(self, counted: Counted) -> bool:
-        """As `Engine.grows`: by the usual engine, where positions alone count."""
-        return counted == "position" and self.usual.grows(counted)
-
-    def known(self, start: Configurations | None) -> Starts:
-        """As `Engine.known`, by the usual engine."""
-        return self.usual.known(start)
-
-    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
-        """As `Engine.grow`, by the usual engine."""
-        return self.usual.grow(known, targets, anew=anew, keep_mode=keep_mode)
+    def grower(self, counted: Counted) -> Engine | None:
+        """As `Engine.grower`: by the usual engine, where positions alone count."""
+        return self.usual.grower(counted) if counted == "position" else None
 
     def forward(
         self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True

@@ -94,7 +94,8 @@ def refined(lattice: Lattice, levels: int, reach: int) -> Refined:
         cells = _with_neighbours(lattice, cells.at(cells.touched | cells.thin))
         inside = cells.inside
         crossed = cells.touched & ~inside
-        divided = ~inside | cells.thin
+        divided = ~inside
+        divided[inside] = cells.at(inside).thin
         _report(lattice, cells, int(crossed.sum()), int(divided.sum()))
         if cells.width == 1:
             return Refined(cells.at(crossed), (*within, cells.at(inside)))
@@ -114,8 +115,9 @@ def _report(lattice: Lattice, cells: Cells, crossed: int, divided: int) -> None:
     while width > 2:
         width //= 2
         halved.append(halved[-1] * growth if width >= THIN else crossed * growth ** len(halved))
-    across = np.ptp(places_of(cells.codes, lattice.d), axis=0) if crossed else np.full(lattice.d, np.inf)
-    halvings = lattice.measure.halvings(np.maximum(across, 1.0))
+    halvings = 0
+    if crossed and lattice.measure.fewest:
+        halvings = lattice.measure.halvings(np.maximum(np.ptp(places_of(cells.codes, lattice.d), axis=0), 1.0))
     lattice.measure.progress.expect(crossed, halved if cells.width > 1 else [], halvings)
 
 

@@ -74,13 +74,15 @@ class MapQuestion:
         return limits + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
 
     @property
-    def _engine(self) -> Engine:
-        return engine_of(self.mechanism)
+    def _grower(self) -> Engine:
+        grower = engine_of(self.mechanism).grower(self.hold)
+        assert grower is not None
+        return grower
 
     @cached_property
     def is_grown(self) -> bool:
         """True if known configurations lead from one point to the next; else each point is measured by itself."""
-        return not self.has_margins and len(self.turns) == 1 and self._engine.grows(self.hold)
+        return not self.has_margins and len(self.turns) == 1 and engine_of(self.mechanism).grower(self.hold) is not None
 
     @property
     def is_quick_anew(self) -> bool:
@@ -92,7 +94,7 @@ class MapQuestion:
         """The configuration that points are searched for anew from; none if the map is not grown."""
         if not self.is_grown:
             return Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
-        return self._engine.known(None if self.start is None else self.start._configurations)
+        return self._grower.known(None if self.start is None else self.start._configurations)
 
     def look(self, points: Floats, known: Starts, anew: bool) -> tuple[Floats, Ints, Starts]:
         """Margins and bindings as of `measure`, and configurations at points or nearest to them, if the map is grown.
@@ -107,7 +109,7 @@ class MapQuestion:
         if not self.is_grown:
             return *self.measure(points), known
         found = self._grown(points, known, anew)
-        ends = self._engine.known(found)
+        ends = self._grower.known(found)
         failed = np.flatnonzero(found.rows.status > Status.PROJECTED)
         put(ends, failed, take_each(known, failed))
         return *self._cut(points, *self._of_grown(found)), ends
@@ -120,7 +122,7 @@ class MapQuestion:
     def _grown(self, points: Floats, known: Starts, anew: bool) -> Configurations:
         targets = np.require(self.space.poses(points), requirements=["C", "W"])
         keeps = self.hold == "orientation" or self.start is not None
-        return self._engine.grow(known, targets, anew=anew, keep_mode=keeps)
+        return self._grower.grow(known, targets, anew=anew, keep_mode=keeps)
 
     def measure(self, points: Floats) -> tuple[Floats, Ints]:
         """Margins (n,) of points (n, d), negative beyond reach, and which of `limits` each is of; -1 for none."""
