@@ -654,13 +654,14 @@ def test_a_map_that_explores_without_closed_forms_goes_round_an_obstacle() -> No
     assert found.limits[[bound for _, bound in found.limits].index("clearance")][0] == "link6–base"
     by_links = np.flatnonzero([found.limits[limit][1] == "clearance" for limit in found.vertex_limit])
     assert len(by_links) > 8
-    points = pf.solve_ik(kept, found.poses(found.vertices[by_links])).points
+    in_its_mode = pf.Options(working_mode="keep")  # others reach farther
+    points = pf.solve_ik(kept, found.poses(found.vertices[by_links]), options=in_its_mode).points
     first, second = points["J6"], points["J7"]
     share = np.clip(((at - first) * (second - first)).sum(1) / ((second - first) ** 2).sum(1), 0.0, 1.0)
     distance = np.linalg.norm(at - first - share[:, None] * (second - first), axis=1) - 0.11 * length
     assert (distance > 0.02 * length - 1e-6).all()
     assert np.median(distance) == pytest.approx(0.02 * length, abs=1e-3 * length)
-    assert np.quantile(distance, 0.9) < 0.07 * length  # a cell: the arm is redundant, and some have another elbow
+    assert distance.max() < 0.07 * length  # a cell: the arm is redundant, and answers may have another elbow
     assert not found.contains([406.9, 100.0])
 
 
