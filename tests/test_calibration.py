@@ -196,7 +196,7 @@ def test_an_outlier_is_named_and_can_be_left_out() -> None:
     data = pf.Measurements(readings, pose=poses, sigma={"position": 0.01, "orientation": 1e-4})
     found = pf.calibrate(own.mechanism, data)
     assert found.worst_rows[0].row == 7 and found.worst_rows[0].residual > 3.0 * found.worst_rows[1].residual
-    assert "row 8 does not fit" in found.table()
+    assert "row 8 does not fit" in str(found)
     for without in (data.without([7]), None):
         weights = None if without is not None else 1.0 * (np.arange(40) != 7)
         again = pf.calibrate(own.mechanism, without or data, weights=weights)
@@ -327,7 +327,7 @@ def test_wrong_calls_say_what_is_wrong() -> None:
 def test_a_calibration_shows_itself() -> None:
     printer = pf.read_klipper(PRINTER)
     found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
-    assert "delta_radius" in found._repr_html_() and "arm_length_a" in found.table()
+    assert "delta_radius" in found._repr_html_() and "arm_length_a" in str(found)
     assert found.to_dict()["parameters"][0]["name"] == "delta_radius"
     figure = pf.plot_calibration(found)
     assert len(figure.axes) == 2

@@ -33,7 +33,6 @@ from pfabrik.cli import main, outputs
 from pfabrik.cli.fitted import fitted
 from pfabrik.cli.group import exit_code
 from pfabrik.cli.outputs import ignores_case, new_folder
-from pfabrik.cli.report import describe_modes
 from pfabrik.cli.stops import AGAIN
 from pfabrik.export.rod_lengths import uneven_rods
 from pfabrik.files import loads
@@ -706,8 +705,7 @@ def test_ik_all_shows_the_pose_that_a_task_leaves_open(run: Callable[..., Result
 def test_a_list_that_was_cut_says_so() -> None:
     found = pf.working_modes(pf.load("serial_arm"), pf.load("serial_arm").home_pose, most_starts=512)
     cut = dataclasses.replace(found, modes=found.modes[:1], hits=found.hits[:1])
-    text = describe_modes(cut, "working", [], lambda mode: [])
-    assert text.startswith("2 working modes, of the 1 nearest to home 1 within all limits\n")
+    assert str(cut).startswith("2 working modes, of the 1 nearest to home 1 within all limits\n")
 
 
 # A file to start from

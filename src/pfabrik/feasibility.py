@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .answers.aligned_text import plain
 from .answers.start_configuration import Start, start_of
 from .arrays import Floats, Ints, shaped
 from .closure.configurations import Configurations
@@ -16,7 +15,6 @@ from .decomposition.leg_forms import LegForm, Rod
 from .decomposition.leg_table import LegTable
 from .derived import derived
 from .description.mechanism import Mechanism, checked_mechanism
-from .description.mechanism_html import card
 from .errors import UnsupportedMechanism, counted
 from .kernels.threads import in_blocks
 from .model import Model, model_of
@@ -25,6 +23,7 @@ from .platform.folds import starts_beside
 from .platform.links_at_poses import links_at_poses
 from .platform.table import table_handle
 from .platform.tip_engine import measured, start_at_tip
+from .printed import Table, plain
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -58,18 +57,16 @@ class Feasibility(NamedTuple):
     limits: tuple[tuple[str, str], ...]
 
     def _repr_html_(self) -> str:
-        """The margin and its limit, for notebooks; of a batch, the rows and the least margin of each limit."""
+        return self.table()._repr_html_()
+
+    def table(self) -> Table:
+        """The margin and its limit; of a batch, the rows and the least margin of each limit."""
         margins, bindings = np.ravel(self.margin), np.ravel(self.binding)
         if not np.ndim(self.margin):
             limit = self.limits[int(bindings[0])] if bindings[0] >= 0 else ("-", "-")
             words = "feasible" if margins[0] >= 0.0 else "not feasible"
-            return card(
-                "Feasibility",
-                [words],
-                ("joint", "bound", "margin"),
-                [(*limit, plain(margins[0], TOLERANCES.active, ".4g"))],
-                "",
-            )
+            row = (*limit, plain(margins[0], TOLERANCES.active, ".4g"))
+            return Table("Feasibility", [words], ("joint", "bound", "margin"), [row])
         n_feasible = int(np.count_nonzero(margins >= 0.0))
         lines = [f"batch of shape {np.shape(self.margin)}", f"{n_feasible} of {counted(len(margins), 'row')} feasible"]
         places, counts = np.unique(bindings[bindings >= 0], return_counts=True)
@@ -77,7 +74,7 @@ class Feasibility(NamedTuple):
             (*self.limits[place], str(count), plain(np.nanmin(margins[bindings == place]), TOLERANCES.active, ".4g"))
             for count, place in sorted(zip(counts.tolist(), places.tolist(), strict=True), reverse=True)
         ]
-        return card("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows, "")
+        return Table("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows)
 
 
 def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = None) -> Feasibility:

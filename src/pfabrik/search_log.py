@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import hypot
 
-from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
@@ -13,7 +12,6 @@ from .closure.attempts import Attempt
 from .closure.configurations import Configurations
 from .closure.link_distances import too_near
 from .description.mechanism import Mechanism
-from .description.mechanism_html import card
 from .engine import engine_of
 from .errors import InvalidArgument
 from .feasibility import feasibility
@@ -21,6 +19,7 @@ from .ik import keeps_mode, solve_ik
 from .model import model_of
 from .options import Options, checked_options
 from .platform.tip_engine import measured
+from .printed import Printed, Table, plain
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -29,7 +28,7 @@ KEPT_APART = "links kept apart"
 
 
 @dataclass(frozen=True, repr=False)
-class SearchLog:
+class SearchLog(Printed):
     """The attempts to answer one target; printed as a table.
 
     Attributes
@@ -55,26 +54,19 @@ class SearchLog:
             return KEPT_APART
         return next((each.phase for each in self.attempts if each.ending in ("reached", "nearest")), "none")
 
-    def __str__(self) -> str:
-        lines = [aligned(*self._table()), self._blocked()]
-        return "\n".join([*filter(None, lines), f"answer: {self.solution}, by {self.answered_by}"])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        """Every attempt, for notebooks."""
-        header, rows = self._table()
-        lines = filter(None, [f"answered by: {self.answered_by}", self._blocked()])
-        return card("Search", lines, header, rows, "")
-
-    def _table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """The header and the cells of the attempts."""
+    def table(self) -> Table:
+        """Every attempt, then the limit that is in the way and the phase that gave the answer."""
         least = TOLERANCES.position * self.solution.mechanism.characteristic_length
         header = ("phase", "start", "steps", f"distance [{self.solution.mechanism.length_unit}]", "ending")
-        return header, [
-            (each.phase, each.start, str(each.steps), plain(each.distance, least).replace("nan", "-"), each.ending)
+        rows = [
+            (each.phase, each.start, str(each.steps), plain(each.distance, least), each.ending)
             for each in self.attempts
         ]
+        blocked, answer = self._blocked(), f"answer: {self.solution}, by {self.answered_by}"
+        return Table("Search", (), header, rows, ["\n".join(filter(None, [blocked, answer]))])
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def _blocked(self) -> str:
         """A sentence on the limit that is in the way; empty if there is none."""

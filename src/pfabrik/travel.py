@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .answers.active_limits import ActiveLimit, active_limits
-from .answers.aligned_text import aligned, plain
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.words import DEAD_POINT, NO_FREEDOM, STRETCHED, has_freedom, short_names
@@ -18,7 +17,6 @@ from .arguments import array
 from .arrays import Floats, Mask
 from .closure.first_order import are_stretched, is_at_dead_point
 from .description.mechanism import Mechanism
-from .description.mechanism_html import card
 from .description.task import task_of
 from .engine import engine_of
 from .errors import InvalidArgument, counted
@@ -27,6 +25,7 @@ from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, task_remark
 from .motion.singularities import assembly_signs
 from .motion.tilt_axis import tilt_axis
+from .printed import Printed, Table, plain
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
 
@@ -78,7 +77,7 @@ class Reach:
 
 
 @dataclass(frozen=True, repr=False)
-class Travel(Sequence[Reach]):
+class Travel(Printed, Sequence[Reach]):
     """The result of `travel`: one `Reach` per direction, in the order of the arguments."""
 
     origin: Solution
@@ -105,23 +104,11 @@ class Travel(Sequence[Reach]):
     def __repr__(self) -> str:
         return f"<Travel of '{self.origin.mechanism.name}': {counted(len(self), 'direction')}>"
 
-    def __str__(self) -> str:
-        """A table of all directions, angles in degrees, and what stops the end effector if no limit does."""
-        return "\n\n".join([aligned(_HEADER, self._rows()), *self._remarks()])
-
-    def _repr_html_(self) -> str:
-        """The table for notebooks."""
-        return card(
-            self.origin.mechanism.name, ["how far the end effector can go", *self._remarks()], _HEADER, self._rows(), ""
-        )
-
-    def _rows(self) -> list[tuple[str, ...]]:
-        return [(*_direction(reach), *self._distance(reach), reach.why) for reach in self]
-
-    def _remarks(self) -> list[str]:
-        """Causes that are too long for the table."""
-        remark = task_remark(self.origin.mechanism)
-        return [remark] if any(reach.cause == remark for reach in self) else []
+    def table(self) -> Table:
+        """All directions, angles in degrees, and what stops the end effector; a cause that is too long for it below."""
+        remark, title = task_remark(self.origin.mechanism), f"Travel of {self.origin.mechanism.name}"
+        rows = [(*_direction(reach), *self._distance(reach), reach.why) for reach in self]
+        return Table(title, (), _HEADER, rows, [remark] * any(reach.cause == remark for reach in self))
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
         """Distance and unit as text; degrees about an axis."""

@@ -7,27 +7,23 @@ import numpy as np
 from ..arrays import Floats, shaped
 from ..closure.link_distances import pair_distances, pair_names
 from ..closure.placed_links import placed_at
-from ..description.mechanism_html import card
 from ..frozen import FrozenMapping
 from ..motion.limited_coordinates import coned, ranges_of
+from ..printed import Printed, Table, plain
 from ..tolerances import TOLERANCES
-from .aligned_text import plain
 from .solution import Solution, checked_solution
 
 
-class Margins(FrozenMapping[tuple[str, str], float | Floats]):
+class Margins(Printed, FrozenMapping[tuple[str, str], float | Floats]):
     """(joint, bound) -> margin, for every limit, as `margins` returns them."""
 
-    def _repr_html_(self) -> str:
-        """Every limit, the nearest first, for notebooks; of a batch, the least margin of each."""
+    def table(self) -> Table:
+        """Every limit, the nearest first; of a batch, the least margin of each."""
         least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
         order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
-        rows = [
-            (*limit, "-" if np.isnan(least[limit]) else plain(least[limit], TOLERANCES.active, ".4g"))
-            for limit in order
-        ]
+        rows = [(*limit, plain(least[limit], TOLERANCES.active, ".4g")) for limit in order]
         is_one = all(np.ndim(margin) == 0 for margin in self.values())
-        return card("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows, "")
+        return Table("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows)
 
 
 def _least(margins: Floats) -> float:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..checks import require_type
 from ..kernels.rows import REACHED
+from ..printed import Table
 from .answer_fields import Answer
-from .solution_html import answer_html
+from .solution_table import answer_table
 from .status import Status
 from .words import as_sentence, what_blocks
 
@@ -123,9 +124,12 @@ class Solution(Answer):
         counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
         return f"<{type(self).__name__} of '{self.mechanism.name}': {counts or 'empty'}>"
 
+    def table(self) -> Table:
+        """Status, pose, actuators and, for notebooks, a small drawing; of a batch, the number of rows per status."""
+        return answer_table(self, self._counts())
+
     def _repr_html_(self) -> str:
-        """Status, errors, actuators and a small drawing, for notebooks; of a batch, the number of rows per status."""
-        return answer_html(self, self._counts())
+        return self.table()._repr_html_()
 
     def _counts(self) -> dict[str, int]:
         """Status name -> number of rows, for those that occur."""

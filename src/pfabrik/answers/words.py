@@ -17,9 +17,9 @@ from ..description.task import task_of
 from ..model import model_of
 from ..motion.fitting_task import has_dependent_coordinates, motions_at, task_remark
 from ..motion.tilt_axis import tilt_axis
+from ..printed import error_text
 from ..rotations import to_rotvec
 from ..tolerances import TOLERANCES
-from .aligned_text import error_text
 
 if TYPE_CHECKING:
     from ..description.mechanism import Joint, Mechanism

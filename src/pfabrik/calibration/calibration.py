@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..answers.aligned_text import error_text
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
+from ..printed import Printed, Table, error_text
 from .instrument import INSTRUMENT
 from .linear_fit import LinearFit
 from .measurements import Measurements
-from .parameter_values import ParameterValue, Suspect, as_html, as_numbers, as_text, plain
+from .parameter_values import ParameterValue, Suspect, as_numbers, plain, table_of
 from .parameters import Parameters
 from .suggest import suggested
 
@@ -38,7 +38,7 @@ TOGETHER = 0.1
 """Part of an open direction from which a parameter is named as one of those that change together."""
 
 
-class Calibration:
+class Calibration(Printed):
     """Parameters of a machine fitted to measurements; made by `calibrate`.
 
     Attributes
@@ -205,13 +205,9 @@ class Calibration:
         counts = f"{len(self.names)} parameters{left}, rms {self._size(self.rms)}"
         return f"<Calibration of '{self._parameters.mechanism.name}': {counts}>"
 
-    def _repr_html_(self) -> str:
-        """A table of the parameters, for notebooks."""
-        return as_html(self._parameters.mechanism, self.parameters, self._facts)
-
-    def table(self) -> str:
-        """The parameters as text, a line each; then what is left, what is open, and what does not fit."""
-        return as_text(self._parameters.mechanism, self.parameters, self._facts)
+    def table(self) -> Table:
+        """The parameters, a line each; then what is left, what is open, and what does not fit."""
+        return table_of(self._parameters.mechanism, self.parameters, self._facts)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain numbers, lists and dicts, ready for JSON."""

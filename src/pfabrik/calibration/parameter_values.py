@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ..answers.aligned_text import aligned, error_text
-from ..answers.aligned_text import plain as shown
 from ..description.mechanism import Mechanism
-from ..description.mechanism_html import card
+from ..printed import Table, error_text
+from ..printed import plain as shown
 from ..tolerances import TOLERANCES
 
 HEADER = ("parameter", "described", "calibrated", "deviation", "unit", "")
@@ -50,14 +49,10 @@ class Suspect(NamedTuple):
     residual: float
 
 
-def as_text(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> str:
-    """A line for each parameter, then facts."""
-    return "\n".join([aligned(HEADER, (_cells(each, mechanism) for each in parameters)), "", *facts])
-
-
-def as_html(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> str:
-    """A table of the parameters of a machine, for notebooks."""
-    return card(mechanism.name, list(facts), HEADER, [_cells(each, mechanism) for each in parameters], "")
+def table_of(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> Table:
+    """A row for each parameter, then facts."""
+    rows = [_cells(each, mechanism) for each in parameters]
+    return Table(mechanism.name, (), HEADER, rows, ["\n".join(facts)])
 
 
 def as_numbers(parameters: Sequence[ParameterValue]) -> list[dict[str, Any]]:

@@ -13,11 +13,14 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
+from ..errors import counted
 from ..ik import solve_ik
 from ..kernels.certify.pose_cells import STEPS, CellParameters, is_beside
 from ..kernels.certify.prove import DONE
 from ..kernels.certify.subdivision import HALF, PROVED_LEGS
 from ..model import model_of
+from ..printed import Printed, Table
+from ..rotations import to_rpy
 from .pose_region import PoseRegion
 from .subdividing import Subdividing, first_cells, step_poses
 
@@ -51,7 +54,7 @@ class Refutation(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Certificate:
+class Certificate(Printed):
     """The verdict on a region of poses.
 
     Attributes
@@ -139,6 +142,27 @@ class Certificate:
                 "rotation_error": float(refutation.answer.rotation_error),
             }
         return plain
+
+    def table(self) -> Table:
+        """The verdict, and what it rests on."""
+        lines = [f"{self.verdict}  {counted(self.n_cells, 'cell')}"]
+        unit, refutation = self.mechanism.length_unit, self.refutation
+        if self:
+            lines.append(f"every pose is reached; margin at least {self.margin:.4g}")
+        elif refutation is not None:
+            joint, bound = refutation.limit
+            x, y, z = refutation.pose[:3, 3].tolist()
+            roll, pitch, yaw = np.degrees(to_rpy(refutation.pose[:3, :3])).tolist()
+            answer = refutation.answer
+            off, turned = float(answer.position_error), math.degrees(float(answer.rotation_error))
+            lines += [
+                f"not reached: {x:.6g} {y:.6g} {z:.6g} {unit}, roll {roll:.4g}, pitch {pitch:.4g}, yaw {yaw:.4g} deg",
+                f"{joint} {bound}: margin {refutation.margin:.4g}; "
+                f"nearest pose {off:.4g} {unit} and {turned:.4g} deg away",
+            ]
+        else:
+            lines.append(f"open: {self.reason}")
+        return Table(f"Certificate of {self.mechanism.name}", lines)
 
     def __repr__(self) -> str:
         words = f"margin at least {self.margin:.4g}" if self.verdict == PROVED else self.reason

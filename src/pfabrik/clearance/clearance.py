@@ -13,13 +13,13 @@ from ..arrays import Floats, Ints, shaped
 from ..closure.link_distances import least_distances
 from ..closure.placed_links import PlacedLinks
 from ..description.links import has_pairs, links_of
-from ..description.mechanism_html import card
 from ..errors import UnsupportedMechanism
+from ..printed import Printed, Table
 from .gradients import gradients_of
 
 
 @dataclass(frozen=True, eq=False)
-class Clearance:
+class Clearance(Printed):
     """The least distance between links, as `clearance` returns it.
 
     Attributes
@@ -64,9 +64,9 @@ class Clearance:
     def __repr__(self) -> str:
         return f"<Clearance: {self._words}>"
 
-    def _repr_html_(self) -> str:
-        """The least distance and its links, for notebooks."""
-        return card("Clearance", [self._words], (), (), "")
+    def table(self) -> Table:
+        """The least distance and its links."""
+        return Table("Clearance", [self._words])
 
     @property
     def _words(self) -> str:

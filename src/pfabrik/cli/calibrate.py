@@ -12,7 +12,7 @@ import pfabrik as pf
 from .arguments import MECH, load
 from .export import text_of
 from .outputs import OUTPUT, check_outputs, force_option, picture, refuse_both_on_stdout, refuse_existing, whole_file
-from .printing import json_option, note, print_answer
+from .printing import json_option, note, print_result
 
 
 @click.command()
@@ -75,7 +75,7 @@ def calibrate(
 
         with picture(plot):
             plot_calibration(result)
-    print_answer(as_json, result.to_dict, result.table)
+    print_result(as_json, result)
     if not result.determined.all():
         note("the data leave parameters open: measure other poses or quantities, or free fewer")
     return 0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from ..answers.aligned_text import aligned
 from ..catalog import catalog as names
 from ..catalog import description
+from ..printed import aligned
 from .printing import json_option, print_answer
 
 

@@ -11,10 +11,9 @@ import click
 import pfabrik as pf
 
 from ..cells import is_finite
-from ..errors import counted
 from .arguments import FINITE, MECH, load
 from .outputs import check_outputs
-from .printing import json_option, print_answer
+from .printing import json_option, print_result
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,7 +70,7 @@ def certify(
     if budget is not None:
         asked["budget"] = budget
     certificate = pf.certify(mechanism, region, limits=None if limits is None else limits.split(","), **asked)
-    print_answer(as_json, certificate.to_dict, lambda: _describe(certificate))
+    print_result(as_json, certificate)
     return 0 if certificate else 1
 
 
@@ -109,33 +108,3 @@ def _numbers(option: str, words: str, counts: Sequence[int], between: str) -> li
             f"{option}: found '{words}'; expected {expected} finite numbers with '{between}' between"
         )
     return [float(value) for value in values]
-
-
-def _describe(certificate: pf.Certificate) -> str:
-    """The verdict, and what it rests on, for people."""
-    lines = [f"{certificate.verdict}  {counted(certificate.n_cells, 'cell')}"]
-    unit, refutation = certificate.mechanism.length_unit, certificate.refutation
-    if certificate:
-        lines.append(f"every pose is reached; margin at least {certificate.margin:.4g}")
-    elif refutation is not None:
-        joint, bound = refutation.limit
-        x, y, z = refutation.pose[:3, 3].tolist()
-        roll, pitch, yaw = _rpy(refutation.pose)
-        answer = refutation.answer
-        off, turned = float(answer.position_error), math.degrees(float(answer.rotation_error))
-        lines += [
-            f"not reached: {x:.6g} {y:.6g} {z:.6g} {unit}, roll {roll:.4g}, pitch {pitch:.4g}, yaw {yaw:.4g} deg",
-            f"{joint} {bound}: margin {refutation.margin:.4g}; nearest pose {off:.4g} {unit} and {turned:.4g} deg away",
-        ]
-    else:
-        lines.append(f"open: {certificate.reason}")
-    return "\n".join(lines)
-
-
-def _rpy(pose: Any) -> list[float]:
-    """Roll, pitch and yaw of a pose [deg]."""
-    import numpy as np
-
-    from ..rotations import to_rpy
-
-    return [float(angle) for angle in np.degrees(to_rpy(pose[:3, :3]))]

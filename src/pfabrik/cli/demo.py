@@ -15,8 +15,8 @@ import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned, error_text
 from ..extras import require
+from ..printed import aligned, error_text
 from .outputs import check_outputs, new_folder, picture, real, whole_folder
 from .printing import print_text
 

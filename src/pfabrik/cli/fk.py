@@ -11,7 +11,7 @@ import pfabrik as pf
 from ..cells import is_finite
 from ..errors import counted
 from .arguments import MECH, load
-from .printing import json_option, print_answer
+from .printing import json_option, print_result
 
 if TYPE_CHECKING:
     from ..arrays import Floats
@@ -41,15 +41,14 @@ def fk(mech: str, values: tuple[float, ...], list_all: bool, as_json: bool) -> i
     found for get the feasible one whose actuators are nearest. With --all the exit code is 0 if some mode keeps all
     limits.
     """
-    from .report import describe, pose_cells, pose_header, print_modes
+    from .report import print_modes
 
     mechanism = load(mech)
     actuators = coordinates(mechanism, values)
     if list_all:
-        header = pose_header(mechanism)
-        return print_modes(lambda: pf.assembly_modes(mechanism, actuators), "assembly", header, pose_cells, as_json)
+        return print_modes(lambda: pf.assembly_modes(mechanism, actuators), as_json)
     solution = pf.solve_fk(mechanism, actuators)
-    print_answer(as_json, solution.to_dict, lambda: describe(solution, actuators))
+    print_result(as_json, solution)
     return 0 if solution else 1
 
 

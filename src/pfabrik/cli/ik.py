@@ -9,8 +9,8 @@ import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned
-from ..answers.aligned_text import plain as plain_number
+from ..printed import aligned
+from ..printed import plain as plain_number
 from ..tolerances import TOLERANCES
 from .arguments import MECH, TargetOptions, load, note_left_out, note_unused_projection, projecting, targeted
 from .printing import json_option, note, print_answer
@@ -62,15 +62,17 @@ def ik(
     note_only_tilt(mechanism, pose)
     if list_all:
         note_unused_projection("--all")
-        return print_working_modes(mechanism, pose, as_json)
+        from .report import print_modes
+
+        return print_modes(lambda: pf.working_modes(mechanism, pose), as_json)
     solution = pf.solve_ik(mechanism, pose, options=options)
-    from .report import clearance_line, describe, margins_table
+    from .report import clearance_line, margins_table
 
     wrench = (force or (0.0, 0.0, 0.0)) + (moment or ()) if force or moment else None
     held = None if wrench is None else pf.forces(solution, wrench)
 
     def in_words() -> str:
-        tables = [describe(solution), *([] if held is None else [forces_table(solution, held)])]
+        tables = [str(solution.table()), *([] if held is None else [forces_table(solution, held)])]
         return "\n\n".join(tables + ([margins_table(solution), *clearance_line(solution)] if with_margins else []))
 
     print_answer(as_json, lambda: as_object(solution, with_margins, held), in_words)
@@ -134,19 +136,3 @@ def forces_table(solution: pf.Solution, held: pf.Forces) -> str:
     least = 1e-9 * max(map(abs, held.actuators.tolist()))
     values = [plain_number(float(value), least) for value in held.actuators]
     return aligned(["actuator", "exerts", "unit"], zip(mechanism.actuator_names, values, units, strict=True))
-
-
-def print_working_modes(mechanism: pf.Mechanism, target: Target, as_json: bool) -> int:
-    """Print all working modes, each with its actuator values, and its pose where the task leaves it open."""
-    from ..description.readouts import readouts
-    from .report import in_units, pose_cells, pose_header, print_modes
-
-    shown = readouts(mechanism)
-    header = [f"{readout.name} [{readout.unit}]" for readout in shown]
-    is_open = mechanism.task != mechanism.whole_task
-
-    def cells(mode: pf.Solution) -> list[str]:
-        return in_units(shown, mode.actuators) + (pose_cells(mode) if is_open else [])
-
-    header += pose_header(mechanism) if is_open else []
-    return print_modes(lambda: pf.working_modes(mechanism, target), "working", header, cells, as_json)

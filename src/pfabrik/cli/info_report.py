@@ -10,7 +10,6 @@ from collections.abc import Iterable, Sequence
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned, error_text
 from ..chains.serial_chain import is_chain
 from ..description.home_mobility import universal_axes
 from ..description.joint_types import KINDS
@@ -18,6 +17,7 @@ from ..description.mechanism import MOST_JOINTS_FOR_FREEDOM
 from ..description.readouts import Readout, readout
 from ..meshes import hull_of
 from ..model import model_of
+from ..printed import aligned, error_text
 from ..tolerances import TOLERANCES
 from .fitted import line_width
 

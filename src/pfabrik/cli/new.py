@@ -11,9 +11,9 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from ..answers.aligned_text import aligned
 from ..catalog import catalog, catalog_file, template, templates, title
 from ..errors import UnknownName
+from ..printed import aligned
 from .arguments import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import json_option, print_answer

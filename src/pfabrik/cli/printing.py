@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import click
 
+from ..printed import Table
 from .fitted import fitted, line_width
+
+
+class Result(Protocol):
+    """What a command prints."""
+
+    def to_dict(self) -> dict[str, Any]: ...
+    def table(self) -> Table: ...
 
 
 def json_option(help: str = "One JSON object on stdout; angles in radians.") -> Callable[..., Any]:
@@ -24,6 +32,11 @@ def print_answer(
         print_json(to_object())
     else:
         print_text(to_text(), to_stderr=to_stderr)
+
+
+def print_result(as_json: bool, result: Result, *, to_stderr: bool = False) -> None:
+    """Print what a result says of itself."""
+    print_answer(as_json, result.to_dict, lambda: str(result.table()), to_stderr=to_stderr)
 
 
 def print_text(text: str, *, to_stderr: bool = False) -> None:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned, plain
 from ..cells import is_finite
 from ..errors import near_miss
 from .arguments import MECH, TargetOptions, load, targeted
-from .printing import json_option, print_answer
+from .printing import json_option, print_result
 
 speed_option = click.option(
     "--speed",
@@ -39,26 +38,8 @@ def speed(mech: str, target: TargetOptions, speeds: tuple[str, ...], as_json: bo
     if not solution:
         raise click.ClickException(f"not reached: {str(solution.status).lower()}; see `pfabrik ik`")
     highest = pf.platform_speed(solution, speed=speed_limits(mechanism, speeds) or None)
-    print_answer(as_json, lambda: as_object(highest), lambda: speed_table(highest, mechanism.length_unit))
+    print_result(as_json, highest)
     return 0
-
-
-def as_object(highest: Iterable[pf.PlatformSpeed]) -> dict[str, object]:
-    """Platform speeds as plain numbers; None where nothing limits one."""
-    finite = [motion.speed if math.isfinite(motion.speed) else None for motion in highest]
-    return {"speeds": [motion._asdict() | {"speed": value} for motion, value in zip(highest, finite, strict=True)]}
-
-
-def speed_table(highest: Iterable[pf.PlatformSpeed], length_unit: str) -> str:
-    """Platform speeds as a table, a row for each direction or axis."""
-    rows = []
-    for motion in highest:
-        turns = motion.kind == "about"
-        value = math.degrees(motion.speed) if turns else motion.speed
-        shown = plain(value, 1e-9) if math.isfinite(value) else "unlimited"
-        direction = [plain(component, 1e-9) for component in motion.direction]
-        rows.append((motion.kind, *direction, shown, f"{'deg' if turns else length_unit}/s", motion.limited_by))
-    return aligned(["", "x", "y", "z", "speed", "unit", "limited by"], rows)
 
 
 def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "--speed") -> dict[str, float]:

@@ -9,11 +9,10 @@ import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned
 from ..errors import counted
 from .arguments import FINITE, MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
-from .printing import json_option, print_answer
+from .printing import json_option, print_result
 from .speed import speed_limits, speed_option
 
 
@@ -65,18 +64,5 @@ def time(
         )
         if handle is not None:
             timed.write(handle)
-    print_answer(as_json, lambda: as_object(timed), lambda: describe(timed), to_stderr=output == STANDARD)
+    print_result(as_json, timed, to_stderr=output == STANDARD)
     return 0
-
-
-def as_object(timed: pf.Timed) -> dict[str, object]:
-    """The time, how many samples, and the limits that hold the path back."""
-    held = [{"actuator": name, "what": what, "share": share} for (name, what), share in timed.held_back.items()]
-    return {"duration": timed.duration, "samples": len(timed.times), "held_back": held}
-
-
-def describe(timed: pf.Timed) -> str:
-    """The time, how many samples, and the limits that hold the path back, for people."""
-    rows = [(name, what, f"{100.0 * share:.1f} %") for (name, what), share in timed.held_back.items()]
-    duration = f"{timed.duration:.6g} s, {counted(len(timed.times), 'sample')}"
-    return f"{duration}\n\n{aligned(['held back by', 'its', 'of the time'], rows)}" if rows else duration

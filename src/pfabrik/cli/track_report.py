@@ -13,13 +13,13 @@ import numpy as np
 
 import pfabrik as pf
 
-from ..answers.aligned_text import plain
 from ..answers.words import short_names
 from ..arrays import Floats
 from ..cells import CsvWriter
 from ..description.readouts import readouts
 from ..errors import counted
 from ..paths.along import Extremes
+from ..printed import plain
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
 

@@ -10,7 +10,7 @@ import pfabrik as pf
 
 from .arguments import FINITE, MECH, TargetOptions, Triple, load, targeted
 from .outputs import check_outputs, picture
-from .printing import json_option, print_answer
+from .printing import json_option, print_result
 
 
 @click.command()
@@ -45,5 +45,5 @@ def travel(
         with picture(path):
             pf.plot_travel(distances)
         click.echo(f"wrote {path}", err=True)
-    print_answer(as_json, distances.to_dict, lambda: str(distances))
+    print_result(as_json, distances)
     return 0

@@ -11,8 +11,8 @@ import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import error_text
 from ..errors import counted
+from ..printed import error_text
 from .arguments import MECH, load
 from .printing import json_option, print_answer
 

@@ -11,10 +11,10 @@ import click
 
 import pfabrik as pf
 
-from ..answers.aligned_text import aligned
 from ..cells import is_finite
 from ..checks import require_ending
 from ..extras import require
+from ..printed import aligned
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, Triple, load, rpy_option
 from .outputs import check_outputs, picture

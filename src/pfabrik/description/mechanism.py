@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..checks import require_mapping, require_type
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
 from ..frozen import FrozenMapping
+from ..printed import Table
 from .body_shapes import Shape
 from .coercion import items, numbers
 from .copies import Pattern
@@ -24,7 +25,7 @@ from .joint_types import JOINT_TYPES, JointType
 from .joints import Cone, Joint, Range, Vector, set_fields
 from .leg_joints import legs_name
 from .legs import Leg, as_legs
-from .mechanism_html import mechanism_html
+from .mechanism_table import mechanism_table
 from .structure import Structure, as_pairs
 
 __all__ = [
@@ -108,9 +109,12 @@ class Mechanism(Structure):
     def __repr__(self) -> str:
         return f"<Mechanism '{self.name}': {self._counts()}, task {' '.join(self.task)}>"
 
+    def table(self) -> Table:
+        """Name, counts, task, actuators with their limits and, for notebooks, a small drawing of home."""
+        return mechanism_table(self, f"{self._counts()}; task {' '.join(self.task)}")
+
     def _repr_html_(self) -> str:
-        """Name, counts, task, actuators with their limits, and a small drawing of home, for notebooks."""
-        return mechanism_html(self, f"{self._counts()}; task {' '.join(self.task)}")
+        return self.table()._repr_html_()
 
     def _counts(self) -> str:
         counts = {"joint": len(self.joints), "actuator": len(self.actuator_names)}

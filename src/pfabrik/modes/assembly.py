@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..answers.solution import Solution
+from ..answers.solution_table import pose_cells, pose_columns
 from ..arrays import Floats, Mask
 from ..checks import require_count
 from ..closure.close import Closing, close, platform_poses
@@ -24,6 +26,16 @@ from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes
 @dataclass(frozen=True)
 class AssemblyModes(Modes):
     """The assembly modes that were found, nearest to home first, with how often; see `Modes` for the fields."""
+
+    kind = "assembly"
+
+    @staticmethod
+    def _columns(mechanism: Mechanism) -> list[str]:
+        return pose_columns(mechanism)
+
+    @staticmethod
+    def _cells(mode: Solution) -> list[str]:
+        return pose_cells(mode)
 
 
 def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: int = 40_000) -> AssemblyModes:

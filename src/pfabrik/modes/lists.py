@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import overload
+from typing import Any, ClassVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.aligned_text import plain
 from ..answers.solution import Solution
+from ..answers.words import by_bound, exceeded
 from ..arrays import Floats
-from ..description.mechanism_html import card
-from ..description.readouts import Readout, readouts
+from ..description.mechanism import Mechanism
 from ..errors import counted
+from ..printed import Printed, Table
 from ..tolerances import TOLERANCES
 
 BATCH = 512
@@ -29,16 +29,13 @@ HITS = 10
 STEPS = 80
 """Newton steps a start may take; most need fewer than 20."""
 
-SHOWN = 24
-"""Modes that a notebook shows, at most."""
-
 ALONG = 1e-3
 """Step that tests whether a solution is one of a continuum [L or rad]: large enough to distinguish it from a double
 root, too small to reach another solution."""
 
 
 @dataclass(frozen=True)
-class Modes(Sequence[Solution]):
+class Modes(Printed, Sequence[Solution]):
     """The modes that were found, nearest to home first.
 
     Attributes
@@ -47,6 +44,8 @@ class Modes(Sequence[Solution]):
     hits : number of starts that led to each.
     starts : number of starts.
     """
+
+    kind: ClassVar[str]
 
     modes: tuple[Solution, ...]
     hits: tuple[int, ...]
@@ -80,27 +79,37 @@ class Modes(Sequence[Solution]):
     def __len__(self) -> int:
         return len(self.modes)
 
-    def _repr_html_(self) -> str:
-        """Every mode with its status and actuator values, for notebooks; of many, the nearest to home."""
-        kind = type(self).__name__.removesuffix("Modes").lower()
-        lines = [f"{counted(self.total, f'{kind} mode')} in {counted(self.starts, 'start')}"]
-        if self.total > SHOWN:
-            lines.append(f"the {SHOWN} nearest to home:")
+    @staticmethod
+    def _columns(mechanism: Mechanism) -> list[str]:
+        """Names of the columns that tell modes apart."""
+        raise NotImplementedError
+
+    @staticmethod
+    def _cells(mode: Solution) -> list[str]:
+        """Cells of a mode in these columns."""
+        raise NotImplementedError
+
+    def table(self) -> Table:
+        """Every mode, the limits that it exceeds, and how likely it is that there are others."""
+        chance = f"another one would find a new mode with a probability of about {self.unseen:.2%}"
+        searched = f"{counted(self.starts, 'start')}; {chance}"
         if not self.modes:
-            return card("No mode", lines, ("mode", "status"), [], "")
-        mechanism = self.modes[0].mechanism
-        columns = readouts(mechanism)
+            return Table(f"No {self.kind} mode", [f"no {self.kind} mode found"], remarks=[searched])
+        mechanism, kept = self.modes[0].mechanism, sum(map(bool, self)) or "none"
+        count = f"{counted(self.total, f'{self.kind} mode')}, "
+        count += f"of the {len(self)} nearest to home " if self.total > len(self) else ""
         rows = [
-            (str(place), str(mode.status).lower(), *_values(columns, mode))
-            for place, mode in enumerate(self.modes[:SHOWN], 1)
+            [str(place), *self._cells(mode), str(hits), by_bound(exceeded(mode)) or "nothing"]
+            for place, (mode, hits) in enumerate(zip(self.modes, self.hits, strict=True), 1)
         ]
-        header = ("mode", "status", *(f"{each.name} [{each.unit}]" for each in columns))
-        return card(mechanism.name, lines, header, rows, "")
+        header = ["mode", *self._columns(mechanism), "starts", "exceeds"]
+        return Table(mechanism.name, [f"{count}{kept} within all limits"], header, rows, [searched])
 
-
-def _values(columns: Sequence[Readout], mode: Solution) -> list[str]:
-    """The actuators of a mode in the units that people read."""
-    return [plain(float(each.display(value)), 1e-9) for each, value in zip(columns, mode.actuators, strict=True)]
+    def to_dict(self) -> dict[str, Any]:
+        """Modes and counts as plain numbers, lists and dicts, ready for JSON."""
+        modes = [mode.to_dict() for mode in self.modes]
+        counts = {"total": self.total, "hits": list(self.hits), "starts": self.starts, "unseen": self.unseen}
+        return {"modes": modes, **counts}
 
 
 class Clusters:

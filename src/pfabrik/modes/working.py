@@ -8,11 +8,13 @@ from math import prod
 import numpy as np
 
 from ..answers.solution import Solution
+from ..answers.solution_table import actuator_columns, in_units, pose_cells, pose_columns
 from ..answers.status import Status
 from ..arrays import Floats
 from ..checks import require_count
 from ..closure.close import CLOSED, close
 from ..description.mechanism import Mechanism
+from ..description.readouts import readouts
 from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.rows import POSITION_ERROR, ROTATION_ERROR
@@ -34,11 +36,23 @@ class WorkingModes(Modes):
         Modes are the combinations of one branch per leg; there may be more than are listed.
     """
 
+    kind = "working"
+
     branches: tuple[tuple[tuple[int, ...], ...], ...]
 
     @property
     def total(self) -> int:
         return sum(prod(map(len, legs)) for legs in self.branches)
+
+    @staticmethod
+    def _columns(mechanism: Mechanism) -> list[str]:
+        is_open = mechanism.task != mechanism.whole_task
+        return actuator_columns(mechanism) + (pose_columns(mechanism) if is_open else [])
+
+    @staticmethod
+    def _cells(mode: Solution) -> list[str]:
+        is_open = mode.mechanism.task != mode.mechanism.whole_task
+        return in_units(readouts(mode.mechanism), mode.actuators) + (pose_cells(mode) if is_open else [])
 
     @property
     def _found_once(self) -> int:

@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..derived import derived
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
-from ..description.mechanism_html import card
+from ..printed import Printed, Table
 from ..tolerances import TOLERANCES
 from .joint_rates import actuated_columns, first_order, right_singular
 from .walks import around_home
@@ -41,7 +41,7 @@ class NearlyFree:
 
 
 @dataclass(frozen=True)
-class Mobility:
+class Mobility(Printed):
     """Numbers of independent motions of a mechanism at generic configurations; home may be special.
 
     Attributes
@@ -71,10 +71,10 @@ class Mobility:
         """Actuators beyond the freedoms of the end effector; negative where there are too few."""
         return self.actuators - self.platform
 
-    def _repr_html_(self) -> str:
-        """Every count with its meaning, for notebooks."""
+    def table(self) -> Table:
+        """Every count with its meaning."""
         rows = [(name.replace("_", "-"), str(getattr(self, name)), words) for name, words in _IN_WORDS.items()]
-        return card("Mobility", (), ("", "count", "of"), rows, "")
+        return Table("Mobility", (), ("", "count", "of"), rows)
 
 
 _IN_WORDS = {

@@ -19,8 +19,8 @@ from ..arrays import Floats
 from ..derived import derived
 from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
-from ..description.mechanism_html import card
 from ..description.task import task_of
+from ..printed import Printed, Table, plain
 from ..tolerances import TOLERANCES
 from .displacements import displacements
 from .joint_rates import actuated_columns, first_order
@@ -33,7 +33,7 @@ NUMBERS = (*KINDS, "lost", "gained")
 
 
 @dataclass(frozen=True, eq=False)
-class Singularity:
+class Singularity(Printed):
     """Measures of the distance from each kind of singularity: 0 at a singularity, growing with the distance.
 
     Measures are scale free (lengths in units of L, angles in rad), (...,) each; inf where nothing can be lost
@@ -64,19 +64,19 @@ class Singularity:
     gained: Floats
     kinds: tuple[str, ...] | list[tuple[str, ...]]
 
-    def _repr_html_(self) -> str:
-        """Every measure and whether it is singular, for notebooks; of a batch, the least, and the singular rows."""
+    def table(self) -> Table:
+        """Every measure and whether it is singular; of a batch, the least, and the singular rows."""
         is_one = np.ndim(self.serial) == 0
         rows = []
         for kind in KINDS:
             measure = np.ravel(getattr(self, kind))
             known = measure[~np.isnan(measure)]
-            least = f"{known.min():.3g}" if len(known) else "-"
+            least = plain(min(known, default=np.nan), 0.0, ".3g")
             count = int(np.count_nonzero(known < TOLERANCES.singular))
             rows.append((kind, least, ("yes" if count else "no") if is_one else str(count)))
         header = ("kind", "measure", "singular") if is_one else ("kind", "least measure", "singular rows")
         lines = [] if is_one else [f"batch of shape {np.shape(self.serial)}"]
-        return card("Singularity", lines, header, rows, "")
+        return Table("Singularity", lines, header, rows)
 
 
 def singularity_of(values: Floats, lost: Floats, gained: Floats) -> Singularity:

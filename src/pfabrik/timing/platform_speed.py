@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
-from ..description.mechanism_html import card
+from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..errors import InvalidArgument
 from ..motion.displacements import rate_units
 from ..motion.joint_rates import actuated_columns, first_order, right_singular
 from ..motion.mobility import generic_of
+from ..printed import Printed, Table, plain
 from ..tolerances import TOLERANCES
 from .time_path import limits_of
 
@@ -41,18 +43,43 @@ class PlatformSpeed(NamedTuple):
     speed: float
     limited_by: str
 
-    def _repr_html_(self) -> str:
-        """Direction, speed and the actuator that limits it, for notebooks."""
-        unit = "length/s" if self.kind == "along" else "deg/s"
-        speed = self.speed if self.kind == "along" else float(np.degrees(self.speed))
-        direction = ", ".join(f"{part:.4g}" for part in self.direction)
-        row = (f"{self.kind} ({direction})", f"{speed:.6g} {unit}", self.limited_by or "-")
-        return card("Platform speed", [], ("direction", "speed", "limited by"), [row], "")
+
+class PlatformSpeeds(Printed, tuple[PlatformSpeed, ...]):
+    """The highest speeds in several directions, of one mechanism."""
+
+    mechanism: Mechanism
+
+    def __new__(cls, mechanism: Mechanism, speeds: Iterable[PlatformSpeed]) -> PlatformSpeeds:
+        new = super().__new__(cls, speeds)
+        new.mechanism = mechanism
+        return new
+
+    def __getnewargs__(self) -> tuple[Mechanism, tuple[PlatformSpeed, ...]]:
+        return self.mechanism, tuple(self)
+
+    def table(self) -> Table:
+        """Kind and direction, the speed, and the actuator that limits it."""
+        rows = []
+        for motion in self:
+            turns = motion.kind == "about"
+            value = math.degrees(motion.speed) if turns else motion.speed
+            speed = plain(value, 1e-9) if math.isfinite(value) else "unlimited"
+            unit = f"{'deg' if turns else self.mechanism.length_unit}/s"
+            rows.append(
+                (motion.kind, *(plain(part, 1e-9) for part in motion.direction), speed, unit, motion.limited_by)
+            )
+        return Table(f"Platform speed of {self.mechanism.name}", (), _HEADER, rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every motion as plain numbers, ready for JSON; None where nothing limits its speed."""
+        finite = [each.speed if math.isfinite(each.speed) else None for each in self]
+        return {"speeds": [each._asdict() | {"speed": value} for each, value in zip(self, finite, strict=True)]}
 
 
-def platform_speed(
-    solution: Solution, *, speed: float | Mapping[str, float] | None = None
-) -> tuple[PlatformSpeed, ...]:
+_HEADER = ("", "x", "y", "z", "speed", "unit", "limited by")
+
+
+def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | None = None) -> PlatformSpeeds:
     """The highest speeds of a platform along and about each axis of its task, and along the slowest direction of all.
 
     Axes are those of the base; of a tilt, the platform's x and y axes.
@@ -94,7 +121,7 @@ def platform_speed(
     slowest = _slowest(_translations(inverse, forward, sizes), inverse / limits[:, None], shares)
     if slowest is not None:
         speeds.append(_fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names))
-    return tuple(speeds)
+    return PlatformSpeeds(solution.mechanism, speeds)
 
 
 def _twists(solution: Solution) -> Floats:

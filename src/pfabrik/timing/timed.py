@@ -11,10 +11,10 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
-from ..description.mechanism_html import card
 from ..description.readouts import readouts
 from ..errors import counted
 from ..extras import require
+from ..printed import Printed, Table
 from ..rotations import to_rpy
 from ..whole_files import whole_path
 
@@ -28,7 +28,7 @@ REACHED = 0.99
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Timed:
+class Timed(Printed):
     """A path as fast as it may be followed, in n samples.
 
     Attributes
@@ -72,11 +72,16 @@ class Timed:
         name = self.mechanism.name
         return f"<Timed path of '{name}': {self.duration:.6g} s, {counted(len(self.times), 'sample')}>"
 
-    def _repr_html_(self) -> str:
-        """Duration, and the limits that hold the path back, for notebooks."""
+    def table(self) -> Table:
+        """Duration, and the limits that hold the path back."""
         lines = [f"{self.duration:.6g} s, {counted(len(self.times), 'sample')}"]
         rows = [(name, what, f"{share:.1%}") for (name, what), share in self.held_back.items()]
-        return card(self.mechanism.name, lines, ("held back by", "limit", "share of the time"), rows, "")
+        return Table(self.mechanism.name, lines, ("held back by", "limit", "share of the time"), rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Duration, number of samples and the limits that hold the path back, ready for JSON."""
+        held = [{"actuator": name, "what": what, "share": share} for (name, what), share in self.held_back.items()]
+        return {"duration": self.duration, "samples": len(self.times), "held_back": held}
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write times, poses, actuators, their rates and accelerations; angles in degrees.

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from ..arguments import array, is_positive
 from ..arrays import Floats
 from ..checks import require_known
-from ..description.mechanism_html import card
 from ..errors import InvalidArgument
+from ..printed import Printed, Table
 
 if TYPE_CHECKING:
     from .region import Region
@@ -36,7 +36,7 @@ MOST_VERTICES = 20_000
 
 
 @dataclass(frozen=True)
-class Inscribed:
+class Inscribed(Printed):
     """A shape that lies within reach.
 
     Attributes
@@ -56,12 +56,12 @@ class Inscribed:
         share = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / (4.0 if len(self.extents) == 2 else 6.0)}
         return float(share[self.kind] * np.prod(self.extents))
 
-    def _repr_html_(self) -> str:
-        """Centre and extents, for notebooks, in the units of the workspace: lengths, or radians."""
+    def table(self) -> Table:
+        """Centre and extents, in the units of the workspace: lengths, or radians."""
         numbers = zip(self.centre.tolist(), self.extents.tolist(), strict=True)
         rows = [(str(place), f"{middle:.6g}", f"{extent:.6g}") for place, (middle, extent) in enumerate(numbers, 1)]
-        lines = [f"size {self.size:.6g}"]
-        return card(f"Largest {self.kind}", lines, ("coordinate", "centre", "extent"), rows, "")
+        header = ("coordinate", "centre", "extent")
+        return Table(f"Largest {self.kind}", [f"size {self.size:.6g}"], header, rows)
 
 
 def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:

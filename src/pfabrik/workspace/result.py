@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from ..certify.enclosure import Enclosure
+from ..printed import Printed, Table
 from .border_search import sliced
 from .inscribed import Inscribed, Kind, inscribed
 from .region import Region
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-class Workspace(Region):
+class Workspace(Printed, Region):
     """The workspace of a mechanism over two or three coordinates.
 
     Attributes
@@ -128,11 +129,11 @@ class Workspace(Region):
             "components": [{"size": each.size, "at_start": each is self.at_start} for each in self.components],
         }
 
-    def _repr_html_(self) -> str:
-        """Size, ends, what forms the border and, over two coordinates, its outline, for notebooks."""
-        from .workspace_html import workspace_html
+    def table(self) -> Table:
+        """Size, ends, what forms the border and, for notebooks and over two coordinates, its outline."""
+        from .workspace_table import workspace_table
 
-        return workspace_html(self)
+        return workspace_table(self)
 
     def __repr__(self) -> str:
         over = ", ".join(self.names)

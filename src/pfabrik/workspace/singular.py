@@ -16,11 +16,11 @@ from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
-from ..description.mechanism_html import card
 from ..errors import InvalidArgument, counted
 from ..ik import solve_ik
 from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
+from ..printed import Printed, Table
 from ..telling import OnProgress, telling
 from .lattice_points import codes
 from .locus import drawn_to_border, locus
@@ -42,7 +42,7 @@ LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class SingularityMap:
+class SingularityMap(Printed):
     """Measures of singularity over a workspace, on a lattice of points.
 
     Attributes
@@ -82,14 +82,14 @@ class SingularityMap:
         locus = self.locus_vertices, self.locus_faces
         return plot_map(self.workspace, self.step, self.points, self.measures, *locus, ax)
 
-    def _repr_html_(self) -> str:
-        """The parts between parallel singularities, and the least of each measure, for notebooks."""
+    def table(self) -> Table:
+        """The parts between parallel singularities, and the least of each measure."""
         sizes = [size for size in self.sizes.tolist() if size > LEAST_SHARE]
         lines = [counted(len(self.points), "point")]
         lines += [] if len(self.locus_faces) else ["no parallel singularity"]
         rows = [(f"part {place}", f"{size:.1%} of the points") for place, size in enumerate(sizes)]
         rows += least_measures(self.measures)
-        return card(self.workspace.mechanism.name, lines, ("singularities", ""), rows, "")
+        return Table(self.workspace.mechanism.name, lines, ("singularities", ""), rows)
 
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
@@ -99,7 +99,7 @@ class SingularityMap:
 
 
 @dataclass(frozen=True, eq=False)
-class SingularityTrack:
+class SingularityTrack(Printed):
     """Measures of singularity along a path.
 
     Attributes
@@ -113,11 +113,11 @@ class SingularityTrack:
     signs: Floats
     crossings: Ints
 
-    def _repr_html_(self) -> str:
-        """The rows before which the path leads through a singularity, and the least of each measure, for notebooks."""
+    def table(self) -> Table:
+        """The rows before which the path leads through a singularity, and the least of each measure."""
         crossings = ", ".join(map(str, self.crossings.tolist())) or "none"
         rows = [("crossings before rows", crossings), *least_measures(self.measures)]
-        return card("Singularities along a path", [counted(len(self.signs), "row")], ("singularities", ""), rows, "")
+        return Table("Singularities along a path", [counted(len(self.signs), "row")], ("singularities", ""), rows)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
