@@ -9,7 +9,6 @@ import click
 
 import pfabrik as pf
 
-from ..errors import counted
 from .arguments import FINITE, MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
 from .printing import json_option, print_result
