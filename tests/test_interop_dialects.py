@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from in_mujoco import Model
 from pfabrik.errors import InvalidArgument, InvalidMechanism
+from pfabrik.files import dumps, loads
 from pfabrik.interop import Imported, from_sdf, from_urdf, verify
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -324,10 +325,17 @@ def test_what_is_wrong_with_a_told_loop_is_refused_in_a_sentence(old: str, new: 
         from_urdf(CLOSED.replace(old, new), end_effector="rocker")
 
 
-def test_a_description_in_millimetres_is_asked_for_its_unit() -> None:
+def test_a_description_in_millimetres_is_noted_and_its_mechanism_file_takes_their_word() -> None:
     far = CLOSED.replace('xyz="0.2 0 0"', 'xyz="200 0 0"').replace("0 0 0.06", "0 0 60")
     far = far.replace(ONE, "170 0 60").replace(OTHER, "-30 0 120")
-    assert "up to 200 m away: a description has metres" in notes_of(from_urdf(far, end_effector="rocker"))
+    found = from_urdf(far, end_effector="rocker")
+    assert 'up to 200 m away, as a description has metres; if millimetres were meant, write length = "mm"' in notes_of(
+        found
+    )
+    mended = loads(dumps(found.mechanism).replace('length = "m"', 'length = "mm"'))
+    expected = from_urdf(CLOSED, end_effector="rocker", length_unit="mm").mechanism
+    for angle in np.linspace(-0.5, 0.5, 11):
+        np.testing.assert_allclose(pf.solve_fk(mended, [angle]).pose, pf.solve_fk(expected, [angle]).pose, atol=1e-9)
 
 
 def test_drives_that_no_joint_has_and_loops_that_hold_nothing_are_noted() -> None:

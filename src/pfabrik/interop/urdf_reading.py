@@ -114,7 +114,8 @@ def read_description(
         raise fault(f"loop '{name}'", "a name that a joint or another loop has too", "a name of its own")
     farthest = max(float(np.linalg.norm(frame[:3, 3])) for frame in links.frames.values())
     if farthest > FAR:
-        notes.append(Note(f"links are up to {farthest:.4g} m away: a description has metres; were millimetres meant?"))
+        meant = 'if millimetres were meant, write length = "mm" in `units` of the mechanism file'
+        notes.append(Note(f"links are up to {farthest:.4g} m away, as a description has metres; {meant}"))
     return links, [*written, *told]
 
 
