@@ -34,7 +34,7 @@ pf.plot_calibration(found).savefig("calibrated.png", dpi=110)
 # determine nine. A small residual is no proof. The result says so, instead of rods that are wrong by centimetres.
 heights = printer.measurements.without(range(7, printer.measurements.rows))
 guess = pf.calibrate(printer.mechanism, heights, free=printer.free)
-print(guess, guess.determined.sum(), "determined")
+print(repr(guess), guess.determined.sum(), "determined")
 print(guess.undetermined)
 
 # Would more heights help? Thirty of them, simulated with a probe that repeats to 0.01 mm, determine radius, angles and

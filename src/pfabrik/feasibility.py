@@ -23,7 +23,7 @@ from .platform.folds import starts_beside
 from .platform.links_at_poses import links_at_poses
 from .platform.table import table_handle
 from .platform.tip_engine import measured, start_at_tip
-from .printed import Table, plain
+from .printed import ResultTable, plain
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -59,14 +59,14 @@ class Feasibility(NamedTuple):
     def _repr_html_(self) -> str:
         return self.table()._repr_html_()
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """The margin and its limit; of a batch, the rows and the least margin of each limit."""
         margins, bindings = np.ravel(self.margin), np.ravel(self.binding)
         if not np.ndim(self.margin):
             limit = self.limits[int(bindings[0])] if bindings[0] >= 0 else ("-", "-")
             words = "feasible" if margins[0] >= 0.0 else "not feasible"
             row = (*limit, plain(margins[0], TOLERANCES.active, ".4g"))
-            return Table("Feasibility", [words], ("joint", "bound", "margin"), [row])
+            return ResultTable("Feasibility", [words], ("joint", "bound", "margin"), [row])
         n_feasible = int(np.count_nonzero(margins >= 0.0))
         lines = [f"batch of shape {np.shape(self.margin)}", f"{n_feasible} of {counted(len(margins), 'row')} feasible"]
         places, counts = np.unique(bindings[bindings >= 0], return_counts=True)
@@ -74,7 +74,7 @@ class Feasibility(NamedTuple):
             (*self.limits[place], str(count), plain(np.nanmin(margins[bindings == place]), TOLERANCES.active, ".4g"))
             for count, place in sorted(zip(counts.tolist(), places.tolist(), strict=True), reverse=True)
         ]
-        return Table("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows)
+        return ResultTable("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows)
 
 
 def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = None) -> Feasibility:

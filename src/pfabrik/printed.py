@@ -11,7 +11,7 @@ from .tolerances import TOLERANCES
 
 
 @dataclass(frozen=True)
-class Table:
+class ResultTable:
     """Lines of text, a table, and remarks on it. As text it is neither cut nor coloured.
 
     Attributes
@@ -45,7 +45,7 @@ class Table:
 class Printed:
     """A result that prints its table."""
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """What is printed."""
         raise NotImplementedError
 

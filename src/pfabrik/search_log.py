@@ -19,7 +19,7 @@ from .ik import keeps_mode, solve_ik
 from .model import model_of
 from .options import Options, checked_options
 from .platform.tip_engine import measured
-from .printed import Printed, Table, plain
+from .printed import Printed, ResultTable, plain
 from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
@@ -54,7 +54,7 @@ class SearchLog(Printed):
             return KEPT_APART
         return next((each.phase for each in self.attempts if each.ending in ("reached", "nearest")), "none")
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Every attempt, then the limit that is in the way and the phase that gave the answer."""
         least = TOLERANCES.position * self.solution.mechanism.characteristic_length
         header = ("phase", "start", "steps", f"distance [{self.solution.mechanism.length_unit}]", "ending")
@@ -63,7 +63,7 @@ class SearchLog(Printed):
             for each in self.attempts
         ]
         blocked, answer = self._blocked(), f"answer: {self.solution}, by {self.answered_by}"
-        return Table("Search", (), header, rows, ["\n".join(filter(None, [blocked, answer]))])
+        return ResultTable("Search", (), header, rows, ["\n".join(filter(None, [blocked, answer]))])
 
     def __repr__(self) -> str:
         return str(self)

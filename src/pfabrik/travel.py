@@ -25,7 +25,7 @@ from .model import model_of
 from .motion.fitting_task import has_dependent_coordinates, task_remark
 from .motion.singularities import assembly_signs
 from .motion.tilt_axis import tilt_axis
-from .printed import Printed, Table, plain
+from .printed import Printed, ResultTable, plain
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES
 
@@ -104,11 +104,11 @@ class Travel(Printed, Sequence[Reach]):
     def __repr__(self) -> str:
         return f"<Travel of '{self.origin.mechanism.name}': {counted(len(self), 'direction')}>"
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """All directions, angles in degrees, and what stops the end effector; a cause that is too long for it below."""
         remark, title = task_remark(self.origin.mechanism), f"Travel of {self.origin.mechanism.name}"
         rows = [(*_direction(reach), *self._distance(reach), reach.why) for reach in self]
-        return Table(title, (), _HEADER, rows, [remark] * any(reach.cause == remark for reach in self))
+        return ResultTable(title, (), _HEADER, rows, [remark] * any(reach.cause == remark for reach in self))
 
     def _distance(self, reach: Reach) -> tuple[str, str]:
         """Distance and unit as text; degrees about an axis."""

@@ -9,7 +9,7 @@ from ..closure.link_distances import pair_distances, pair_names
 from ..closure.placed_links import placed_at
 from ..frozen import FrozenMapping
 from ..motion.limited_coordinates import coned, ranges_of
-from ..printed import Printed, Table, plain
+from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 
@@ -17,13 +17,13 @@ from .solution import Solution, checked_solution
 class Margins(Printed, FrozenMapping[tuple[str, str], float | Floats]):
     """(joint, bound) -> margin, for every limit, as `margins` returns them."""
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Every limit, the nearest first; of a batch, the least margin of each."""
         least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
         order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
         rows = [(*limit, plain(least[limit], TOLERANCES.active, ".4g")) for limit in order]
         is_one = all(np.ndim(margin) == 0 for margin in self.values())
-        return Table("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows)
+        return ResultTable("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows)
 
 
 def _least(margins: Floats) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..checks import require_type
 from ..kernels.rows import REACHED
-from ..printed import Table
+from ..printed import ResultTable
 from .answer_fields import Answer
 from .solution_table import answer_table
 from .status import Status
@@ -124,7 +124,7 @@ class Solution(Answer):
         counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
         return f"<{type(self).__name__} of '{self.mechanism.name}': {counts or 'empty'}>"
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Status, pose, actuators and, for notebooks, a small drawing; of a batch, the number of rows per status."""
         return answer_table(self, self._counts())
 

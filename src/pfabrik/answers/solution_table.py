@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..description.mechanism_table import bound_text
 from ..description.readouts import Readout, readouts
 from ..description.sketch import sketch
-from ..printed import Table, plain
+from ..printed import ResultTable, plain
 from ..rotations import to_rpy
 from ..tolerances import TOLERANCES
 from .words import as_sentence, loop_gap
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from .answer_fields import Answer
 
 
-def answer_table(answer: Answer, counts: dict[str, int]) -> Table:
+def answer_table(answer: Answer, counts: dict[str, int]) -> ResultTable:
     """One answer; of a batch, the number of rows with each status."""
     name = answer.mechanism.name
     if answer.shape != ():
         rows = [(status, str(count)) for status, count in counts.items()]
-        return Table(name, [f"batch of shape {answer.shape}"], ("status", "rows"), rows)
+        return ResultTable(name, [f"batch of shape {answer.shape}"], ("status", "rows"), rows)
     if not np.isfinite(answer.pose).all():
-        return Table(name, [str(answer.status).lower()])
+        return ResultTable(name, [str(answer.status).lower()])
     header, *rows = zip(*_actuators(answer), strict=True)
     drawing = sketch(answer.mechanism, answer.points, answer.pose[:3, 3])
-    return Table(name, [as_sentence(answer), "", *_pose(answer)], header, rows, drawing=drawing)
+    return ResultTable(name, [as_sentence(answer), "", *_pose(answer)], header, rows, drawing=drawing)
 
 
 def _pose(answer: Answer) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
-from ..printed import Printed, Table, error_text
+from ..printed import Printed, ResultTable, error_text
 from .instrument import INSTRUMENT
 from .linear_fit import LinearFit
 from .measurements import Measurements
@@ -205,7 +205,7 @@ class Calibration(Printed):
         counts = f"{len(self.names)} parameters{left}, rms {self._size(self.rms)}"
         return f"<Calibration of '{self._parameters.mechanism.name}': {counts}>"
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """The parameters, a line each; then what is left, what is open, and what does not fit."""
         return table_of(self._parameters.mechanism, self.parameters, self._facts)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..description.mechanism import Mechanism
-from ..printed import Table, error_text
+from ..printed import ResultTable, error_text
 from ..printed import plain as shown
 from ..tolerances import TOLERANCES
 
@@ -49,10 +49,10 @@ class Suspect(NamedTuple):
     residual: float
 
 
-def table_of(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> Table:
+def table_of(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> ResultTable:
     """A row for each parameter, then facts."""
     rows = [_cells(each, mechanism) for each in parameters]
-    return Table(mechanism.name, (), HEADER, rows, ["\n".join(facts)])
+    return ResultTable(mechanism.name, (), HEADER, rows, ["\n".join(facts)])
 
 
 def as_numbers(parameters: Sequence[ParameterValue]) -> list[dict[str, Any]]:

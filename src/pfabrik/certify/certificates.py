@@ -19,7 +19,7 @@ from ..kernels.certify.pose_cells import STEPS, CellParameters, is_beside
 from ..kernels.certify.prove import DONE
 from ..kernels.certify.subdivision import HALF, PROVED_LEGS
 from ..model import model_of
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from ..rotations import to_rpy
 from .pose_region import PoseRegion
 from .subdividing import Subdividing, first_cells, step_poses
@@ -143,7 +143,7 @@ class Certificate(Printed):
             }
         return plain
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """The verdict, and what it rests on."""
         lines = [f"{self.verdict}  {counted(self.n_cells, 'cell')}"]
         unit, refutation = self.mechanism.length_unit, self.refutation
@@ -162,7 +162,7 @@ class Certificate(Printed):
             ]
         else:
             lines.append(f"open: {self.reason}")
-        return Table(f"Certificate of {self.mechanism.name}", lines)
+        return ResultTable(f"Certificate of {self.mechanism.name}", lines)
 
     def __repr__(self) -> str:
         words = f"margin at least {self.margin:.4g}" if self.verdict == PROVED else self.reason

@@ -14,7 +14,7 @@ from ..closure.link_distances import least_distances
 from ..closure.placed_links import PlacedLinks
 from ..description.links import has_pairs, links_of
 from ..errors import UnsupportedMechanism
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from .gradients import gradients_of
 
 
@@ -64,9 +64,9 @@ class Clearance(Printed):
     def __repr__(self) -> str:
         return f"<Clearance: {self._words}>"
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """The least distance and its links."""
-        return Table("Clearance", [self._words])
+        return ResultTable("Clearance", [self._words])
 
     @property
     def _words(self) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import click
 
-from ..printed import Table
+from ..printed import ResultTable
 from .fitted import fitted, line_width
 
 
@@ -16,7 +16,7 @@ class Result(Protocol):
     """What a command prints."""
 
     def to_dict(self) -> dict[str, Any]: ...
-    def table(self) -> Table: ...
+    def table(self) -> ResultTable: ...
 
 
 def json_option(help: str = "One JSON object on stdout; angles in radians.") -> Callable[..., Any]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..checks import require_mapping, require_type
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
 from ..frozen import FrozenMapping
-from ..printed import Table
+from ..printed import ResultTable
 from .body_shapes import Shape
 from .coercion import items, numbers
 from .copies import Pattern
@@ -109,7 +109,7 @@ class Mechanism(Structure):
     def __repr__(self) -> str:
         return f"<Mechanism '{self.name}': {self._counts()}, task {' '.join(self.task)}>"
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Name, counts, task, actuators with their limits and, for notebooks, a small drawing of home."""
         return mechanism_table(self, f"{self._counts()}; task {' '.join(self.task)}")
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from ..printed import Table
+from ..printed import ResultTable
 from .readouts import readouts
 from .sketch import sketch
 from .structure import Structure
 
 
-def mechanism_table(mechanism: Structure, facts: str) -> Table:
+def mechanism_table(mechanism: Structure, facts: str) -> ResultTable:
     """Name and facts, the actuators with their limits, and home as a drawing."""
     rows = [(each.name, *map(bound_text, each.limits), each.unit) for each in readouts(mechanism)]
-    return Table(mechanism.name, [facts], ("actuator", "min", "max", "unit"), rows, drawing=sketch(mechanism))
+    return ResultTable(mechanism.name, [facts], ("actuator", "min", "max", "unit"), rows, drawing=sketch(mechanism))
 
 
 def bound_text(bound: float) -> str:

@@ -14,7 +14,7 @@ from ..answers.words import by_bound, exceeded
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..errors import counted
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from ..tolerances import TOLERANCES
 
 BATCH = 512
@@ -89,12 +89,12 @@ class Modes(Printed, Sequence[Solution]):
         """Cells of a mode in these columns."""
         raise NotImplementedError
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Every mode, the limits that it exceeds, and how likely it is that there are others."""
         chance = f"another one would find a new mode with a probability of about {self.unseen:.2%}"
         searched = f"{counted(self.starts, 'start')}; {chance}"
         if not self.modes:
-            return Table(f"No {self.kind} mode", [f"no {self.kind} mode found"], remarks=[searched])
+            return ResultTable(f"No {self.kind} mode", [f"no {self.kind} mode found"], remarks=[searched])
         mechanism, kept = self.modes[0].mechanism, sum(map(bool, self)) or "none"
         count = f"{counted(self.total, f'{self.kind} mode')}, "
         count += f"of the {len(self)} nearest to home " if self.total > len(self) else ""
@@ -103,7 +103,7 @@ class Modes(Printed, Sequence[Solution]):
             for place, (mode, hits) in enumerate(zip(self.modes, self.hits, strict=True), 1)
         ]
         header = ["mode", *self._columns(mechanism), "starts", "exceeds"]
-        return Table(mechanism.name, [f"{count}{kept} within all limits"], header, rows, [searched])
+        return ResultTable(mechanism.name, [f"{count}{kept} within all limits"], header, rows, [searched])
 
     def to_dict(self) -> dict[str, Any]:
         """Modes and counts as plain numbers, lists and dicts, ready for JSON."""

@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..derived import derived
 from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from ..tolerances import TOLERANCES
 from .joint_rates import actuated_columns, first_order, right_singular
 from .walks import around_home
@@ -71,10 +71,10 @@ class Mobility(Printed):
         """Actuators beyond the freedoms of the end effector; negative where there are too few."""
         return self.actuators - self.platform
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Every count with its meaning."""
         rows = [(name.replace("_", "-"), str(getattr(self, name)), words) for name, words in _IN_WORDS.items()]
-        return Table("Mobility", (), ("", "count", "of"), rows)
+        return ResultTable("Mobility", (), ("", "count", "of"), rows)
 
 
 _IN_WORDS = {

@@ -20,7 +20,7 @@ from ..derived import derived
 from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..printed import Printed, Table, plain
+from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
 from .displacements import displacements
 from .joint_rates import actuated_columns, first_order
@@ -64,7 +64,7 @@ class Singularity(Printed):
     gained: Floats
     kinds: tuple[str, ...] | list[tuple[str, ...]]
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Every measure and whether it is singular; of a batch, the least, and the singular rows."""
         is_one = np.ndim(self.serial) == 0
         rows = []
@@ -76,7 +76,7 @@ class Singularity(Printed):
             rows.append((kind, least, ("yes" if count else "no") if is_one else str(count)))
         header = ("kind", "measure", "singular") if is_one else ("kind", "least measure", "singular rows")
         lines = [] if is_one else [f"batch of shape {np.shape(self.serial)}"]
-        return Table("Singularity", lines, header, rows)
+        return ResultTable("Singularity", lines, header, rows)
 
 
 def singularity_of(values: Floats, lost: Floats, gained: Floats) -> Singularity:

@@ -18,7 +18,7 @@ from ..errors import InvalidArgument
 from ..motion.displacements import rate_units
 from ..motion.joint_rates import actuated_columns, first_order, right_singular
 from ..motion.mobility import generic_of
-from ..printed import Printed, Table, plain
+from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
 from .time_path import limits_of
 
@@ -57,7 +57,7 @@ class PlatformSpeeds(Printed, tuple[PlatformSpeed, ...]):
     def __getnewargs__(self) -> tuple[Mechanism, tuple[PlatformSpeed, ...]]:
         return self.mechanism, tuple(self)
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Kind and direction, the speed, and the actuator that limits it."""
         rows = []
         for motion in self:
@@ -68,7 +68,7 @@ class PlatformSpeeds(Printed, tuple[PlatformSpeed, ...]):
             rows.append(
                 (motion.kind, *(plain(part, 1e-9) for part in motion.direction), speed, unit, motion.limited_by)
             )
-        return Table(f"Platform speed of {self.mechanism.name}", (), _HEADER, rows)
+        return ResultTable(f"Platform speed of {self.mechanism.name}", (), _HEADER, rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Every motion as plain numbers, ready for JSON; None where nothing limits its speed."""

@@ -14,7 +14,7 @@ from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
 from ..errors import counted
 from ..extras import require
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from ..rotations import to_rpy
 from ..whole_files import whole_path
 
@@ -72,11 +72,11 @@ class Timed(Printed):
         name = self.mechanism.name
         return f"<Timed path of '{name}': {self.duration:.6g} s, {counted(len(self.times), 'sample')}>"
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Duration, and the limits that hold the path back."""
         lines = [f"{self.duration:.6g} s, {counted(len(self.times), 'sample')}"]
         rows = [(name, what, f"{share:.1%}") for (name, what), share in self.held_back.items()]
-        return Table(self.mechanism.name, lines, ("held back by", "limit", "share of the time"), rows)
+        return ResultTable(self.mechanism.name, lines, ("held back by", "limit", "share of the time"), rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Duration, number of samples and the limits that hold the path back, ready for JSON."""

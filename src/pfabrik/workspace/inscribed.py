@@ -13,7 +13,7 @@ from ..arguments import array, is_positive
 from ..arrays import Floats
 from ..checks import require_known
 from ..errors import InvalidArgument
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 
 if TYPE_CHECKING:
     from .region import Region
@@ -56,12 +56,12 @@ class Inscribed(Printed):
         share = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / (4.0 if len(self.extents) == 2 else 6.0)}
         return float(share[self.kind] * np.prod(self.extents))
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Centre and extents, in the units of the workspace: lengths, or radians."""
         numbers = zip(self.centre.tolist(), self.extents.tolist(), strict=True)
         rows = [(str(place), f"{middle:.6g}", f"{extent:.6g}") for place, (middle, extent) in enumerate(numbers, 1)]
         header = ("coordinate", "centre", "extent")
-        return Table(f"Largest {self.kind}", [f"size {self.size:.6g}"], header, rows)
+        return ResultTable(f"Largest {self.kind}", [f"size {self.size:.6g}"], header, rows)
 
 
 def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from ..certify.enclosure import Enclosure
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from .border_search import sliced
 from .inscribed import Inscribed, Kind, inscribed
 from .region import Region
@@ -129,7 +129,7 @@ class Workspace(Printed, Region):
             "components": [{"size": each.size, "at_start": each is self.at_start} for each in self.components],
         }
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """Size, ends, what forms the border and, for notebooks and over two coordinates, its outline."""
         from .workspace_table import workspace_table
 

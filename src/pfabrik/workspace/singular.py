@@ -20,7 +20,7 @@ from ..errors import InvalidArgument, counted
 from ..ik import solve_ik
 from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
-from ..printed import Printed, Table
+from ..printed import Printed, ResultTable
 from ..telling import OnProgress, telling
 from .lattice_points import codes
 from .locus import drawn_to_border, locus
@@ -82,14 +82,14 @@ class SingularityMap(Printed):
         locus = self.locus_vertices, self.locus_faces
         return plot_map(self.workspace, self.step, self.points, self.measures, *locus, ax)
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """The parts between parallel singularities, and the least of each measure."""
         sizes = [size for size in self.sizes.tolist() if size > LEAST_SHARE]
         lines = [counted(len(self.points), "point")]
         lines += [] if len(self.locus_faces) else ["no parallel singularity"]
         rows = [(f"part {place}", f"{size:.1%} of the points") for place, size in enumerate(sizes)]
         rows += least_measures(self.measures)
-        return Table(self.workspace.mechanism.name, lines, ("singularities", ""), rows)
+        return ResultTable(self.workspace.mechanism.name, lines, ("singularities", ""), rows)
 
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
@@ -113,11 +113,11 @@ class SingularityTrack(Printed):
     signs: Floats
     crossings: Ints
 
-    def table(self) -> Table:
+    def table(self) -> ResultTable:
         """The rows before which the path leads through a singularity, and the least of each measure."""
         crossings = ", ".join(map(str, self.crossings.tolist())) or "none"
         rows = [("crossings before rows", crossings), *least_measures(self.measures)]
-        return Table("Singularities along a path", [counted(len(self.signs), "row")], ("singularities", ""), rows)
+        return ResultTable("Singularities along a path", [counted(len(self.signs), "row")], ("singularities", ""), rows)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""

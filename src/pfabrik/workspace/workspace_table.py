@@ -9,7 +9,7 @@ import numpy as np
 
 from ..answers.words import limit_name
 from ..description.sketch import HEIGHT, MARGIN, WIDTH
-from ..printed import Table
+from ..printed import ResultTable
 from .border import REST, groups_of
 from .sizes import in_words, kind_of
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 HEADER = ("border", "formed by", "joint")
 
 
-def workspace_table(region: Region) -> Table:
+def workspace_table(region: Region) -> ResultTable:
     """Size, ends and parts of the border; over two coordinates, a drawing in the colours of its pictures."""
     if not len(region.faces):
-        return Table(region.mechanism.name, ["nothing within reach"], HEADER)
+        return ResultTable(region.mechanism.name, ["nothing within reach"], HEADER)
     lines = [in_words(region)]
     for name, low, high, unit in zip(region.names, *region.bounds.tolist(), region.units, strict=True):
         factor, label = (180.0 / np.pi, "deg") if unit == "rad" else (1.0, unit)
         lines.append(f"{name} from {low * factor:.6g} to {high * factor:.6g} {label}")
     rows = [(f"{share:.1%}", limit_name(*limit), kind_of(region, limit[0])) for limit, share in region.shares.items()]
     drawing = outline(region) if len(region.names) == 2 else ""
-    return Table(region.mechanism.name, lines, HEADER, rows, drawing=drawing)
+    return ResultTable(region.mechanism.name, lines, HEADER, rows, drawing=drawing)
 
 
 def outline(region: Region) -> str:
