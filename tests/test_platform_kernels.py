@@ -182,7 +182,7 @@ def test_slopes_of_distances_of_links_are_their_differences(name: str) -> None:
 
     def at_poses(state: E.PlatformState) -> np.ndarray:
         E.evaluate_legs(table, state, leg_eval)
-        leg_links.place_links(table, links, leg_eval)
+        leg_links.place_links(table, links, leg_eval.frames, leg_eval.values)
         return excesses_of(links)
 
     state = random_configuration(mechanism, legs, rng)
