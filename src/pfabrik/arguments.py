@@ -107,12 +107,12 @@ def as_floats(name: str, value: Any, expected: str) -> Floats:
 
 
 def is_positive(values: Floats) -> Mask:
-    """Which values are finite and greater than 0."""
+    """True where values are finite and greater than 0."""
     return np.isfinite(values) & (values > 0.0)
 
 
 def is_not_negative(values: Floats) -> Mask:
-    """Which values are finite and not negative."""
+    """True where values are finite and not negative."""
     return np.isfinite(values) & (values >= 0.0)
 
 
@@ -122,5 +122,5 @@ def any_values(values: Floats) -> Mask:
 
 
 def is_not_infinite(values: Floats) -> Mask:
-    """Which values are finite, or NaN for what is not known."""
+    """True where values are finite, or NaN for what is not known."""
     return np.asarray(~np.isinf(values))

@@ -63,7 +63,7 @@ def require_angle(name: str, value: Any) -> float:
 
 
 def require_type(name: str, value: Any, kind: type[Kind], expected: str) -> Kind:
-    """What is of a type; InvalidArgument for anything else."""
+    """Return a value of a type; raise InvalidArgument for anything else."""
     if not isinstance(value, kind):
         raise InvalidArgument(name, type(value).__name__, expected)
     return value

@@ -13,7 +13,7 @@ from .fitted import fitted, line_width
 
 
 class Result(Protocol):
-    """What a command prints."""
+    """A result that prints itself, as text and as JSON."""
 
     def to_dict(self) -> dict[str, Any]: ...
     def table(self) -> ResultTable: ...
