@@ -15,9 +15,7 @@ from ..arrays import Floats, shaped
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..fk import solve_fk
-from ..motion.determined import require_determined
-from ..motion.displacements import actuator_units
-from ..motion.joint_path import JointPath, joint_path
+from ..kinematics import JointPath, actuator_units, joint_path, require_determined
 from .drive_limits import HalfSpaces, image_of_box, preimage_of_box
 from .hull import Hull, feasible_hull
 from .inverses import inverses

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from ..motion.displacements import actuator_units
+from ..kinematics import actuator_units
 from .task_path import Coordinates
 
 ON_THE_WAY = 16

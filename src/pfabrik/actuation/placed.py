@@ -16,8 +16,7 @@ from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
 from ..feasibility import feasibility
 from ..ik import solve_ik
-from ..model import model_of
-from ..motion.joint_path import JointPath
+from ..kinematics import JointPath, model_of
 from ..options import Options
 from ..platform.coordinates import read_coordinates
 from ..platform.jacobians import actuator_slopes

@@ -12,9 +12,7 @@ import numpy as np
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
-from ..description.task import Task, task_of
-from ..motion.joint_path import JointPath
-from ..motion.mobility import generic_of
+from ..kinematics import JointPath, Task, generic_of, task_of
 from ..rotations import CROSSED, from_rotvec, to_rotvec, turning, yaws
 from ..tolerances import TOLERANCES
 

@@ -15,7 +15,7 @@ from ..closure.link_distances import pair_distances_at, pair_names
 from ..description.mechanism import Mechanism
 from ..model import Model
 from ..motion.displacements import rate_units
-from ..motion.joint_rates import first_order, graph_of, right_singular
+from ..motion.joint_rates import cycle_basis, first_order, right_singular
 from ..motion.limited_coordinates import coned, ranges_of
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
@@ -135,7 +135,7 @@ def stretched_joint(model: Model, q: Floats) -> tuple[ActiveLimit, ...]:
     if not len(motions):  # so folded that nothing moves, to first order
         return ()
     lost = np.linalg.svd(motions @ twist[0].T)[0][:, min(freedoms, len(motions)) - 1] @ motions
-    coordinate = model.mechanism.coordinates[int(np.argmax(np.abs(graph_of(model.mechanism).rates.T @ lost)))]
+    coordinate = model.mechanism.coordinates[int(np.argmax(np.abs(cycle_basis(model.mechanism).rates.T @ lost)))]
     value = float(q[0, coordinate.column]) + coordinate.home
     return (ActiveLimit(coordinate.joint.name, "stretched", value, value, None, coordinate.place),)
 

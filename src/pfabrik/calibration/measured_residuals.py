@@ -12,13 +12,10 @@ from ..answers.solution import Solution
 from ..answers.start_configuration import start_of
 from ..answers.status import Status
 from ..arrays import Floats, Ints
-from ..closure.configurations import Configurations
 from ..description.mechanism import Mechanism
-from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..ik import solve_ik
-from ..model import model_of
-from ..motion.displacements import home_coordinates
+from ..kinematics import Configurations, engine_of, home_coordinates, model_of
 from ..options import Options
 from ..rotations import to_rotvec
 from .instrument import aligned, seen

@@ -8,14 +8,20 @@ import numpy as np
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, shaped
-from ..closure.first_order import JointRates
 from ..description.geometry import Geometry
-from ..description.graph import tree_of
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
-from ..model import model_of
-from ..motion.displacements import displacements, end_effector_pose, geometry_screws, home_coordinates, rate_units
-from ..motion.joint_rates import graph_of
+from ..kinematics import (
+    JointRates,
+    cycle_basis,
+    displacements,
+    end_effector_pose,
+    home_coordinates,
+    model_of,
+    rate_units,
+    tree_of,
+)
+from ..motion.displacements import geometry_screws
 from ..motion.singularities import task_twists
 from ..tolerances import TOLERANCES
 from .parameters import Parameters
@@ -106,7 +112,7 @@ class GeometrySlopes:
         weights = np.concatenate([np.nan_to_num(slopes.points), slopes.axes[:, :, 0], slopes.axes[:, :, 1]], axis=2)
         units = np.eye(9)[:, None] * np.ones((len(mechanism.joints), 1))
         changes = geometry_screws(mechanism, q, units[..., :3], units[..., 3:].reshape(9, -1, 2, 3))
-        ways = np.concatenate([graph_of(mechanism).of_joints, tree_of(mechanism).paths[body][None]])
+        ways = np.concatenate([cycle_basis(mechanism).of_joints, tree_of(mechanism).paths[body][None]])
         sums = _at(_summed(changes, weights, ways), end_effector_pose(mechanism, q)[:, :3, 3] / self.length)
         n, _, _, p = sums.shape
         self.openings, self.twist_changes = sums[:, :-1].reshape(n, -1, p), sums[:, -1]
@@ -130,7 +136,7 @@ class GeometrySlopes:
         self.opened = np.abs(np.concatenate(left, axis=1)).max(axis=(0, 1), initial=0.0)
         twists = self.rates.twists @ rates + self.twist_changes
         twists[:, :3] *= self.length
-        return twists, graph_of(self.mechanism).rates.T @ rates * self.units[:, None]
+        return twists, cycle_basis(self.mechanism).rates.T @ rates * self.units[:, None]
 
     def at_held_pose(self) -> Floats:
         """Rates of the actuators (n, n_a, p) per unit of every parameter, with the task's coordinates held."""

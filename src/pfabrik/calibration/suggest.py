@@ -9,9 +9,9 @@ from ..answers.status import Status
 from ..arrays import Floats
 from ..checks import require_choice, require_count
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..errors import InvalidArgument
 from ..ik import solve_ik
+from ..kinematics import task_of
 from ..rotations import from_rotvec
 from .linear_fit import LinearFit
 from .measured_residuals import Fit, slopes_of, whitened

@@ -18,7 +18,7 @@ from ..ik import solve_ik
 from ..kernels.certify.pose_cells import STEPS, CellParameters, is_beside
 from ..kernels.certify.prove import DONE
 from ..kernels.certify.subdivision import HALF, PROVED_LEGS
-from ..model import model_of
+from ..kinematics import model_of
 from ..printed import Printed, ResultTable
 from ..rotations import to_rpy
 from .pose_region import PoseRegion

@@ -15,7 +15,7 @@ from ..errors import InvalidArgument, UnsupportedMechanism
 from ..kernels.certify.pose_cells import BOX, ROTATION_VECTOR, TILT, CellParameters
 from ..kernels.certify.prove import ENCLOSE
 from ..kernels.certify.subdivision import HALF, N_COLUMNS
-from ..model import Model
+from ..kinematics import Model
 from ..rotations import to_rotvec
 from ..telling import OnProgress
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg

@@ -8,11 +8,11 @@ from ..arrays import Ints
 from ..closure.link_distances import pair_names
 from ..closure.links_on_paths import link_limits
 from ..derived import derived
-from ..description.links import NOWHERE, links_of
+from ..description.links import NOWHERE
 from ..kernels.certify.link_rows import CellLinks, new_cell_links
 from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.clearance.solids import CAPSULE, KIND
-from ..model import Model
+from ..kinematics import Model, links_of
 from ..platform.links_of_legs import bodies_of_link_ends
 
 

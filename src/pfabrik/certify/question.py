@@ -13,7 +13,6 @@ from ..answers.status import Status
 from ..arrays import Floats
 from ..checks import require_count, require_finite, require_names, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..description.task import task_of
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..feasibility import feasibility
 from ..ik import solve_ik
@@ -21,7 +20,7 @@ from ..kernels.certify.link_rows import ROWS_A_PAIR
 from ..kernels.certify.pose_cells import CellParameters
 from ..kernels.certify.prove import BREAKS, BROKEN, DONE, SPENT, TOO_SMALL
 from ..kernels.certify.subdivision import FOUND_MARGIN, LIMIT, N_OPEN, N_PROVED, N_STACK, PROVED_MARGIN
-from ..model import Model, model_of
+from ..kinematics import Model, model_of, task_of
 from ..poses import are_poses
 from ..rotations import to_rotvec
 from ..targets import Target, as_targets

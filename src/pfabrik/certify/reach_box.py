@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Record
 from ..decomposition.leg_table import LegTable
 from ..kernels.legs import records as K
-from ..model import Model
+from ..kinematics import Model
 from ..rotations import from_rotvec
 
 PAD = 1e-9

@@ -22,7 +22,7 @@ from ..kernels.certify.subdivision import (
 )
 from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.handle import Handle
-from ..model import Model
+from ..kinematics import Model
 from ..platform.table import kernel_table, table_handle
 from ..rotations import from_rotvec, to_rotvec
 from ..telling import OnProgress

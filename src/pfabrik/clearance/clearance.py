@@ -12,8 +12,8 @@ from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, Ints, shaped
 from ..closure.link_distances import least_distances
 from ..closure.placed_links import PlacedLinks
-from ..description.links import has_pairs, links_of
 from ..errors import UnsupportedMechanism
+from ..kinematics import links_of
 from ..printed import Printed, ResultTable
 from .gradients import gradients_of
 
@@ -95,7 +95,7 @@ def clearance(solution: Solution) -> Clearance:
     if not mechanism.shapes:
         reason = "no link has a thickness: give legs one, or add [[body]] tables"
         raise UnsupportedMechanism(mechanism.name, [reason], "measured for clearance")
-    if not has_pairs(mechanism):
+    if not len(links_of(mechanism).pairs):
         reason = "all links with a thickness share a joint, or are one body, or are ignored"
         raise UnsupportedMechanism(mechanism.name, [reason], "measured for clearance")
     distances, nearest, _ = _measured(solution)

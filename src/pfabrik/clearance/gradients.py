@@ -8,13 +8,8 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints
-from ..closure.first_order import JointRates
-from ..description.graph import tree_of
-from ..description.home_mobility import column_joints
-from ..description.links import links_of
 from ..description.mechanism import Mechanism
-from ..model import model_of
-from ..motion.displacements import actuator_units, end_effector_pose
+from ..kinematics import JointRates, actuator_units, column_joints, end_effector_pose, links_of, model_of, tree_of
 from ..tolerances import TOLERANCES
 
 

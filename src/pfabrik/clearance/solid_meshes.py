@@ -8,9 +8,9 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints
-from ..description.body_shapes import Shape
-from ..description.links import hulls_of, links_of
-from ..description.mechanism import Mechanism
+from ..description.links import hulls_of
+from ..description.mechanism import Mechanism, Shape
+from ..kinematics import links_of
 from ..meshes import MeshHull, middle_of
 from ..tolerances import TOLERANCES
 from .clearance import clearance, placed_links

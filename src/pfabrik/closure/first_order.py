@@ -16,7 +16,7 @@ from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..motion.displacements import rate_units
-from ..motion.joint_rates import actuated_columns, graph_of, present_screws
+from ..motion.joint_rates import actuated_columns, cycle_basis, present_screws
 from ..motion.mobility import generic_of
 from ..motion.singularities import Singularity, loop_basis, singularity_of
 from ..tolerances import TOLERANCES
@@ -79,7 +79,7 @@ class JointRates:
 
     def __init__(self, model: Model, q: Floats, like: Model | None = None) -> None:
         mechanism = model.mechanism
-        self._graph, self._found = graph_of(mechanism), rates(model, q, JOINTS, like)
+        self._graph, self._found = cycle_basis(mechanism), rates(model, q, JOINTS, like)
         self.actuated, counts = actuated_columns(mechanism), generic_of((like or model).mechanism).mobility
         self._most = counts.platform + counts.internal
         self.screws, self.by_actuators, self.motions = self._found.screws, self._found.joints, self._found.motions
@@ -183,7 +183,7 @@ def _made(model: Model, asks: int, like: Model) -> _Prepared:
     from ..kernels.closure.first_order import new_first_order_scratch
 
     mechanism, generic = model.mechanism, generic_of(like.mechanism)
-    graph, counts, actuated = graph_of(mechanism), generic.mobility, actuated_columns(mechanism)
+    graph, counts, actuated = cycle_basis(mechanism), generic.mobility, actuated_columns(mechanism)
     plan = FirstOrderPlan(
         loops=np.ascontiguousarray(graph.orthonormal),
         way=np.array(graph.path, float),

@@ -25,9 +25,7 @@ from ..kernels.platform.equations import LegEvaluation, new_leg_evaluation
 from ..kernels.platform.forward import NewtonScratch, new_newton_scratch
 from ..kernels.platform.search_records import Starts, new_solutions
 from ..kernels.platform.tables import EXACTLY, NEAREST, QUESTION, Question, Start, new_answer_scratch
-from ..model import Model, model_of
-from ..motion.joint_path import JointPath
-from ..motion.tilt_axis import tilt_axis
+from ..kinematics import JointPath, Model, model_of, tilt_axis
 from ..options import Options
 from ..platform.nearest_pose import home_start, no_starts
 from ..platform.rotation import keeps_rotation

@@ -14,13 +14,11 @@ import numpy as np
 from ..arrays import Floats
 from ..checks import require_ending
 from ..description.mechanism import Mechanism
-from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.platform import tables as T
 from ..kernels.platform.evaluate import new_evaluation_scratch
 from ..kernels.platform.search_records import new_solutions
-from ..model import Model, model_of
-from ..motion.tilt_axis import tilt_axis
+from ..kinematics import Model, engine_of, model_of, tilt_axis
 from ..options import Options
 from ..platform.legs_engine import LegsEngine
 from ..platform.seeds import seeds_of

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..closure.links_on_paths import link_limits
-from ..description.links import links_of
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.clearance.link_records import LinkLimits
 from ..kernels.clearance.solids import BOX, CAPSULE, DISC, KIND
 from ..kernels.legs import records as K
+from ..kinematics import links_of
 from .moved_bodies import BASE, Motion, MovedBodies
 
 

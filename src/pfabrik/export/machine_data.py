@@ -15,8 +15,7 @@ from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
-from ..model import model_of
-from ..motion.mobility import generic_of
+from ..kinematics import generic_of, model_of
 from ..platform.links_of_legs import keeps_links
 from ..rotations import nearest_turn, square_to
 from .exported_links import ExportedLinks, exported_links

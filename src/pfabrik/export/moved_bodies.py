@@ -11,11 +11,10 @@ from ..arrays import Floats
 from ..decomposition.leg_forms import LegForm, Rod
 from ..description.home_mobility import universal_axes
 from ..description.joints import Joint
-from ..description.links import links_of
 from ..description.mechanism import Mechanism
 from ..kernels.clearance.solids import CAPSULE, DISC, KIND
 from ..kernels.legs import records as K
-from ..model import model_of
+from ..kinematics import links_of, model_of
 from ..tolerances import TOLERANCES
 
 BASE, PLATFORM, FIRST_MOVED = 0, 1, 2

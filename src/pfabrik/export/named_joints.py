@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from ..checks import require_names
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
-from ..motion.determined import require_determined
-from ..motion.joint_path import JointPath, joint_path
+from ..kinematics import JointPath, joint_path, require_determined
 
 PURPOSE = "exported"
 

@@ -10,13 +10,10 @@ from ..arrays import Floats
 from ..clearance.solid_meshes import solids_of
 from ..common_centre import common_centre
 from ..description.home_mobility import joint_screws
-from ..description.links import links_of
 from ..description.mechanism import Joint, Mechanism
 from ..description.places import joint_places, joints_on
-from ..description.plane import plane_of
 from ..drawn_parts import Part, Place, hangs, home_rail, parts_of, role_of, size_of
-from ..model import Model
-from ..motion.displacements import columns
+from ..kinematics import Model, columns, links_of, plane_of
 
 THICKNESS = 0.0125
 """Radius of a usual bar, as a share of the machine's size."""

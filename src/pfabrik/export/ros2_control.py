@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..checks import require_path
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..motion.joint_path import JointPath
+from ..kinematics import JointPath
 from ..whole_files import whole_path
 from .export_c import c_source, require_identifier
 from .machine_data import Machine

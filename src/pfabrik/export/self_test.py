@@ -12,7 +12,7 @@ from ..configuration import configuration
 from ..description.mechanism import Mechanism
 from ..feasibility import feasibility
 from ..ik import solve_ik
-from ..motion.mobility import generic_of
+from ..kinematics import generic_of
 from ..options import Options
 from ..poses import pose
 from .machine_data import Machine

@@ -9,7 +9,7 @@ from importlib import resources
 import numpy as np
 
 from ..arrays import Floats
-from ..motion.joint_path import JointPath
+from ..kinematics import JointPath
 from ..tolerances import TOLERANCES
 from .controller_tables import ControllerTables, controller_tables
 from .machine_data import Machine

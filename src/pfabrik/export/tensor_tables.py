@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..kernels.legs import records as K
-from ..motion.joint_path import JointPath
+from ..kinematics import JointPath
 from .machine_data import Coordinate, ExportedLeg, Machine
 
 ENDS = {K.WELD: "weld", K.HINGE: "hinge", K.CROSS: "cross", K.TRIPLE: "triple", K.BALL: "ball"}

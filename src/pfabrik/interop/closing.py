@@ -14,14 +14,13 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..closure.close import close, platform_poses
-from ..description.graph import tree_of
-from ..description.home_mobility import column_joints
 from ..description.joint_types import JointType
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
+from ..kinematics import column_joints, columns, displacements, home_coordinates, rate_units, tree_of
 from ..motion.closure import Closure, closure_of
-from ..motion.displacements import columns, displacements, home_coordinates, rate_units, screws
+from ..motion.displacements import screws
 from ..rotations import shortest_turns, to_rotvec
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
-from ..description.body_shapes import Shape
+from ..description.mechanism import Shape
 
 LENGTHS = ("thickness", "ends", "at", "diameter", "size")
 """Fields of a shape that are lengths, or points."""

@@ -12,8 +12,8 @@ import numpy as np
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
 from ..errors import Fault, InvalidMechanism
-from ..motion.displacements import columns, rate_units
-from ..motion.joint_rates import graph_of, loop_slopes, right_singular
+from ..kinematics import columns, cycle_basis, rate_units
+from ..motion.joint_rates import loop_slopes, right_singular
 from ..tolerances import TOLERANCES
 from .assembling import closed_structure
 from .closing import OpenLoops, close_home
@@ -167,7 +167,7 @@ def _ratios_of_loops(opened: OpenMechanism, leader: str, names: Sequence[str]) -
     structure = closed_structure(opened, loops, home)
     sizes, directions = right_singular(loop_slopes(structure, np.zeros((1, len(structure.coordinates)))))
     free = directions[0, (sizes > SAME_ROW * sizes.max(initial=0.0)).sum() :]
-    motions = graph_of(structure).rates.T @ free.T
+    motions = cycle_basis(structure).rates.T @ free.T
     if home.gap > TOLERANCES.file_digits or not motions[at].any():
         return {}
     ratios = {name: motions[row] @ motions[at] / (motions[at] @ motions[at]) for name, row in place.items()}

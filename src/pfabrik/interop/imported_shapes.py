@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
-from ..description.body_shapes import Shape
-from ..description.links import MOST_PAIRS, bodies_of_shapes, links_of, overlaps_at_home
-from ..description.mechanism import Mechanism
+from ..description.links import MOST_PAIRS, bodies_of_shapes, overlaps_at_home
+from ..description.mechanism import Mechanism, Shape
 from ..description.shape_faults import MOST_SHAPES, form_of_shapes, shape_faults
 from ..description.structure import Structure
+from ..kinematics import links_of
 from .collision import Collision, Solid
 from .notes import Note, note_names
 

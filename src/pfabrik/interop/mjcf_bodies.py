@@ -14,9 +14,8 @@ from ..description.home_mobility import universal_axes
 from ..description.joint_coordinates import JointCoordinate
 from ..description.joint_types import KINDS
 from ..description.joints import Joint
-from ..description.links import links_of
 from ..description.mechanism import Mechanism
-from ..motion.displacements import columns
+from ..kinematics import columns, links_of
 from .cuts import Branch, CutTree
 from .mjcf_struts import Half, halves_of, struts_of
 from .names import unique

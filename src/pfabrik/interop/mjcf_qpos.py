@@ -14,7 +14,7 @@ from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
-from ..motion.displacements import columns
+from ..kinematics import columns
 from ..rotations import to_quaternion
 from .cuts import Branch, CutTree, cut_tree
 from .mjcf_bodies import si_unit

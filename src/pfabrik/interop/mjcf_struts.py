@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..description.body_shapes import Shape
 from ..description.form_faults import shown
 from ..description.graph import sliding_along
 from ..description.joints import Joint
-from ..description.links import links_of
-from ..description.mechanism import Mechanism
+from ..description.mechanism import Mechanism, Shape
+from ..kinematics import links_of
 from ..tolerances import TOLERANCES
 from .collision import Solid
 from .xml_reading import fault

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
-from ..description.graph import tree_of
 from ..description.home_mobility import loop_conditions
 from ..description.structure import Structure
-from ..motion.displacements import columns, displacements, joint_displacements
-from ..motion.joint_rates import at_reference, graph_of, loop_errors_here, loop_slopes, moved
+from ..kinematics import columns, cycle_basis, displacements, tree_of
+from ..motion.displacements import joint_displacements
+from ..motion.joint_rates import at_reference, loop_errors_here, loop_slopes, moved
 from ..rotations import from_rotvec
 from .digits import NOTHING, Rounding
 from .relations import Axis, Relation, axes_of, equations
@@ -65,7 +65,9 @@ class Moving:
     """
 
     def __init__(self, structure: Structure, threshold: float) -> None:
-        values = np.linalg.svd(loop_slopes(structure, np.zeros((1, len(graph_of(structure).path)))), compute_uv=False)
+        values = np.linalg.svd(
+            loop_slopes(structure, np.zeros((1, len(cycle_basis(structure).path)))), compute_uv=False
+        )
         self.rank = int(np.count_nonzero(values > threshold))
         self.q, self.gap = walked(structure, self.rank, 0), np.inf
 
@@ -208,7 +210,7 @@ def _adjoint(motions: Floats, point: Floats, length: float) -> Floats:
 
 def walked(structure: Structure, rank: int, seed: int) -> Floats:
     """Configurations (n, c) some steps from home along motions that are free up to rounding, and closed up to it."""
-    q, rng = np.zeros((SAMPLES, len(graph_of(structure).path))), np.random.default_rng(seed)
+    q, rng = np.zeros((SAMPLES, len(cycle_basis(structure).path))), np.random.default_rng(seed)
     for _ in range(WALK):
         right = np.linalg.svd(loop_slopes(structure, q))[2][:, rank:]
         step = np.einsum("nki,nk->ni", right, rng.standard_normal(right.shape[:2]))

@@ -13,7 +13,7 @@ from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..fk import solve_fk
 from ..ik import solve_ik
-from ..motion.mobility import generic_of
+from ..kinematics import generic_of
 from ..poses import pose
 from ..rotations import angles_between
 

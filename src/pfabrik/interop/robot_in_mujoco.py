@@ -15,7 +15,7 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..extras import require
 from ..files.units import metres_of
-from ..motion.displacements import columns
+from ..kinematics import columns
 from ..rotations import to_quaternion
 from ..tolerances import TOLERANCES
 from .compiled_model import CompiledModel

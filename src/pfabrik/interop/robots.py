@@ -17,7 +17,7 @@ from ..description.joints import Cone, Joint
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, PfabrikError, UnknownName, counted
 from ..files.units import metres_of
-from ..motion.mobility import generic_of
+from ..kinematics import generic_of
 from .assembling import Imported, closed
 from .choices import NoEndEffector, choices_of
 from .collision import NO_COLLISION, Collision

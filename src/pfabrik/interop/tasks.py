@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..description.mechanism import Mechanism
+from ..kinematics import generic_of
 from ..motion.fitting_task import AXES, FittingTask, fitting_tasks, has_dependent_coordinates, task_remark
-from ..motion.mobility import generic_of
 from .notes import Note, note_names
 
 MOST_TASKS, WELL_CONDITIONED = 4, 0.1

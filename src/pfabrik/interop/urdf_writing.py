@@ -16,7 +16,7 @@ from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
-from ..motion.displacements import columns
+from ..kinematics import columns
 from ..whole_files import whole_path
 from .cuts import Branch, cut_tree
 from .mjcf_bodies import axes_of, si_unit

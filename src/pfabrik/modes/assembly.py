@@ -15,7 +15,7 @@ from ..closure.random_starts import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, solution_at
-from ..model import model_of
+from ..kinematics import model_of
 from ..motion.closure import Closure
 from ..motion.walks import stepped_freely
 from ..tolerances import TOLERANCES

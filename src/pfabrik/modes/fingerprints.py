@@ -10,8 +10,9 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..closure.close import Closing, close
 from ..description.mechanism import Mechanism
+from ..kinematics import columns
 from ..motion.closure import Closure
-from ..motion.displacements import centres, columns
+from ..motion.displacements import centres
 from ..motion.limited_coordinates import within_turns
 from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES

@@ -14,11 +14,9 @@ from ..arrays import Floats
 from ..checks import require_count
 from ..closure.close import CLOSED, close
 from ..description.mechanism import Mechanism
-from ..description.readouts import readouts
-from ..engine import engine_of
 from ..errors import InvalidArgument
 from ..kernels.rows import POSITION_ERROR, ROTATION_ERROR
-from ..model import model_of
+from ..kinematics import engine_of, model_of, readouts
 from ..poses import are_poses, made_exact, what_is_wrong
 from ..targets import Target, as_targets
 from .branches import BranchSearch, Listed

@@ -126,6 +126,11 @@ def placed(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
     return bodies, _centres(geometry, bodies)
 
 
+def joint_centres(mechanism: Structure, q: Floats) -> Floats:
+    """Present centres of all joints, as points of their first bodies, (n, joints, 3) [length], in base coordinates."""
+    return placed(mechanism, q)[1]
+
+
 def end_effector_pose(mechanism: Structure, q: Floats) -> Floats:
     """Pose of the end effector, T_base_platform, (n, 4, 4) [length].
 

@@ -44,7 +44,8 @@ class CycleBasis:
 
 
 @derived
-def graph_of(mechanism: Structure) -> CycleBasis:
+def cycle_basis(mechanism: Structure) -> CycleBasis:
+    """The paths and loops along which screws of joint rates add up."""
     tree, owners = tree_of(mechanism), column_joints(mechanism)
     path = tree.paths[mechanism.end_effector_body][owners]
     orthonormal = np.linalg.qr(tree.loops.T)[0].T
@@ -55,7 +56,7 @@ def graph_of(mechanism: Structure) -> CycleBasis:
 
 def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
     """Loop conditions (n, 6 loops, c) and twist of the end effector (n, r, c), per orthonormal joint rate."""
-    graph, present = graph_of(mechanism), present_screws(mechanism, q)
+    graph, present = cycle_basis(mechanism), present_screws(mechanism, q)
     twist = body_twist(graph.path, present)
     velocity, angular = twist[:, 3:], twist[:, :3]
     rows = [velocity] if mechanism.end_effector_is_joint else [velocity, angular]
@@ -64,12 +65,12 @@ def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
 
 def present_screws(mechanism: Structure, q: Floats) -> Floats:
     """Screws of orthonormal joint rates, (n, c, 6): angular velocity, velocity of the present reference point."""
-    return np.asarray(graph_of(mechanism).rates @ at_reference(mechanism, q, screws(mechanism, q)))
+    return np.asarray(cycle_basis(mechanism).rates @ at_reference(mechanism, q, screws(mechanism, q)))
 
 
 def loop_slopes(mechanism: Structure, q: Floats) -> Floats:
     """Slopes of the loops' errors by orthonormal joint rates, (n, 6 loops, c)."""
-    return loop_conditions(graph_of(mechanism).fundamental, present_screws(mechanism, q))
+    return loop_conditions(cycle_basis(mechanism).fundamental, present_screws(mechanism, q))
 
 
 def loop_errors_here(mechanism: Structure, q: Floats) -> Floats:
@@ -86,7 +87,7 @@ def at_reference(mechanism: Structure, q: Floats, origin_screws: Floats) -> Floa
 
 
 def moved(mechanism: Structure, q: Floats, rates: Floats) -> Floats:
-    return stepped(mechanism, q, rates @ graph_of(mechanism).rates)
+    return stepped(mechanism, q, rates @ cycle_basis(mechanism).rates)
 
 
 def right_singular(matrices: Floats) -> tuple[Floats, Floats]:

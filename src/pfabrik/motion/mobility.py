@@ -14,6 +14,7 @@ from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
 from ..printed import Printed, ResultTable
 from ..tolerances import TOLERANCES
+from .displacements import actuator_units
 from .joint_rates import actuated_columns, first_order, right_singular
 from .walks import around_home
 
@@ -109,6 +110,7 @@ class Generic:
 
 @derived
 def generic_of(mechanism: Mechanism) -> Generic:
+    """Mobility, twists of the platform, and rank of the loop conditions at generic configurations."""
     q = around_home(mechanism)
     closure, twist = first_order(mechanism, q[: max(FEWEST, int(COUNTING / max(1, q.shape[1]) ** 3))])
     locked = sum(coordinate.joint.is_rigid for coordinate in mechanism.coordinates)
@@ -133,6 +135,16 @@ def generic_of(mechanism: Mechanism) -> Generic:
     )
     left, sizes, _ = np.linalg.svd(np.hstack(list(twists)), full_matrices=False)
     return Generic(counts, left[:, : int(_rank(sizes))], rank, bool(ranks[0] < rank))
+
+
+def internal_rates(mechanism: Mechanism, q: Floats) -> Floats:
+    """Rates of the actuators in internal motions at coordinates q (1, c): (n_a, k) [rad or length]."""
+    generic, actuated = generic_of(mechanism), actuated_columns(mechanism)
+    closure, twist = first_order(mechanism, q)
+    motions = right_singular(closure)[1][0, generic.rank :].T
+    still = motions @ right_singular(twist @ motions)[1][0, generic.mobility.platform :].T
+    rates = np.linalg.svd(still[actuated])[0][:, : generic.mobility.internal]
+    return np.asarray(rates * actuator_units(mechanism)[:, None])
 
 
 def _nearly_free(mechanism: Mechanism, values: Floats, right: Floats) -> tuple[NearlyFree, ...]:

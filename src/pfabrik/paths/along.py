@@ -12,8 +12,7 @@ from ..arrays import Floats
 from ..decomposition.elementary_joints import ElementaryJoint
 from ..decomposition.leg_forms import Rod
 from ..description.mechanism import Mechanism
-from ..model import model_of
-from ..motion.displacements import displacements, home_coordinates
+from ..kinematics import displacements, home_coordinates, model_of
 
 
 class Extremes(NamedTuple):

@@ -13,10 +13,8 @@ import numpy as np
 from ..arrays import Floats
 from ..cells import is_finite, unmarked
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..errors import counted, near_miss
-from ..motion.joint_series import passive_series
-from ..motion.mobility import generic_of
+from ..kinematics import generic_of, passive_series, task_of
 from ..poses import pose
 from ..tolerances import TOLERANCES
 from .joint_columns import JointColumns, joint_columns

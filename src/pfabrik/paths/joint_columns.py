@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
-from ..motion.joint_path import JointPath, path_of
+from ..kinematics import JointPath, joint_path
 
 UNITS = ("_deg", "_rad")
 """Endings of columns of angles; without one they are in degrees, as roll, pitch and yaw are."""
@@ -38,7 +38,7 @@ def joint_columns(mechanism: Mechanism, header: Sequence[str]) -> JointColumns |
     known |= {name + unit: name for name, is_angle in angles.items() if is_angle for unit in UNITS}
     columns = tuple(name for name in header if name in known)
     try:
-        path = path_of(mechanism, tuple(known[name] for name in columns))
+        path = joint_path(mechanism, tuple(known[name] for name in columns))
     except InvalidArgument:
         return None
     return JointColumns(path, columns)

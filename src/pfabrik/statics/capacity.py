@@ -13,7 +13,7 @@ from ..arguments import any_values, array
 from ..arrays import Floats, shaped
 from ..checks import require_choice
 from ..errors import InvalidArgument, UnsupportedMechanism
-from ..motion.displacements import actuator_units
+from ..kinematics import actuator_units
 from ..tolerances import TOLERANCES
 from .actuator_values import Bounds, bounds_of
 from .first_order_maps import Maps, is_redundantly_actuated, maps_of, twist_units

@@ -12,8 +12,7 @@ from ..answers.status import Status
 from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..errors import counted
-from ..model import model_of
-from ..motion.mobility import generic_of
+from ..kinematics import generic_of, model_of
 from ..platform.jacobians import regular_forward_map
 from ..tolerances import TOLERANCES
 from .reasons import Reasons, add_reason, no_reasons

@@ -14,7 +14,7 @@ from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, Mask, shaped
 from ..description.mechanism import Mechanism
 from ..frozen import FrozenMapping
-from ..motion.displacements import actuator_units, end_effector_pose, placed
+from ..kinematics import actuator_units, end_effector_pose, joint_centres
 from ..tolerances import TOLERANCES
 from .first_order_maps import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 from .joint_balance import Balance, about_centres, balance
@@ -115,7 +115,7 @@ class Forces:
     def _places(self) -> tuple[Floats, Floats]:
         """Joint centres (n, joints, 3) and reference points (n, 3) [length]."""
         mechanism, q = self._mechanism, self._coordinates
-        return placed(mechanism, q)[1], end_effector_pose(mechanism, q)[:, :3, 3]
+        return joint_centres(mechanism, q), end_effector_pose(mechanism, q)[:, :3, 3]
 
     @cached_property
     def _is_unknown(self) -> Mask:

@@ -20,11 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..closure.first_order import JointRates
-from ..description.home_mobility import column_joints
 from ..description.mechanism import Mechanism
-from ..model import model_of
-from ..motion.joint_rates import graph_of
+from ..kinematics import JointRates, column_joints, cycle_basis, model_of
 from ..tolerances import TOLERANCES
 
 ROWS_A_BLOCK = 512
@@ -101,7 +98,7 @@ def _balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
 
 def of_joints(mechanism: Mechanism, by_loop: Floats) -> Floats:
     """Wrenches (n, joints, 6, k) from those of loops, (n, 6 loops, k)."""
-    joints, (n, _, k) = graph_of(mechanism).of_joints, by_loop.shape
+    joints, (n, _, k) = cycle_basis(mechanism).of_joints, by_loop.shape
     return np.asarray(np.einsum("lj,nlik->njik", joints, by_loop.reshape(n, len(joints), 6, k)))
 
 

@@ -8,11 +8,8 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints, Mask
-from ..closure.first_order import JointRates
-from ..description.graph import tree_of
 from ..errors import UnsupportedMechanism
-from ..model import model_of
-from ..motion.joint_rates import graph_of
+from ..kinematics import JointRates, cycle_basis, model_of, tree_of
 from .first_order_maps import Maps, is_redundantly_actuated
 from .joint_balance import of_joints
 
@@ -49,7 +46,7 @@ def responses_of(solution: Solution, maps: Maps, purpose: str) -> Responses:
         raise UnsupportedMechanism(mechanism.name, [reason], purpose)
     first, r = JointRates(model_of(mechanism), solution._configurations.coordinates_at(places)), maps.forward.shape[1]
     path, shift = tree_of(mechanism).paths[mechanism.end_effector_body], np.eye(6, 3)
-    openings = np.einsum("lj,ik->lijk", graph_of(mechanism).of_joints, shift).reshape(-1, 3 * len(path))
+    openings = np.einsum("lj,ik->lijk", cycle_basis(mechanism).of_joints, shift).reshape(-1, 3 * len(path))
     rates = first.geometry(openings, np.zeros((len(first.actuated), openings.shape[1])))
     twists = np.swapaxes((first.twists @ rates)[:, :r].reshape(-1, r, len(path), 3), 1, 2)
     twists = twists + np.multiply.outer(path, shift[:r])

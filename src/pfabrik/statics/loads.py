@@ -13,10 +13,9 @@ from ..answers.solution import Solution
 from ..arguments import array
 from ..arrays import Floats, Ints
 from ..checks import require_known, require_mapping
-from ..description.graph import tree_of
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
-from ..motion.displacements import displacements
+from ..kinematics import displacements, tree_of
 
 BodyLoads: TypeAlias = Mapping[str, tuple[ArrayLike, ArrayLike]]
 """Body -> (mass, centre), (force, point) or (wrench, point): points of the body, at home, in base coordinates."""

@@ -14,8 +14,7 @@ from ..arrays import Floats, Mask, shaped
 from ..checks import require_known, require_names, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
-from ..motion.displacements import actuator_units, placed
-from ..motion.mobility import generic_of
+from ..kinematics import actuator_units, generic_of, joint_centres
 from ..tolerances import TOLERANCES
 from .actuator_values import positive_values
 from .first_order_maps import Maps, is_redundantly_actuated, maps_of, twist_units
@@ -169,7 +168,7 @@ def _give_rods(solution: Solution, maps: Maps, compliance: Floats, by_rod: Float
     """Add what rods give to compliance (n, r, r), lengths in L; mask of the rows at which that is not known, (n,)."""
     found, stretched = responses_of(solution, maps, "given the stiffness of its rods"), by_rod > 0.0
     mechanism, rods = solution.mechanism, rods_of(solution.mechanism)
-    lines = along(rods, placed(mechanism, solution._configurations.coordinates_at(found.places))[1])[:, stretched]
+    lines = along(rods, joint_centres(mechanism, solution._configurations.coordinates_at(found.places)))[:, stretched]
     ends = rods.ends[stretched]
     by_length = np.einsum("nri,nrai->nra", lines, found.twists[:, ends]) / twist_units(mechanism)
     compliance[found.places] += np.einsum("nra,nrb,r->nab", by_length, by_length, 1.0 / by_rod[stretched])

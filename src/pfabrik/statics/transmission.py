@@ -8,12 +8,8 @@ import numpy as np
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
-from ..closure.first_order import JointRates
 from ..description.mechanism import Mechanism
-from ..model import model_of
-from ..motion.displacements import columns, rate_units
-from ..motion.joint_rates import graph_of
-from ..motion.mobility import generic_of
+from ..kinematics import JointRates, columns, cycle_basis, generic_of, model_of, rate_units
 from ..tolerances import TOLERANCES
 from .first_order_maps import Maps, maps_of
 from .reasons import Reasons, has_reason, in_shape
@@ -98,7 +94,7 @@ def _of_joint(solution: Solution, maps: Maps, joint: str) -> Floats:
     mechanism = solution.mechanism
     q, column = np.where(maps.is_valid[:, None], solution._coordinates, 0.0), columns(mechanism)[joint]
     first, units = JointRates(model_of(mechanism), q), rate_units(mechanism)
-    rates = graph_of(mechanism).rates.T[column] @ first.by_actuators
+    rates = cycle_basis(mechanism).rates.T[column] @ first.by_actuators
     return np.asarray(rates * units[column][:, None] / units[first.actuated])
 
 

@@ -8,7 +8,7 @@ from ..answers.differential import inverse_jacobian
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from ..motion.displacements import actuator_units
+from ..kinematics import actuator_units
 from ..tolerances import TOLERANCES
 
 LOOKS = 80

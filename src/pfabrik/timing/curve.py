@@ -9,7 +9,7 @@ import numpy as np
 from ..answers.tracked import Track
 from ..arrays import Floats
 from ..kernels.timing import second_derivatives
-from ..motion.displacements import actuator_units
+from ..kinematics import actuator_units
 from ..poses import between
 
 FINEST, FEWEST = 20_000, 2

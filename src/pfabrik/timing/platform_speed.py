@@ -13,11 +13,8 @@ from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..errors import InvalidArgument
-from ..motion.displacements import rate_units
-from ..motion.joint_rates import actuated_columns, first_order, right_singular
-from ..motion.mobility import generic_of
+from ..kinematics import internal_rates, task_of
 from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
 from .time_path import limits_of
@@ -109,7 +106,7 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
     twists = _twists(solution)[:, : len(sizes)]
     kept = twists @ (forward / sizes[:, None])
     following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
-    shares, speeds = _Shares(_internal_rates(solution) / limits[:, None]), []
+    shares, speeds = _Shares(internal_rates(mechanism, solution._coordinates) / limits[:, None]), []
     for twist in twists:
         rates = inverse @ twist
         if not _is_made(twist, forward @ rates, sizes):
@@ -129,17 +126,6 @@ def _twists(solution: Solution) -> Floats:
     task = task_of(solution.mechanism)
     lines, turns = np.eye(3)[list(task.axes)], task.turning_axes(solution.pose)
     return np.block([[lines, np.zeros((len(lines), 3))], [np.zeros((len(turns), 3)), turns]])
-
-
-def _internal_rates(solution: Solution) -> Floats:
-    """Rates of the actuators in internal motions, (n_a, k)."""
-    mechanism, generic = solution.mechanism, generic_of(solution.mechanism)
-    closure, twist = first_order(mechanism, solution._coordinates)
-    motions = right_singular(closure)[1][0, generic.rank :].T
-    still = motions @ right_singular(twist @ motions)[1][0, generic.mobility.platform :].T
-    actuated = actuated_columns(mechanism)
-    rates = np.linalg.svd(still[actuated])[0][:, : generic.mobility.internal]
-    return np.asarray(rates * rate_units(mechanism)[actuated, None])
 
 
 class _Shares:

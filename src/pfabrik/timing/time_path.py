@@ -11,10 +11,9 @@ from ..answers.tracked import Track
 from ..arrays import Floats
 from ..checks import put_limits, require_positive, require_type
 from ..description.mechanism import Mechanism
-from ..description.readouts import readouts
 from ..errors import InvalidArgument
 from ..kernels.timing import fastest
-from ..motion.displacements import actuator_units
+from ..kinematics import actuator_units, readouts
 from ..tolerances import TOLERANCES
 from .crossings import refuse_crossings
 from .curve import Curve, curve_of, largest_between

@@ -11,9 +11,9 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
-from ..description.readouts import readouts
 from ..errors import counted
 from ..extras import require
+from ..kinematics import readouts
 from ..printed import Printed, ResultTable
 from ..rotations import to_rpy
 from ..whole_files import whole_path

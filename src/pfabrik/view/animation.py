@@ -14,10 +14,10 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
 from ..checks import require_ending, require_positive
-from ..description.plane import plane_of
 from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
+from ..kinematics import plane_of
 from ..skeleton import Skeleton, skeleton_of
 from ..telling import OnProgress, telling
 from ..whole_files import whole_path

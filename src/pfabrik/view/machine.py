@@ -11,8 +11,8 @@ from ..answers.solution import Solution
 from ..checks import require_names
 from ..description.joint_types import JointType
 from ..description.mechanism import Mechanism
-from ..description.plane import plane_of
 from ..drawing import SMALL
+from ..kinematics import plane_of
 from ..skeleton import Line, Mark, Skeleton, checked_shown, skeleton_of
 from ..tolerances import TOLERANCES
 from .canvas import Canvas, canvas_on

@@ -13,10 +13,9 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..arrays import Floats, Mask
 from ..checks import require_method, require_type
-from ..description.plane import plane_of
-from ..description.readouts import Readout, readouts
 from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument, counted
+from ..kinematics import Readout, plane_of, readouts
 from ..skeleton import skeleton_of
 from .canvas import Canvas, canvas_on, new_axes
 from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
-from ...description.task import task_of
+from ...kinematics import task_of
 from ...rotations import from_quaternion
 from .scene import GIZMO, MACHINE
 from .shapes import quaternion

@@ -12,9 +12,8 @@ import numpy as np
 
 from ...answers.solution import Solution
 from ...description.mechanism import Mechanism
-from ...description.readouts import Readout, readout, readouts
-from ...description.task import task_of
 from ...errors import counted
+from ...kinematics import Readout, readout, readouts, task_of
 from ...rotations import to_rpy
 from ..looks import ACHIEVED, HELD
 from .panel_html import BOX, NOTE, margins_html, pose_html, status_html, watch_html

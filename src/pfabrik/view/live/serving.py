@@ -12,7 +12,7 @@ import rich
 
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
-from ...description.plane import plane_of
+from ...kinematics import plane_of
 
 if TYPE_CHECKING:
     import viser

@@ -14,9 +14,7 @@ from ...configuration import configuration
 from ...description.mechanism import Mechanism
 from ...fk import solve_fk
 from ...ik import solve_ik
-from ...motion.displacements import home_coordinates
-from ...motion.joint_path import JointPath, joint_path
-from ...motion.joint_series import passive_series
+from ...kinematics import JointPath, home_coordinates, joint_path, passive_series
 from ...poses import pose
 from ...rotations import to_rpy
 

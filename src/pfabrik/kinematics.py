@@ -1,0 +1,71 @@
+"""What capabilities build on beside the public verbs: names that stay while the engines below them change.
+
+A capability (statics, say, or timing) is a thin room over the verbs, `solve_ik`, `track` or `margins`, each imported
+from its public module. What it asks of the machine itself it imports from here, and reaches no deeper: the import
+contracts in `pyproject.toml` name the rooms that have kernels of their own, and what few imports are owed. Each name
+is documented where it is defined.
+
+Machine       model_of, Model; engine_of, Configurations; task_of, Task
+Shown as      readouts, readout, Readout; plane_of
+Graph         tree_of, column_joints, columns; passive_series; links_of
+Motion        home_coordinates, displacements, end_effector_pose, joint_centres; joint_path, JointPath; tilt_axis
+First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
+"""
+
+from .closure.configurations import Configurations
+from .closure.first_order import JointRates
+from .description.graph import tree_of
+from .description.home_mobility import column_joints
+from .description.links import links_of
+from .description.plane import plane_of
+from .description.readouts import Readout, readout, readouts
+from .description.task import Task, task_of
+from .engine import engine_of
+from .model import Model, model_of
+from .motion.determined import require_determined
+from .motion.displacements import (
+    actuator_units,
+    columns,
+    displacements,
+    end_effector_pose,
+    home_coordinates,
+    joint_centres,
+    rate_units,
+)
+from .motion.joint_path import JointPath, joint_path
+from .motion.joint_rates import cycle_basis
+from .motion.joint_series import passive_series
+from .motion.mobility import generic_of, internal_rates
+from .motion.tilt_axis import tilt_axis
+
+__all__ = [
+    "Configurations",
+    "JointPath",
+    "JointRates",
+    "Model",
+    "Readout",
+    "Task",
+    "actuator_units",
+    "column_joints",
+    "columns",
+    "cycle_basis",
+    "displacements",
+    "end_effector_pose",
+    "engine_of",
+    "generic_of",
+    "home_coordinates",
+    "internal_rates",
+    "joint_centres",
+    "joint_path",
+    "links_of",
+    "model_of",
+    "passive_series",
+    "plane_of",
+    "rate_units",
+    "readout",
+    "readouts",
+    "require_determined",
+    "task_of",
+    "tilt_axis",
+    "tree_of",
+]
