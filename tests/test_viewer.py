@@ -23,12 +23,11 @@ from machines import tripod_rps
 from pfabrik.answers.margins import nearest_first
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, MissingLibrary
-from pfabrik.view.live import panel_html
-from pfabrik.view.live.newest import Newest
-from pfabrik.view.live.serving import backed_off
+from pfabrik.view.live import panel
+from pfabrik.view.live.live_machine import backed_off
+from pfabrik.view.live.scene import SHAPES, cylinder, fan, quaternion, upright_to
 from pfabrik.view.live.session import Session, moved
-from pfabrik.view.live.shapes import SHAPES, cylinder, fan, quaternion, upright_to
-from pfabrik.view.live.watching import Watch
+from pfabrik.view.live.workers import Newest, Watch
 
 pytest.importorskip("viser")
 
@@ -343,10 +342,10 @@ def test_a_panel_does_not_jump_while_values_change() -> None:
     heights, rows = set(), set()
     for target in ((0, 0, 190), (0, 0, 400), (60, 40, 260), (-90, 20, 100)):
         session.go_to(pf.pose(target))
-        heights.add(re.findall(r"height:[0-9.]+em;overflow:auto", panel_html.status_html(session))[0])
-        rows.add(panel_html.margins_html(session).count("white-space:nowrap"))
+        heights.add(re.findall(r"height:[0-9.]+em;overflow:auto", panel.status_html(session))[0])
+        rows.add(panel.margins_html(session).count("white-space:nowrap"))
     assert len(heights) == 1
-    assert rows == {panel_html.BARS}
+    assert rows == {panel.BARS}
 
 
 def test_a_camera_moves_back_until_the_target_is_in_view() -> None:
@@ -402,7 +401,7 @@ def test_a_taken_port_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_the_page_says_when_the_program_is_gone() -> None:
-    text = panel_html.watch_html()
+    text = panel.watch_html()
     assert "has ended" in text and "/pfabrik-alive" in text
     assert "//" not in text  # it asks the server of the page alone
 

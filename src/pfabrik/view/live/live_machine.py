@@ -1,9 +1,9 @@
-"""One machine as it is shown: its session, and all elements of the page that show the answer."""
+"""One machine as it is shown: its session, and all elements of the page: scene, panel, handles, and the camera."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -12,20 +12,35 @@ from ...answers.status import Status
 from ...answers.tracked import Track
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
+from ...kinematics import plane_of, task_of
+from ...rotations import from_quaternion
 from ...skeleton import checked_shown, skeleton_of
 from ..plot_track import checked_track
-from .handles import Handles
 from .panel import Actions, Panel
-from .player import due_after
-from .scene import Scene
-from .serving import aim_camera
+from .scene import MACHINE, Scene, quaternion
 from .session import Session
+from .workers import due_after
 
 if TYPE_CHECKING:
     import viser
 
 Shown: TypeAlias = tuple[Mechanism, Solution | None, Track | None]
 """A machine, the configuration that it is first shown in (default: home), and the path that can be played."""
+
+
+GIZMO = 0.35
+"""Size of the handles to drag [L]."""
+
+FAR = 1e6
+"""Range of a handle [L]: the answer, not the handle, shows what is out of reach."""
+
+DISTANCE = 2.1
+"""Distance of the camera from the middle of the machine, in radii of the machine."""
+
+IN_VIEW = 0.8
+"""Share of the camera's angle within which the target is kept: its handles need room around it."""
+
+SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
 
 
 class LiveMachine:
@@ -99,3 +114,89 @@ def checked(what: object) -> Shown:
         return what.mechanism, what[int(checked_track(what)[0])], what
     mechanism, solution = checked_shown(what)
     return mechanism, solution, None
+
+
+class Handles:
+    """The target in the user's hand: a handle to move it, one to turn it, each with the axes that the task leaves free.
+
+    Parameters
+    ----------
+    drag : called with the pose (4, 4) that the user asks for, at every motion of the mouse.
+    """
+
+    def __init__(self, server: viser.ViserServer, mechanism: Mechanism, drag: Callable[[Floats], None]) -> None:
+        self._length, self._drag = mechanism.characteristic_length, drag
+        task = task_of(mechanism)
+        self._all: list[Any] = []
+        self._held: Any = None
+        limits = ((-FAR, FAR),) * 3
+        common: dict[str, Any] = {"scale": GIZMO, "depth_test": False, "translation_limits": limits}
+        if any(task.axes):
+            self._add(server, "move", active_axes=task.axes, disable_rotations=True, **common)
+        if task.rotations:
+            still = {"disable_axes": True, "disable_sliders": True}
+            self._add(server, "turn", active_axes=task.turns, **still, **common)
+
+    def show(self, target: Floats) -> None:
+        """Bring the handles to a target, but for the one in the user's hand."""
+        for handle in self._all:
+            if handle is not self._held:
+                handle.position, handle.wxyz = target[:3, 3] / self._length, quaternion(target[:3, :3])
+
+    def release(self) -> None:
+        """Let all handles follow the answers again: a page that goes in the middle of a motion does not say so."""
+        self._held = None
+
+    def show_all(self, visible: bool) -> None:
+        """Show or hide them."""
+        for handle in self._all:
+            handle.visible = visible
+
+    def _add(self, server: viser.ViserServer, name: str, **properties: Any) -> None:
+        handle = server.scene.add_transform_controls(f"{MACHINE}/target_{name}", **properties)
+
+        async def moved(event: Any) -> None:
+            self._held = None if event.phase == "end" else event.target
+            if event.phase == "update":
+                self._drag(self._pose(event.target))
+
+        handle.on_update(moved)
+        self._all.append(handle)
+
+    def _pose(self, handle: Any) -> Floats:
+        pose = np.eye(4)
+        pose[:3, :3] = from_quaternion(np.roll(np.asarray(handle.wxyz, float), -1))
+        pose[:3, 3] = np.asarray(handle.position, float) * self._length
+        return pose
+
+
+def keep_in_view(server: viser.ViserServer, point: Floats) -> None:
+    """Move the camera of each page back, if need be, until a point (3,) of the scene is in view, its handles too."""
+    for client in server.get_clients().values():
+        camera = client.camera
+        try:
+            position, middle, angle = np.array(camera.position), np.array(camera.look_at), float(camera.fov)
+        except (AssertionError, AttributeError):  # the page has not yet told where its camera is
+            continue
+        camera.position = backed_off(position, middle, angle, point)
+
+
+def backed_off(position: Floats, middle: Floats, angle: float, point: Floats) -> Floats:
+    """The place (3,) of a camera that looks at a middle (3,), moved back until a point is within its angle [rad]."""
+    along = (middle - position) / max(float(np.linalg.norm(middle - position)), 1e-12)
+    away = point - position
+    across = float(np.linalg.norm(away - (away @ along) * along))
+    missing = across / np.tan(0.5 * IN_VIEW * angle) - float(away @ along)
+    return np.asarray(position - max(missing, 0.0) * along)
+
+
+def aim_camera(server: viser.ViserServer, mechanism: Mechanism, points: Floats) -> None:
+    """Place the camera so that points (n, 3) [length] are in view; a planar machine is viewed from the front."""
+    seen = points / mechanism.characteristic_length
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))
+    plane = plane_of(mechanism)
+    direction = SEEN_FROM if plane is None else np.cross(*plane)
+    camera = server.initial_camera
+    camera.position, camera.look_at = middle + DISTANCE * radius * direction, middle
+    camera.up = (0.0, 0.0, 1.0) if plane is None else plane[1]

@@ -4,31 +4,68 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...answers.margins import nearest_first
 from ...answers.solution import Solution
+from ...answers.status import Status
+from ...arrays import Floats
 from ...description.mechanism import Mechanism
 from ...errors import counted
 from ...kinematics import Readout, readout, readouts, task_of
-from ...rotations import to_rpy
 from ..looks import ACHIEVED, HELD
-from .panel_html import BOX, NOTE, margins_html, pose_html, status_html, watch_html
-from .session import DIGITS, Session
+from .session import COORDINATES, DIGITS, Session, coordinates
 
 if TYPE_CHECKING:
     import viser
 
-    from .border_patches import Patch
+    from .scene import Patch
 
 FAR = 2.0
 """Range of sliders on each side of home where there is no limit [L or half turns]."""
 
 STEPS = 1000.0
 """Approximate number of steps of a slider."""
+
+BARS = 8
+"""Margins that have a bar; further ones are only counted."""
+
+ALIVE_EVERY = 2000
+"""Time between two looks whether the program still answers [ms]."""
+
+GONE = "The program behind this page has ended: nothing moves any more. Start it again, and reload the page."
+
+WATCH = (
+    "if(!window.pfabrikWatch){const b=document.createElement('div');b.dataset.pfabrik='gone';b.textContent=this.alt;"
+    "b.style.cssText='display:none;position:fixed;left:0;right:0;top:0;z-index:9999;padding:0.6em;text-align:center;"
+    f"background:{HELD};color:white;font:1em sans-serif';document.body.append(b);"
+    "window.pfabrikWatch=setInterval(()=>fetch('/pfabrik-alive',{cache:'no-store'}).then(()=>'none',()=>'block')"
+    f".then(d=>b.style.display=d),{ALIVE_EVERY})}}"
+)
+"""Script that asks the server of the page whether it is there, and says so where it is not."""
+
+BOX = "margin:0.3em 0.8em;font-size:0.85em;line-height:1.35"
+
+STATUS = "height:5.4em;overflow:auto"
+"""Style of the status: four lines, further ones by scrolling, so that what is below stays where it is."""
+
+NOTE = "min-height:1.35em"
+"""Style of a note, which has a line to itself even where it says nothing."""
+
+NAME = "width:8em;overflow:hidden;white-space:nowrap;text-overflow:ellipsis"
+"""Style of a limit's name: one line, however long it is."""
+
+COPY = (
+    "const t=this.previousElementSibling;t.select();"
+    "(navigator.clipboard?navigator.clipboard.writeText(t.value):Promise.reject()).catch(()=>document.execCommand('copy'));"
+    "this.textContent='Copied';setTimeout(()=>this.textContent='Copy pose',900)"
+)
+"""Script of the button: copies by the clipboard if the browser allows it, else by a command of the document."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +97,20 @@ class Panel:
         self._status = gui.add_html("")
         self._margins = gui.add_html("")
         with gui.add_folder("Target"):
-            self._target = {name: self._target_slider(gui, mechanism, name) for name in coordinates_of(mechanism)}
+            task = task_of(mechanism)
+            names = compress(COORDINATES, (*task.axes, *task.turns))
+            self._target = {name: self._target_slider(gui, mechanism, name) for name in names}
             self._pose = gui.add_html("")
             gui.add_button("Home").on_click(lambda _: actions.go_home())
-        self._add_joints(gui, mechanism, session)
+        in_series = () if session.path is None else session.path.coordinates
+        self._joint_readouts = [readout(each, mechanism.length_unit) for each in in_series]
+        self._readouts, self._joints = readouts(mechanism), []
+        length = mechanism.characteristic_length
+        if in_series:
+            with gui.add_folder("Joints"):
+                self._joints = self._sliders(gui, length, self._joint_readouts, session.joints, actions.change_joint)
         with gui.add_folder("Actuators"):
-            self._readouts = readouts(mechanism)
-            values = zip(self._readouts, session.actuators, strict=True)
-            self._actuators = [
-                self._actuator_slider(gui, mechanism, place, shown, float(shown.display(value)))
-                for place, (shown, value) in enumerate(values)
-            ]
+            self._actuators = self._sliders(gui, length, self._readouts, session.actuators, actions.change_actuator)
         self._add_path(gui, steps)
         self._add_modes(gui)
         self._workspace = gui.add_checkbox("Workspace at this orientation", initial_value=False)
@@ -86,8 +126,7 @@ class Panel:
         self._status.content = status_html(session)
         self._margins.content = margins_html(session)
         self._pose.content = pose_html(session)
-        position, angles = session.target[:3, 3], np.degrees(to_rpy(session.target[:3, :3]))
-        named = dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), (*position, *angles), strict=True))
+        named = coordinates(session.target)
         for name, slider in self._target.items():
             self._set(slider, named[name])
         for slider, shown, value in zip(self._actuators, self._readouts, session.actuators, strict=True):
@@ -141,26 +180,24 @@ class Panel:
             slider = _slider(gui, f"{name} [deg]", -180.0, 180.0, 0.0)
         return self._heard(slider, lambda value: self._actions.change_target(name, value))
 
-    def _actuator_slider(
-        self, gui: viser.GuiApi, mechanism: Mechanism, place: int, shown: Readout, value: float
-    ) -> Any:
-        slider = _coordinate_slider(gui, mechanism, shown, value)
-        return self._heard(slider, lambda moved_to: self._actions.change_actuator(place, shown.coordinate(moved_to)))
-
-    def _add_joints(self, gui: viser.GuiApi, mechanism: Mechanism, session: Session) -> None:
-        """Sliders of the passive joints in series that carry the end effector, if there are such joints."""
-        self._joints: list[Any] = []
-        named = () if session.path is None else session.path.coordinates
-        self._joint_readouts = [readout(each, mechanism.length_unit) for each in named]
-        if not named:
-            return
-        with gui.add_folder("Joints"):
-            for place, (shown, value) in enumerate(zip(self._joint_readouts, session.joints, strict=True)):
-                self._joints.append(self._joint_slider(gui, mechanism, place, shown, float(shown.display(value))))
-
-    def _joint_slider(self, gui: viser.GuiApi, mechanism: Mechanism, place: int, shown: Readout, value: float) -> Any:
-        slider = _coordinate_slider(gui, mechanism, shown, value)
-        return self._heard(slider, lambda moved_to: self._actions.change_joint(place, shown.coordinate(moved_to)))
+    def _sliders(
+        self,
+        gui: viser.GuiApi,
+        length: float,
+        shown: Sequence[Readout],
+        values: Floats,
+        change: Callable[[int, float], None],
+    ) -> list[Any]:
+        """A slider for each coordinate, over its range, or far enough where there is none."""
+        sliders = []
+        for place, (each, value) in enumerate(zip(shown, values, strict=True)):
+            at, far = float(each.display(value)), 180.0 if each.is_angle else FAR * length
+            free_low, free_high = rounded(at - far, at + far)
+            low, high = each.limits
+            low, high = (low if np.isfinite(low) else free_low), (high if np.isfinite(high) else free_high)
+            slider = _slider(gui, f"{each.name} [{each.unit}]", low, max(high, low), at)
+            sliders.append(self._heard(slider, partial(_change, change, place, each)))
+        return sliders
 
     def _heard(self, slider: Any, tell: Callable[[float], None]) -> Any:
         """Report the values that the user gives a slider; returns the slider."""
@@ -199,10 +236,8 @@ class Panel:
             self._actions.take_mode(place - 1)
 
 
-def coordinates_of(mechanism: Mechanism) -> tuple[str, ...]:
-    """The names of a target's sliders: the coordinates of the task, a rotation as angles."""
-    task = task_of(mechanism)
-    return tuple(compress(("x", "y", "z", "roll", "pitch", "yaw"), (*task.axes, *task.turns)))
+def _change(change: Callable[[int, float], None], place: int, shown: Readout, value: float) -> None:
+    change(place, shown.coordinate(value))
 
 
 def _of_users(listen: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -226,10 +261,55 @@ def _slider(gui: viser.GuiApi, label: str, low: float, high: float, value: float
     return gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high)))
 
 
-def _coordinate_slider(gui: viser.GuiApi, mechanism: Mechanism, shown: Readout, value: float) -> Any:
-    """A slider over the range of a coordinate, or far enough where there is none."""
-    far = 180.0 if shown.is_angle else FAR * mechanism.characteristic_length
-    free_low, free_high = rounded(value - far, value + far)
-    low, high = shown.limits
-    low, high = (low if np.isfinite(low) else free_low), (high if np.isfinite(high) else free_high)
-    return _slider(gui, f"{shown.name} [{shown.unit}]", low, max(high, low), value)
+# What the panel says, as HTML.
+
+
+def watch_html() -> str:
+    """An element that nobody sees, which starts the script: scripts in HTML that is put in later do not run."""
+    script, words = escape(WATCH, quote=True), escape(GONE, quote=True)
+    return f'<img src="data:," alt="{words}" style="display:none" onerror="{script}">'
+
+
+def status_html(session: Session) -> str:
+    """The status of the answer, with the limits that block its target, as HTML."""
+    reached = session.solution.status == Status.REACHED
+    status, *reasons = session.sentence.split("; ")
+    lines = "".join(f"<div>{escape(reason)}</div>" for reason in reasons)
+    colour = ACHIEVED if reached else HELD
+    return (
+        f'<div style="{BOX};{STATUS};color:{colour}"><b data-pfabrik="status">{escape(status)}</b>'
+        f'<div data-pfabrik="held">{lines}</div></div>'
+    )
+
+
+def margins_html(session: Session) -> str:
+    """The nearest limits as bars, 1 in the middle of a range and 0 on the limit."""
+    margins = nearest_first(session.solution)
+    if not margins:
+        return ""
+    rows = "".join(_bar(f"{joint} {bound}", margin) for joint, bound, margin in margins[:BARS])
+    more = f"<div>and {len(margins) - BARS} others, farther off</div>" if len(margins) > BARS else ""
+    return f'<div data-pfabrik="margins" style="{BOX}">{rows}{more}</div>'
+
+
+def _bar(name: str, value: float) -> str:
+    full = escape(name, quote=True)
+    share, colour = 100.0 * float(np.clip(value, 0.0, 1.0)), HELD if value <= 1e-6 else ACHIEVED
+    return (
+        f'<div style="display:flex;gap:0.5em;align-items:center"><span style="{NAME}" title="{full}">'
+        f"{full}</span>"
+        f'<span style="flex:1;background:#e8e8e8;height:0.6em"><span style="display:block;height:100%;'
+        f'width:{share:.1f}%;background:{colour}"></span></span><span style="width:3em;text-align:right">'
+        f"{value:.2f}</span></div>"
+    )
+
+
+def pose_html(session: Session) -> str:
+    """The target as Python, to copy."""
+    text = escape(session.pose_as_python, quote=True)
+    return (
+        f'<div style="{BOX};display:flex;gap:0.4em"><input readonly data-pfabrik="pose" value="{text}" '
+        f'style="flex:1;min-width:0;border:1px solid #ccc;font:0.9em monospace;padding:0.2em">'
+        f'<button data-pfabrik="copy" onclick="{escape(COPY, quote=True)}" '
+        f'style="border:1px solid #ccc;padding:0 0.6em;cursor:pointer">Copy pose</button></div>'
+    )

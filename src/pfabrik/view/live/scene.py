@@ -1,25 +1,31 @@
-"""A machine in the browser: the same skeleton as in pictures, with thickness. One unit of the scene is L."""
+"""A machine in the browser: the same skeleton as in pictures, with thickness. One unit of the scene is L.
+
+Meshes are vertices (n, 3) and faces (k, 3), of about the size 1; turns are quaternions, scalar first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...answers.tracked import Track
 from ...arrays import Floats
 from ...clearance.solid_meshes import SolidMesh
 from ...description.mechanism import Mechanism
 from ...drawn_parts import Part
+from ...rotations import shortest_turns, to_quaternion, to_rotvec
 from ...skeleton import Mark, Skeleton
 from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, of_a_body, rgb
-from .shapes import SHAPES, cylinder, fan, quaternion, upright_to
 
 if TYPE_CHECKING:
     import viser
 
-    from .border_patches import Patch
+Mesh = tuple[NDArray[np.float32], NDArray[np.int32]]
+Colour = tuple[int, int, int]
 
 RADIUS = 0.0125
 """Of a usual bar [L]."""
@@ -33,13 +39,30 @@ JOINT = 0.034
 FRAME = 0.12
 """Length of the axes at the reference point [L]."""
 
-GIZMO = 0.35
-"""Size of the handles to drag [L]."""
-
-PLAIN: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
+NO_SHADOW: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
+PLAIN: dict[str, Any] = {"lod": "off", **NO_SHADOW}
 """Settings of many small meshes that save the time of computers without a graphics card."""
 
 MACHINE = "/machine"
+
+SIDES = 16
+"""Sides of what is round."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A part of the border of a workspace that has one colour.
+
+    Attributes
+    ----------
+    corners : of its triangles, (k, 3, 3), or both ends of its segments, (k, 2, 3), in the base frame [length].
+    name, share : the limits that form it, and their share of the border.
+    """
+
+    name: str
+    share: float
+    colour: str
+    corners: Floats
 
 
 class Scene:
@@ -52,29 +75,16 @@ class Scene:
         self._scene, self._length = server.scene, mechanism.characteristic_length
         self._labels: dict[str, Any] = {}
         self._border: list[Any] = []
-        self._add_lines(skeleton)
+        self._lines = self._add_many("lines", cylinder(), **self._cylinders(skeleton))
         self._faces = [
-            self._scene.add_mesh_simple(
-                f"{MACHINE}/bodies/{place}",
-                *fan(line.corners / self._length),
-                color=_colour_of(line.part),
-                opacity=0.45,
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
+            self._add_mesh(
+                f"bodies/{place}", fan(line.corners / self._length), _colour_of(line.part), 0.45, side="double"
             )
             for place, line in enumerate(skeleton.parts)
             if line.part.kind == "plate"
         ]
         self._solids = [
-            self._scene.add_mesh_simple(
-                f"{MACHINE}/solids/{place}",
-                *_triangles(solid, self._length),
-                color=_colour_of_solid(solid),
-                opacity=0.5,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            self._add_mesh(f"solids/{place}", self._triangles(solid), _colour_of_solid(solid), 0.5, side="front")
             for place, solid in enumerate(skeleton.solids)
         ]
         kinds = sorted({mark.joint.type for mark in skeleton.marks})
@@ -88,14 +98,13 @@ class Scene:
 
     def show(self, skeleton: Skeleton, pose: Floats) -> None:
         """Move everything to a configuration."""
-        positions, turns, scales, colours = self._cylinders(skeleton)
-        self._lines.batched_positions, self._lines.batched_wxyzs = positions, turns
-        self._lines.batched_scales, self._lines.batched_colors = scales, colours
+        for name, values in self._cylinders(skeleton).items():
+            setattr(self._lines, name, values)
         corners = (line.corners for line in skeleton.parts if line.part.kind == "plate")
         for face, face_corners in zip(self._faces, corners, strict=True):
             face.vertices = fan(face_corners / self._length)[0]
         for mesh, solid in zip(self._solids, skeleton.solids, strict=True):
-            mesh.vertices, mesh.color = _triangles(solid, self._length)[0], _colour_of_solid(solid)
+            mesh.vertices, mesh.color = self._triangles(solid)[0], _colour_of_solid(solid)
         for kind, joints in self._joints.items():
             marks = _of_kind(skeleton, kind)
             joints.batched_positions, joints.batched_colors = self._places(marks), _colours(marks)
@@ -119,10 +128,9 @@ class Scene:
             if corners.shape[1] == 2:
                 self._border.append(self._scene.add_line_segments(name, corners, rgb(patch.colour), thickness=3.0))
                 continue
-            faces = np.arange(3 * len(corners)).reshape(-1, 3)
-            style: dict[str, Any] = {"color": rgb(patch.colour), "opacity": 0.4, "side": "double"}
-            style |= {"cast_shadow": False, "receive_shadow": False, "flat_shading": True}
-            self._border.append(self._scene.add_mesh_simple(name, corners.reshape(-1, 3), faces, **style))
+            mesh = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+            name = f"workspace/{place}"
+            self._border.append(self._add_mesh(name, mesh, rgb(patch.colour), 0.4, flat_shading=True))
 
     def hide_border(self) -> None:
         """Hide the border."""
@@ -130,38 +138,33 @@ class Scene:
             part.remove()
         self._border = []
 
-    def _add_lines(self, skeleton: Skeleton) -> None:
-        positions, turns, scales, colours = self._cylinders(skeleton)
-        self._lines = self._scene.add_batched_meshes_simple(
-            f"{MACHINE}/lines",
-            *cylinder(),
-            batched_wxyzs=turns,
-            batched_positions=positions,
-            batched_scales=scales,
-            batched_colors=colours,
-            **PLAIN,
-        )
+    def _add_mesh(self, name: str, mesh: tuple[Any, Any], colour: Colour, opacity: float, **style: Any) -> Any:
+        style = {"color": colour, "opacity": opacity, "side": "double", **NO_SHADOW, **style}
+        return self._scene.add_mesh_simple(f"{MACHINE}/{name}", *mesh, **style)
+
+    def _add_many(self, name: str, mesh: Mesh, **style: Any) -> Any:
+        return self._scene.add_batched_meshes_simple(f"{MACHINE}/{name}", *mesh, **style, **PLAIN)
 
     def _add_joints(self, kind: str, skeleton: Skeleton) -> Any:
-        marks = _of_kind(skeleton, kind)
-        upright = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (len(marks), 1))
-        vertices, faces = SHAPES[kind]()
-        return self._scene.add_batched_meshes_simple(
-            f"{MACHINE}/joints/{kind}",
-            (JOINT * vertices).astype(np.float32),
-            faces,
-            batched_wxyzs=upright,
+        marks, (vertices, faces) = _of_kind(skeleton, kind), SHAPES[kind]()
+        return self._add_many(
+            f"joints/{kind}",
+            ((JOINT * vertices).astype(np.float32), faces),
+            batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (len(marks), 1)),
             batched_positions=self._places(marks),
             batched_colors=_colours(marks),
             flat_shading=True,
-            **PLAIN,
         )
 
     def _places(self, marks: list[Mark]) -> Any:
         return (np.array([mark.place for mark in marks]) / self._length).astype(np.float32)
 
-    def _cylinders(self, skeleton: Skeleton) -> tuple[Any, Any, Any, Any]:
-        """Every line as a cylinder: its middle, its turn from upright, radii and length, and its colour."""
+    def _triangles(self, solid: SolidMesh) -> tuple[Any, Any]:
+        """Vertices and faces in the scene."""
+        return (solid.vertices / self._length).astype(np.float32), solid.faces.astype(np.uint32)
+
+    def _cylinders(self, skeleton: Skeleton) -> dict[str, Any]:
+        """Every line as a cylinder: its middle, its turn from upright, its colour, and its radii and length."""
         ends, radii, colours, held = [], [], [], skeleton.held
         for line in skeleton.parts:
             colour = rgb(HELD) if held & set(line.part.joints) else _colour_of(line.part)
@@ -172,10 +175,12 @@ class Scene:
         lines = np.reshape(ends, (-1, 2, 3)) / self._length
         along = lines[:, 1] - lines[:, 0]
         lengths = np.linalg.norm(along, axis=1)
-        scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
-        placements = (lines.mean(axis=1), upright_to(along), scales)
-        middles, turns, scales = (values.astype(np.float32) for values in placements)
-        return middles, turns, scales, np.array(colours, np.uint8)
+        return {
+            "batched_positions": lines.mean(axis=1).astype(np.float32),
+            "batched_wxyzs": upright_to(along).astype(np.float32),
+            "batched_scales": np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1).astype(np.float32),
+            "batched_colors": np.array(colours, np.uint8),
+        }
 
     def _name(self, skeleton: Skeleton) -> None:
         """Labels at the joints whose limits hold."""
@@ -190,16 +195,11 @@ class Scene:
                 self._labels[name] = self._scene.add_label(f"{MACHINE}/held/{name}", name, position=at)
 
 
-def _colour_of(part: Part) -> tuple[int, int, int]:
+def _colour_of(part: Part) -> Colour:
     return rgb(BASE if part.role == "base" else of_a_body(part.role))
 
 
-def _triangles(solid: SolidMesh, length: float) -> tuple[Any, Any]:
-    """Vertices and faces in the scene."""
-    return (solid.vertices / length).astype(np.float32), solid.faces.astype(np.uint32)
-
-
-def _colour_of_solid(solid: SolidMesh) -> tuple[int, int, int]:
+def _colour_of_solid(solid: SolidMesh) -> Colour:
     """Dark for the two links that are nearest to each other, orange where they stop it or overlap, light elsewhere."""
     return rgb(HELD if solid.is_stopped else ACTUATED if solid.is_nearest else BASE)
 
@@ -212,3 +212,61 @@ def _colours(marks: list[Mark]) -> Any:
     """Of joints: orange where a limit holds, dark where they are actuated, light elsewhere."""
     names = (HELD if mark.held_by else ACTUATED if mark.joint.actuated else PASSIVE for mark in marks)
     return np.array([rgb(name) for name in names], np.uint8)
+
+
+def _from_trimesh(make: str, **size: Any) -> Mesh:
+    """A mesh that trimesh makes, which is imported when it is needed."""
+    from trimesh import creation
+
+    made = getattr(creation, make)(**size)
+    return np.asarray(made.vertices, np.float32), np.asarray(made.faces, np.int32)
+
+
+def cylinder(sides: int = SIDES, height: float = 1.0) -> Mesh:
+    """Upright, about its middle, of radius 1: a prism where it has few sides."""
+    return _from_trimesh("cylinder", radius=1.0, height=height, sections=sides)
+
+
+def octahedron() -> Mesh:
+    """With corners on the axes, 1.1 from its middle."""
+    vertices = 1.1 * np.vstack([np.eye(3), -np.eye(3)])
+    faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    return vertices.astype(np.float32), np.array(faces, np.int32)
+
+
+def tetrahedron() -> Mesh:
+    """With corners 1.2 from its middle."""
+    vertices = 0.7 * np.array([[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]])
+    return vertices.astype(np.float32), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
+
+
+SHAPES: dict[str, Callable[[], Mesh]] = {
+    "revolute": lambda: _from_trimesh("uv_sphere", radius=0.8, count=(9, SIDES)),
+    "prismatic": lambda: _from_trimesh("box", extents=(1.6, 1.6, 1.6)),
+    "universal": octahedron,
+    "spherical": tetrahedron,
+    "cylindrical": lambda: cylinder(6, 1.6),
+    "fixed": lambda: cylinder(3, 1.6),
+}
+"""Shapes of joints, those of the markers in pictures: round, square, diamond, triangle, hexagon."""
+
+
+def fan(corners: Floats) -> Mesh:
+    """A face through corners (k, 3) in order, as triangles about their middle."""
+    here = np.arange(len(corners))
+    middle = np.full(len(corners), len(corners))
+    vertices = np.vstack([corners, corners.mean(axis=0)]).astype(np.float32)
+    return vertices, np.stack([here, np.roll(here, -1), middle], axis=1).astype(np.int32)
+
+
+def upright_to(directions: Floats) -> Floats:
+    """The quaternions (n, 4) of the shortest turns of the z axis to directions (n, 3); none for no direction."""
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    upright = np.broadcast_to((0.0, 0.0, 1.0), directions.shape)
+    along = np.divide(directions, lengths, out=upright.copy(), where=lengths > 0.0)
+    return quaternion(shortest_turns(upright, along))
+
+
+def quaternion(rotations: Floats) -> Floats:
+    """The quaternions (..., 4) of rotation matrices (..., 3, 3)."""
+    return np.roll(to_quaternion(to_rotvec(rotations)), 1, axis=-1)

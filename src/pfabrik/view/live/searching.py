@@ -1,16 +1,21 @@
-"""Searches that take longer than a motion of the mouse: for modes, and for the workspace."""
+"""Searches that take longer than a motion of the mouse: for modes, and for the border of the workspace."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
+import numpy as np
+
 from ...answers.solution import Solution
 from ...answers.words import by_bound, exceeded
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
 from .live_machine import LiveMachine
-from .newest import Newest
+from .scene import Patch
+from .workers import Newest
+
+POSITIONS = ("x", "y", "z")
 
 
 class Searches:
@@ -64,8 +69,6 @@ class Searches:
             panel.tell(f"looking for the workspace: {100 * done // max(total, 1)} %")
 
         def search() -> None:
-            from .border_patches import border_of
-
             patches, size = border_of(start, progress)
             with self._lock:
                 if self._shown() is machine and panel.wants_workspace:
@@ -84,3 +87,26 @@ def _kept(mode: Solution) -> str:
     """The limits that a mode exceeds, in words; "within limits" if there are none."""
     beyond = by_bound(exceeded(mode))
     return f"beyond {beyond}" if beyond else "within limits"
+
+
+def border_of(start: Solution, on_progress: Callable[[int, int], None]) -> tuple[list[Patch], str]:
+    """The border of the workspace at a configuration's orientation, in its working mode, and its size in words.
+
+    Each face has the colour of the limit that forms it. Other coordinates are as in that configuration. A workspace
+    over angles has no patches.
+    """
+    from ...workspace.ask import workspace
+    from ...workspace.border import groups_of
+    from ...workspace.sizes import in_words
+
+    space = workspace(start.mechanism, start=start, on_progress=on_progress)
+    size = in_words(space)
+    if not set(space.names) <= set(POSITIONS):
+        return [], f"workspace over {', '.join(space.names)}: {size}; it has no place in the scene"
+    vertices = np.repeat(start.pose[None, :3, 3], len(space.vertices), axis=0)
+    vertices[:, [POSITIONS.index(name) for name in space.names]] = space.vertices
+    corners, limits = np.asarray(vertices[space.faces]), np.asarray(space.face_limit)
+    return [
+        Patch(group.label, group.share, group.colour, corners[np.isin(limits, group.limits)])
+        for group in groups_of(space)
+    ], size

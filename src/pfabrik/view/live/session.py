@@ -22,6 +22,9 @@ DIGITS = 9
 """Digits after the point that are shown: further ones are rounding; no -0.0 is shown."""
 
 
+COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
 class Session:
     """One machine, its target or actuator values, and its answer.
 
@@ -82,17 +85,17 @@ class Session:
     @property
     def pose_as_python(self) -> str:
         """The target as a Python expression."""
-        place = ", ".join(f"{value:.6g}" for value in self.target[:3, 3].round(DIGITS) + 0.0)
-        turned = np.degrees(to_rpy(self.target[:3, :3])).round(DIGITS) + 0.0
-        angles = ", ".join(f"{value:.6g}" for value in turned)
-        return f"pf.pose([{place}], rpy=[{angles}], degrees=True)"
+        words = [f"{np.round(value, DIGITS) + 0.0:.6g}" for value in coordinates(self.target).values()]
+        return f"pf.pose([{', '.join(words[:3])}], rpy=[{', '.join(words[3:])}], degrees=True)"
+
+
+def coordinates(target: Floats) -> dict[str, float]:
+    """A pose (4, 4) as "x", "y", "z" [length], and "roll", "pitch", "yaw" [deg]."""
+    values = np.concatenate([target[:3, 3], np.degrees(to_rpy(target[:3, :3]))])
+    return dict(zip(COORDINATES, values.tolist(), strict=True))
 
 
 def moved(target: Floats, name: str, value: float) -> Floats:
-    """A pose with one of its coordinates changed: "x", "y", "z" [length], "roll", "pitch", "yaw" [deg]."""
-    place, angles = np.array(target[:3, 3]), np.degrees(to_rpy(target[:3, :3]))
-    if name in "xyz":
-        place["xyz".index(name)] = value
-    else:
-        angles[("roll", "pitch", "yaw").index(name)] = value
-    return pose(place, rpy=angles, degrees=True)
+    """A pose with one of its `coordinates` changed."""
+    values = list((coordinates(target) | {name: value}).values())
+    return pose(values[:3], rpy=values[3:], degrees=True)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
+import io
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import rich
 
 from ...answers.solution import Solution, checked_solution
 from ...arrays import Floats
@@ -19,14 +23,14 @@ from ...extras import require
 from ...files import load
 from ...first_answers import prepare
 from ...whole_files import whole_path
-from .live_machine import LiveMachine, Shown, checked
-from .newest import Newest
+from .live_machine import LiveMachine, Shown, checked, keep_in_view
 from .panel import Actions
-from .player import Player
 from .searching import Searches
-from .serving import keep_in_view, quietly, serve
 from .session import Session, moved
-from .watching import Watch
+from .workers import Newest, Player, Watch
+
+if TYPE_CHECKING:
+    import viser
 
 LOOPBACK, PORT = "127.0.0.1", 8080
 
@@ -73,7 +77,7 @@ class Viewer:
         what = checked(load(shown) if isinstance(shown, str | os.PathLike) else shown)
         self._lock = threading.RLock()
         self._closed = threading.Event()
-        self._server = serve(host, port)
+        self._server = _serve(host, port)
         shown_host = "localhost" if host in ("0.0.0.0", "::") else host
         self.port = self._server.get_port()
         self.url = f"http://{shown_host}:{self.port}"
@@ -141,7 +145,7 @@ class Viewer:
             self._watch.end()
         self._newest.end()
         self._searches.end()
-        with quietly():
+        with _quietly():
             self._server.stop()
         atexit.unregister(self.close)
 
@@ -223,16 +227,16 @@ class Viewer:
     def _build(self, shown: Shown) -> None:
         """Show a machine in place of the one shown before."""
         actions = Actions(
-            self._change_target,
-            self._change_actuator,
-            self._change_joint,
-            self._go_home,
-            self._searches.find_modes,
-            self._take_mode,
-            self._take_step,
-            self._play,
-            self._searches.show_workspace,
-            self._send,
+            change_target=self._change_target,
+            change_actuator=self._change_actuator,
+            change_joint=self._change_joint,
+            go_home=self._go_home,
+            find_modes=self._searches.find_modes,
+            take_mode=self._take_mode,
+            take_step=self._take_step,
+            play=self._play,
+            show_workspace=self._searches.show_workspace,
+            save=self._send,
         )
         with self._lock:
             if self._player is not None:
@@ -281,3 +285,30 @@ class Viewer:
         """Send the page as a download."""
         if client is not None:
             client.send_file_download(f"{self.mechanism.name}.html", self._page().encode())
+
+
+def _serve(host: str, port: int) -> viser.ViserServer:
+    """A server at an address, and at the next free port; it opens no way in from elsewhere."""
+    import viser
+
+    class Local(viser.ViserServer):
+        def request_share_url(self, verbose: bool = True) -> None:
+            """A page could ask for a tunnel to the outside; this one is of this computer alone."""
+
+    with _quietly():
+        return Local(host=host, port=port, verbose=False)
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    """Keep what the server says of itself off standard output, and out of the cells of a notebook.
+
+    It prints by rich, whose console writes into a notebook's cell by itself, not on standard output.
+    """
+    console = rich.get_console()
+    was_quiet, console.quiet = console.quiet, True
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        console.quiet = was_quiet
