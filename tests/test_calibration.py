@@ -275,7 +275,7 @@ def test_measurements_from_a_table(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.values, 0.0, atol=1e-9)
     lines[1] = lines[1].replace(";", ";x", 1)
     file.write_text("\n".join(lines))
-    with pytest.raises(InvalidArgument, match="line 2, column 'A2'"):
+    with pytest.raises(InvalidArgument, match="line 2: column 'A2'"):
         pf.read_measurements(file, mechanism)
 
 

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import csv
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from ..arrays import Floats
-from ..cells import is_finite, unmarked
 from ..checks import require_path
+from ..csv_columns import CsvColumns
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, near_miss
 from ..poses import pose
+from ..text_lines import WrongText, as_text, lines_of, refusing
 from .measurements import Measurements, Sigma
 
 POSITION, QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 ANGLES = ("roll", "pitch", "yaw")
 HEIGHT, DISTANCE, DISTANCE_TO = "height", "distance", "distance_to"
 
-LARGEST = 20_000_000
-"""Largest file read [bytes]."""
+MOST_ROWS = 100_000
+"""Lines of a file at most."""
 
 
 def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma: Sigma = None) -> Measurements:
@@ -41,12 +41,12 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
     InvalidArgument : a file that is no such table, with its line and column.
     """
     checked_mechanism(mechanism)
-    header, rows = _table(Path(require_path("path", path)))
-    columns = dict(zip(header, np.array(rows, float).reshape(len(rows), len(header)).T, strict=True))
+    read = _columns(Path(require_path("path", path)))
+    columns = dict(read)
     for name in [name for name in columns if name.endswith("_deg")]:
         columns[name.removesuffix("_deg")] = np.radians(columns.pop(name))
     for name in ANGLES:
-        if name in columns and name in header:
+        if name in columns and name in read:
             columns[name] = np.radians(columns[name])
         if f"{name}_rad" in columns:
             columns[name] = columns.pop(f"{name}_rad")
@@ -63,43 +63,16 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
     )
 
 
-def _table(path: Path) -> tuple[list[str], list[list[float]]]:
-    """Names and numbers of a table; NaN for empty cells."""
+def _columns(path: Path) -> dict[str, Floats]:
+    """The numbers of a table by column; NaN for empty cells."""
     try:
-        raw = path.read_bytes()[: LARGEST + 1]
+        with refusing(str(path), "a CSV file of measurements"), path.open("rb") as raw, as_text(raw) as text:
+            table = CsvColumns(lines_of(text, MOST_ROWS, "a table"), comment="#")
+            for rows in table.rows(MOST_ROWS):
+                return {name: np.array(table.numbers(rows, name, gaps=True), float) for name in table.header}
+            raise WrongText("no line of numbers; expected a header, then a configuration a line")
     except OSError as error:
         raise InvalidArgument("path", f"{path}: {error.strerror}", "a CSV file that can be read") from None
-    if len(raw) > LARGEST or b"\0" in raw:
-        raise InvalidArgument("path", f"{path}, which is no text, or too large", "a CSV file")
-    lines = raw.decode("utf-8-sig", "replace").splitlines()
-    separator = max(",;\t", key=lines[0].count) if lines else ","
-    header: list[str] = []
-    rows: list[list[float]] = []
-    for number, cells in enumerate(csv.reader(lines, delimiter=separator), 1):
-        texts = [unmarked(cell.strip()) for cell in cells]
-        if not any(texts) or texts[0].startswith("#"):
-            continue
-        if not header:
-            header = texts
-            twice = sorted({name for name in header if header.count(name) > 1})
-            if twice:
-                raise InvalidArgument("path", f"line {number}: column '{twice[0]}' twice", "every column once")
-            continue
-        if len(texts) != len(header):
-            raise InvalidArgument("path", f"line {number}: {len(texts)} cells", f"{len(header)}, as the header has")
-        rows.append([_number(text, name, number, separator) for text, name in zip(texts, header, strict=True)])
-    if not rows:
-        raise InvalidArgument("path", f"{path}, without a line of numbers", "a header, then a configuration a line")
-    return header, rows
-
-
-def _number(text: str, name: str, line: int, separator: str) -> float:
-    decimal = text if separator == "," else text.replace(",", ".")
-    if decimal.lower() in ("", "nan"):
-        return float("nan")
-    if not is_finite(decimal):
-        raise InvalidArgument("path", f"line {line}, column '{name}': '{text[:20]}'", "a number, or nothing")
-    return float(decimal)
 
 
 def _check_names(columns: dict[str, Floats], mechanism: Mechanism) -> None:

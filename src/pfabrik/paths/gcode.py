@@ -12,7 +12,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..files.units import METRES
-from .path import MOST_STEPS, WrongPath
+from ..text_lines import WrongText
+from .path import MOST_STEPS
 from .unread import CODES, IN_ONE_PROGRAM, has_offset, refuse_code, refuse_steering
 
 WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -117,7 +118,7 @@ def steps_of(
         _obey(state, words, number)
         moves = any(letter in words for letter in AXES)
         if state.motion is None and moves:
-            raise WrongPath(f"line {number}: a position without G0, G1, G2 or G3")
+            raise WrongText(f"line {number}: a position without G0, G1, G2 or G3")
         if state.motion is not None and (moves or any(letter in words for letter in OFFSETS + "R")):
             yield from _move(state, words, number, tolerance, longest)
         if any(code in (2, 30) for code in words.get("M", [])):
@@ -138,14 +139,14 @@ def _words(text: str, number: int, passed: dict[str, int]) -> dict[str, list[flo
         passed.setdefault(plain.split()[0], number)
         return {}
     if unread:
-        raise WrongPath(f"line {number}: found '{unread[0][:20]}'; expected words such as X12.5")
+        raise WrongText(f"line {number}: found '{unread[0][:20]}'; expected words such as X12.5")
     for letter, value in WORD.findall(plain):
         if abs(float(value)) > FARTHEST:
-            raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
+            raise WrongText(f"line {number}: found {letter}{value[:20]}; expected a number below {FARTHEST:g}")
         if letter in OTHER_AXES:
-            raise WrongPath(f"line {number}: found {letter}{value[:20]}; expected axes {', '.join(AXES)}")
+            raise WrongText(f"line {number}: found {letter}{value[:20]}; expected axes {', '.join(AXES)}")
         if letter in words and letter in AXES:
-            raise WrongPath(f"line {number}: found {letter} twice; expected one place")
+            raise WrongText(f"line {number}: found {letter} twice; expected one place")
         words.setdefault(letter, []).append(float(value))
     return words
 
@@ -172,7 +173,7 @@ def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None
     """Update the modal state from the words of a line that are no motion."""
     if "O" in words:
         if state.has_number or state.motion is not None:
-            raise WrongPath(f"line {number}: found O{words['O'][-1]:g}, another program; expected {IN_ONE_PROGRAM}")
+            raise WrongText(f"line {number}: found O{words['O'][-1]:g}, another program; expected {IN_ONE_PROGRAM}")
         state.has_number = True
     for code in words.get("M", []):
         if f"M{code:g}" in CODES:
@@ -199,7 +200,7 @@ def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None
     if "F" in words and 4.0 not in words.get("G", []):  # whose F is a time
         state.feed = words["F"][-1]
         if not state.feed > 0.0:
-            raise WrongPath(f"line {number}: found F{state.feed:g}; expected a feed above zero")
+            raise WrongText(f"line {number}: found F{state.feed:g}; expected a feed above zero")
 
 
 def _move(
@@ -226,7 +227,7 @@ def _move(
 
 def _parts(length: float, longest: float, number: int) -> int:
     if length / longest > MOST_STEPS:
-        raise WrongPath(
+        raise WrongText(
             f"line {number}: a move of {length:g}, in steps of {longest:g}: too many steps; expected longer ones"
         )
     return max(1, math.ceil(length / longest * (1.0 - ROUNDING)))
@@ -237,7 +238,7 @@ def _arc(
 ) -> Iterator[Floats]:
     """Places on a circle or a helix, clockwise (G2) or not, seen against the plane's normal."""
     if words.get("P", [1.0])[-1] != 1.0:
-        raise WrongPath(f"line {number}: found P{words['P'][-1]:g}; expected an arc of one turn at most")
+        raise WrongText(f"line {number}: found P{words['P'][-1]:g}; expected an arc of one turn at most")
     u, v, _ = plane = PLANES[state.plane]
     begin, sense = state.place, -1.0 if state.motion == 2 else 1.0
     chord = end[[u, v]] - begin[[u, v]]
@@ -248,7 +249,7 @@ def _arc(
         centre = np.array(offsets)
     radius, off = float(np.hypot(*centre)), float(np.hypot(*(chord - centre)))
     if not radius > 0.0 or abs(radius - off) > max(OFF_ROUND * radius, 2.0 * tolerance):
-        raise WrongPath(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
+        raise WrongText(f"line {number}: an arc from radius {radius:g} to {off:g}; expected the same")
     start, stop = math.atan2(-centre[1], -centre[0]), math.atan2(*(chord - centre)[::-1])
     turn = (sense * (stop - start)) % (2.0 * math.pi)
     turn = 2.0 * math.pi if turn < ONE_PLACE else turn
@@ -257,7 +258,7 @@ def _arc(
         flat = 4.0 * math.asin(math.sqrt(tolerance) / math.sqrt(2.0 * radius))
     if turn / flat > MOST_STEPS:
         fault = f"an arc of radius {radius:g} in steps that are off by {tolerance:g} at most: too many steps"
-        raise WrongPath(f"line {number}: {fault}; expected a larger tolerance")
+        raise WrongText(f"line {number}: {fault}; expected a larger tolerance")
     count = max(_parts(radius * turn, longest, number), math.ceil(turn / flat))
     for part in range(1, count):
         share = part / count
@@ -273,6 +274,6 @@ def _centre_of(chord: Floats, radius: float, sense: float, number: int) -> Float
     """The centre of an arc given by its radius; a negative one is that of the longer arc."""
     half = float(np.hypot(*chord)) / 2.0
     if half == 0.0 or half > abs(radius) * (1.0 + DIGITS):
-        raise WrongPath(f"line {number}: found R{radius:g} for ends {2.0 * half:g} apart; expected at least half of it")
+        raise WrongText(f"line {number}: found R{radius:g} for ends {2.0 * half:g} apart; expected at least half of it")
     height = math.sqrt(max(radius * radius - half * half, 0.0)) * math.copysign(1.0, radius) * sense
     return chord / 2.0 + height * np.array([-chord[1], chord[0]]) / (2.0 * half)

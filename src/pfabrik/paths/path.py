@@ -20,10 +20,6 @@ BLOCK = 4096
 AngleUnit: TypeAlias = Literal["deg", "rad"]
 
 
-class WrongPath(ValueError):
-    """A file that is no path; its text names the line and what was found, then what was expected."""
-
-
 class Path(NamedTuple):
     """Targets in their order.
 

@@ -16,22 +16,19 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_path, require_positive
+from ..csv_columns import SAID
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
 from ..poses import pose
 from ..rotations import to_rpy
-from .csv_table import SAID, CsvTable
-from .encodings import as_text
+from ..text_lines import WrongText, as_text, lines_of, refusing
+from .csv_table import CsvTable
 from .gcode import COMMENT, Move, steps_of
-from .path import BLOCK, MOST_STEPS, Path, WrongPath, joined
+from .path import BLOCK, MOST_STEPS, Path, joined
 from .sampling import at_rate, divided, timed
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
 CHORD, LONGEST = 1e-5, 1e-2
 """Largest distance of a chord from its arc, and longest straight part of a move, as shares of L."""
-
-LONGEST_LINE = 100_000
-"""Characters of a line at most; a file with a longer one is not the text of a path."""
 
 FIRST_WORD = re.compile(r"\s*([%/]|[A-Z]\s*[-+.\d])", re.IGNORECASE)
 """The beginning of a line of G-code."""
@@ -103,27 +100,21 @@ def path_blocks(
             require_positive(option, value)
     file = require_path("path", path)
     name = "standard input" if str(file) == "-" else str(file)
-    try:
-        with _opened(file) as handle:
-            is_table, lines = _begun(_text(handle, 10 * most), file.suffix.lower())
-            if is_table:
-                table = CsvTable(lines, mechanism)
-                blocks, has_times = _counted(table.blocks(), most), table.has_times
-                if longest is not None:
-                    blocks = divided(blocks, longest)
-            else:
-                step = LONGEST * length if longest is None else longest
-                passed: dict[str, int] = {}
-                program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed)
-                blocks, has_times = _program(program, passed, most), True
-            if has_times or sample_time is not None or rate is not None:
-                blocks = timed(blocks, sample_time, rapid)
-            yield from _counted(blocks if rate is None else at_rate(blocks, rate), most)
-    except WrongPath as error:
-        found, _, expected = str(error).partition("; expected ")
-        raise InvalidArgument(name, found, expected or "CSV or G-code that can be followed") from None
-    except UnicodeDecodeError:
-        raise InvalidArgument(name, "a file that is no text", "CSV or G-code") from None
+    with refusing(name, "CSV or G-code that can be followed"), _opened(file) as handle:
+        is_table, lines = _begun(lines_of(handle, 10 * most, "a path"), file.suffix.lower())
+        if is_table:
+            table = CsvTable(lines, mechanism)
+            blocks, has_times = _counted(table.blocks(), most), table.has_times
+            if longest is not None:
+                blocks = divided(blocks, longest)
+        else:
+            step = LONGEST * length if longest is None else longest
+            passed: dict[str, int] = {}
+            program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed)
+            blocks, has_times = _program(program, passed, most), True
+        if has_times or sample_time is not None or rate is not None:
+            blocks = timed(blocks, sample_time, rapid)
+        yield from _counted(blocks if rate is None else at_rate(blocks, rate), most)
 
 
 @contextmanager
@@ -144,18 +135,6 @@ def _opened(path: FilePath) -> Iterator[TextIO]:
         text.detach()  # else standard input would be closed with it
         if raw is not standard:
             raw.detach()
-
-
-def _text(handle: TextIO, most: int) -> Iterator[str]:
-    """Lines, up to as many as a file may have, blank ones and comments included, and none of them endless."""
-    number = 0
-    while line := handle.readline(LONGEST_LINE):
-        number += 1
-        if len(line) == LONGEST_LINE or "\0" in line:
-            raise WrongPath(f"line {number}: no text of a path; expected CSV or G-code")
-        if number > most:
-            raise WrongPath(f"more than {most} lines; expected a shorter path, or parts of it")
-        yield line
 
 
 def _begun(lines: Iterator[str], ending: str) -> tuple[bool, Iterator[str]]:
@@ -196,7 +175,7 @@ def _program(steps: Iterator[Move], passed: dict[str, int], most: int) -> Iterat
         feeds, lines = np.array([step.feed for step in part]), [step.line for step in part]
         yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"), dict(passed))
     if count < 2:
-        raise WrongPath("no moves; expected CSV or G-code")
+        raise WrongText("no moves; expected CSV or G-code")
 
 
 def _counted(blocks: Iterable[Path], most: int) -> Iterator[Path]:
@@ -211,4 +190,4 @@ def _counted(blocks: Iterable[Path], most: int) -> Iterator[Path]:
 def _require_few(count: int, lines: Sequence[int], most: int) -> None:
     if count > most:
         found = f"line {lines[most - count]}: more than {most} targets"
-        raise WrongPath(f"{found}; expected a shorter path, parts of it, or longer steps")
+        raise WrongText(f"{found}; expected a shorter path, parts of it, or longer steps")

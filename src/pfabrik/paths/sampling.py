@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..rotations import angles_and_sines
-from .path import BLOCK, MOST_STEPS, Path, WrongPath, joined
+from ..text_lines import WrongText
+from .path import BLOCK, MOST_STEPS, Path, joined
 
 LEAST_TURN = 1e-6
 """Rotations below this angle are rounding [deg]."""
@@ -52,7 +53,7 @@ def divided(blocks: Iterable[Path], longest: float) -> Iterator[Path]:
         far = np.linalg.norm(np.diff(block.targets[:, :3, 3], axis=0), axis=1)
         parts = np.maximum(np.ceil(far / longest * (1.0 - 1e-12)), 1.0)
         if parts.sum() > MOST_STEPS:
-            raise WrongPath(f"line {block.lines[int(parts.argmax()) + 1]}: too many steps; expected longer ones")
+            raise WrongText(f"line {block.lines[int(parts.argmax()) + 1]}: too many steps; expected longer ones")
         ends = np.cumsum(parts).astype(np.int64)
         if is_first:
             yield block.at(np.zeros(1, np.int64), np.zeros(1))
@@ -71,11 +72,11 @@ def at_rate(blocks: Iterable[Path], rate: float) -> Iterator[Path]:
         if times is None or not np.isfinite(times).all():
             place = 0 if times is None else int(np.flatnonzero(~np.isfinite(times))[0])
             fault = "a step without a time; expected a column t or feed, or feeds and a speed of rapid moves"
-            raise WrongPath(f"line {block.lines[place]}: {fault}")
+            raise WrongText(f"line {block.lines[place]}: {fault}")
         begin = float(times[0]) if is_first else begin
         passed = (float(times[-1]) - begin) * rate * (1.0 + 1e-12)
         if passed >= count + MOST_STEPS:  # it may be infinite
-            raise WrongPath(f"line {block.lines[-1]}: more than {MOST_STEPS} samples; expected a lower rate")
+            raise WrongText(f"line {block.lines[-1]}: more than {MOST_STEPS} samples; expected a lower rate")
         total = math.floor(passed) + 1
         for start in range(count, total, BLOCK):
             sampled = np.minimum(begin + np.arange(start, min(start + BLOCK, total)) / rate, times[-1])

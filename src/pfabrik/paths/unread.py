@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from .path import WrongPath
+from ..text_lines import WrongText
 
 WITHOUT_OFFSETS = "positions as the machine has them, without offsets but the first (G54)"
 IN_ONE_PROGRAM = "all moves one after the other in one program"
@@ -67,20 +67,20 @@ CODES: dict[str, tuple[str, str]] = {
 
 
 def refuse_steering(plain: str, number: int) -> None:
-    """WrongPath for a line that steers a program: subroutines, conditions, variables."""
+    """WrongText for a line that steers a program: subroutines, conditions, variables."""
     spaced = " ".join(plain.split())
     if MAY_STEER.search(spaced) is None or spaced.startswith(LABELS):
         return
     for pattern, what, expected in OF_PROGRAMS:
         match = pattern.search(spaced)
         if match:
-            raise WrongPath(f"line {number}: found {match[0].strip()[:20]}, {what}; expected {expected}")
+            raise WrongText(f"line {number}: found {match[0].strip()[:20]}, {what}; expected {expected}")
 
 
 def refuse_code(code: str, number: int) -> None:
-    """WrongPath for a code that is not followed."""
+    """WrongText for a code that is not followed."""
     what, expected = CODES.get(code, ("which is not followed here", PLAIN_MOVES))
-    raise WrongPath(f"line {number}: found {code}, {what}; expected {expected}")
+    raise WrongText(f"line {number}: found {code}, {what}; expected {expected}")
 
 
 def has_offset(code: str, words: Mapping[str, Sequence[float]], axes: str) -> bool:
