@@ -41,15 +41,13 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
     InvalidArgument : a file that is no such table, with its line and column.
     """
     checked_mechanism(mechanism)
-    read = _columns(Path(require_path("path", path)))
-    columns = dict(read)
-    for name in [name for name in columns if name.endswith("_deg")]:
-        columns[name.removesuffix("_deg")] = np.radians(columns.pop(name))
-    for name in ANGLES:
-        if name in columns and name in read:
-            columns[name] = np.radians(columns[name])
-        if f"{name}_rad" in columns:
-            columns[name] = columns.pop(f"{name}_rad")
+    columns: dict[str, Floats] = {}
+    for column, values in _columns(Path(require_path("path", path))).items():
+        bare = column.removesuffix("_rad")
+        name = bare if bare in ANGLES else column.removesuffix("_deg")
+        if name in columns:
+            raise InvalidArgument("path", f"column '{name}' in two units", "one of them")
+        columns[name] = np.radians(values) if column.endswith("_deg") or column in ANGLES else values
     _check_names(columns, mechanism)
     sensors = [n for n in mechanism.coordinate_names if n in columns and n not in mechanism.actuator_names]
     return Measurements(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,12 +12,11 @@ from ..arrays import Floats
 from ..cells import unmarked
 from ..csv_columns import CsvColumns, CsvRows
 from ..description.mechanism import Mechanism
-from ..errors import near_miss
-from ..kinematics import generic_of, passive_series, task_of
+from ..errors import InvalidArgument, near_miss
+from ..kinematics import JointPath, generic_of, joint_path, passive_series, task_of
 from ..poses import pose
 from ..text_lines import WrongText
 from ..tolerances import TOLERANCES
-from .joint_columns import JointColumns, joint_columns
 from .path import BLOCK, AngleUnit, Path
 
 POSITION = ("x", "y", "z")
@@ -90,6 +90,37 @@ class CsvTable:
 def _spelled(cell: str) -> str:
     """The name of a column: those of poses also in capitals."""
     return cell.lower() if cell.lower() in OF_POSES else unmarked(cell)
+
+
+class JointColumns(NamedTuple):
+    """The columns of a header that are coordinates of joints in series, and what they give."""
+
+    path: JointPath
+    columns: tuple[str, ...]
+
+    def poses(self, values: Mapping[str, Floats]) -> Floats:
+        """Targets (n, 4, 4) of the cells of the columns, (n,) each."""
+        q = [
+            np.radians(values[name]) if is_angle and not name.endswith("_rad") else values[name]
+            for name, is_angle in zip(self.columns, self.path.is_angle, strict=True)
+        ]
+        return self.path.poses(np.stack(q, axis=1))
+
+
+def joint_columns(mechanism: Mechanism, header: Sequence[str]) -> JointColumns | None:
+    """The columns that are named after coordinates of a mechanism; None if they are not joints in series to its end.
+
+    Angles are in degrees, as roll, pitch and yaw are, or in the unit behind their names.
+    """
+    angles = {each.name: each.kind == "angle" for each in mechanism.coordinates}
+    known = {name: name for name in angles}
+    known |= {name + unit: name for name, is_angle in angles.items() if is_angle for unit in ("_deg", "_rad")}
+    columns = tuple(name for name in header if name in known)
+    try:
+        path = joint_path(mechanism, tuple(known[name] for name in columns))
+    except InvalidArgument:
+        return None
+    return JointColumns(path, columns)
 
 
 def _check_header(line: int, header: Sequence[str], mechanism: Mechanism) -> None:
