@@ -93,26 +93,26 @@ class Panel:
     """
 
     def __init__(self, gui: viser.GuiApi, mechanism: Mechanism, session: Session, actions: Actions, steps: int) -> None:
-        self._actions, self._touched = actions, None
+        self._gui, self._actions, self._touched = gui, actions, None
+        self._length = mechanism.characteristic_length
         self._status = gui.add_html("")
         self._margins = gui.add_html("")
         with gui.add_folder("Target"):
             task = task_of(mechanism)
             names = compress(COORDINATES, (*task.axes, *task.turns))
-            self._target = {name: self._target_slider(gui, mechanism, name) for name in names}
+            self._target = {name: self._target_slider(mechanism, name) for name in names}
             self._pose = gui.add_html("")
             gui.add_button("Home").on_click(lambda _: actions.go_home())
         in_series = () if session.path is None else session.path.coordinates
         self._joint_readouts = [readout(each, mechanism.length_unit) for each in in_series]
         self._readouts, self._joints = readouts(mechanism), []
-        length = mechanism.characteristic_length
         if in_series:
             with gui.add_folder("Joints"):
-                self._joints = self._sliders(gui, length, self._joint_readouts, session.joints, actions.change_joint)
+                self._joints = self._sliders(self._joint_readouts, session.joints, actions.change_joint)
         with gui.add_folder("Actuators"):
-            self._actuators = self._sliders(gui, length, self._readouts, session.actuators, actions.change_actuator)
-        self._add_path(gui, steps)
-        self._add_modes(gui)
+            self._actuators = self._sliders(self._readouts, session.actuators, actions.change_actuator)
+        self._add_path(steps)
+        self._add_modes()
         self._workspace = gui.add_checkbox("Workspace at this orientation", initial_value=False)
         self._workspace.on_update(_of_users(lambda event: actions.show_workspace(event.target.value)))
         self._border = gui.add_html("")
@@ -129,9 +129,9 @@ class Panel:
         named = coordinates(session.target)
         for name, slider in self._target.items():
             self._set(slider, named[name])
-        for slider, shown, value in zip(self._actuators, self._readouts, session.actuators, strict=True):
-            self._set(slider, float(shown.display(value)))
-        for slider, shown, value in zip(self._joints, self._joint_readouts, session.joints, strict=True):
+        of_actuators = zip(self._actuators, self._readouts, session.actuators, strict=True)
+        of_joints = zip(self._joints, self._joint_readouts, session.joints, strict=True)
+        for slider, shown, value in (*of_actuators, *of_joints):
             self._set(slider, float(shown.display(value)))
 
     def tell(self, words: str, *, alarming: bool = False) -> None:
@@ -171,37 +171,31 @@ class Panel:
         if slider is not self._touched:
             slider.value = float(np.clip(round(value, DIGITS), slider.min, slider.max)) + 0.0
 
-    def _target_slider(self, gui: viser.GuiApi, mechanism: Mechanism, name: str) -> Any:
-        if name in ("x", "y", "z"):
-            home = float(mechanism.home_pose["xyz".index(name), 3])
-            far = FAR * mechanism.characteristic_length
-            slider = _slider(gui, f"{name} [{mechanism.length_unit}]", *rounded(home - far, home + far), home)
-        else:
-            slider = _slider(gui, f"{name} [deg]", -180.0, 180.0, 0.0)
-        return self._heard(slider, lambda value: self._actions.change_target(name, value))
+    def _target_slider(self, mechanism: Mechanism, name: str) -> Any:
+        low, high, at, unit = -180.0, 180.0, 0.0, "deg"
+        if name in "xyz":
+            at, far, unit = float(mechanism.home_pose["xyz".index(name), 3]), FAR * self._length, mechanism.length_unit
+            low, high = rounded(at - far, at + far)
+        return self._slider(f"{name} [{unit}]", low, high, at, lambda value: self._actions.change_target(name, value))
 
-    def _sliders(
-        self,
-        gui: viser.GuiApi,
-        length: float,
-        shown: Sequence[Readout],
-        values: Floats,
-        change: Callable[[int, float], None],
-    ) -> list[Any]:
+    def _sliders(self, shown: Sequence[Readout], values: Floats, change: Callable[[int, float], None]) -> list[Any]:
         """A slider for each coordinate, over its range, or far enough where there is none."""
         sliders = []
         for place, (each, value) in enumerate(zip(shown, values, strict=True)):
-            at, far = float(each.display(value)), 180.0 if each.is_angle else FAR * length
+            at, far = float(each.display(value)), 180.0 if each.is_angle else FAR * self._length
             free_low, free_high = rounded(at - far, at + far)
             low, high = each.limits
             low, high = (low if np.isfinite(low) else free_low), (high if np.isfinite(high) else free_high)
-            slider = _slider(gui, f"{each.name} [{each.unit}]", low, max(high, low), at)
-            sliders.append(self._heard(slider, partial(_change, change, place, each)))
+            tell = partial(_tell_coordinate, change, place, each)
+            sliders.append(self._slider(f"{each.name} [{each.unit}]", low, max(high, low), at, tell))
         return sliders
 
-    def _heard(self, slider: Any, tell: Callable[[float], None]) -> Any:
-        """Report the values that the user gives a slider; returns the slider."""
+    def _slider(self, label: str, low: float, high: float, value: float, tell: Callable[[float], None]) -> Any:
+        """A slider that tells the values that the user gives it."""
+        step = 10.0 ** np.floor(np.log10(max(high - low, 1e-9) / STEPS))
+        return self._heard(self._gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high))), tell)
 
+    def _heard(self, slider: Any, tell: Callable[[float], None]) -> Any:
         def moved(event: Any) -> None:
             self._touched = event.target
             tell(event.target.value)
@@ -209,25 +203,25 @@ class Panel:
         slider.on_update(_of_users(moved))
         return slider
 
-    def _add_path(self, gui: viser.GuiApi, steps: int) -> None:
+    def _add_path(self, steps: int) -> None:
         self._step: Any = None
         if steps < 2:
             return
-        with gui.add_folder("Path"):
-            playing = gui.add_checkbox("Play", initial_value=False)
+        with self._gui.add_folder("Path"):
+            playing = self._gui.add_checkbox("Play", initial_value=False)
             playing.on_update(_of_users(lambda event: self._actions.play(event.target.value)))
-            self._step = gui.add_slider("step", 1, steps, 1, 1)
+            self._step = self._gui.add_slider("step", 1, steps, 1, 1)
             self._heard(self._step, lambda step: self._actions.take_step(int(step)))
 
-    def _add_modes(self, gui: viser.GuiApi) -> None:
-        with gui.add_folder("Modes", expand_by_default=False):
-            self._add_search(gui, "working", "of this pose")
-            self._add_search(gui, "assembly", "of these actuator values")
-            self._modes = gui.add_dropdown("mode", ("none",), visible=False)
+    def _add_modes(self) -> None:
+        with self._gui.add_folder("Modes", expand_by_default=False):
+            self._add_search("working", "of this pose")
+            self._add_search("assembly", "of these actuator values")
+            self._modes = self._gui.add_dropdown("mode", ("none",), visible=False)
             self._modes.on_update(_of_users(self._chosen))
 
-    def _add_search(self, gui: viser.GuiApi, kind: str, hint: str) -> None:
-        button = gui.add_button(f"{kind.capitalize()} modes", hint=f"All configurations {hint}")
+    def _add_search(self, kind: str, hint: str) -> None:
+        button = self._gui.add_button(f"{kind.capitalize()} modes", hint=f"All configurations {hint}")
         button.on_click(lambda _: self._actions.find_modes(kind))
 
     def _chosen(self, event: Any) -> None:
@@ -236,7 +230,7 @@ class Panel:
             self._actions.take_mode(place - 1)
 
 
-def _change(change: Callable[[int, float], None], place: int, shown: Readout, value: float) -> None:
+def _tell_coordinate(change: Callable[[int, float], None], place: int, shown: Readout, value: float) -> None:
     change(place, shown.coordinate(value))
 
 
@@ -254,11 +248,6 @@ def rounded(low: float, high: float) -> tuple[float, float]:
     """A range with ends that are easily read."""
     unit = 10.0 ** np.floor(np.log10(high - low)) / 10.0
     return float(np.floor(low / unit) * unit), float(np.ceil(high / unit) * unit)
-
-
-def _slider(gui: viser.GuiApi, label: str, low: float, high: float, value: float) -> Any:
-    step = 10.0 ** np.floor(np.log10(max(high - low, 1e-9) / STEPS))
-    return gui.add_slider(label, low, high, float(step), float(np.clip(value, low, high)))
 
 
 # What the panel says, as HTML.

@@ -143,7 +143,7 @@ class Scene:
         return self._scene.add_mesh_simple(f"{MACHINE}/{name}", *mesh, **style)
 
     def _add_many(self, name: str, mesh: Mesh, **style: Any) -> Any:
-        return self._scene.add_batched_meshes_simple(f"{MACHINE}/{name}", *mesh, **style, **PLAIN)
+        return self._scene.add_batched_meshes_simple(f"{MACHINE}/{name}", *mesh, **(style | PLAIN))
 
     def _add_joints(self, kind: str, skeleton: Skeleton) -> Any:
         marks, (vertices, faces) = _of_kind(skeleton, kind), SHAPES[kind]()
