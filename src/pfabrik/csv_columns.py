@@ -31,7 +31,6 @@ class CsvColumns:
     ----------
     spelled : the name of a column from its cell.
     known : names by which the separator is recognised; without them, by the number of cells.
-    comment : the beginning of lines that are passed over; by default there are none.
 
     Attributes
     ----------
@@ -43,19 +42,11 @@ class CsvColumns:
     """
 
     def __init__(
-        self,
-        lines: Iterable[str],
-        spelled: Callable[[str], str] = unmarked,
-        known: Collection[str] = (),
-        comment: str | None = None,
+        self, lines: Iterable[str], spelled: Callable[[str], str] = unmarked, known: Collection[str] = ()
     ) -> None:
-        self._separator, lines = _separated(iter(lines), lambda cell: spelled(cell) in known, comment)
+        self._separator, lines = _separated(iter(lines), lambda cell: spelled(cell) in known)
         self._decimal = "." if self._separator == "," else None
-        self._rows = (
-            (number, cells)
-            for number, cells in _numbered(lines, self._separator)
-            if any(cells) and not _is_comment(cells[0], comment)
-        )
+        self._rows = (row for row in _numbered(lines, self._separator) if any(row[1]))
         self.line, header = next(self._rows, (1, []))
         if not header:
             raise WrongText("empty; expected a header that names columns")
@@ -97,16 +88,12 @@ class CsvColumns:
         return number
 
 
-def _is_comment(text: str, comment: str | None) -> bool:
-    return comment is not None and text.lstrip().startswith(comment)
-
-
-def _separated(lines: Iterator[str], is_known: Callable[[str], bool], comment: str | None) -> tuple[str, Iterator[str]]:
+def _separated(lines: Iterator[str], is_known: Callable[[str], bool]) -> tuple[str, Iterator[str]]:
     """The separator of cells, from a first line that gives it or from the column names in the header; and all lines."""
     read: list[str] = []
     for line in lines:
         read.append(line)
-        if line.strip() and not _is_comment(line, comment):
+        if line.strip():
             break
     stated = SAID.fullmatch(read[-1].strip()) if read else None
     if stated is not None:

@@ -30,7 +30,8 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
     Columns, in any order: every actuator; and of `x`, `y`, `z` with `roll`, `pitch`, `yaw` [deg] (or `qx`, `qy`, `qz`,
     `qw`), `height`, names of other coordinates that a sensor reads, and `distance` with `distance_to`, the line of
     another row (the first one below the header is 1). An angle's column is in radians, or degrees if `_deg` is behind
-    its name; roll, pitch and yaw the other way round, with `_rad`. Empty cells were not measured.
+    its name; roll, pitch and yaw the other way round, with `_rad`. Empty cells were not measured. Lines that begin
+    with # are passed over.
 
     Parameters
     ----------
@@ -65,7 +66,8 @@ def _columns(path: Path) -> dict[str, Floats]:
     """The numbers of a table by column; NaN for empty cells."""
     try:
         with refusing(str(path), "a CSV file of measurements"), path.open("rb") as raw, as_text(raw) as text:
-            table = CsvColumns(lines_of(text, MOST_ROWS, "a table"), comment="#")
+            lines = lines_of(text, MOST_ROWS, "a table")
+            table = CsvColumns("\n" if line.lstrip().startswith("#") else line for line in lines)
             for rows in table.rows(MOST_ROWS):
                 return {name: np.array(table.numbers(rows, name, gaps=True), float) for name in table.header}
             raise WrongText("no line of numbers; expected a header, then a configuration a line")
