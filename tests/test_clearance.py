@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,10 +16,14 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from checks import INTERPRETED, actuator_units
 from in_mujoco import Model, mujoco
+from links import by_cases, distances_of_struts, struts, thick_hexaglide
+from oracles import targets_about
 from pfabrik.answers.active_limits import ActiveLimit, binding_limits
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
+from pfabrik.files import loads
 from pfabrik.files.units import metres_of
 from pfabrik.files.writing import dumps
 from pfabrik.interop import qpos as mjcf_qpos
@@ -27,60 +32,23 @@ from pfabrik.kernels.clearance.capsules import capsule_clearance
 from pfabrik.kernels.clearance.least_clearance import least_clearance
 from pfabrik.kernels.clearance.solids import BOX, CAPSULE, DISC
 from pfabrik.skeleton import skeleton_of
-from test_compiled_and_interpreted import INTERPRETED
+from slopes import beside, slopes
 
 Array = NDArray[np.float64]
-ROWS = 500 if INTERPRETED else 100_000
+ROWS = 500 if INTERPRETED else 20_000
 SLOW = pytest.mark.slow if INTERPRETED else ()
 KINDS = ("capsule", "box", "disc")
-
-STRUTS = {
-    "base": [[100, 20, 0], [100, -20, 0]],
-    "platform": [[40, 40, 195], [40, -40, 195]],
-    "stroke": (155, 280),
-    "copies": {"count": 3, "axis": [0, 0, 1]},
-    "reference_point": [0, 0, 195],
-}
 DELTA = (Path(pf.__file__).parent / "catalog" / "delta.toml").read_text()
 
 
-def struts(thickness: float = 12.0, **more: object) -> pf.Mechanism:
-    return pf.Mechanism.from_legs("U-P*-S", thickness=thickness, **STRUTS, **more)  # type: ignore[arg-type]
+def around(machine: pf.Mechanism, count: int, shift: float, turn: float) -> pf.Solution:
+    """Answers at poses near home [L and rad]."""
+    return pf.solve_ik(machine, targets_about(machine, np.random.default_rng(3), count, shift, turn))
 
 
-def around(machine: pf.Mechanism, count: int, length: float, angle: float) -> pf.Solution:
-    """Answers at poses near home."""
-    rng = np.random.default_rng(3)
-    targets = np.tile(machine.home_pose, (count, 1, 1))
-    targets[:, :3, 3] += rng.uniform(-length, length, (count, 3))
-    targets[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-angle, angle, (count, 3))).as_matrix() @ targets[:, :3, :3]
-    return pf.solve_ik(machine, targets)
-
-
-def axes_of_struts(poses: Array) -> Array:
-    """Both ends of the axes of all struts of `struts` at poses, (n, 6, 2, 3), by their points alone."""
-    ends = []
-    for k in range(3):
-        turn = Rotation.from_euler("z", 120.0 * k, degrees=True).as_matrix()
-        for foot, head in zip(STRUTS["base"], STRUTS["platform"], strict=True):
-            local = turn @ np.array(head, float) - STRUTS["reference_point"]
-            moved = poses[:, :3, :3] @ local + poses[:, :3, 3]
-            ends.append(np.stack([np.broadcast_to(turn @ np.array(foot, float), moved.shape), moved], axis=1))
-    return np.stack(ends, axis=1)
-
-
-def distances_of_struts(poses: Array, thickness: float = 12.0) -> dict[str, Array]:
-    """The distances of all pairs of struts at poses, (n,), by the names of their bodies."""
-    axes = axes_of_struts(poses)
-    return {
-        f"BC{i + 1}–BC{j + 1}": by_cases(np.concatenate([axes[:, i], axes[:, j]], axis=1)) - thickness
-        for i, j in itertools.combinations(range(6), 2)
-    }
-
-
-def refused(make: object, *args: object, **kwargs: object) -> list[str]:
+def refused(make: Callable[[], object]) -> list[str]:
     with pytest.raises(InvalidMechanism) as caught:
-        make(*args, **kwargs)  # type: ignore[operator]
+        make()
     return [str(fault) for fault in caught.value.faults]
 
 
@@ -100,27 +68,6 @@ def random_segments(rng: np.random.Generator, count: int) -> Array:
     ends[kind == 4, 3] = (2.0 * middle - ends[:, 2])[kind == 4]
     ends[kind == 5, 2] = ends[kind == 5, 1]
     return ends
-
-
-def by_cases(ends: Array) -> Array:
-    """Distances by all cases of the quadratic programme in two parameters: four ends, and inside in 80 bits."""
-    p, q, x, y = np.moveaxis(ends.astype(np.longdouble), 1, 0)
-
-    def to_line(point: Array, start: Array, end: Array) -> Array:
-        d = end - start
-        square = (d * d).sum(-1)
-        t = np.clip(((point - start) * d).sum(-1) / np.where(square > 0, square, 1), 0, 1)
-        return np.linalg.norm((start + t[:, None] * d - point).astype(float), axis=1)
-
-    least = np.min([to_line(p, x, y), to_line(q, x, y), to_line(x, p, q), to_line(y, p, q)], axis=0)
-    d, e, w = q - p, y - x, x - p
-    n = np.cross(d, e)
-    square = (n * n).sum(-1)
-    some = np.where(square > 0, square, 1)
-    s, t = (np.cross(w, e) * n).sum(-1) / some, (np.cross(w, d) * n).sum(-1) / some
-    inside = (square > 0) & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-    distance = np.abs((w * n).sum(-1)) / np.sqrt(some)
-    return np.where(inside, np.minimum(distance, least), least).astype(float)
 
 
 def test_segments_are_as_far_apart_as_the_cases_of_their_quadratic_programme_say() -> None:
@@ -192,9 +139,9 @@ def measured(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[floa
     return float(clearance[0]), points[0]
 
 
-COMBINATIONS = list(itertools.product(KINDS, KINDS))
+COMBINATIONS = list(itertools.combinations_with_replacement(KINDS, 2))
 PAIRS = [
-    *(pytest.param(*kinds, 6 if INTERPRETED else 150, id="-".join(kinds)) for kinds in COMBINATIONS),
+    *(pytest.param(*kinds, 6 if INTERPRETED else 60, id="-".join(kinds)) for kinds in COMBINATIONS),
     *(
         pytest.param(*kinds, 12_000, id=f"{'-'.join(kinds)}-many", marks=pytest.mark.campaign)
         for kinds in ([] if INTERPRETED else COMBINATIONS)
@@ -248,7 +195,7 @@ def test_overlapping_solids_are_as_deep_as_the_shortest_way_out(first: str, seco
         if clearance > 0.0:
             assert "capsule" in (first, second)
             continue
-        if k < 20:
+        if k < 4:
             best = directions[np.argsort(way_out(directions))[:3]]
             ends = [
                 minimize(lambda v: way_out(v / np.linalg.norm(v)), n, method="Nelder-Mead", tol=1e-12) for n in best
@@ -265,68 +212,38 @@ def test_overlapping_solids_are_as_deep_as_the_shortest_way_out(first: str, seco
 
 
 def test_struts_are_as_far_apart_as_their_axes_less_their_thickness() -> None:
-    machine = struts()
-    answers = around(machine, 20 if INTERPRETED else 200, 60, 0.4)
-    found = pf.clearance(answers)
-    starts = np.stack([answers.points[f"A{k}"] for k in range(1, 7)])
-    ends = np.stack([answers.points[f"C{k}"] for k in range(1, 7)])
-    pairs = list(itertools.combinations(range(6), 2))
-    by_pair = [by_cases(np.stack([starts[i], ends[i], starts[j], ends[j]], axis=1)) - 12.0 for i, j in pairs]
-    valid = np.isfinite(answers.position_error)
-    np.testing.assert_allclose(np.asarray(found.distance)[valid], np.min(by_pair, axis=0)[valid], atol=1e-9)
-    named = [pairs.index(tuple(sorted(int(name[2:]) - 1 for name in row))) for row in np.asarray(found.links)]
-    np.testing.assert_allclose(np.array(by_pair)[named, range(len(named))], found.distance, atol=1e-9)
+    """All pairs, as margins beyond a clearance, and the nearest of them, with its points."""
+    machine = struts(clearance=2.0)
+    answers = around(machine, 20 if INTERPRETED else 200, 0.2, 0.2)
+    found, margins, expected = pf.clearance(answers), pf.margins(answers), distances_of_struts(answers.pose)
+    assert {name for name, bound in margins if bound == "clearance"} == set(expected)
+    for name, distance in expected.items():
+        room = (distance - 2.0) / machine.characteristic_length
+        np.testing.assert_allclose(margins[name, "clearance"], room, atol=1e-9)
+    np.testing.assert_allclose(found.distance, np.min(list(expected.values()), axis=0), atol=1e-9)
+    named = [expected["–".join(sorted(links))][row] for row, links in enumerate(np.asarray(found.links).tolist())]
+    np.testing.assert_allclose(named, found.distance, atol=1e-9)
     gaps = np.linalg.norm(found.points[:, 1] - found.points[:, 0], axis=-1)
     np.testing.assert_allclose(gaps, np.abs(found.distance), atol=1e-9)
+    assert not [limit for limit in pf.margins(around(struts(), 2, 0.1, 0.2)) if limit[1] == "clearance"]
 
 
-def test_one_answer_has_one_distance_and_the_same_as_in_a_batch() -> None:
+def test_one_answer_has_one_distance_and_the_same_as_in_a_batch_and_invalid_rows_none() -> None:
     machine = struts()
-    answers = around(machine, 5, 40, 0.2)
-    found, one = pf.clearance(answers), pf.clearance(answers[3])
-    assert isinstance(one.distance, float)
-    assert one.distance == np.asarray(found.distance)[3]
-    assert one.links == tuple(np.asarray(found.links)[3])
-    np.testing.assert_array_equal(one.points, found.points[3])
-    assert f"'{one.links[0]}'" in repr(one)
-    for shapes in (
-        (),
-        [
-            pf.Shape("base", "box", at=(0, 0, -20), size=(9, 9, 9)),
-            pf.Shape("AB1", "sphere", at=(90, 22, 32), diameter=16),
-        ],
-    ):
-        machine = struts(12.0, shapes=shapes)
+    targets = np.stack([machine.home_pose, np.full((4, 4), np.nan), machine.home_pose])
+    targets[2, 0, 3] += 20.0
+    answers = pf.solve_ik(machine, targets, options=pf.Options(on_invalid="mark"))
+    found, one = pf.clearance(answers), pf.clearance(answers[2])
+    assert isinstance(one.distance, float) and one.distance == np.asarray(found.distance)[2]
+    assert one.links == tuple(np.asarray(found.links)[2]) and f"'{one.links[0]}'" in repr(one)
+    np.testing.assert_array_equal(one.points, found.points[2])
+    assert np.isnan(np.asarray(found.distance)).tolist() == [False, True, False] and np.isnan(found.points[1]).all()
+    assert np.asarray(found.links)[1].tolist() == ["", ""]
+    box = pf.Shape("base", "box", at=(0, 0, -20), size=(9, 9, 9))
+    for machine in (struts(), struts(shapes=[box])):
         none = pf.clearance(pf.solve_ik(machine, np.empty((0, 4, 4))))
         assert np.shape(none.distance) == (0,) and none.points.shape == (0, 2, 3) and none.links.shape == (0, 2)
         assert none.gradient.shape == (0, 6) and "no configuration" in repr(none)
-
-
-def test_a_row_without_a_configuration_has_no_clearance() -> None:
-    machine = struts()
-    targets = np.stack([machine.home_pose, np.full((4, 4), np.nan)])
-    found = pf.clearance(pf.solve_ik(machine, targets, options=pf.Options(on_invalid="mark")))
-    assert np.isnan(np.asarray(found.distance)).tolist() == [False, True]
-    assert np.asarray(found.links)[1].tolist() == ["", ""]
-    assert np.isnan(found.points[1]).all()
-
-
-def test_a_machine_ten_times_as_large_has_ten_times_the_clearance() -> None:
-    machine = struts()
-    scaled = pf.Mechanism.from_legs(
-        "U-P*-S",
-        base=10.0 * np.array(STRUTS["base"]),
-        platform=10.0 * np.array(STRUTS["platform"]),
-        stroke=(1550, 2800),
-        copies={"count": 3, "axis": [0, 0, 1]},
-        reference_point=[0, 0, 1950],
-        thickness=120,
-    )
-    answers = around(machine, 20, 40, 0.3)
-    poses = answers.pose.copy()
-    poses[:, :3, 3] *= 10.0
-    by_ten = pf.clearance(pf.solve_ik(scaled, poses))
-    np.testing.assert_allclose(by_ten.distance, 10.0 * np.asarray(pf.clearance(answers).distance), atol=1e-6)
 
 
 THICK_DELTA = (
@@ -361,23 +278,13 @@ at = [0, 0, 60]
 size = [300, 200, 20]
 """
 )
-HEXAGLIDE = (Path(pf.__file__).parent / "catalog" / "hexaglide.toml").read_text()
-THICK_HEXAGLIDE = HEXAGLIDE + "".join(
-    f'\n[[body]]\nname = "rod{side}{k}"\nthickness = 8\n' for side in "LR" for k in (1, 2, 3)
-)
-THICK_HEXAGLIDE += '\n[[body]]\nname = "platform"\nshape = "sphere"\nat = [0, 0, 260]\ndiameter = 30\n'
 
 
-def loaded(text: str, folder: Path) -> pf.Mechanism:
-    (folder / "machine.toml").write_text(text)
-    return pf.load(folder / "machine.toml")
-
-
-def thick_servo() -> pf.Mechanism:
-    machine = pf.load("servo_hexapod")
-    inner = [body for body in machine.bodies if body not in ("base", machine.end_effector)]
-    plate = pf.Shape("base", "box", at=(0, 0, -6), size=(60, 40, 2), axes=((0.8, 0.6, 0), (-0.6, 0.8, 0)))
-    return machine.with_shapes([plate, *(pf.Shape(body, thickness=2.2) for body in inner)])
+def thick_delta() -> pf.Mechanism:
+    """Rods on either side of the platform are left out: they end side by side."""
+    machine = loads(THICK_DELTA)
+    beside = [(f"rodL{i}", f"rod{side}{j}") for side in "LR" for i in (1, 2, 3) for j in (1, 2, 3)]
+    return machine.with_shapes(machine.shapes, beside)
 
 
 def bar(machine: pf.Mechanism, body: str, ends: tuple[str, str], off: float, width: float) -> pf.Shape:
@@ -405,7 +312,13 @@ def struts_around_a_column() -> pf.Mechanism:
     column = pf.Shape("base", "box", at=(0, 0, 60), size=(60, 80, 120), axes=((0.8, 0.6, 0), (-0.6, 0.8, 0)))
     plate = pf.Shape("platform", "disc", at=(0, 0, 150), axis=(0, 0.1, 1), diameter=50, thickness=10)
     beside = [("BC1", "BC2"), ("BC3", "BC4"), ("BC5", "BC6"), ("AB1", "BC4"), ("BC2", "AB5"), ("BC3", "BC6")]
-    return struts(12.0, shapes=[column, plate], ignore=beside)
+    return struts(shapes=[column, plate], ignore=beside)
+
+
+def hexaglide_with_a_ball() -> pf.Mechanism:
+    machine = thick_hexaglide(8.0)
+    ball = pf.Shape("platform", "sphere", at=(0, 0, 260), diameter=30)
+    return machine.with_shapes([*machine.shapes, ball]).with_clearance(None)
 
 
 def with_boxes_as_meshes(text: str) -> str:
@@ -450,34 +363,45 @@ def in_mujoco(machine: pf.Mechanism, answers: pf.Solution) -> Array:
     return np.array(found)
 
 
-def machine_named(name: str, folder: Path) -> pf.Mechanism:
-    made = {"servo_hexapod": thick_servo, "five_bar": five_bar_of_plates, "struts": struts_around_a_column}
-    texts = {"delta": THICK_DELTA, "hexaglide": THICK_HEXAGLIDE}
-    return loaded(texts[name], folder) if name in texts else made[name]()
-
-
 @pytest.mark.parametrize(
-    ("name", "length", "angle"),
+    ("make", "shift", "turn"),
     [
-        ("five_bar", 55, 0.0),
-        ("struts", 45, 0.3),
-        ("delta", 130, 0.0),
-        pytest.param("hexaglide", 60, 0.4, marks=SLOW),
-        pytest.param("servo_hexapod", 12, 0.1, marks=SLOW),
+        (five_bar_of_plates, 0.4, 0.0),
+        (struts_around_a_column, 0.3, 0.3),
+        (thick_delta, 0.5, 0.0),
+        pytest.param(hexaglide_with_a_ball, 0.3, 0.4, marks=SLOW),
     ],
 )
 def test_links_are_as_far_apart_as_in_the_exported_machine(
-    name: str, length: float, angle: float, tmp_path: Path
+    make: Callable[[], pf.Mechanism], shift: float, turn: float
 ) -> None:
-    machine = machine_named(name, tmp_path)
-    assert loaded(dumps(machine), tmp_path) == machine
-    if name in ("delta", "hexaglide"):
-        machine = with_pairs_that_part(name, tmp_path)
-    answers = around(machine, 2 if INTERPRETED else 1_000, length, angle)
+    machine = make()
+    assert loads(dumps(machine)) == machine
+    answers = around(machine, 2 if INTERPRETED else 400, shift, turn)
     found, expected = np.asarray(pf.clearance(answers).distance), in_mujoco(machine, answers)
     assert (expected > 0.0).any()
     np.testing.assert_array_equal(found > 0.0, expected > 0.0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * machine.characteristic_length)
+
+
+def struts_about_a_ball() -> pf.Mechanism:
+    plate = pf.Shape("platform", "disc", at=(0, 0, 205), axis=(0, 0, 1), diameter=150, thickness=10)
+    return struts(shapes=[plate, pf.Shape("base", "sphere", at=(0, 0, 150), diameter=20)])
+
+
+@pytest.mark.parametrize("make", [struts_about_a_ball, pytest.param(thick_delta, marks=SLOW)])
+def test_gradients_are_the_differences_by_actuators(make: Callable[[], pf.Mechanism]) -> None:
+    machine = make()
+    answers, compared = around(machine, 20, 0.2, 0.1), 0
+    found, units = pf.clearance(answers), actuator_units(machine) / machine.characteristic_length
+    for row in np.flatnonzero((answers.status == pf.Status.REACHED) & (np.abs(found.distance) > 1e-3)):
+        near = beside(answers[int(row)])
+        there = pf.clearance(near)
+        changes = slopes(machine, np.asarray(there.distance)) * units
+        same = ((there.links == found.links[row]).all(axis=(0, 2))) & (near.status == pf.Status.REACHED).all(axis=0)
+        np.testing.assert_allclose((found.gradient[row] * units)[same], changes[same], rtol=0, atol=1e-4)
+        compared += np.count_nonzero(same & (np.abs(changes) > 1e-2))
+    assert compared > 5
 
 
 def test_links_that_share_a_joint_or_are_ignored_are_left_out() -> None:
@@ -503,14 +427,8 @@ def test_a_machine_without_thickness_has_no_clearance() -> None:
         pf.clearance(pf.solve_ik(machine, machine.home_pose))
     with pytest.raises(InvalidArgument):
         pf.clearance(machine)  # type: ignore[arg-type]
-
-
-def test_links_that_overlap_at_home_are_named_with_how_deep() -> None:
-    faults = refused(struts, 45.0)
-    assert "leg[0].thickness: found 'BC2', which is 5 deep in 'BC1' at home" in faults[0]
-    assert struts(29.282)
-    ignored = [("BC1", "BC2"), ("BC3", "BC4"), ("BC5", "BC6"), ("BC1", "BC4"), ("BC2", "BC5"), ("BC3", "BC6")]
-    assert struts(45.0, ignore=ignored).ignore == tuple(ignored)
+    with pytest.raises(InvalidArgument, match="a list of Shape"):
+        struts(shapes=5)
 
 
 @pytest.mark.parametrize(
@@ -528,75 +446,61 @@ def test_links_that_overlap_at_home_are_named_with_how_deep() -> None:
         ('name = "rodL"\nthickness = 3\nends = [[0, 0, 0]]', "body[0].ends", "two points"),
     ],
 )
-def test_what_no_body_can_have_is_named_at_its_place(said: str, place: str, words: str, tmp_path: Path) -> None:
-    faults = refused(loaded, f"{DELTA}\n[[body]]\n{said}\n", tmp_path)
-    assert faults[0].startswith(f"{tmp_path / 'machine.toml'}: {place}:") or faults[0].startswith(f"{place}:"), faults
+def test_what_no_body_can_have_is_named_at_its_place(said: str, place: str, words: str) -> None:
+    faults = refused(lambda: loads(f"{DELTA}\n[[body]]\n{said}\n"))
+    assert f"{place}:" in faults[0]
     assert words in faults[0]
     assert len(faults) == 1
 
 
-def test_a_clearance_in_a_file_must_be_one_that_home_keeps(tmp_path: Path) -> None:
-    wrong = {
-        "clearance = -1": "0 or more",
-        "clearance = 'x'": "a number",
-        "clearance = 2": "links with a thickness",
-    }
-    for line, expected in wrong.items():
-        assert expected in refused(loaded, DELTA.replace("schema = 1", f"schema = 1\n{line}"), tmp_path)[0]
-    assert "28 from 'BC1' at home; expected links that are at least 30 apart" in refused(struts, clearance=30)[0]
+ONE_BALL = pf.Shape("base", "sphere", at=(0, 0, -50), diameter=1)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: struts(45.0), "leg[0].thickness: found 'BC2', which is 5 deep in 'BC1' at home"),
+        (lambda: struts({}), "a number"),
+        (lambda: struts(clearance=30), "28 from 'BC1' at home; expected links that are at least 30 apart"),
+        (lambda: pf.load("stewart").with_shapes([1]), "found [1]"),
+        (lambda: pf.load("stewart").with_shapes([ONE_BALL] * 301), "at most 300"),
+        (lambda: pf.load("stewart").with_shapes((), ignore=7), "pairs of bodies"),
+        (lambda: pf.load("stewart").with_shapes((), ignore=["base"]), "two bodies"),
+        *(
+            (lambda line=line: loads(DELTA.replace("schema = 1", f"schema = 1\nclearance = {line}")), words)
+            for line, words in (("-1", "0 or more"), ("'x'", "a number"), ("2", "links with a thickness"))
+        ),
+    ],
+)
+def test_shapes_and_clearances_that_no_machine_can_have_are_named(make: Callable[[], object], words: str) -> None:
+    assert words in refused(make)[0]
+
+
+def test_links_may_be_as_thick_as_home_lets_them_and_a_clearance_is_kept_in_a_file() -> None:
+    assert struts(29.282)
+    ignored = [("BC1", "BC2"), ("BC3", "BC4"), ("BC5", "BC6"), ("BC1", "BC4"), ("BC2", "BC5"), ("BC3", "BC6")]
+    assert struts(45.0, ignore=ignored).ignore == tuple(ignored)
     kept = struts(clearance=2)
-    assert loaded(dumps(kept), tmp_path) == kept
+    assert loads(dumps(kept)) == kept
     assert kept.with_clearance(None).clearance is None and kept != kept.with_clearance(3)
 
 
-def test_copies_of_a_body_have_its_shape_turned_with_them(tmp_path: Path) -> None:
-    machine = loaded(THICK_DELTA, tmp_path)
+def test_copies_of_a_body_have_its_shape_turned_with_them() -> None:
+    machine = loads(THICK_DELTA)
     arms = [shape for shape in machine.shapes if shape.body.startswith("arm")]
     assert [shape.body for shape in arms] == ["arm1", "arm2", "arm3"]
     for k, shape in enumerate(arms, start=1):
         np.testing.assert_allclose(shape.ends[0], machine.joint(f"A{k}").at, atol=1e-9)  # type: ignore[index]
     with_dimension = THICK_DELTA.replace("thickness = 14", 'thickness = "2 * wide"') + "\n[dimensions]\nwide = 7\n"
-    assert loaded(with_dimension, tmp_path).shapes == machine.shapes
-    assert "wide" in dumps(loaded(with_dimension, tmp_path))
-
-
-def with_pairs_that_part(name: str, folder: Path) -> pf.Mechanism:
-    """A machine in which the nearest pair is not one of rods that end side by side on the platform."""
-    if name == "struts":
-        plate = pf.Shape("platform", "disc", at=(0, 0, 205), axis=(0, 0, 1), diameter=150, thickness=10)
-        return struts(12.0, shapes=[plate, pf.Shape("base", "sphere", at=(0, 0, 150), diameter=20)])
-    machine = machine_named(name, folder)
-    beside = [(f"rodL{i}", f"rod{side}{j}") for side in "LR" for i in (1, 2, 3) for j in (1, 2, 3)]
-    return machine.with_shapes(machine.shapes, beside)
-
-
-@pytest.mark.parametrize("name", ["struts", pytest.param("delta", marks=SLOW)])
-def test_gradients_are_the_differences_by_actuators(name: str, tmp_path: Path) -> None:
-    machine = with_pairs_that_part(name, tmp_path)
-    length, angle = {"struts": (25, 0.1), "delta": (90, 0.0)}[name]
-    answers = around(machine, 20, length, angle)
-    found = pf.clearance(answers)
-    units = np.array([1.0 if drive.kind == "angle" else machine.characteristic_length for drive in machine.drives])
-    compared = 0
-    for row in range(20):
-        if answers.status[row] != pf.Status.REACHED or abs(found.distance[row]) < 1e-3:
-            continue
-        for place, unit in enumerate(units):
-            step = 1e-6 * unit * np.eye(len(units))[place]
-            ends = [pf.solve_fk(machine, answers.actuators[row] + sign * step, start=answers[row]) for sign in (-1, 1)]
-            low, high = (pf.clearance(end) for end in ends)
-            if low.links == high.links == tuple(found.links[row]) and ends[0] and ends[1]:
-                change, scale = (high.distance - low.distance) / (2e-6 * unit), machine.characteristic_length / unit
-                assert found.gradient[row, place] == pytest.approx(change, abs=1e-4 * scale)
-                compared += abs(change) > 1e-2 * scale
-    assert compared > 5
+    assert loads(with_dimension).shapes == machine.shapes
+    assert "wide" in dumps(loads(with_dimension))
 
 
 # What is shown
 
 
 def test_pictures_and_the_viewer_have_links_as_thick_as_they_are() -> None:
-    machine = struts(12.0, shapes=[pf.Shape("base", "box", at=(0, 0, -20), size=(240, 200, 10))])
+    machine = struts(shapes=[pf.Shape("base", "box", at=(0, 0, -20), size=(240, 200, 10))])
     skeleton = skeleton_of(pf.solve_ik(machine, machine.home_pose))
     box, strut = skeleton.solids[0], skeleton.solids[1]
     np.testing.assert_allclose(np.ptp(box.vertices, axis=0), [240, 200, 10])
@@ -606,50 +510,34 @@ def test_pictures_and_the_viewer_have_links_as_thick_as_they_are() -> None:
     assert abs(volume) == pytest.approx(np.pi * 36 * length + 4 / 3 * np.pi * 216, rel=0.05)
     assert sum(solid.is_nearest for solid in skeleton.solids) == 2
     assert not any(solid.is_stopped for solid in skeleton.solids)
-    assert len(pf.plot(machine).collections) > len(pf.plot(pf.load("stewart")).collections)
 
 
-def test_the_command_says_how_far_apart_links_are(tmp_path: Path) -> None:
-    file = tmp_path / "hexapod.toml"
-    file.write_text(dumps(struts()))
-    shown = CliRunner().invoke(main, ["info", str(file)]).output
-    assert "BC1       capsule" in shown or "BC1   capsule" in shown
-    assert "at home BC" in shown
-    ik = ["ik", str(file), "--position", "0", "0", "200", "--margins"]
-    assert "17.282 mm apart (no clearance is kept)" in CliRunner().invoke(main, ik).output
-    plain = json.loads(CliRunner().invoke(main, [*ik, "--json"]).output)
+def test_the_command_says_how_far_apart_links_are_and_which_clearance_is_kept(tmp_path: Path) -> None:
+    def said(*words: str) -> str:
+        return CliRunner().invoke(main, list(words)).output
+
+    free, kept = str(tmp_path / "free.toml"), str(tmp_path / "kept.toml")
+    pf.save(struts(), free)
+    pf.save(struts(clearance=2.0), kept)
+    shown = said("info", free)
+    assert ("BC1       capsule" in shown or "BC1   capsule" in shown) and "at home BC" in shown
+    at = ["--position", "0", "0", "200"]
+    assert "17.282 mm apart (no clearance is kept)" in said("ik", free, *at, "--margins")
+    plain = json.loads(said("ik", free, *at, "--json"))
     assert plain["clearance"]["distance"] == pytest.approx(2 * 14.6410161514 - 12)
-    assert "clearance" not in json.loads(CliRunner().invoke(main, ["ik", "stewart", *ik[2:], "--json"]).output)
-
-
-def test_what_is_no_list_of_shapes_or_too_long_a_one_is_refused() -> None:
-    with pytest.raises(InvalidArgument, match="a list of Shape"):
-        struts(12.0, shapes=5)
-    assert "a number" in refused(struts, {})[0]  # type: ignore[arg-type]
-    assert "found [1]" in refused(pf.load("stewart").with_shapes, [1])[0]
-    many = [pf.Shape("base", "sphere", at=(0, 0, -50), diameter=1)] * 301
-    assert "at most 300" in refused(pf.load("stewart").with_shapes, many)[0]
-    assert "pairs of bodies" in refused(pf.load("stewart").with_shapes, (), ignore=7)[0]
-    assert "two bodies" in refused(pf.load("stewart").with_shapes, (), ignore=["base"])[0]
+    assert "clearance" not in json.loads(said("ik", "stewart", *at, "--json"))
+    shown = said("info", kept)
+    assert "clearance              2 mm kept between links" in shown and "(the clearance kept is 2 mm)" in shown
+    assert json.loads(said("info", "--json", kept))["clearance"] == 2.0
+    assert "BC1–BC4" in (table := said("ik", kept, *at, "--margins")) and "clearance" in table
 
 
 # As a limit
 
 
-def test_every_pair_of_links_has_a_margin_that_is_its_distance_beyond_the_clearance() -> None:
-    machine = struts(clearance=2.0)
-    answers = around(machine, 20, 20, 0.2)
-    found, length = pf.margins(answers), machine.characteristic_length
-    expected = distances_of_struts(answers.pose)
-    assert {name for name, bound in found if bound == "clearance"} == set(expected)
-    for name, distance in expected.items():
-        np.testing.assert_allclose(found[name, "clearance"], (distance - 2.0) / length, atol=1e-9)
-    assert not [limit for limit in pf.margins(around(struts(), 2, 20, 0.2)) if limit[1] == "clearance"]
-
-
 def test_feasibility_is_the_least_of_strokes_and_distances_and_what_solve_ik_reaches() -> None:
     machine = struts(clearance=10.0)
-    n = 100 if INTERPRETED else 20_000
+    n = 100 if INTERPRETED else 4_000
     rng = np.random.default_rng(5)
     turns = rng.uniform(-1.0, 1.0, (n, 3)) * [0.5, 0.5, 2.2]
     targets = pf.pose(machine.home_pose[:3, 3] + rng.uniform(-30, 30, (n, 3)), rotvec=turns)
@@ -670,14 +558,16 @@ def test_feasibility_is_the_least_of_strokes_and_distances_and_what_solve_ik_rea
     np.testing.assert_array_equal(reached.status == 0, expected[rows] >= 0.0)
 
 
-@pytest.mark.parametrize("name", ["delta", "hexaglide"])
-def test_feasibility_knows_links_on_inner_bodies_and_tasks_that_leave_something_open(name: str, tmp_path: Path) -> None:
-    machine = machine_named(name, tmp_path)
+@pytest.mark.parametrize("make", [lambda: loads(THICK_DELTA), hexaglide_with_a_ball], ids=["delta", "hexaglide"])
+def test_feasibility_knows_links_on_inner_bodies_and_tasks_that_leave_something_open(
+    make: Callable[[], pf.Mechanism],
+) -> None:
+    machine = make()
     least = 0.9 * float(pf.clearance(pf.solve_ik(machine, machine.home_pose)).distance)
     kept, length = machine.with_clearance(least), machine.characteristic_length
     rng = np.random.default_rng(4)
     n = 12 if INTERPRETED else 60
-    turns = rng.uniform(-0.2, 0.2, (n, 3)) * (name == "hexaglide")
+    turns = rng.uniform(-0.2, 0.2, (n, 3)) * ("rotation" in machine.task)
     targets = pf.pose(machine.home_pose[:3, 3] + 0.2 * length * rng.uniform(-1, 1, (n, 3)), rotvec=turns)
     free, found = pf.feasibility(machine, targets), pf.feasibility(kept, targets)
     distance = np.asarray(pf.clearance(pf.solve_ik(machine, targets, options=pf.Options(working_mode="keep"))).distance)
@@ -728,13 +618,3 @@ def test_sizes_of_workspaces_are_not_proved_of_a_machine_with_a_clearance() -> N
 def test_names_of_two_bodies_are_whole_however_long_they_are() -> None:
     rows = [(ActiveLimit("a" * 60 + "–" + "b" * 60, "clearance", 1.0, 2.0),), ()]
     assert binding_limits(rows)["joint"].tolist() == ["a" * 60 + "–" + "b" * 60, ""]
-
-
-def test_the_command_says_which_clearance_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "machine.toml"
-    path.write_text(dumps(struts(clearance=2.0)))
-    output = CliRunner().invoke(main, ["info", str(path)]).output
-    assert "clearance              2 mm kept between links" in output and "(the clearance kept is 2 mm)" in output
-    assert json.loads(CliRunner().invoke(main, ["info", "--json", str(path)]).output)["clearance"] == 2.0
-    table = CliRunner().invoke(main, ["ik", str(path), "--position", "0", "0", "195", "--margins"]).output
-    assert "BC1–BC4" in table and "clearance" in table
