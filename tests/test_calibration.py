@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
+from pfabrik.files import loads
 from pfabrik.model import model_of
 from pfabrik.rotations import to_rotvec
 
@@ -58,7 +61,7 @@ def test_sensitivities_are_those_of_machines_made_anew(name: str, kind: str) -> 
     slopes = pf.sensitivity(solution, own)
     home, length = np.array([each.home for each in mechanism.coordinates]), mechanism.characteristic_length
     rng = np.random.default_rng(2)
-    for k in rng.choice(len(own), min(3, len(own)), replace=False):
+    for k in rng.choice(len(own), min(2, len(own)), replace=False):
         step, poses = 1e-5 * own.scales[k], []
         for sign in (1.0, -1.0):
             values = own.values + sign * step * (np.arange(len(own)) == k)
@@ -73,20 +76,28 @@ def test_sensitivities_are_those_of_machines_made_anew(name: str, kind: str) -> 
         assert np.abs(found - expected[: len(found)]).max() < 1e-6 * length / own.scales[k]
 
 
-def test_actuators_at_a_held_pose() -> None:
-    mechanism = pf.load("stewart").without_limits()
-    solution = pf.solve_ik(mechanism, pf.pose([10, 5, 190], rotvec=[0.1, -0.05, 0.03]))
-    own = pf.parameters(mechanism, ["points", "offsets"])
-    slopes = pf.sensitivity(solution, own).actuators
-    for k in (0, 20, 35, 37):
-        both = []
-        for sign in (1.0, -1.0):
-            other = own.apply(own.values + sign * 1e-4 * (np.arange(len(own)) == k))
-            both.append(pf.solve_ik(other, solution.pose).actuators)
-        np.testing.assert_allclose(slopes[:, k], (both[0] - both[1]) / 2e-4, atol=1e-7)
+def stewart_with_a_tool() -> pf.Mechanism:
+    """A platform whose reference point goes by two dimensions."""
+    text = (Path(pf.__file__).parent / "catalog" / "stewart.toml").read_text()
+    point = 'reference_point = [0, "side", "195 + tool"]'
+    return loads(text.replace("reference_point = [0, 0, 195]", point) + "\n[dimensions]\nside = 7\ntool = 20\n")
 
 
-def test_parameters_change_what_they_name(tmp_path: Path) -> None:
+@pytest.mark.parametrize("machine", [pf.load("stewart"), stewart_with_a_tool()], ids=["struts", "tool"])
+def test_pose_and_actuators_change_as_those_of_machines_with_other_values(machine: pf.Mechanism) -> None:
+    mechanism = machine.without_limits()
+    solution = pf.solve_ik(mechanism, mechanism.home_pose @ pf.pose([10, 5, -5], rotvec=[0.3, -0.4, 0.5]))
+    own = pf.parameters(mechanism, ["side", "tool"] if mechanism.dimensions else ["points", "offsets"])
+    found = pf.sensitivity(solution, own)
+    for k in range(0, len(own), 9) if len(own) > 2 else (0, 1):
+        ends = [own.apply(own.values + sign * 1e-4 * (np.arange(len(own)) == k)) for sign in (1.0, -1.0)]
+        values = [pf.solve_ik(end, solution.pose).actuators for end in ends]
+        np.testing.assert_allclose(found.actuators[:, k], (values[0] - values[1]) / 2e-4, atol=1e-7)
+        moved = [pf.solve_fk(end, solution.actuators, start=solution.q).pose[:3, 3] for end in ends]
+        np.testing.assert_allclose(found.pose[:3, k], (moved[0] - moved[1]) / 2e-4, atol=1e-6)
+
+
+def test_parameters_change_what_they_name() -> None:
     delta = pf.load("linear_delta")
     own = pf.parameters(delta, ["lengths", "offsets", "BL1"])
     assert own.names[:4] == ("A1.rod", "A2.rod", "A3.rod", "A1.offset")
@@ -105,22 +116,14 @@ def test_tied_copies_vary_as_one() -> None:
     changed = tied.apply(tied.values + 0.3)
     radii = [math.hypot(*changed.joint(f"AL{k}").at[:2]) for k in (1, 2, 3)]
     assert np.ptp(radii) < 1e-9
-    mixed = pf.parameters(pf.load("five_bar"), "points")
-    with pytest.raises(InvalidArgument, match="turned copies"):
-        pf.parameters(mixed.mechanism, "points", ties="copies")
 
 
-def test_dimensions_are_parameters_by_name(tmp_path: Path) -> None:
-    printer = pf.read_klipper(PRINTER).mechanism
-    own = pf.parameters(printer, ["delta_radius", "arm_length_a"])
+def test_dimensions_are_parameters_by_name() -> None:
+    own = pf.parameters(pf.read_klipper(PRINTER).mechanism, ["delta_radius", "arm_length_a"])
     assert own.apply([164.0, 345.0]).dimensions["delta_radius"] == 164.0
-    solution = pf.solve_ik(printer, [20.0, 10.0, 5.0])
-    slopes = pf.sensitivity(solution, own).pose[:3]
-    for k in (0, 1):
-        ends = [pf.solve_fk(own.apply(own.values + s * np.eye(2)[k]), solution.actuators) for s in (1e-4, -1e-4)]
-        np.testing.assert_allclose(slopes[:, k], (ends[0].pose[:3, 3] - ends[1].pose[:3, 3]) / 2e-4, atol=1e-6)
 
 
+@cache
 def hexapod_data(tilt: float, n: int = 40) -> tuple[pf.Parameters, np.ndarray, np.ndarray, np.ndarray]:
     """A Stewart platform that is not as drawn: its parameters, their true values, and readings at exact poses."""
     rng = np.random.default_rng(3)
@@ -176,7 +179,7 @@ def test_heights_alone_leave_the_arms_open() -> None:
     assert found.rank == 9 and not found.determined[-3:].any() and found.determined[3:6].all()
 
 
-@pytest.mark.parametrize(("repetitions", "within"), [(30, 0.35), pytest.param(200, 0.2, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(("repetitions", "within"), [(16, 0.5), pytest.param(200, 0.2, marks=pytest.mark.campaign)])
 def test_deviations_are_those_of_repetitions(repetitions: int, within: float) -> None:
     mechanism, rng, sigma = pf.load("linear_delta"), np.random.default_rng(6), 0.02
     own = pf.parameters(mechanism, ["lengths", "offsets"])
@@ -192,6 +195,7 @@ def test_deviations_are_those_of_repetitions(repetitions: int, within: float) ->
 
 def test_an_outlier_is_named_and_can_be_left_out() -> None:
     own, true, readings, poses = hexapod_data(tilt=0.15)
+    poses = poses.copy()
     poses[7, 0, 3] += 0.4
     data = pf.Measurements(readings, pose=poses, sigma={"position": 0.01, "orientation": 1e-4})
     found = pf.calibrate(own.mechanism, data)
@@ -241,7 +245,7 @@ def test_suggested_poses_beat_random_ones() -> None:
 def test_tolerances_of_joints_add_to_the_error_of_a_pose() -> None:
     mechanism = pf.load("stewart")
     solution = pf.solve_ik(mechanism, pf.pose([10, 5, 190], rotvec=[0.05, 0.1, 0]))
-    own = pf.parameters(mechanism, ["AL1", "CR2"])
+    own = pf.parameters(mechanism, ["AL1"])
     slopes = pf.sensitivity(solution, own)
     errors = dict.fromkeys(own.names, 0.02) | {"BL1": 0.01}
     worst = pf.accuracy(solution, errors, sensitivity=slopes)
@@ -294,37 +298,52 @@ def test_passive_joints_with_sensors() -> None:
     np.testing.assert_allclose(found.values, [0.02, -0.01], atol=1e-7)
 
 
-def test_wrong_calls_say_what_is_wrong() -> None:
-    mechanism, printer = pf.load("stewart"), pf.read_klipper(PRINTER)
-    own, _, readings, poses = hexapod_data(tilt=0.1, n=4)
-    data = pf.Measurements(readings, pose=poses)
-    with pytest.raises(UnknownName, match="no parameter named 'AL9'"):
-        pf.parameters(mechanism, ["AL9"])
-    with pytest.raises(UnsupportedMechanism, match="calibrated by its lengths"):
-        pf.parameters(mechanism, "lengths")
-    with pytest.raises(InvalidArgument, match="dimensions of a machine that has none"):
-        pf.parameters(mechanism, "dimensions")
-    with pytest.raises(InvalidArgument, match="6 actuators a row"):
-        pf.calibrate(printer.mechanism, data)
-    with pytest.raises(InvalidArgument, match="priors beside measurements without sigma"):
-        pf.calibrate(mechanism, data, priors={"AL1.x": 1.0})
-    with pytest.raises(InvalidArgument, match="parameters of another machine"):
-        pf.calibrate(printer.mechanism, data, free=own)
-    with pytest.raises(InvalidArgument, match="cannot be assembled at"):
-        pf.calibrate(mechanism, pf.Measurements(readings / 25.4, pose=poses))
-    with pytest.raises(InvalidArgument, match="not a rotation"):
-        pf.Measurements(readings, pose=2.0 * poses)
-    with pytest.raises(InvalidArgument, match="not finite"):
-        pf.Measurements(readings * np.nan, pose=poses)
-    with pytest.raises(InvalidArgument, match="one for every quantity"):
-        pf.calibrate(mechanism, pf.Measurements(readings, pose=poses, sigma={"position": 1.0}))
-    with pytest.raises(InvalidArgument, match="measurements: found none"):
-        pf.Measurements(readings)
-    legs = pf.load("rrr")
-    with pytest.raises(UnsupportedMechanism, match="loops do not close with another"):
-        pf.calibrate(
-            legs, pf.Measurements(off_home(legs.without_limits(), 1).actuators[None], height=[0.1]), free="axes"
-        )
+def readings() -> np.ndarray:
+    return hexapod_data(tilt=0.1, n=4)[2]
+
+
+def off_data(**changes: object) -> pf.Measurements:
+    """Measurements of a hexapod with something wrong."""
+    return pf.Measurements(**{"actuators": readings(), "pose": hexapod_data(tilt=0.1, n=4)[3]} | changes)  # type: ignore[arg-type]
+
+
+WRONG: list[tuple[type[Exception], str, Callable[[], object]]] = [
+    (UnknownName, "no parameter named 'AL9'", lambda: pf.parameters(pf.load("stewart"), ["AL9"])),
+    (UnsupportedMechanism, "calibrated by its lengths", lambda: pf.parameters(pf.load("stewart"), "lengths")),
+    (InvalidArgument, "dimensions of a machine that has none", lambda: pf.parameters(pf.load("rps"), "dimensions")),
+    (InvalidArgument, "turned copies", lambda: pf.parameters(pf.load("five_bar"), "points", ties="copies")),
+    (InvalidArgument, "6 actuators a row", lambda: pf.calibrate(pf.load("delta"), off_data())),
+    (
+        InvalidArgument,
+        "priors beside measurements without sigma",
+        lambda: pf.calibrate(pf.load("stewart"), off_data(), priors={"AL1.x": 1.0}),
+    ),
+    (
+        InvalidArgument,
+        "parameters of another machine",
+        lambda: pf.calibrate(pf.load("delta"), off_data(), free=pf.parameters(pf.load("stewart"))),
+    ),
+    (
+        InvalidArgument,
+        "cannot be assembled at",
+        lambda: pf.calibrate(pf.load("stewart"), off_data(actuators=readings() / 25.4)),
+    ),
+    (
+        InvalidArgument,
+        "one for every quantity",
+        lambda: pf.calibrate(pf.load("stewart"), off_data(sigma={"position": 1.0})),
+    ),
+    (InvalidArgument, "not a rotation", lambda: off_data(pose=2.0 * off_data().pose)),  # type: ignore[operator]
+    (InvalidArgument, "not finite", lambda: off_data(actuators=readings() * np.nan)),
+    (InvalidArgument, "measurements: found none", lambda: pf.Measurements(readings())),
+    (InvalidArgument, "rows 2 and 2", lambda: off_data(distances=[(0, 1, 10.0), (2, 2, 3.0)])),
+]
+
+
+@pytest.mark.parametrize(("error", "words", "call"), WRONG, ids=[words for _, words, _ in WRONG])
+def test_wrong_calls_say_what_is_wrong(error: type[Exception], words: str, call: Callable[[], object]) -> None:
+    with pytest.raises(error, match=words):
+        call()
 
 
 def test_a_calibration_shows_itself() -> None:
@@ -374,9 +393,3 @@ def test_a_poor_fit_warns_and_its_deviations_grow() -> None:
     with pytest.warns(UserWarning, match="free 'frame' or 'tool' too"):
         found = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=far, sigma=0.01), free="offsets")
     assert found.deviations.min() > found.rms * 1e-3 and not found.determined.any()
-
-
-def test_a_distance_of_a_reading_from_itself_is_refused() -> None:
-    _, _, readings, _ = hexapod_data(tilt=0.1, n=4)
-    with pytest.raises(InvalidArgument, match="rows 2 and 2"):
-        pf.Measurements(readings, distances=[(0, 1, 10.0), (2, 2, 3.0)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import INTERPRETED
+from links import least_of_struts, struts
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
 from pfabrik.certify.subdividing import region_parameters
@@ -99,7 +101,7 @@ def test_a_stewart_platform_reaches_a_box_that_is_proved_and_not_a_slightly_larg
     assert refuted.verdict == "REFUTED" and refuted.refutation is not None
     assert refuted.refutation.limit[1] in ("min", "max") and refuted.refutation.answer.status == Status.PROJECTED
     for certificate in (proved, refuted):
-        assert_holds(certificate, 5 if INTERPRETED else 50_000, np.random.default_rng(0))
+        assert_holds(certificate, 5 if INTERPRETED else 20_000, np.random.default_rng(0))
     # The margin, from all corners of the box: they are the extremes here to a hundredth.
     corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 6, indexing="ij"), -1).reshape(-1, 6)
     region = stewart_box(34.0, 7.5)
@@ -118,7 +120,7 @@ def test_boxes_at_their_cones_and_ranges_take_few_cells(name: str, half: float, 
     region = PoseRegion.box(centre - half, centre + half, rotation=math.radians(degrees))
     certificate = pf.certify(machine, region, budget=cells)
     assert certificate
-    assert_holds(certificate, 3 if INTERPRETED else 20_000, np.random.default_rng(6))
+    assert_holds(certificate, 3 if INTERPRETED else 5_000, np.random.default_rng(6))
 
 
 @pytest.mark.parametrize("name", POSITIONED)
@@ -127,12 +129,12 @@ def test_verdicts_on_random_regions_hold(name: str) -> None:
     verdicts = set()
     for _ in range(1 if INTERPRETED else 10):
         certificate = pf.certify(machine, random_region(name, rng), budget=10 if INTERPRETED else 20_000)
-        assert_holds(certificate, 3 if INTERPRETED else 3000, rng)
+        assert_holds(certificate, 3 if INTERPRETED else 1000, rng)
         verdicts.add(certificate.verdict)
     assert INTERPRETED or "PROVED" in verdicts
 
 
-@pytest.mark.parametrize("name", POSITIONED)
+@pytest.mark.parametrize("name", ["stewart", "servo_hexapod", "hexaglide", "delta", "psu", "five_bar", "prr"])
 def test_bounds_of_every_limit_enclose_its_values_on_random_cells(name: str) -> None:
     """The forms of all rows over a cell, against the forms at single poses of it, which depend on no bound."""
     machine, rng = pf.load(name), np.random.default_rng(1)
@@ -140,7 +142,7 @@ def test_bounds_of_every_limit_enclose_its_values_on_random_cells(name: str) -> 
     table = kernel_table(model.legs)
     sides, cell_rows, rows = model.legs.home_sides[0], new_rows(table), new_rows(table)
     n_checked = 0
-    for _ in range(2 if INTERPRETED else 8):
+    for _ in range(2 if INTERPRETED else 5):
         region = random_region(name, rng)
         parameters = region_parameters(model, region, 0.0)
         share = 10.0 ** rng.uniform(-3.0, -0.5)
@@ -221,22 +223,21 @@ def test_rounding_stays_within_its_bound_far_from_the_origin() -> None:
 
 
 @pytest.mark.parametrize("change", ["moved", "scaled", "relabelled"])
-def test_verdicts_do_not_depend_on_where_a_machine_is_or_on_its_unit_or_names(change: str) -> None:
-    stewart = pf.load("stewart")
-    turn = Rotation.from_rotvec([0.0, 0.0, 0.7]).as_matrix()
-    for radius, tilt, expected in ((30.0, 0.2, "PROVED"), (60.0, 0.2, "REFUTED")):
-        centre, size = CENTRE_OF_STEWART, radius
-        machine = stewart
-        if change == "moved":
-            machine, centre = moved(stewart, turn, np.array([500.0, -300.0, 50.0])), centre + [500.0, -300.0, 50.0]
-        elif change == "scaled":
-            machine, centre, size = scaled(stewart, 1e-3), 1e-3 * centre, 1e-3 * radius
-        else:
-            machine, _, _ = relabelled(stewart, np.random.default_rng(4))
-        certificate = pf.certify(machine, PoseRegion.ball(centre, size, tilt=tilt))
-        original = pf.certify(stewart, PoseRegion.ball(CENTRE_OF_STEWART, radius, tilt=tilt))
-        assert certificate.verdict == original.verdict == expected
-        assert_holds(certificate, 3 if INTERPRETED else 2000, np.random.default_rng(5))
+@pytest.mark.parametrize(("radius", "verdict"), [(30.0, "PROVED"), (60.0, "REFUTED")])
+def test_verdicts_do_not_depend_on_where_a_machine_is_or_on_its_unit_or_names(
+    change: str, radius: float, verdict: str
+) -> None:
+    stewart, shift, size = pf.load("stewart"), np.zeros(3), 1.0
+    if change == "moved":
+        shift = np.array([500.0, -300.0, 50.0])
+        machine = moved(stewart, Rotation.from_rotvec([0.0, 0.0, 0.7]).as_matrix(), shift)
+    elif change == "scaled":
+        machine, size = scaled(stewart, 1e-3), 1e-3
+    else:
+        machine, _, _ = relabelled(stewart, np.random.default_rng(4))
+    certificate = pf.certify(machine, PoseRegion.ball(size * CENTRE_OF_STEWART + shift, size * radius, tilt=0.2))
+    assert certificate.verdict == verdict
+    assert_holds(certificate, 3 if INTERPRETED else 1000, np.random.default_rng(5))
 
 
 def test_a_leg_in_another_working_mode_is_neither_proved_nor_refuted() -> None:
@@ -300,8 +301,6 @@ def test_a_certified_workspace_has_its_size_between_two_bounds() -> None:
         (space.vertices[:, None] >= every[:, 0] - 1e-9) & (space.vertices[:, None] <= every[:, 1] + 1e-9), -1
     )
     assert inside.any(axis=1).all()
-    with pytest.raises(pf.errors.InvalidArgument, match="certified"):
-        pf.workspace(pf.load("stewart"), tilt=0.1, certified=True)
 
 
 @pytest.mark.skipif(INTERPRETED, reason="maps take long as plain Python")
@@ -313,8 +312,6 @@ def test_the_largest_box_is_proved_and_a_larger_one_is_not() -> None:
     assert not pf.certify(machine, PoseRegion.box(found.centre - half, found.centre + half))
     ball = pf.largest(pf.load("stewart"), "ball", centre=CENTRE_OF_STEWART, extents=[60, 60, 60], tilt=0.2)
     assert ball.certificate and ball.certificate.region.shape == "ball"
-    with pytest.raises(pf.errors.UnknownName):
-        pf.largest(machine, "cube")  # type: ignore[arg-type]
 
 
 def test_uncertain_points_are_proved_for_all_machines_near() -> None:
@@ -326,7 +323,7 @@ def test_uncertain_points_are_proved_for_all_machines_near() -> None:
     assert pf.certify(machine, region, uncertain=radius)
     model = model_of(machine)
     points = model._geometry.points
-    for _ in range(2 if INTERPRETED else 20):
+    for _ in range(2 if INTERPRETED else 8):
         away = rng.normal(size=points.shape)
         away *= radius / np.linalg.norm(away, axis=1, keepdims=True)
         other = model.with_geometry(points=points + away).mechanism
@@ -357,36 +354,53 @@ def test_only_the_limits_of_named_joints_count() -> None:
         pf.certify(machine, region, limits=["no_such_joint"])
 
 
-def test_machines_and_regions_that_cannot_be_proved_say_why() -> None:
-    with pytest.raises(pf.errors.UnsupportedMechanism, match="no legs in closed form"):
-        pf.certify(pf.load("panda"), PoseRegion.box([0, 0, 0], [1, 1, 1]))
-    with pytest.raises(pf.errors.UnsupportedMechanism, match="A1, B1"):
-        pf.certify(pf.load("nrpm"), PoseRegion.box([0, 0, 0], [1, 1, 1]))
-    with pytest.raises(pf.errors.InvalidArgument, match="rotation about x"):
-        pf.certify(pf.load("delta"), PoseRegion.box([0, 0, -180], [0, 0, -170], rotation=0.1))
-    tricept = pf.load("tricept")
-    p = tricept.home_pose[:3, 3]
-    certificate = pf.certify(tricept, PoseRegion.box(p - 1, p + 1), budget=100)
-    assert certificate.verdict == "OPEN" and "restricts the platform" in certificate.reason
-    ankle = pf.load("ankle_ups")
-    at_home = pf.certify(ankle, PoseRegion.box(ankle.home_pose[:3, 3], ankle.home_pose[:3, 3]))
-    assert at_home.verdict == "OPEN" and "no bounds" in at_home.reason
-    eye = pf.load("agile_eye").without_limits()  # three hinges through a point, which do not reach every rotation
-    turned = pf.certify(eye, PoseRegion.box([0, 0, 0], [0, 0, 0], rotation=0.1), budget=100)
-    assert turned.verdict == "OPEN"
-    for wrong in ({"low": [0, 0, 1], "high": [0, 0, 0]}, {"low": [0, 0], "high": [1, 1, 1]}):
-        with pytest.raises(pf.errors.InvalidArgument):
-            PoseRegion.box(**wrong)
-    with pytest.raises(pf.errors.InvalidArgument, match="tilt"):
-        PoseRegion.ball([0, 0, 0], 1, tilt=0.1, rotation=0.1)
-    with pytest.raises(pf.errors.InvalidArgument, match="budget"):
-        pf.certify(pf.load("stewart"), stewart_box(1, 1), budget=0)
+AT_HOME = np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("error", "words", "ask"),
+    [
+        ("UnsupportedMechanism", "no legs in closed form", lambda: pf.certify(pf.load("panda"), box_about(AT_HOME, 1))),
+        ("UnsupportedMechanism", "A1, B1", lambda: pf.certify(pf.load("nrpm"), box_about(AT_HOME, 1))),
+        ("InvalidArgument", "rotation about x", lambda: pf.certify(pf.load("delta"), box_about(AT_HOME, 1, 0.1))),
+        ("InvalidArgument", "expected", lambda: PoseRegion.box([0, 0, 1], [0, 0, 0])),
+        ("InvalidArgument", "expected", lambda: PoseRegion.box([0, 0], [1, 1, 1])),
+        ("InvalidArgument", "tilt", lambda: PoseRegion.ball([0, 0, 0], 1, tilt=0.1, rotation=0.1)),
+        ("InvalidArgument", "budget", lambda: pf.certify(pf.load("stewart"), stewart_box(1, 1), budget=0)),
+        ("InvalidArgument", "certified", lambda: pf.workspace(pf.load("stewart"), tilt=0.1, certified=True)),
+        ("UnknownName", "cube", lambda: pf.largest(pf.load("five_bar"), "cube")),  # type: ignore[arg-type]
+    ],
+)
+def test_what_cannot_be_certified_is_refused(error: str, words: str, ask: Callable[[], object]) -> None:
+    with pytest.raises(getattr(pf.errors, error), match=words):
+        ask()
+
+
+def box_about(centre: np.ndarray, half: float, rotation: float = 0.0) -> PoseRegion:
+    return PoseRegion.box(centre - half, centre + half, rotation=rotation)
+
+
+@pytest.mark.parametrize(
+    ("machine", "half", "rotation", "words"),
+    [
+        (pf.load("tricept"), 1.0, 0.0, "restricts the platform"),
+        (pf.load("ankle_ups"), 0.0, 0.0, "no bounds"),
+        # three hinges through a point, which do not reach every rotation
+        (pf.load("agile_eye").without_limits(), 0.0, 0.1, ""),
+    ],
+    ids=["tricept", "ankle_ups", "agile_eye"],
+)
+def test_what_legs_restrict_or_what_has_no_bounds_is_open(
+    machine: pf.Mechanism, half: float, rotation: float, words: str
+) -> None:
+    certificate = pf.certify(machine, box_about(machine.home_pose[:3, 3], half, rotation), budget=100)
+    assert certificate.verdict == "OPEN" and words in certificate.reason
 
 
 def test_the_share_of_a_cell_above_a_plane_is_its_volume() -> None:
     rng = np.random.default_rng(7)
-    points = rng.uniform(-1.0, 1.0, (400_000, 3))
-    for trial in range(30):
+    points = rng.uniform(-1.0, 1.0, (100_000, 3))
+    for trial in range(15):
         row = np.zeros(9)
         row[:3] = rng.normal(size=3) * 10.0 ** rng.uniform(-3, 0, 3)
         row[0] = 0.0 if trial % 5 == 0 else row[0]
@@ -394,7 +408,7 @@ def test_the_share_of_a_cell_above_a_plane_is_its_volume() -> None:
         inner, outer = share_above(row, 3, BELOW), share_above(row, 3, ABOVE)
         sampled = float((points @ row[:3] + row[CENTRE] >= 0.0).mean())
         assert inner <= outer <= inner + 1e-3
-        assert inner - 4e-3 <= sampled <= outer + 4e-3
+        assert inner - 8e-3 <= sampled <= outer + 8e-3
 
 
 def test_bounds_of_a_span_hold_for_every_pose_of_a_cell() -> None:
@@ -403,7 +417,7 @@ def test_bounds_of_a_span_hold_for_every_pose_of_a_cell() -> None:
     model = model_of(machine)
     table, sides = kernel_table(model.legs), model.legs.home_sides[0]
     over, at = new_rows(table), new_rows(table)
-    for _ in range(3 if INTERPRETED else 40):
+    for _ in range(3 if INTERPRETED else 12):
         region = random_region("servo_hexapod", rng)
         parameters = region_parameters(model, region, 0.0)
         box = np.concatenate([parameters.middle, 10.0 ** rng.uniform(-3, -1) * parameters.half])
@@ -447,59 +461,25 @@ def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:
 # Links
 
 
-def struts(
-    thickness: float = 20.0, clearance: float | None = 4.0, size: float = 1.0, turn: float = 0.0
-) -> pf.Mechanism:
-    """Six struts with long strokes, so that links are what comes first; larger, and turned about z."""
-    c, s = np.cos(turn), np.sin(turn)
-    points = {
-        name: size * np.array(ends, float) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        for name, ends in (("base", [[100, 20, 0], [100, -20, 0]]), ("platform", [[40, 40, 195], [40, -40, 195]]))
-    }
-    return pf.Mechanism.from_legs(
-        "U-P*-S",
-        **points,  # type: ignore[arg-type]
-        stroke=(100.0 * size, 400.0 * size),
-        copies={"count": 3, "axis": [0, 0, 1]},
-        reference_point=[0, 0, 195 * size],
-        thickness=thickness * size,
-    ).with_clearance(None if clearance is None else clearance * size)
+def thick_struts(size: float = 1.0) -> pf.Mechanism:
+    """With long strokes, so that links are what comes first."""
+    return struts(20.0, 4.0, stroke=(100.0, 400.0), size=size)
 
 
 def box_of_struts(half: float, degrees: float, size: float = 1.0) -> PoseRegion:
-    middle = np.array([0.0, 0.0, 195.0])
-    return PoseRegion.box(size * (middle - half), size * (middle + half), rotation=math.radians(degrees))
-
-
-def distances_of_axes(machine: pf.Mechanism, poses: np.ndarray) -> np.ndarray:
-    """Least distances of the axes of struts (n,) by their twelve ends: the least of a convex function on a square."""
-    base = np.array([machine.joint(f"A{k}").at for k in range(1, 7)])
-    platform = np.array([machine.joint(f"C{k}").at for k in range(1, 7)]) - machine.home_pose[:3, 3]
-    ends = poses[:, None, :3, 3] + np.einsum("nij,kj->nki", poses[:, :3, :3], platform)
-    least = np.full(len(poses), np.inf)
-    for i in range(6):
-        for j in range(i):
-            d, e, w = ends[:, i] - base[i], ends[:, j] - base[j], base[i] - base[j]
-            dd, ee, de = (d * d).sum(1), (e * e).sum(1), (d * e).sum(1)
-            s, t = np.full(len(poses), 0.5), np.full(len(poses), 0.5)
-            for _ in range(200):  # each in turn, until neither moves
-                before = s
-                s = np.clip((t * de - d @ w) / dd, 0.0, 1.0)
-                t = np.clip((s * de + e @ w) / ee, 0.0, 1.0)
-                if np.abs(s - before).max() < 1e-12:
-                    break
-            least = np.minimum(least, np.linalg.norm(w + s[:, None] * d - t[:, None] * e, axis=1))
-    return least
+    return box_about(np.array([0.0, 0.0, 195.0 * size]), half * size, math.radians(degrees))
 
 
 def test_links_are_proved_apart_in_a_box_and_refuted_in_a_larger_one() -> None:
-    machine, rng = struts(), np.random.default_rng(0)
-    region = box_of_struts(25.0, 7.0)
-    proved = pf.certify(machine, region)
+    machine, rng = thick_struts(), np.random.default_rng(0)
+    region, length = box_of_struts(25.0, 7.0), machine.characteristic_length
+    proved, close = pf.certify(machine, region), pf.certify(machine, region, tolerance=0.02 if INTERPRETED else 2e-3)
     assert proved and proved.replay()
-    poses = random_poses(region, 50 if INTERPRETED else 100_000, rng)
-    assert (distances_of_axes(machine, poses) >= 24.0 + proved.margin * machine.characteristic_length).all()
-    assert (pf.solve_ik(machine, poses[:1000]).status == Status.REACHED).all()
+    assert_holds(proved, 50 if INTERPRETED else 1000, rng)
+    room = least_of_struts(random_poses(region, 50 if INTERPRETED else 20_000, rng), 24.0) / length
+    assert (room >= proved.margin).all()
+    assert close and close.margin <= close.least_found and close.margin <= room.min()
+    assert close.least_found - close.margin <= (0.021 if INTERPRETED else 2.1e-3)
     # Legs alone leave more room.
     wide = box_of_struts(30.0, 24.0)
     assert pf.certify(machine.with_clearance(None), wide)
@@ -508,59 +488,22 @@ def test_links_are_proved_apart_in_a_box_and_refuted_in_a_larger_one() -> None:
     assert refuted.verdict == "REFUTED" and refutation is not None
     assert refutation.limit[1] == "clearance" and "–" in refutation.limit[0]
     assert refutation.answer.status == Status.PROJECTED
-    away = distances_of_axes(machine, refutation.pose[None])[0] - 24.0
-    assert away < 0.0 and refutation.margin == pytest.approx(away / machine.characteristic_length, abs=1e-9)
+    away = least_of_struts(refutation.pose[None], 24.0)[0]
+    assert away < 0.0 and refutation.margin == pytest.approx(away / length, abs=1e-9)
     assert [limit.bound for limit in refutation.answer.active_limits][:1] == ["clearance"]
 
 
-def test_a_proved_margin_of_links_is_near_the_least_one() -> None:
-    machine, region = struts(), box_of_struts(25.0, 7.0)
-    close = pf.certify(machine, region, tolerance=0.02 if INTERPRETED else 2e-3)
-    least = float(distances_of_axes(machine, random_poses(region, 20_000, np.random.default_rng(1))).min())
-    found = (least - 24.0) / machine.characteristic_length
-    assert close and close.margin <= close.least_found and close.margin <= found
-    assert close.least_found - close.margin <= (0.021 if INTERPRETED else 2.1e-3)
-
-
-@pytest.mark.parametrize(("half", "degrees"), [(25.0, 7.0), (30.0, 24.0)])
-def test_verdicts_on_links_do_not_depend_on_size_or_direction(half: float, degrees: float) -> None:
-    original = pf.certify(struts(), box_of_struts(half, degrees))
-    assert original.verdict != "OPEN"
-    assert pf.certify(struts(size=1e-3), box_of_struts(half, degrees, 1e-3)).verdict == original.verdict
+@pytest.mark.parametrize(("half", "degrees", "verdict"), [(25.0, 7.0, "PROVED"), (30.0, 24.0, "REFUTED")])
+def test_verdicts_on_links_do_not_depend_on_size_or_place(half: float, degrees: float, verdict: str) -> None:
+    assert pf.certify(thick_struts(1e-3), box_of_struts(half, degrees, 1e-3)).verdict == verdict
     away = np.array([500.0, -300.0, 50.0])
-    region = PoseRegion.box(*(away + [0, 0, 195.0] + [[-half] * 3, [half] * 3]), rotation=math.radians(degrees))
-    assert pf.certify(moved(struts(), np.eye(3), away), region).verdict == original.verdict
-
-
-def test_descents_of_the_distance_from_proved_boxes_stay_above_the_clearance() -> None:
-    machine, region = struts(), box_of_struts(30.0, 9.0)
-    certificate = pf.certify(machine, region)
-    assert certificate
-
-    def distance(point: np.ndarray) -> float:
-        return float(distances_of_axes(machine, region.pose(np.atleast_2d(point)))[0])
-
-    rng, units = np.random.default_rng(2), region.high - region.low
-    for _ in range(1 if INTERPRETED else 12):
-        start = rng.uniform(region.low, region.high)
-        bounds = list(zip(region.low / units, region.high / units, strict=True))
-        found = minimize(lambda x: distance(x * units), start / units, bounds=bounds, method="L-BFGS-B")
-        assert found.fun >= 24.0 + certificate.margin * machine.characteristic_length - 1e-9
+    region = box_about(away + [0, 0, 195.0], half, math.radians(degrees))
+    assert pf.certify(moved(thick_struts(), np.eye(3), away), region).verdict == verdict
 
 
 def test_a_track_on_which_links_come_too_near_between_two_steps_is_not_proved() -> None:
-    machine = struts()
-    region, rng = box_of_struts(50.0, 50.0), np.random.default_rng(3)
-    first, last = (region.pose(rng.uniform(region.low, region.high, (20_000, 6))) for _ in range(2))
-    middle = first.copy()  # of the turn between both
-    turn = Rotation.from_matrix(last[:, :3, :3] @ np.swapaxes(first[:, :3, :3], 1, 2)).as_rotvec()
-    middle[:, :3, :3] = Rotation.from_rotvec(0.5 * turn).as_matrix() @ first[:, :3, :3]
-    middle[:, :3, 3] = 0.5 * (first[:, :3, 3] + last[:, :3, 3])
-    at_ends = np.minimum(distances_of_axes(machine, first), distances_of_axes(machine, last))
-    too_near = np.flatnonzero((at_ends > 24.1) & (distances_of_axes(machine, middle) < 23.9))
-    pairs = np.stack([first[too_near], last[too_near]], axis=1)
-    reached = (np.asarray(pf.solve_ik(machine, pairs).status) == Status.REACHED).all(axis=1)
-    ends = pairs[reached][0]
+    machine = thick_struts()
+    ends = pf.pose([[-10.26, -14.35, 235.17], [8.03, 9.28, 156.0]], rotvec=[[0.33, -0.63, 0.73], [0.65, -0.71, -0.09]])
     assert (pf.solve_ik(machine, ends).status == Status.REACHED).all()
     assert pf.certify(machine, ends).verdict != "PROVED"
 
@@ -571,22 +514,26 @@ def test_ten_million_random_poses_of_what_is_proved_are_feasible() -> None:
     certificate = pf.certify(machine, stewart_box(34.0, 7.5))
     assert certificate
     for _ in range(100):
-        poses = random_poses(stewart_box(34.0, 7.5), 100_000, rng)
-        assert pf.feasibility(machine, poses).margin.min() >= certificate.margin - 1e-12
+        assert_holds(certificate, 100_000, rng)
     for name in POSITIONED:
         for _ in range(60):
             assert_holds(pf.certify(pf.load(name), random_region(name, rng)), 20_000, rng)
 
 
 @pytest.mark.campaign
-def test_no_descent_from_a_proved_box_finds_a_smaller_margin() -> None:
-    machine, region = pf.load("stewart"), stewart_box(34.0, 7.5)
+@pytest.mark.parametrize(
+    ("machine", "region"),
+    [(pf.load("stewart"), stewart_box(34.0, 7.5)), (thick_struts(), box_of_struts(30.0, 9.0))],
+    ids=["limits", "links"],
+)
+def test_no_descent_from_a_proved_box_finds_a_smaller_margin(machine: pf.Mechanism, region: PoseRegion) -> None:
     certificate = pf.certify(machine, region)
+    assert certificate
 
     def margin(point: np.ndarray) -> float:
         return float(pf.feasibility(machine, region.pose(point)).margin)
 
-    for low, high in certificate.boxes:
+    for low, high in certificate.boxes[:200]:
         for start in (0.5 * (low + high), low, high):
             found = minimize(margin, start, bounds=list(zip(low, high, strict=True)), method="Powell")
             assert margin(np.clip(found.x, low, high)) >= certificate.margin - 1e-12

@@ -460,7 +460,12 @@ ONE_BALL = pf.Shape("base", "sphere", at=(0, 0, -50), diameter=1)
     ("make", "words"),
     [
         (lambda: struts(45.0), "leg[0].thickness: found 'BC2', which is 5 deep in 'BC1' at home"),
-        (lambda: struts({}), "a number"),
+        (
+            lambda: pf.Mechanism.from_legs(
+                [pf.Leg("U-P*-S", (0, 9, 0), (0, 9, 9), thickness={})], reference_point=(0, 0, 9)
+            ),
+            "a number",
+        ),
         (lambda: struts(clearance=30), "28 from 'BC1' at home; expected links that are at least 30 apart"),
         (lambda: pf.load("stewart").with_shapes([1]), "found [1]"),
         (lambda: pf.load("stewart").with_shapes([ONE_BALL] * 301), "at most 300"),
@@ -521,15 +526,15 @@ def test_the_command_says_how_far_apart_links_are_and_which_clearance_is_kept(tm
     pf.save(struts(clearance=2.0), kept)
     shown = said("info", free)
     assert ("BC1       capsule" in shown or "BC1   capsule" in shown) and "at home BC" in shown
-    at = ["--position", "0", "0", "200"]
-    assert "17.282 mm apart (no clearance is kept)" in said("ik", free, *at, "--margins")
+    at = ["--position", "0", "0", "200", "--margins"]
+    assert "17.282 mm apart (no clearance is kept)" in said("ik", free, *at)
     plain = json.loads(said("ik", free, *at, "--json"))
     assert plain["clearance"]["distance"] == pytest.approx(2 * 14.6410161514 - 12)
     assert "clearance" not in json.loads(said("ik", "stewart", *at, "--json"))
     shown = said("info", kept)
     assert "clearance              2 mm kept between links" in shown and "(the clearance kept is 2 mm)" in shown
     assert json.loads(said("info", "--json", kept))["clearance"] == 2.0
-    assert "BC1–BC4" in (table := said("ik", kept, *at, "--margins")) and "clearance" in table
+    assert "BC1–BC4" in (table := said("ik", kept, *at)) and "clearance" in table
 
 
 # As a limit
