@@ -77,47 +77,51 @@ def ankle() -> Actuation:
     return actuation_of("g1_ankle", ("pitch_joint", "roll_joint"))
 
 
-@pytest.mark.parametrize(("name", "joints", "size"), MAPS, ids=[f"{name}-{joints}" for name, joints, _ in MAPS])
+every_map = pytest.mark.parametrize(
+    ("name", "joints", "size"), MAPS, ids=[f"{name}-{joints}" for name, joints, _ in MAPS]
+)
+
+
+@every_map
 def test_there_and_back_gives_the_same_joints(name: str, joints: Any, size: float) -> None:
     a = actuation_of(name, joints)
-    q = near_home(a, size, 12).reshape(3, 4, -1)
+    q = near_home(a, size, 6).reshape(2, 3, -1)
     x = a.to_actuators(q)
-    assert x and x.values.shape == (3, 4, len(a.mechanism.actuator_names))
+    assert x and x.values.shape == (2, 3, len(a.mechanism.actuator_names))
     back = a.to_joints(x, start=q)
     assert back
     np.testing.assert_allclose(np.asarray(back), q, atol=1e-7 * max(1.0, np.abs(q).max()))
     np.testing.assert_array_equal(a.to_actuators(q[1, 2]).values, x.values[1, 2])
 
 
-@pytest.mark.parametrize(("name", "joints", "size"), MAPS, ids=[f"{name}-{joints}" for name, joints, _ in MAPS])
-def test_the_jacobian_is_the_finite_difference_of_the_map(name: str, joints: Any, size: float) -> None:
-    a, step = actuation_of(name, joints), 1e-5
-    q = near_home(a, size, 6, seed=1)
-    units = np.where(a._coordinates.is_angle, 1.0, a.mechanism.characteristic_length)
-    J = a.jacobian(q)
-    for place, unit in enumerate(units):
-        off = np.zeros(len(units))
-        off[place] = step * unit
-        change = a.to_actuators(q + off).values - a.to_actuators(q - off).values
-        np.testing.assert_allclose(J[:, :, place], change / (2.0 * step * unit), rtol=1e-6, atol=2e-6 * np.abs(J).max())
-
-
-@pytest.mark.parametrize(("name", "joints", "size"), MAPS, ids=[f"{name}-{joints}" for name, joints, _ in MAPS])
-def test_power_in_is_power_out(name: str, joints: Any, size: float) -> None:
+@every_map
+def test_rates_are_slopes_of_the_map_and_power_in_is_power_out(name: str, joints: Any, size: float) -> None:
     """Whichever way: rates by the map, torques by its transpose, and both by their inverses."""
-    a, random = actuation_of(name, joints), np.random.default_rng(2)
-    q = near_home(a, size, 20)
-    rates = random.normal(size=q.shape)
-    torques = random.normal(size=(20, len(a.mechanism.actuator_names)))
-    x_rates = a.velocities(q, rates)
-    power_in, power_out = (torques * x_rates).sum(1), (a.torques_to_joints(q, torques) * rates).sum(1)
-    scale = (np.abs(torques) * np.abs(x_rates)).sum(1)
-    assert (np.abs(power_in - power_out) <= 1e-12 * scale).all()
-    of_joints = random.normal(size=q.shape)
-    back = a.torques_to_actuators(q, of_joints)
-    scale = (np.abs(back) * np.abs(x_rates)).sum(1)
-    assert (np.abs((back * x_rates).sum(1) - (of_joints * rates).sum(1)) <= 1e-11 * scale).all()
+    a, random, step = actuation_of(name, joints), np.random.default_rng(2), 1e-5
+    q, n_a = near_home(a, size, 6), len(a.mechanism.actuator_names)
+    J, units = a.jacobian(q), np.where(a._coordinates.is_angle, 1.0, a.mechanism.characteristic_length)
+    off = step * np.diag(units)
+    ahead, behind = (a.to_actuators(q + sign * off[:, None]).values for sign in (1.0, -1.0))
+    slopes = np.moveaxis((ahead - behind) / (2.0 * step * units[:, None, None]), 0, -1)
+    np.testing.assert_allclose(J, slopes, rtol=1e-6, atol=2e-6 * np.abs(J).max())
+    rates, torques, of_joints = random.normal(size=q.shape), random.normal(size=(6, n_a)), random.normal(size=q.shape)
+    x_rates, back = a.velocities(q, rates), a.torques_to_actuators(q, of_joints)
+    for made, needed, most in ((torques, a.torques_to_joints(q, torques), 1e-12), (back, of_joints, 1e-11)):
+        scale = (np.abs(made) * np.abs(x_rates)).sum(1)
+        assert (np.abs((made * x_rates).sum(1) - (needed * rates).sum(1)) <= most * scale).all()
     np.testing.assert_allclose(a.joint_velocities(q, x_rates), rates, atol=1e-9 * np.abs(rates).max())
+
+
+def test_a_start_tells_the_assembly_mode() -> None:
+    a = pf.actuation(pf.load("five_bar").without_limits(), "task")
+    x = np.asarray(a.to_actuators(a.home))
+    modes = pf.assembly_modes(a.mechanism, x)
+    assert len(modes) > 1
+    for mode in modes:
+        expected = mode.pose[1:3, 3]
+        np.testing.assert_allclose(np.asarray(a.to_joints(x, start=mode)), expected, atol=1e-6)
+        np.testing.assert_allclose(np.asarray(a.to_joints(x, start=mode.q)), expected, atol=1e-6)
+    np.testing.assert_allclose(np.asarray(a.to_joints(x)), a.home, atol=1e-6)
 
 
 def test_motor_angles_are_those_of_the_ankle_s_author() -> None:
@@ -158,21 +162,6 @@ def closed_in_mujoco(a: Actuation, q: np.ndarray) -> tuple[Model, np.ndarray]:
     _, rows = model.rows()
     motions = np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows, 1e-9) :].T
     return model, motions @ np.linalg.pinv(motions[[model.model.joint(name).dofadr[0] for name in a.names]])
-
-
-@pytest.mark.parametrize("q", [(0.1, -0.1), (-0.5, 0.15), (0.3, 0.2)])
-def test_motors_bear_in_mujoco_what_torques_are_mapped_to(q: tuple[float, float]) -> None:
-    """Torques at pitch and roll, until the exported model is at rest on its servos: so small that loops stay closed."""
-    a, tau = ankle(), np.array([3e-3, -2e-3])
-    model, _ = closed_in_mujoco(a, np.array(q))
-    data = model.data
-    data.ctrl[:] = np.asarray(a.to_actuators(q))
-    for name, torque in zip(a.names, tau, strict=True):
-        data.qfrc_applied[model.model.joint(name).dofadr[0]] = torque
-    mujoco.mj_step(model.model, data, 3000)
-    at_rest = [data.qpos[model.model.joint(name).qposadr[0]] for name in a.names]
-    assert np.abs(data.qvel).max() < 1e-9 and np.abs(np.array(at_rest) - q).max() > 1e-6
-    np.testing.assert_allclose(data.actuator_force, -a.torques_to_actuators(at_rest, tau), rtol=0.0, atol=1e-5 * 2e-3)
 
 
 @pytest.mark.parametrize("q", [(0.1, -0.1), (-0.5, 0.15), (0.3, 0.2)])
@@ -247,7 +236,7 @@ def test_nothing_is_nan_at_and_beyond_dead_points() -> None:
 # Torque and speed limits.
 
 
-@pytest.mark.parametrize(("name", "joints", "size"), MAPS, ids=[f"{name}-{joints}" for name, joints, _ in MAPS])
+@every_map
 def test_torque_limits_hold_what_actuators_can_make(name: str, joints: Any, size: float) -> None:
     """Random torques within their limits are in the set; the corners of the box are made within them; more is not."""
     a, random = actuation_of(name, joints), np.random.default_rng(5)
@@ -270,8 +259,6 @@ def test_speed_limits_are_those_of_the_actuators() -> None:
     random = np.random.default_rng(6).normal(size=(50, 2, 2)) * 3.0
     fast = np.abs(a.velocities(q, random)) > [3.0, 4.0]
     np.testing.assert_array_equal(capacity.contains(random), ~fast.any(axis=-1))
-    with pytest.raises(InvalidArgument, match="no max_speed of 'left_motor_joint'"):
-        a.speed_limits(q)
 
 
 def test_the_polygon_of_torques_has_the_corners_of_extreme_motors() -> None:
@@ -313,7 +300,7 @@ def test_torques_of_redundant_actuators_have_the_least_norm() -> None:
 def test_the_hull_is_feasible_and_says_what_is_lost() -> None:
     a = ankle()
     hull = a.hull()
-    random = np.random.default_rng(8).uniform(a.low, a.high, (4000, 2))
+    random = np.random.default_rng(8).uniform(a.low, a.high, (2000, 2))
     feasible = np.asarray(a.to_actuators(random).status) == Status.REACHED
     inside = hull.contains(random)
     assert (feasible | ~inside).mean() > 0.999
@@ -326,50 +313,38 @@ def test_the_hull_is_feasible_and_says_what_is_lost() -> None:
     assert area / np.prod(a.high - a.low) == pytest.approx(1.0 - hull.share_cut, abs=0.02)
 
 
-@pytest.mark.slow
-def test_a_box_without_ranges_has_to_be_given() -> None:
-    a = actuation_of("delta", "task")
-    with pytest.raises(InvalidArgument, match="no range of x, y, z"):
-        a.hull()
-    box = a.home + np.array([[-30.0, -30.0, -20.0], [30.0, 30.0, 20.0]])
-    assert a.hull(box).normals.shape[1] == 3
-    with pytest.raises(InvalidArgument, match="no feasible point"):
-        a.hull(box + 1e4)
-
-
 # Wrong calls.
 
 
-def test_joints_that_do_not_determine_the_actuators_are_refused() -> None:
-    """The arms of a redundant hexapod turn while its platform rests."""
-    with pytest.raises(UnsupportedMechanism, match=r"do not determine the actuators: with them at rest, .* can still"):
-        pf.actuation(pf.load("nrpm"), "task")
+def half_driven() -> Mechanism:
+    joints = [
+        Joint("a", "revolute", ("base", "link"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
+        Joint("b", "revolute", ("link", "tip"), at=(1, 0, 0), axis=(0, 0, 1)),
+    ]
+    return Mechanism("half driven", joints, "tip", (2, 0, 0))
 
 
-def test_joints_that_the_loops_tie_together_are_refused() -> None:
-    """A way through a strut has six coordinates, of which two are independent."""
-    with pytest.raises(UnsupportedMechanism, match=r"the loops leave AL\[0\], .* 2 freedoms, not 6"):
-        pf.actuation(pf.load("ankle_ups"), ("AL", "BL", "CL"))
-
-
-def test_actuators_that_do_not_determine_the_joints_are_refused() -> None:
-    with pytest.warns(pf.errors.MobilityWarning):
-        arm = Mechanism(
-            name="half driven",
-            joints=[
-                Joint("a", "revolute", ("base", "link"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
-                Joint("b", "revolute", ("link", "tip"), at=(1, 0, 0), axis=(0, 0, 1)),
-            ],
-            end_effector="tip",
-            reference_point=(2, 0, 0),
-        )
-    with pytest.raises(UnsupportedMechanism, match="actuators do not determine the joints: with them locked, b can"):
-        pf.actuation(arm, ("a", "b"))
-
-
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
+        # The arms of a redundant hexapod turn while its platform rests.
+        (
+            lambda: pf.actuation(pf.load("nrpm"), "task"),
+            UnsupportedMechanism,
+            "do not determine the actuators: with them at rest, .* can still",
+        ),
+        # A way through a strut has six coordinates, of which two are independent.
+        (
+            lambda: pf.actuation(pf.load("ankle_ups"), ("AL", "BL", "CL")),
+            UnsupportedMechanism,
+            r"the loops leave AL\[0\], .* 2 freedoms, not 6",
+        ),
+        (
+            lambda: pf.actuation(half_driven(), ("a", "b")),
+            UnsupportedMechanism,
+            "actuators do not determine the joints: with them locked, b can",
+        ),
         (lambda: pf.actuation(pf.load("g1_ankle"), ("pitch",)), UnknownName, "did you mean 'pitch_joint'"),
         (lambda: pf.actuation(pf.load("g1_ankle"), ("pitch_joint",)), InvalidArgument, "in series"),
         (lambda: ankle().jacobian([0.0, 0.0, 0.0]), InvalidArgument, "shape .3,.; expected .*pitch_joint, roll_joint"),
@@ -378,9 +353,12 @@ def test_actuators_that_do_not_determine_the_joints_are_refused() -> None:
         (lambda: ankle().torques_to_joints([0.0, 0.0], [1.0]), InvalidArgument, "left_motor_joint, right_motor_joint"),
         (lambda: ankle().torques_to_joints(np.zeros((3, 2)), np.zeros((4, 2))), InvalidArgument, "shapes that agree"),
         (lambda: ankle().sample(0), InvalidArgument, "from 1 to"),
+        (lambda: ankle().speed_limits([0.1, 0.05]), InvalidArgument, "no max_speed of 'left_motor_joint'"),
+        (lambda: actuation_of("delta", "task").hull(), InvalidArgument, "no range of x, y, z"),
+        (lambda: actuation_of("delta", "task").hull([[1e4] * 3, [2e4] * 3]), InvalidArgument, "no feasible point"),
         (lambda: ankle().hull([[0.0, 0.0], [0.0, 1.0]]), InvalidArgument, "without an extent"),
     ],
-    ids=range(9),
+    ids=range(15),
 )
 def test_wrong_calls_name_what_is_wrong(call: Any, error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
@@ -402,16 +380,17 @@ def test_maps_end_at_parallel_singularities_and_come_back() -> None:
         ]
     ankle = Mechanism(name="ankle", joints=joints, end_effector="foot", reference_point=(0, 0, 0), task=["tilt"])
     a = pf.actuation(ankle, ("pitch", "roll"))
-    sample = a.sample(500)
-    led = np.repeat(a.home[None], 500, axis=0)  # in small steps, so that only singularities lead to another assembly
-    for share in np.linspace(0.02, 1.0, 50):
-        led = np.asarray(a.to_joints(a.to_actuators(a.home + share * (sample.q - a.home)).values, start=led))
-    assert (np.abs(led - sample.q).max(axis=1) < 1e-6).mean() > 0.98  # some are led to one axis after the other
+    sample = a.sample(100)
+    some = sample.q[:30]
+    led = np.repeat(a.home[None], 30, axis=0)  # in small steps, so that only singularities lead to another assembly
+    for share in np.linspace(0.04, 1.0, 25):
+        led = np.asarray(a.to_joints(a.to_actuators(a.home + share * (some - a.home)).values, start=led))
+    assert (np.abs(led - some).max(axis=1) < 1e-6).mean() > 0.95  # some are led to one axis after the other
     home = np.sign(np.linalg.det(a.jacobian(a.home)))
     assert (np.sign(np.linalg.det(a.jacobian(sample.q))) == home).all()
-    drawn = np.random.default_rng(1).uniform(a.low, a.high, (2000, 2))
+    drawn = np.random.default_rng(1).uniform(a.low, a.high, (600, 2))
     margin, mapped = a.margin(drawn), a.to_actuators(drawn)
     beyond = margin.bound == "singularity"
     assert beyond.any() and (np.asarray(mapped.status)[beyond & (margin.margin < 0.0)] == Status.PROJECTED).all()
     lost = float((margin.margin < 0.0).mean())
-    assert a.hull().share_lost == pytest.approx(lost, abs=0.04)
+    assert a.hull().share_lost == pytest.approx(lost, abs=0.06)

@@ -21,10 +21,9 @@ from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
 from pfabrik.certify.subdividing import region_parameters
 from pfabrik.cli import main
-from pfabrik.kernels.certify.affine_forms import ABOVE, AWAY, BELOW, BOUNDS, CENTRE, ERROR
-from pfabrik.kernels.certify.half_spaces_of_cells import share_above
+from pfabrik.kernels.certify.affine_forms import ABOVE, BELOW, CENTRE
 from pfabrik.kernels.certify.limit_rows import put_limits
-from pfabrik.kernels.certify.pose_cells import CURVATURE, CellParameters, new_cell, put_cell
+from pfabrik.kernels.certify.pose_cells import put_cell
 from pfabrik.kernels.certify.subdivision import new_rows
 from pfabrik.model import model_of
 from pfabrik.platform.table import kernel_table
@@ -165,31 +164,6 @@ def test_bounds_of_every_limit_enclose_its_values_on_random_cells(name: str) -> 
             assert (excess[is_known] <= 1e-13).all(), name
             n_checked += int(is_known.sum())
     assert n_checked > 50 or not len(table.limited) + len(table.cones)
-
-
-def test_rotations_move_points_as_their_cells_say() -> None:
-    """p + R b of exp, by SciPy, against the linear part of a cell and its bound, over rotation vectors and tilts."""
-    rng = np.random.default_rng(2)
-    for trial in range(300):
-        kind, size = trial % 2, 10.0 ** rng.uniform(-3.0, 0.0)
-        box = np.concatenate([np.zeros(3), rng.uniform(-1.2, 1.2, 3), np.zeros(3), size * rng.uniform(0.0, 1.0, 3)])
-        parameters = CellParameters(
-            np.array([kind, 0, 6, 0]), box[:6], box[6:], np.zeros((1, 12)), np.zeros((1, 6)), np.zeros(1)
-        )
-        cell, s, b = new_cell(), rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
-        put_cell(parameters, box, cell)
-
-        def rotation(r: np.ndarray, kind: int = kind) -> Rotation:
-            if kind == 0:
-                return Rotation.from_rotvec(r)
-            return Rotation.from_rotvec([r[0], r[1], 0.0]) * Rotation.from_rotvec([0.0, 0.0, r[2]])
-
-        before, after = (rotation(r).apply(b) for r in (box[3:6], box[3:6] + s * box[9:]))
-        linear = np.cross(s @ cell.motions[3:, 3:], before)
-        error = np.linalg.norm(after - before - linear)
-        assert error <= cell.sizes[CURVATURE] * np.linalg.norm(b) + 1e-15
-        turn = (rotation(box[3:6] + s * box[9:]) * rotation(box[3:6]).inv()).magnitude()
-        assert turn <= cell.sizes[3] + 1e-15
 
 
 def test_rounding_stays_within_its_bound_far_from_the_origin() -> None:
@@ -395,43 +369,6 @@ def test_what_legs_restrict_or_what_has_no_bounds_is_open(
 ) -> None:
     certificate = pf.certify(machine, box_about(machine.home_pose[:3, 3], half, rotation), budget=100)
     assert certificate.verdict == "OPEN" and words in certificate.reason
-
-
-def test_the_share_of_a_cell_above_a_plane_is_its_volume() -> None:
-    rng = np.random.default_rng(7)
-    points = rng.uniform(-1.0, 1.0, (100_000, 3))
-    for trial in range(15):
-        row = np.zeros(9)
-        row[:3] = rng.normal(size=3) * 10.0 ** rng.uniform(-3, 0, 3)
-        row[0] = 0.0 if trial % 5 == 0 else row[0]
-        row[CENTRE] = rng.uniform(-1, 1) * np.abs(row[:3]).sum()
-        inner, outer = share_above(row, 3, BELOW), share_above(row, 3, ABOVE)
-        sampled = float((points @ row[:3] + row[CENTRE] >= 0.0).mean())
-        assert inner <= outer <= inner + 1e-3
-        assert inner - 8e-3 <= sampled <= outer + 8e-3
-
-
-def test_bounds_of_a_span_hold_for_every_pose_of_a_cell() -> None:
-    """`AWAY` and `ERROR` of the span of rods on cranks, against its values at single poses."""
-    machine, rng = pf.load("servo_hexapod"), np.random.default_rng(8)
-    model = model_of(machine)
-    table, sides = kernel_table(model.legs), model.legs.home_sides[0]
-    over, at = new_rows(table), new_rows(table)
-    for _ in range(3 if INTERPRETED else 12):
-        region = random_region("servo_hexapod", rng)
-        parameters = region_parameters(model, region, 0.0)
-        box = np.concatenate([parameters.middle, 10.0 ** rng.uniform(-3, -1) * parameters.half])
-        put_cell(parameters, box, over.cell)
-        put_limits(table, sides, 0.0, 0, 6, over)
-        span = over.bounds.span
-        for s in rng.uniform(-1, 1, (8, 6)):
-            put_cell(parameters, np.concatenate([box[:6] + s * box[6:], np.zeros(6)]), at.cell)
-            put_limits(table, sides, 0.0, 0, 6, at)
-            if at.bounds.span[BOUNDS, ERROR] > 1e-6:
-                continue
-            away = at.bounds.span[CENTRE] - span[CENTRE]
-            assert np.linalg.norm(away) <= span[BOUNDS, AWAY] + 1e-13
-            assert np.linalg.norm(away - s @ span[:6]) <= span[BOUNDS, ERROR] + 1e-13
 
 
 def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_every_topology_has_an_example_is_told_from_its_sub_chains_and_says_wher
 @pytest.mark.parametrize("name", ["five_bar", "stewart"])
 def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     mechanism = pf.load(name)
-    wanted = some_targets(mechanism, 2000)
+    wanted = some_targets(mechanism, 600)
     answer, expected = geometric.solve_ik(mechanism, wanted), oracles.solve_ik(mechanism, wanted)
     clear = abs(expected.margin) > ON_THE_EDGE
     np.testing.assert_array_equal(answer.reached[clear], expected.reached[clear])
@@ -71,37 +71,31 @@ def test_reached_exactly_where_the_oracle_says(name: str) -> None:
     np.testing.assert_allclose(off, 0.0, atol=1e-10)
 
 
-def test_a_grid_of_candidates_finds_nearly_every_reachable_target_and_no_other() -> None:
+def test_a_grid_of_candidates_finds_nearly_every_reachable_target_and_no_other_and_keeps_every_limit() -> None:
     mechanism = pf.load("nrpm")
-    wanted = some_targets(mechanism)
-    reached, margin = geometric.solve_ik(mechanism, wanted).reached, oracles.margin(mechanism, wanted)
+    wanted = some_targets(mechanism, 300)
+    answer, margin = geometric.solve_ik(mechanism, wanted), oracles.margin(mechanism, wanted)
+    reached = answer.reached
     assert (pf.solve_ik(mechanism, wanted).status[reached] == pf.Status.REACHED).all()
     assert not reached[margin < -ON_THE_EDGE].any()
     assert reached[margin > 0].mean() > 0.97
     assert margin[~reached].max() < 0.1
-
-
-def test_redundant_answers_close_and_keep_every_limit() -> None:
-    mechanism = pf.load("nrpm")
-    wanted = some_targets(mechanism)
-    answer = geometric.solve_ik(mechanism, wanted)
-    wanted, values = wanted[answer.reached], answer.actuators[answer.reached]
-    column = mechanism.actuator_names.index
+    values, column = answer.actuators[reached], mechanism.actuator_names.index
     for arm in oracles.arms(mechanism):
         extension = values[:, column(arm.slide.name)]
-        lines = arm.lines(wanted, values[:, column(arm.hinge.name)])
+        lines = arm.lines(wanted[reached], values[:, column(arm.hinge.name)])
         assert (lines.slack(extension) > -ON_THE_EDGE).all()
         for j, strut in enumerate(arm.struts):
             length = np.hypot(np.sqrt(lines.table[:, j, 1]), lines.table[:, j, 0] - extension)
             np.testing.assert_allclose(values[:, column(strut.slide.name)], length, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("elbow", [(-3.4, -1.2), (-6.0, 0.2), (-1.6, 4.2), (-1.7, 2.5), None])
+@pytest.mark.parametrize("elbow", [(-3.4, -1.2), (-6.0, 0.2), (-1.6, 4.2), None])
 @pytest.mark.parametrize("crank", [(-0.5, 4.5), (-8.0, 8.0), None])
 def test_a_leg_takes_its_other_branch_where_homes_breaks_a_limit_and_only_there(elbow: Any, crank: Any) -> None:
     """As leg by leg in NumPy; an elbow may have two intervals of bends, and a crank counts where its range has it."""
     mechanism = pf.load("five_bar").with_limits(p1=crank, p5=(-3.0, 3.0), p2=elbow, p4=(-2.5, 1.7))
-    wanted = some_targets(mechanism, 500)
+    wanted = some_targets(mechanism, 200)
     answer, expected = geometric.solve_ik(mechanism, wanted), oracles.solve_ik(mechanism, wanted)
     np.testing.assert_array_equal(answer.reached, expected.reached)
     assert answer.reached.any()
@@ -148,7 +142,7 @@ def test_where_a_leg_has_no_side_the_branch_is_the_documented_one() -> None:
 @pytest.mark.parametrize("started", [False, True])
 def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool) -> None:
     mechanism = pf.load("nrpm")
-    wanted = some_targets(mechanism, 200, seed=2)
+    wanted = some_targets(mechanism, 100, seed=2)
     column, every_arm = mechanism.actuator_names.index, oracles.arms(mechanism)
     sides = [np.linspace(*j.range, arms.CANDIDATES_A_SIDE) for j in (every_arm[0].hinge, every_arm[0].slide)]
     grid = np.stack(np.meshgrid(*sides, indexing="ij")).reshape(2, -1).T  # the arms are alike
@@ -182,7 +176,7 @@ def test_redundant_coordinates_stay_or_go_to_the_nearest_candidate(started: bool
 
 def test_an_answer_as_start_keeps_its_redundant_coordinates() -> None:
     mechanism = pf.load("nrpm")
-    wanted = some_targets(mechanism, 400)
+    wanted = some_targets(mechanism, 120)
     wanted = wanted[geometric.solve_ik(mechanism, wanted).reached]
     for first in (geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)):
         again = geometric.solve_ik(mechanism, wanted, start=first)
@@ -208,7 +202,7 @@ def test_a_start_out_of_range_does_not_stay() -> None:
 def test_arms_without_ranges_search_a_turn_and_a_length_to_either_side() -> None:
     limited = pf.load("nrpm")
     mechanism = limited.with_limits(dict.fromkeys(f"{name}{i}" for name in "AB" for i in (1, 2, 3)))
-    wanted = some_targets(mechanism, 400)
+    wanted = some_targets(mechanism, 120)
     answer, solution = geometric.solve_ik(mechanism, wanted), pf.solve_ik(mechanism, wanted)
     assert answer.reached.sum() > 0.9 * geometric.solve_ik(limited, wanted).reached.sum()
     assert (solution.status[answer.reached] == pf.Status.REACHED).all()
@@ -259,7 +253,7 @@ def test_cones_of_half_a_turn_and_more_limit_nothing() -> None:
     stewart = pf.load("stewart")
     wide = {j.name: dataclasses.replace(j.cone, half_angle=np.pi) if j.cone else None for j in stewart.joints}
     for mechanism in (stewart.with_limits(wide), stewart.without_limits()):
-        assert geometric.solve_ik(mechanism, some_targets(stewart, 400))
+        assert geometric.solve_ik(mechanism, some_targets(stewart, 200))
 
 
 # --- descriptions that count otherwise -------------------------------------------------------------------------------
@@ -289,7 +283,7 @@ def test_struts_arms_and_cranks_may_be_described_from_their_other_end_and_counte
     )
     machines = (stewart, turned_strut, {}), (nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})
     for mechanism, other, signs in machines:
-        wanted = some_targets(mechanism, 400)
+        wanted = some_targets(mechanism, 200)
         plain, answer = geometric.solve_ik(mechanism, wanted), geometric.solve_ik(other, wanted)
         np.testing.assert_array_equal(answer.reached, plain.reached)
         expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuator_names]
@@ -301,9 +295,11 @@ def test_struts_arms_and_cranks_may_be_described_from_their_other_end_and_counte
 def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
     stewart = pf.load("stewart")
     mount = {"connects": ("mount", "cylinderL1"), "cone": Cone((0, 0, 1), np.radians(50), "mount")}
-    joints = [dataclasses.replace(joint, **mount) if joint.name == "AL1" else joint for joint in stewart.joints]
-    mounted = dataclasses.replace(stewart, joints=(*joints, Joint("bolt", "fixed", ("base", "mount"), at=(90, 0, 0))))
-    wanted = some_targets(stewart, 400)
+    moved = redescribed(stewart, AL1=mount)
+    mounted = dataclasses.replace(
+        moved, joints=(*moved.joints, Joint("bolt", "fixed", ("base", "mount"), at=(90, 0, 0)))
+    )
+    wanted = some_targets(stewart, 100)
     expected = geometric.solve_ik(stewart, wanted)
     np.testing.assert_array_equal(geometric.solve_ik(mounted, wanted).actuators, expected.actuators)
 
@@ -314,7 +310,7 @@ def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_batches_rows_and_every_form_of_a_target_are_answered_alike(name: str) -> None:
     mechanism = pf.load(name)
-    wanted = some_targets(mechanism, 300)[: 2 * (len(some_targets(mechanism, 300)) // 2)]
+    wanted = some_targets(mechanism, 200)
     flat = geometric.solve_ik(mechanism, wanted)
     assert not flat
     np.testing.assert_array_equal(np.isnan(flat.actuators).all(axis=1), ~flat.reached)
@@ -370,7 +366,7 @@ def test_a_rotation_typed_with_few_digits_counts_as_the_solver_counts_it(factor:
     np.testing.assert_allclose(geometric.solve_ik(stewart, rough).actuators, expected, rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("distance", [1e4, 1e12, 1e160, 1e308])
+@pytest.mark.parametrize("distance", [1e4, 1e12, 1e308])
 @pytest.mark.parametrize("name", NAMES)
 def test_no_target_is_too_far_to_be_missed(name: str, distance: float) -> None:
     for mechanism in (pf.load(name), pf.load(name).without_limits()):

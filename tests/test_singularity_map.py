@@ -67,12 +67,12 @@ def test_the_locus_goes_as_far_as_the_workspace() -> None:
     ):
         space = pf.workspace(pf.load(name).without_limits(), **options)
         found = pf.singularity_map(space.mechanism, space, resolution=step)
-        begins = random.uniform(*space.bounds, (200_000, len(space.names)))
+        begins = random.uniform(*space.bounds, (60_000, len(space.names)))
         with np.errstate(invalid="ignore"):
             near, far = (closed_form(begins + by) for by in (0.0, 0.1 * step))
             zeros = begins[near * far < 0.0]
             on = closed_form(found.locus_vertices)
-        assert len(zeros) > 100
+        assert len(zeros) > 50
         far_off = [np.linalg.norm(found.locus_vertices - point, axis=1).min() for point in zeros]
         assert max(far_off) < step
         assert np.nanmedian(np.abs(on)) < 0.01
@@ -117,12 +117,11 @@ def test_a_spatial_machine_is_looked_at_likewise() -> None:
 
 
 def test_a_map_and_a_path_can_be_drawn(free_five_bar: pf.Workspace) -> None:
-    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pytest.importorskip("matplotlib.pyplot")
     machine = free_five_bar.mechanism
     assert pf.singularity_map(machine, free_five_bar, resolution=20.0).plot().collections
     along = pf.singularity_map(machine, pf.track(machine, [machine.reference_point] * 3))
     assert along.plot().lines
-    pyplot.close("all")
 
 
 def test_slices_cut_the_locus_where_it_is() -> None:
@@ -157,13 +156,12 @@ def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure() -> None:
     pyplot = pytest.importorskip("matplotlib.pyplot")
     machine = pf.load("stewart").without_limits()
     ends = {"x": (-40.0, 40.0), "y": (-40.0, 40.0), "z": (-60.0, 60.0)}
-    found = pf.singularity_map(machine, pf.workspace(machine, within=ends, resolution=10.0))
+    found = pf.singularity_map(machine, pf.workspace(machine, within=ends, resolution=20.0))
     axes = found.plot()
     panels = [each for each in axes.figure.axes if each.images]
     assert len(panels) == 4
     assert all(panel.get_title().startswith("y = ") for panel in panels)
     assert found.plot(pyplot.figure().add_subplot(projection="3d")).get_zlabel() == "z [mm]"
-    pyplot.close("all")
 
 
 def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Workspace) -> None:

@@ -241,16 +241,6 @@ def test_redundant_actuators_share_with_the_least_norm() -> None:
     found = pf.forces(planar, [10.0, -20.0, 0.0, 0.0, 0.0, 300.0])
     np.testing.assert_allclose(found.actuators, -np.linalg.lstsq(rows.T, [10.0, -20.0, 300.0])[0], atol=1e-9)
     assert "overconstraint" in found.undetermined
-    plane = pf.wrench_capacity(planar, 50.0)
-    assert reach(rows, np.asarray(plane.weakest)[:2], 50.0) == pytest.approx(plane.radius, rel=1e-9)
-    ways = np.linspace(0.0, 2.0 * np.pi, 30)
-    assert min(reach(rows, np.array([np.cos(way), np.sin(way)]), 50.0) for way in ways) >= plane.radius
-
-
-def reach(rows: Array, way: Array, limit: float) -> float:
-    """The force without a moment that planar struts hold in a direction: a linear programme."""
-    held, bounds = np.hstack([np.r_[way, 0.0][:, None], rows.T]), [(0.0, None)] + [(-limit, limit)] * 4
-    return -float(linprog(np.r_[-1.0, np.zeros(4)], A_eq=held, b_eq=np.zeros(3), bounds=bounds).fun)
 
 
 def most(normal: Array, jacobian: Array, low: float, high: float) -> float:

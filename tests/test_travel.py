@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 import oracles
 import pfabrik as pf
 from checks import INTERPRETED
+from links import distances_of_struts, struts
 from machines import closure, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.files import loads
 from pfabrik.tolerances import TOLERANCES
-from test_clearance import distances_of_struts, struts
 
 BESIDE = 1e-8
 """How far before the end must be reached, and after it must not [L or rad]: it is told to 1e-9, closed forms tell

@@ -1,19 +1,18 @@
-"""Workspaces are as large as closed forms say, closed, and bounded by the limits they name."""
+"""Workspaces are as large as closed forms say, to what they say, closed, and bounded by the limits they name."""
 
 from __future__ import annotations
 
 import csv
 import itertools
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -21,13 +20,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from links import distances_of_struts, struts
 from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument
 from pfabrik.workspace.border import LINK_COLOURS, MOTOR_COLOURS, group_of_limits, groups_of
 from pfabrik.workspace.patches import patches_of
 from pfabrik.workspace.verdicts import MapQuestion
-from test_clearance import distances_of_struts, struts
 
 Array = NDArray[np.float64]
 
@@ -58,52 +57,96 @@ def grid(found: pf.Workspace, n: int) -> Array:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(n ** len(axes), -1)
 
 
-def test_a_five_bar_without_limits_fills_what_both_its_arms_reach() -> None:
-    found = pf.workspace(pf.load("five_bar").without_limits())
+class Case(NamedTuple):
+    """A machine, the options of its workspace, the exact size, and the rings that it is what they have in common."""
+
+    machine: pf.Mechanism
+    options: dict[str, Any]
+    size: float
+    rings: list[Ring] | None = None
+
+
+def two_links(a: float, b: float, elbow: tuple[float, float] | None = None, turn: float = 0.0) -> pf.Mechanism:
+    """An arm in a plane, its elbow within a range, in whose middle it is at home, its shoulder within a turn [rad]."""
+    bend = 0.5 * np.pi if elbow is None else sum(elbow) / 2.0
+    bends = None if elbow is None else (elbow[0] - bend, elbow[1] - bend)
+    turns = (-0.5 * turn, 0.5 * turn) if turn else None
+    hand = (a + b * np.cos(bend), b * np.sin(bend), 0)
+    joints = [
+        pf.Joint("A", "revolute", ("base", "a"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True, range=turns),
+        pf.Joint("B", "revolute", ("a", "b"), at=(a, 0, 0), axis=(0, 0, 1), actuated=True, range=bends),
+        pf.Joint("tip", "revolute", ("b", "c"), at=hand, axis=(0, 0, 1)),
+    ]
+    return pf.Mechanism("2R", joints, "tip", task=("x", "y"))
+
+
+def gantry(*sides: float, turn: float = 0.0) -> pf.Mechanism:
+    """Slides along x, y and z by given lengths, not about the middle; and a wrist that turns about z [rad]."""
+    names, joints = ("base", "x", "y", "z", "wrist"), []
+    for k, side in enumerate(sides):
+        ends = (-0.3 * side, 0.7 * side)
+        axis = np.eye(3)[k]
+        joints.append(pf.Joint("XYZ"[k], "prismatic", names[k : k + 2], axis=axis, actuated=True, range=ends))
+    last = names[len(sides)]
+    if turn:
+        ends = (-0.4 * turn, 0.6 * turn)
+        joints.append(pf.Joint("W", "revolute", (last, "tip"), at=(0, 0, 1), axis=(0, 0, 1), actuated=True, range=ends))
+    else:
+        joints.append(pf.Joint("W", "fixed", (last, "tip"), at=(0, 0, 1)))
+    return pf.Mechanism(
+        "gantry", joints, "tip", (0, 0, 1), task=("x", "y", "z", "yaw")[: len(sides)] + ("yaw",) * bool(turn)
+    )
+
+
+def cases() -> Iterator[Any]:
+    """Annuli, sectors, boxes, rings, cylinders and balls in common, and yaw beside positions."""
+    for a, b in ((210, 250), (150, 400), (100, 97)):
+        yield pytest.param(Case(two_links(a, b), {}, 4.0 * np.pi * a * b), id=f"annulus {a} {b}")
+    for low, high, turn in ((0.3, 2.5, 1.0), (1.0, 1.2, 4.0), (0.05, 3.1, 2.0)):
+        exact = 210.0 * 250.0 * turn * (np.cos(low) - np.cos(high))
+        yield pytest.param(Case(two_links(210, 250, (low, high), turn), {}, exact), id=f"sector {low} {high}")
+    for sides in ((7.0, 0.4), (3.0, 2.0, 1.0)):
+        yield pytest.param(Case(gantry(*sides), {}, float(np.prod(sides))), id=f"box {sides}")
+    yield pytest.param(Case(gantry(3.0, 2.0, turn=2.0), {"over": ("x", "yaw")}, 6.0), id="x with yaw")
+    cube = Case(gantry(3.0, 2.0, turn=2.0), {"over": ("x", "y", "yaw")}, 12.0)
+    yield pytest.param(cube, id="box with yaw", marks=pytest.mark.campaign)
     crank, forearm = np.hypot(66.0, 88.0), np.hypot(116.0, 87.0)
-    rings = [(y, 0.0, abs(crank - forearm), crank + forearm) for y in (-50.0, 50.0)]
-    assert area(rings) == pytest.approx(145_913.87, abs=0.1)
-    assert found.names == ("y", "z")
-    assert found.area == pytest.approx(area(rings), rel=1e-5)
-    assert abs(found.area - area(rings)) <= found.uncertainty
-    points = grid(found, 150)
-    assert (found.contains(points) == within(rings, points)).all()
+    lens = [(y, 0.0, abs(crank - forearm), crank + forearm) for y in (-50.0, 50.0)]
+    yield pytest.param(Case(pf.load("five_bar").without_limits(), {}, area(lens), lens), id="lens")
+    planar, turn = struts_only(pf.load("rpr")), pf.pose([0, 0, 0], rpy=[0, 0, 10], degrees=True)[:3, :3]
+    rings = strut_rings(planar, turn, 0.0)
+    yield pytest.param(Case(planar, {"orientation": turn}, area(rings), rings), id="planar struts")
+    machine, turn = struts_only(pf.load("stewart")), pf.pose([0, 0, 0], rpy=[5, -3, 8], degrees=True)[:3, :3]
+    for z in (160.0, 250.0):
+        rings, asked = strut_rings(machine, turn, z), {"orientation": turn, "fixed": {"z": z}}
+        yield pytest.param(Case(machine, asked, area(rings), rings), id=f"rings {z}")
+    nodes, weights = np.polynomial.legendre.leggauss(150)
+    slices = [area(strut_rings(machine, turn, z), 1_000) for z in 205.0 + 145.0 * nodes]
+    shells = Case(machine, {"orientation": turn, "within": {"z": (60.0, 350.0)}}, 145.0 * weights @ slices)
+    yield pytest.param(shells, id="shells", marks=pytest.mark.campaign)
+    linear, rod = pf.load("linear_delta").without_limits(), np.hypot(145.0 - 40.0, 252.0)
+    cylinders = [(105.0 * np.cos(turn), 105.0 * np.sin(turn), 0.0, rod) for turn in np.radians([0.0, 120.0, 240.0])]
+    whole = Case(linear, {"within": {"z": (-60.0, 40.0)}}, 100.0 * area(cylinders), cylinders)
+    yield pytest.param(whole, id="cylinders")
+    exact = 8.0 * (2.0 - np.sqrt(2.0)) * 310.582854123025**3
+    yield pytest.param(Case(pf.load("orthoglide").without_limits(), {}, exact), id="Steinmetz's solid")
 
 
-def test_a_planar_platform_on_struts_fills_three_rings() -> None:
-    machine = struts_only(pf.load("rpr"))
-    turn = pf.pose([0, 0, 0], rpy=[0, 0, 10], degrees=True)[:3, :3]
-    found = pf.workspace(machine, orientation=turn, resolution=0.01)
-    rings = strut_rings(machine, turn, 0.0)
-    assert found.area == pytest.approx(area(rings), rel=1e-4)
-    assert abs(found.area - area(rings)) <= found.uncertainty
-    points = grid(found, 100)
-    assert (found.contains(points) == within(rings, points)).all()
-
-
-@pytest.mark.parametrize("z", [160.0, 200.0, 250.0])
-def test_a_slice_of_a_hexapod_fills_six_rings(z: float) -> None:
-    machine = struts_only(pf.load("stewart"))
-    turn = pf.pose([0, 0, 0], rpy=[5, -3, 8], degrees=True)[:3, :3]
-    found = pf.workspace(machine, orientation=turn, fixed={"z": z})
-    rings = strut_rings(machine, turn, z)
-    assert found.area == pytest.approx(area(rings), rel=1e-4)
-    points = grid(found, 100)
-    assert (found.contains(points) == within(rings, points)).all()
-    assert {bound for _, bound in found.shares} <= {"min", "max"}
-
-
-def test_a_linear_delta_without_limits_fills_three_cylinders() -> None:
-    machine = pf.load("linear_delta").without_limits()
-    found = pf.workspace(machine, within={"z": (-60.0, 40.0)}, resolution=5.0)
-    turns = np.radians([0.0, 120.0, 240.0])
-    rod = np.hypot(145.0 - 40.0, 252.0)
-    rings = [(105.0 * np.cos(turn), 105.0 * np.sin(turn), 0.0, rod) for turn in turns]
-    assert found.volume == pytest.approx(100.0 * area(rings), rel=1e-3)
-    points = grid(found, 24)
-    inside = within(rings, points) & (points[:, 2] >= -60.0) & (points[:, 2] <= 40.0)
-    assert (found.contains(points) == inside).all()
-    assert {("z", "min"), ("z", "max")} < set(found.shares)
+@pytest.mark.parametrize("case", list(cases()))
+def test_a_size_is_off_by_its_uncertainty_at_most_and_what_is_contained_is_what_closed_forms_say(case: Case) -> None:
+    default = pf.workspace(case.machine, **case.options)
+    assert default.uncertainty <= 0.02 * case.size
+    if case.rings:
+        points = grid(default, 100 if len(default.names) == 2 else 24)
+        inside = within(case.rings, points)
+        for name, (low, high) in case.options.get("within", {}).items():
+            inside &= (points[:, default.names.index(name)] >= low) & (points[:, default.names.index(name)] <= high)
+            assert {(name, "min"), (name, "max")} < set(default.shares)
+        assert (default.contains(points) == inside).all()
+    resolution = next(r for r, unit in zip(default.resolution, default.units, strict=True) if unit != "rad")
+    coarser = [pf.workspace(case.machine, **case.options, resolution=factor * resolution) for factor in (1.37, 2.9)]
+    for found in (default, *coarser):
+        assert abs(found.size - case.size) <= found.uncertainty <= 0.25 * case.size
 
 
 def is_closed(faces: NDArray[np.int64]) -> bool:
@@ -114,36 +157,88 @@ def is_closed(faces: NDArray[np.int64]) -> bool:
     return all(ways[b, a] == count for (a, b), count in ways.items())
 
 
-@pytest.mark.parametrize(
-    ("name", "resolution"),
-    [("stewart", 6.0), ("delta", 9.0), ("hexaglide", 4.0), ("rps", 8.0), ("five_bar", None), ("ankle_ups", 0.02)],
-)
-def test_the_mesh_is_closed_and_encloses_what_is_contained(name: str, resolution: float | None) -> None:
-    found = pf.workspace(pf.load(name), resolution=resolution)
+RESOLUTIONS = {"stewart": 8.0, "delta": 12.0, "hexaglide": 8.0, "rps": 8.0, "ankle_ups": 0.05, "linear_delta": 14.0}
+
+
+@cache
+def space(name: str) -> pf.Workspace:
+    """The workspace of a machine of the catalogue, with all its limits."""
+    return pf.workspace(pf.load(name), resolution=RESOLUTIONS.get(name))
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "hexaglide", "rps", "five_bar", "ankle_ups"])
+def test_the_mesh_is_closed_and_encloses_what_is_contained(name: str) -> None:
+    found, n = space(name), 20_000
     assert is_closed(found.faces)
     low, high = found.bounds - [[0.05], [-0.05]] * np.ptp(found.bounds, axis=0)
-    n = 40_000
     hits = float(found.contains(np.random.default_rng(1).uniform(low, high, (n, len(low)))).mean())
     box = float(np.prod(high - low))
     noise = box * np.sqrt(hits * (1.0 - hits) / n)
     assert abs(found.size - box * hits) <= 4.0 * noise + found.uncertainty
 
 
+@cache
+def modes() -> list[pf.Solution]:
+    """Two working modes of a five-bar."""
+    machine = pf.load("five_bar").without_limits().with_limits(p2=(np.radians(-140.0), np.radians(-10.0)))
+    return [each for each in pf.working_modes(machine, [0.0, 10.0, 180.0]) if each][:2]
+
+
+def in_mode(k: int) -> pf.Workspace:
+    return pf.workspace(modes()[k].mechanism, start=modes()[k])
+
+
+def anyhow(machine: pf.Mechanism, **options: Any) -> pf.Workspace:
+    return pf.workspace(machine, orientation="any", **options)
+
+
+def apart() -> pf.Workspace:
+    return anyhow(struts(clearance=16.0), fixed={"z": 195.0}, resolution=10.0)
+
+
+KEEP, ANYHOW = pf.Options(working_mode="keep"), pf.Options(hold="position", working_mode="any")
+SLOW = pytest.mark.slow
+CONTAINED = [
+    *(pytest.param(partial(space, name), None, pf.Options(), id=name) for name in (*RESOLUTIONS, "five_bar", "rrr")),
+    *(pytest.param(partial(in_mode, k), k, KEEP, id=f"mode {k}") for k in (0, 1)),
+    pytest.param(partial(anyhow, pf.load("stewart"), resolution=24.0), None, ANYHOW, id="stewart anyhow", marks=SLOW),
+    pytest.param(partial(anyhow, pf.load("rrr"), resolution=20.0), None, ANYHOW, id="rrr anyhow", marks=SLOW),
+    pytest.param(apart, None, ANYHOW, id="links apart anyhow", marks=SLOW),
+]
+
+
 @pytest.mark.parametrize("n", [150, pytest.param(10_000, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize("name", ["stewart", "five_bar", "linear_delta", "rpr", "rps", "ankle_ups", "hexaglide", "rrr"])
-def test_what_is_contained_is_what_is_reached(name: str, n: int) -> None:
-    machine = pf.load(name)
-    found = pf.workspace(machine, resolution=0.05 * machine.characteristic_length if name != "ankle_ups" else 0.05)
+@pytest.mark.parametrize(("make", "mode", "options"), CONTAINED)
+def test_what_is_contained_is_what_is_reached(
+    make: Callable[[], pf.Workspace], mode: int | None, options: pf.Options, n: int
+) -> None:
+    """In some orientation too, where `solve_ik` may miss some."""
+    found, start = make(), None if mode is None else modes()[mode]
     middle, half = found.bounds.mean(axis=0), 0.55 * np.ptp(found.bounds, axis=0)
     points = np.random.default_rng(2).uniform(middle - half, middle + half, (n, len(half)))
-    reached = pf.solve_ik(machine, found.poses(points)).status == pf.Status.REACHED
-    assert 0.1 < reached.mean() < 0.9
-    assert (found.contains(points) == reached).all()
+    answers = pf.solve_ik(found.mechanism, found.poses(points), start=start, options=options)
+    reached = answers.status == pf.Status.REACHED
+    if options.hold == "position":
+        reached = answers.position_error <= 1e-9 * found.mechanism.characteristic_length
+    assert 0.1 < reached.mean() < 0.95
+    contained = found.contains(points)
+    assert contained[reached].all() and found.contains(found.vertices).mean() > 0.99
+    assert options.hold == "position" or not contained[~reached].any()
+
+
+@pytest.mark.slow
+def test_any_orientation_ends_at_a_window() -> None:
+    machine = pf.load("rpr")
+    low, high = anyhow(machine, resolution=0.2).bounds
+    middle = 0.5 * (low + high)[0]
+    found = anyhow(machine, resolution=0.2, within={"x": (middle, high[0] + 1.0)})
+    assert found.bounds[0, 0] == pytest.approx(middle, abs=5e-3)
+    assert ("x", "min") in found.shares
 
 
 @pytest.mark.parametrize("name", ["stewart", "delta", "rps"])
 def test_vertices_are_on_the_limits_they_name(name: str) -> None:
-    found = pf.workspace(pf.load(name), resolution=0.08 * pf.load(name).characteristic_length)
+    found = space(name)
     told = pf.feasibility(found.mechanism, found.poses(found.vertices))
     bounds = np.array([bound for _, bound in found.limits])[found.vertex_limit]
     assert (told.margin >= 0.0).all()
@@ -157,20 +252,8 @@ def test_vertices_are_on_the_limits_they_name(name: str) -> None:
     assert sum(found.shares.values()) == pytest.approx(1.0)
 
 
-def test_what_has_no_size_is_told_before_it_is_measured() -> None:
-    upright, turn = closure.five_bar_with_tool(), Rotation.from_rotvec([0.4, 0.3, 0.0])
-    joints = [replace(joint, at=turn.apply(joint.at), axis=turn.apply(joint.axis)) for joint in upright.joints]
-    leaning = pf.Mechanism("leaning", joints, "c1", turn.apply(upright.reference_point), task=("x", "y", "z"))
-    with pytest.raises(InvalidArgument, match="x, y, z change in 2 directions"):
-        pf.workspace(leaning)
-    with pytest.raises(InvalidArgument, match="whose task has a tilt"):
-        pf.workspace(closure.ruu(), tilt=0.1)
-    with pytest.raises(InvalidArgument, match="at most 2 coordinates"):
-        pf.workspace(pf.load("ankle_ups"), over=("tilt_x", "tilt_y", "yaw"))
-
-
 def test_shares_of_a_joint_with_two_ranges_are_those_of_both() -> None:
-    found = pf.workspace(pf.load("ankle_ups"), resolution=0.05)
+    found = space("ankle_ups")
     assert sum(found.shares.values()) == pytest.approx(1.0)
     assert {place for group in groups_of(found) for place in group.limits} >= set(found.face_limit.tolist())
     own = np.array([limit == ("pivot", "min") for limit in found.limits])
@@ -178,13 +261,6 @@ def test_shares_of_a_joint_with_two_ranges_are_those_of_both() -> None:
     lengths = np.linalg.norm(np.diff(found.vertices[found.faces], axis=1)[:, 0], axis=1)
     expected = lengths[own[found.face_limit]].sum() / lengths.sum()
     assert found.shares["pivot", "min"] == pytest.approx(expected)
-
-
-def test_an_orthoglide_without_limits_fills_three_cylinders() -> None:
-    machine = pf.load("orthoglide").without_limits()
-    rod = 310.582854123025
-    found = pf.workspace(machine, resolution=rod / 22)
-    assert found.volume == pytest.approx(8.0 * (2.0 - np.sqrt(2.0)) * rod**3, rel=1e-3)
 
 
 def test_a_box_that_grows_holds_all_of_a_workspace_far_from_home() -> None:
@@ -198,18 +274,14 @@ def test_a_box_that_grows_holds_all_of_a_workspace_far_from_home() -> None:
     assert is_closed(found.faces)
 
 
-def test_a_workspace_that_nothing_ends_must_be_cut_off() -> None:
-    machine = pf.load("linear_delta").without_limits()
-    with pytest.raises(InvalidArgument, match=r"'z'.*nothing ends the workspace"):
-        pf.workspace(machine, resolution=15.0)
-
-
 def test_parts_that_do_not_hang_together_are_told_apart() -> None:
     """A 5-bar whose holes cut what is between them off, seen in a strip."""
     found = pf.workspace(pf.load("five_bar").without_limits(), within={"z": (-20.0, 20.0)})
     rings = [(y, 0.0, 35.0, 255.0) for y in (-50.0, 50.0)]
     assert len(found.components) == 3
     assert found.at_start is None  # home is above the strip
+    whole = space("five_bar")
+    assert whole.at_start is whole.components[0] and whole.at_start.contains(whole.mechanism.reference_point[1:])
     assert sum(part.area for part in found.components) == pytest.approx(found.area)
     middle = next(part for part in found.components if part.contains([0.0, 0.0]))
     assert not middle.contains([150.0, 0.0])
@@ -219,24 +291,31 @@ def test_parts_that_do_not_hang_together_are_told_apart() -> None:
     assert (middle.contains(points) == between).all()
 
 
-def test_the_part_of_the_start_comes_first() -> None:
-    found = pf.workspace(pf.load("five_bar"))
-    assert found.at_start is found.components[0]
-    assert found.at_start is not None
-    assert found.at_start.contains(found.mechanism.reference_point[1:])
+LEANING = Rotation.from_rotvec([0.4, 0.3, 0.0])
 
 
-def test_a_start_tells_the_working_mode() -> None:
-    machine = pf.load("five_bar").without_limits().with_limits(p2=(np.radians(-140.0), np.radians(-10.0)))
-    (first, other, *_) = [mode for mode in pf.working_modes(machine, [0.0, 10.0, 180.0]) if mode]
-    sizes = {}
-    for mode in (first, other):
-        found = pf.workspace(machine, start=mode)
-        points = grid(found, 12)
-        reached = [bool(pf.solve_ik(machine, pose, start=mode)) for pose in found.poses(points)]
-        assert found.contains(points).tolist() == reached
-        sizes[mode.actuators[1]] = found.area
-    assert len(sizes) == 2
+def leaning_five_bar() -> pf.Mechanism:
+    upright = closure.five_bar_with_tool()
+    joints = [replace(each, at=LEANING.apply(each.at), axis=LEANING.apply(each.axis)) for each in upright.joints]
+    return pf.Mechanism("leaning", joints, "c1", LEANING.apply(upright.reference_point), task=("x", "y", "z"))
+
+
+@pytest.mark.parametrize(
+    ("words", "machine", "options"),
+    [
+        ("x, y, z change in 2 directions", leaning_five_bar, {}),
+        ("whose task has a tilt", closure.ruu, {"tilt": 0.1}),
+        (
+            "at most 2 coordinates",
+            partial(pf.load, "ankle_ups"),
+            {"over": ("tilt_x", "tilt_y", "yaw")},
+        ),
+        ("'z'.*nothing ends the workspace", lambda: pf.load("linear_delta").without_limits(), {"resolution": 15.0}),
+    ],
+)
+def test_what_has_no_size_is_told(words: str, machine: Callable[[], pf.Mechanism], options: dict[str, Any]) -> None:
+    with pytest.raises(InvalidArgument, match=words):
+        pf.workspace(machine(), **options)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.1])
@@ -247,18 +326,6 @@ def test_where_it_can_lean_to_every_side_it_can(angle: float) -> None:
     leaning = [pf.pose([0, 0, 0], rotvec=[angle * np.cos(each), angle * np.sin(each), 0])[:3, :3] for each in azimuths]
     rings = [ring for rotation in leaning for ring in strut_rings(machine, rotation, 200.0)]
     assert found.area == pytest.approx(area(rings, lines=500), rel=2e-3)
-
-
-def test_any_orientation_reaches_what_some_orientation_reaches() -> None:
-    machine = pf.load("rpr")
-    found = pf.workspace(machine, orientation="any", resolution=0.3)
-    turned = [
-        pf.workspace(machine, orientation=pf.pose([0, 0, 0], rpy=[0, 0, yaw])[:3, :3]) for yaw in (-0.6, 0.0, 0.6)
-    ]
-    points = grid(found, 20)
-    some = np.any([each.contains(points) for each in turned], axis=0)
-    assert found.contains(points[some]).all()
-    assert found.area > max(each.area for each in turned)
 
 
 def reached_at_some_yaw(mechanism: pf.Mechanism, points: Array) -> Array:
@@ -286,41 +353,6 @@ def test_any_orientation_is_that_of_some_yaw_of_a_platform_on_three_struts(monke
     assert found.contains(found.vertices).all()
     assert sum(found.shares.values()) == pytest.approx(1.0)
     assert all(bound in ("min", "max") for _, bound in found.shares)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "resolution"), [("stewart", 16.0), ("hexaglide", 60.0), ("rrr", 20.0)])
-def test_any_orientation_loses_nothing_that_solve_ik_reaches(name: str, resolution: float) -> None:
-    machine = pf.load(name)
-    found = pf.workspace(machine, orientation="any", resolution=resolution)
-    rng = np.random.default_rng(1)
-    near = found.vertices[rng.integers(len(found.vertices), size=150)]
-    points = near + rng.normal(0.0, 0.4 * resolution, near.shape)
-    options = pf.Options(hold="position", working_mode="any")
-    answers = pf.solve_ik(machine, found.poses(points), options=options)
-    reached = answers.position_error <= 1e-9 * machine.characteristic_length
-    assert 30 < reached.sum() < 120
-    assert found.contains(points[reached]).all()
-    assert found.contains(found.vertices).all()
-
-
-@pytest.mark.slow
-def test_any_orientation_ends_at_a_window_and_keeps_the_working_mode_of_a_start() -> None:
-    machine = pf.load("rpr")
-    low, high = pf.workspace(machine, orientation="any", resolution=0.2).bounds
-    middle = 0.5 * (low + high)[0]
-    found = pf.workspace(machine, orientation="any", resolution=0.2, within={"x": (middle, high[0] + 1.0)})
-    assert found.bounds[0, 0] == pytest.approx(middle, abs=5e-3)
-    assert ("x", "min") in found.shares
-    arms = pf.load("rrr")
-    start = pf.solve_ik(arms, arms.home_pose)
-    kept = pf.workspace(arms, orientation="any", resolution=20.0, start=start)
-    points = grid(kept, 8)
-    options = pf.Options(hold="position", working_mode="keep")
-    answers = pf.solve_ik(arms, kept.poses(points), start=start, options=options)
-    reached = answers.position_error <= 1e-9 * arms.characteristic_length
-    assert kept.contains(points)[reached].all()
-    assert kept.area <= pf.workspace(arms, orientation="any", resolution=20.0).area * (1.0 + 1e-6)
 
 
 def test_orientations_at_a_place_are_those_that_are_reached_there() -> None:
@@ -449,55 +481,35 @@ def test_what_is_saved_can_be_read_again(tmp_path: Path) -> None:
     assert {(line["joint"], line["bound"]) for line in lines} >= set(found.shares)
 
 
-@pytest.mark.parametrize("name", ["stewart", "five_bar", "ankle_ups"])
-def test_a_picture_shows_every_limit_of_the_border(name: str) -> None:
+def test_a_picture_has_every_limit_of_the_border_and_the_machine() -> None:
+    """Stops of motors and of elbows differ in colour, and are named where they are."""
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    found = pf.workspace(pf.load(name), resolution=16.0 if name == "stewart" else None)
-    axes = found.plot()
-    legend = axes.get_legend()
-    assert legend is not None
-    words = " ".join(text.get_text() for text in legend.get_texts())
-    assert all(bound in words for _, bound in found.shares)
-    axes.figure.canvas.draw()
-    assert found.plot(axes) is axes
-    if len(found.names) == 3:
-        with pytest.raises(InvalidArgument, match="two-dimensional axes for a workspace of three"):
-            found.plot(pyplot.figure().add_subplot())
-    pyplot.close("all")
-
-
-def test_stops_of_motors_and_of_elbows_differ_in_colour_and_are_named_where_they_are() -> None:
-    pyplot = pytest.importorskip("matplotlib.pyplot")
-    found = pf.workspace(pf.load("five_bar"))
+    tip = pf.solve_ik(pf.load("five_bar"), (0.0, 40.0, 160.0))
+    found = pf.workspace(tip.mechanism, start=tip)
     assert set(found.shares) == {(joint, bound) for joint in ("p1", "p2", "p4", "p5") for bound in ("min", "max")}
     groups = groups_of(found)
     assert len({group.colour for group in groups}) == len(found.shares)
-    assert {group.label for group in groups} == {
-        *(f"{joint} {bound}, actuated" for joint in ("p1", "p5") for bound in ("min", "max")),
-        *(f"{joint} {bound}" for joint in ("p2", "p4") for bound in ("min", "max")),
-    }
-    assert {group.label for group in groups if group.colour in MOTOR_COLOURS} == {
-        group.label for group in groups if group.is_motors
+    actuated = {f"{joint} {bound}, actuated" for joint in ("p1", "p5") for bound in ("min", "max")}
+    assert {group.label for group in groups if group.is_motors} == actuated
+    assert {group.label for group in groups if group.colour in MOTOR_COLOURS} == actuated
+    assert {group.label for group in groups} - actuated == {f"{joint} {bound}" for joint, bound in found.shares} - {
+        label.removesuffix(", actuated") for label in actuated
     }
     axes = found.plot()
     assert sorted(text.get_text() for text in axes.texts) == sorted(" ".join(limit) for limit in found.shares)
     for text in axes.texts:
         nearest = np.argmin(np.linalg.norm(found.vertices - text.xy, axis=1))
         assert " ".join(found.limits[found.vertex_limit[nearest]]) == text.get_text()
-    pyplot.close("all")
-
-
-def test_motors_and_elbows_share_no_colour_where_there_are_too_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    border = sys.modules["pfabrik.workspace.border"]
-    monkeypatch.setattr(border, "MOTOR_COLOURS", ("#0072b2", "#56b4e9"))
-    monkeypatch.setattr(border, "JOINT_COLOURS", ("#e69f00", "#cc79a7"))
-    found = pf.workspace(pf.load("five_bar"), resolution=8.0)
-    assert {group.label for group in groups_of(found)} == {
-        "p1, 5 min, actuated",
-        "p1, 5 max, actuated",
-        "p2, 4 min",
-        "p2, 4 max",
-    }
+    ends = np.concatenate([line.get_xydata() for line in axes.lines if line.get_color() == "#404040"])
+    assert all(np.linalg.norm(ends - point[1:], axis=1).min() < 1e-9 for point in tip.points.values())
+    assert found.plot(axes) is axes
+    solid = pf.workspace(pf.load("stewart"), resolution=30.0)
+    words = " ".join(text.get_text() for text in solid.plot().get_legend().get_texts())
+    assert all(bound in words for _, bound in solid.shares)
+    with pytest.raises(InvalidArgument, match="two-dimensional axes for a workspace of three"):
+        solid.plot(pyplot.figure().add_subplot())
+    turns = space("ankle_ups").plot()  # which has no place for the machine
+    assert not [line for line in turns.lines if line.get_color() == "#404040"]
 
 
 def test_limits_that_are_met_together_do_not_alternate() -> None:
@@ -510,12 +522,11 @@ def test_limits_that_are_met_together_do_not_alternate() -> None:
         assert margins[f"BL{leg}", "cone"] == pytest.approx(margins[f"BR{leg}", "cone"], abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["delta", "linear_delta", "orthoglide", "rps", "five_bar"])
+@pytest.mark.parametrize("name", ["delta", "rps", "five_bar"])
 def test_of_limits_met_together_the_first_binds(name: str) -> None:
     """Equal to 1e-9 of their ranges; in blocks of poses, and one by one."""
-    machine = pf.load(name)
-    found = pf.workspace(machine, resolution=0.08 * machine.characteristic_length)
-    points = found.vertices[np.random.default_rng(5).integers(len(found.vertices), size=400)]
+    found = space(name)
+    machine, points = found.mechanism, found.vertices[np.random.default_rng(5).integers(len(found.vertices), size=400)]
     poses = found.poses(points + 0.02 * (found.bounds.mean(axis=0) - points))
     answers = pf.solve_ik(machine, poses)
     margins = pf.margins(answers[np.asarray(answers.status) == pf.Status.REACHED])
@@ -545,7 +556,7 @@ def test_the_border_is_divided_where_one_motor_takes_over_from_another() -> None
 
 @pytest.mark.parametrize("name", ["delta", "stewart"])
 def test_patches_are_the_border_and_no_more(name: str) -> None:
-    found = pf.workspace(pf.load(name), resolution=12.0)
+    found = space(name)
     groups = groups_of(found)
     place = group_of_limits(found, groups)
     patches = patches_of(found, found.vertices, found.faces, place[found.vertex_limit], place)
@@ -562,28 +573,9 @@ def test_patches_are_the_border_and_no_more(name: str) -> None:
     assert set(edges.values()) == {2}
 
 
-def test_a_machine_is_drawn_in_its_workspace_where_that_has_a_place_beside_it() -> None:
-    pyplot = pytest.importorskip("matplotlib.pyplot")
-    machine = pf.load("five_bar")
-    tip = pf.solve_ik(machine, (0.0, 40.0, 160.0))
-    axes = pf.workspace(machine, resolution=8.0, start=tip).plot()
-    ends = np.concatenate([line.get_xydata() for line in axes.lines if line.get_color() == "#404040"])
-    for point in tip.points.values():
-        assert np.linalg.norm(ends - point[1:], axis=1).min() < 1e-9
-    angles = pf.workspace(pf.load("ankle_ups")).plot()
-    assert not [line for line in angles.lines if line.get_color() == "#404040"]
-    pyplot.close("all")
-
-
-def test_where_nothing_is_within_reach_the_workspace_is_empty() -> None:
-    found = pf.workspace(pf.load("stewart"), fixed={"z": 5000.0})
-    assert found.area == 0.0
-    assert len(found.faces) == 0
-    assert found.components == ()
-    assert not found.contains([0.0, 0.0])
-
-
-def test_a_window_is_looked_at_however_far_from_the_start_it_is() -> None:
+def test_a_window_is_looked_at_however_far_from_the_start_it_is_and_may_be_empty() -> None:
+    none = pf.workspace(pf.load("stewart"), fixed={"z": 5000.0})
+    assert (none.area, len(none.faces), none.components) == (0.0, 0, ()) and not none.contains([0.0, 0.0])
     assert pf.workspace(pf.load("five_bar"), within={"y": (1e5, 2e5)}, resolution=10.0).size == 0.0
     rail = pf.Joint("rail", "prismatic", ("base", "car"), axis=(1, 0, 0), actuated=True)
     lift = pf.Joint("lift", "prismatic", ("car", "platform"), axis=(0, 1, 0), actuated=True, range=(-1, 1))
@@ -663,17 +655,3 @@ def test_a_map_that_explores_without_closed_forms_goes_round_an_obstacle() -> No
     assert np.median(distance) == pytest.approx(0.02 * length, abs=1e-3 * length)
     assert distance.max() < 0.07 * length  # a cell: the arm is redundant, and answers may have another elbow
     assert not found.contains([406.9, 100.0])
-
-
-@pytest.mark.slow
-def test_positions_in_any_orientation_keep_links_apart() -> None:
-    machine = struts(clearance=16.0)
-    found = pf.workspace(machine, fixed={"z": 195.0}, orientation="any", resolution=10.0)
-    free = pf.workspace(machine.with_clearance(None), fixed={"z": 195.0}, orientation="any", resolution=10.0)
-    assert found.size < free.size
-    points = np.random.default_rng(0).uniform(*found.bounds, (40, 2))
-    options = pf.Options(hold="position", working_mode="any")
-    answers = pf.solve_ik(machine, found.poses(points), options=options)
-    is_there = answers.position_error <= 1e-9 * machine.characteristic_length
-    np.testing.assert_array_equal(found.contains(points), is_there)
-    assert min(distance.min() for distance in distances_of_struts(answers.pose).values()) > 16.0 - 1e-6
