@@ -40,29 +40,28 @@ def struts(
     )
 
 
+TURNS = Rotation.from_rotvec(np.outer(np.arange(3) * 2.0 * np.pi / 3.0, [0, 0, 1])).as_matrix()
+BASE, PLATFORM = (np.concatenate([points @ turn.T for turn in TURNS]) for points in (FEET, HEADS))
+PAIRS = list(itertools.combinations(range(6), 2))
+
+
 def axes_of_struts(poses: Array) -> Array:
     """Both ends of the axes of all `struts` at poses, (n, 6, 2, 3)."""
-    ends = []
-    for k in range(3):
-        turn = Rotation.from_euler("z", 120.0 * k, degrees=True).as_matrix()
-        for foot, head in zip(FEET, HEADS, strict=True):
-            moved = poses[:, :3, :3] @ (turn @ head - CENTRE) + poses[:, :3, 3]
-            ends.append(np.stack([np.broadcast_to(turn @ foot, moved.shape), moved], axis=1))
-    return np.stack(ends, axis=1)
+    heads = (PLATFORM - CENTRE) @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, None, :3, 3]
+    return np.stack([np.broadcast_to(BASE, heads.shape), heads], axis=2)
+
+
+def distances_of_pairs(poses: Array, thickness: float = 12.0) -> Array:
+    """The distances of all pairs of struts at poses, (n, 15)."""
+    axes, (i, j) = axes_of_struts(poses), np.transpose(PAIRS)
+    ends = np.concatenate([axes[:, i], axes[:, j]], axis=2)
+    return by_cases(ends.reshape(-1, 4, 3)).reshape(len(poses), -1) - thickness
 
 
 def distances_of_struts(poses: Array, thickness: float = 12.0) -> dict[str, Array]:
-    """The distances of all pairs of struts at poses, (n,), by the names of their bodies."""
-    axes = axes_of_struts(poses)
-    return {
-        f"BC{i + 1}–BC{j + 1}": by_cases(np.concatenate([axes[:, i], axes[:, j]], axis=1)) - thickness
-        for i, j in itertools.combinations(range(6), 2)
-    }
-
-
-def least_of_struts(poses: Array, thickness: float = 12.0) -> Array:
-    """The least of these distances, (n,)."""
-    return np.min(list(distances_of_struts(poses, thickness).values()), axis=0)
+    """The same by the names of their bodies, (n,)."""
+    names = [f"BC{i + 1}–BC{j + 1}" for i, j in PAIRS]
+    return dict(zip(names, distances_of_pairs(poses, thickness).T, strict=True))
 
 
 def by_cases(ends: Array) -> Array:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import INTERPRETED
-from links import least_of_struts, struts
+from links import distances_of_pairs, struts
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
 from pfabrik.certify.subdividing import region_parameters
@@ -413,7 +413,7 @@ def test_links_are_proved_apart_in_a_box_and_refuted_in_a_larger_one() -> None:
     proved, close = pf.certify(machine, region), pf.certify(machine, region, tolerance=0.02 if INTERPRETED else 2e-3)
     assert proved and proved.replay()
     assert_holds(proved, 50 if INTERPRETED else 1000, rng)
-    room = least_of_struts(random_poses(region, 50 if INTERPRETED else 20_000, rng), 24.0) / length
+    room = distances_of_pairs(random_poses(region, 50 if INTERPRETED else 20_000, rng), 24.0) / length
     assert (room >= proved.margin).all()
     assert close and close.margin <= close.least_found and close.margin <= room.min()
     assert close.least_found - close.margin <= (0.021 if INTERPRETED else 2.1e-3)
@@ -425,7 +425,7 @@ def test_links_are_proved_apart_in_a_box_and_refuted_in_a_larger_one() -> None:
     assert refuted.verdict == "REFUTED" and refutation is not None
     assert refutation.limit[1] == "clearance" and "–" in refutation.limit[0]
     assert refutation.answer.status == Status.PROJECTED
-    away = least_of_struts(refutation.pose[None], 24.0)[0]
+    away = distances_of_pairs(refutation.pose[None], 24.0).min()
     assert away < 0.0 and refutation.margin == pytest.approx(away / length, abs=1e-9)
     assert [limit.bound for limit in refutation.answer.active_limits][:1] == ["clearance"]
 

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
+import machines
 import oracles
 import pfabrik as pf
 from checks import INTERPRETED, home_values
+from machines.redescribed import reversed_joints
 from paper import geometric
 from paper.geometric import NoClosedForm, arms, facts, targets
 from paper.geometric.topologies import TOPOLOGIES, closed_form
@@ -104,18 +106,12 @@ def test_a_leg_takes_its_other_branch_where_homes_breaks_a_limit_and_only_there(
 
 
 def five_bar(crank: float = 100.0, forearm: float = 100.0, stretched: bool = False) -> Mechanism:
-    """A 5-bar without limits, its shoulders 60 apart; its first leg bent by a right angle at home, or stretched."""
-    tip = np.array([crank, forearm, 0.0]) if not stretched else np.array([0.6, 0.8, 0.0]) * (crank + forearm)
-    elbow = np.array([crank, 0.0, 0.0]) if not stretched else np.array([0.6, 0.8, 0.0]) * crank
-    z = (0, 0, 1)
-    joints = [
-        Joint("A1", "revolute", ("base", "crank1"), at=(0, 0, 0), axis=z, actuated=True),
-        Joint("B1", "revolute", ("crank1", "rod1"), at=elbow, axis=z),
-        Joint("T", "revolute", ("rod1", "rod2"), at=tip, axis=z),
-        Joint("B2", "revolute", ("rod2", "crank2"), at=tip + [120.0, -90.0, 0.0], axis=z),
-        Joint("A2", "revolute", ("crank2", "base"), at=(60.0, 0, 5.0), axis=z, actuated=True),
-    ]
-    return Mechanism("unlimited 5-bar", joints, "T")
+    """Without limits, its shoulders 60 apart; its first leg bent by a right angle at home, or stretched."""
+    out = np.array([0.6, 0.8])
+    elbow, tip = (
+        (out * crank, out * (crank + forearm)) if stretched else (np.array([crank, 0]), np.array([crank, forearm]))
+    )
+    return machines.five_bar([(0, 0), (60, 0)], [elbow, tip + [120, -90]], tip)
 
 
 def test_a_leg_reaches_out_to_its_stretch_and_not_beyond_and_only_in_its_plane() -> None:
@@ -259,49 +255,37 @@ def test_cones_of_half_a_turn_and_more_limit_nothing() -> None:
 # --- descriptions that count otherwise -------------------------------------------------------------------------------
 
 
-def test_struts_arms_and_cranks_may_be_described_from_their_other_end_and_counted_from_home() -> None:
-    stewart, nrpm, bar = map(pf.load, ("stewart", "nrpm", "five_bar"))
-    strut = {name: np.array(stewart.joint(name).at) for name in ("AL2", "CL2", "AR1", "CR1")}
-    turned_strut = redescribed(
-        stewart,
-        AL1={"connects": ("cylinderL1", "base")},
-        BL1={"connects": ("rodL1", "cylinderL1")},
-        CL2={"connects": ("platform", "rodL2")},
-        BL2={"along": None, "axis": strut["CL2"] - strut["AL2"], "home": 10.0, "range": (-40.0, 85.0)},
-        BR1={"along": None, "axis": strut["AR1"] - strut["CR1"], "home": 3.0, "range": (-72.0, 53.0)},
-    )
-    turned_arm = redescribed(
-        nrpm,
-        A1={"connects": ("arm1", "base"), "axis": np.negative(nrpm.joint("A1").axis)},
-        B2={"connects": ("crossbar2", "arm2"), "axis": np.negative(nrpm.joint("B2").axis)},
-    )
-    turned_crank = redescribed(
-        bar,
-        p1={"connects": ("link1", "base"), "axis": np.negative(bar.joint("p1").axis)},
-        p4={"connects": ("link3", "link4"), "axis": np.negative(bar.joint("p4").axis)},
-        p5={"connects": ("link4", "base")},
-    )
-    machines = (stewart, turned_strut, {}), (nrpm, turned_arm, {}), (bar, turned_crank, {"p5": -1.0})
-    for mechanism, other, signs in machines:
-        wanted = some_targets(mechanism, 200)
-        plain, answer = geometric.solve_ik(mechanism, wanted), geometric.solve_ik(other, wanted)
+@pytest.mark.parametrize("name", NAMES)
+def test_joints_may_be_described_from_their_other_body(name: str) -> None:
+    """With axes turned over, coordinates are the same; else they change sign, and candidates of arms are others."""
+    mechanism = pf.load(name)
+    wanted = some_targets(mechanism, 200)
+    plain = geometric.solve_ik(mechanism, wanted)
+    swapped = {joint.name: {"connects": joint.connects[::-1]} for joint in mechanism.joints}
+    turned_over = {
+        j.name: swapped[j.name] | ({"axis": np.negative(j.axis)} if j.axis else {}) for j in mechanism.joints
+    }
+    signs = np.where([mechanism.joint(each).along is None for each in mechanism.actuator_names], -1.0, 1.0)
+    others = [(redescribed(mechanism, **turned_over), 1.0), (reversed_joints(mechanism), signs)]
+    for other, sign in others[: 1 if name == "nrpm" else 2]:
+        answer = geometric.solve_ik(other, wanted)
         np.testing.assert_array_equal(answer.reached, plain.reached)
-        expected = plain.actuators * [signs.get(name, 1.0) for name in mechanism.actuator_names]
-        if mechanism is stewart:  # whose coordinates count otherwise
-            expected = np.where(plain.reached[:, None], pf.solve_ik(other, wanted).actuators, np.nan)
-        np.testing.assert_allclose(answer.actuators, expected, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(answer.actuators, sign * plain.actuators, rtol=0, atol=1e-9)
 
 
-def test_bodies_that_are_fixed_to_the_base_count_as_the_base() -> None:
+def test_struts_may_be_counted_from_home_and_bodies_fixed_to_the_base_count_as_the_base() -> None:
     stewart = pf.load("stewart")
+    a, c = (np.array(stewart.joint(name).at) for name in ("AL2", "CL2"))
     mount = {"connects": ("mount", "cylinderL1"), "cone": Cone((0, 0, 1), np.radians(50), "mount")}
-    moved = redescribed(stewart, AL1=mount)
-    mounted = dataclasses.replace(
-        moved, joints=(*moved.joints, Joint("bolt", "fixed", ("base", "mount"), at=(90, 0, 0)))
-    )
-    wanted = some_targets(stewart, 100)
-    expected = geometric.solve_ik(stewart, wanted)
-    np.testing.assert_array_equal(geometric.solve_ik(mounted, wanted).actuators, expected.actuators)
+    slide = {"along": None, "axis": c - a, "home": 10.0, "range": (-40.0, 85.0)}
+    other = redescribed(stewart, BL2=slide, AL1=mount)
+    bolt = Joint("bolt", "fixed", ("base", "mount"), at=(90, 0, 0))
+    other = dataclasses.replace(other, joints=(*other.joints, bolt))
+    wanted = some_targets(stewart, 200)
+    plain, answer = geometric.solve_ik(stewart, wanted), geometric.solve_ik(other, wanted)
+    np.testing.assert_array_equal(answer.reached, plain.reached)
+    counted = (np.array(stewart.actuator_names) == "BL2") * (10.0 - np.linalg.norm(c - a))
+    np.testing.assert_allclose(answer.actuators, plain.actuators + counted, rtol=0, atol=1e-9)
 
 
 # --- batches and wrong calls -----------------------------------------------------------------------------------------

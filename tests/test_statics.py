@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from in_mujoco import Model, mujoco
-from machines import closure
+from machines import closure, ring
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
 from pfabrik.files.units import metres_of
 from pfabrik.interop import to_mjcf
@@ -114,9 +114,14 @@ def struts_jacobian(solution: pf.Solution) -> Array:
     return np.array(rows)
 
 
-def test_forces_of_struts_are_those_of_their_lines() -> None:
+def test_struts_push_along_their_lines_and_are_springs_along_them() -> None:
+    k = np.array([100.0, 120.0, 90.0, 200.0, 50.0, 70.0])
     for solution in rows_of("stewart"):
-        expected = -np.linalg.solve(struts_jacobian(solution).T, WRENCH)
+        jacobian, stiff = struts_jacobian(solution), pf.stiffness(solution, k)
+        np.testing.assert_allclose(stiff.matrix, jacobian.T @ np.diag(k) @ jacobian, rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(stiff.matrix @ stiff.compliance, np.eye(6), atol=1e-7)
+        assert stiff.rigid == 0
+        expected = -np.linalg.solve(jacobian.T, WRENCH)
         np.testing.assert_allclose(pf.forces(solution, WRENCH).actuators, expected, rtol=1e-9)
         point = solution.pose[:3, 3] + [3.0, -40.0, 20.0]
         moved = np.r_[WRENCH[:3], WRENCH[3:] + np.cross(solution.pose[:3, 3] - point, WRENCH[:3])]
@@ -308,15 +313,6 @@ def test_the_orthoglide_has_its_published_factors() -> None:
     assert here.rotation.velocity.shape == (0,)
 
 
-def test_stiffness_of_struts_is_that_of_their_springs() -> None:
-    k = np.array([100.0, 120.0, 90.0, 200.0, 50.0, 70.0])
-    for solution in rows_of("stewart"):
-        jacobian, found = struts_jacobian(solution), pf.stiffness(solution, k)
-        np.testing.assert_allclose(found.matrix, jacobian.T @ np.diag(k) @ jacobian, rtol=1e-7, atol=1e-6)
-        np.testing.assert_allclose(found.matrix @ found.compliance, np.eye(6), atol=1e-7)
-        assert found.rigid == 0
-
-
 def test_slack_cables_have_no_stiffness() -> None:
     machine = cables()
     for solution in rows_of("cables"):
@@ -336,8 +332,8 @@ def test_slack_cables_have_no_stiffness() -> None:
 
 def test_rods_that_stretch_are_as_soft_as_slides_in_them() -> None:
     """The same machine with a spring in each rod, as a twelfth actuator, has stiffness from actuators alone."""
-    base = np.array([[c * 150.0, s * 150.0, 0.0] for c, s in map(circle, (0.1, 2.0, 2.2, 4.1, 4.3, 6.2))])
-    top = np.array([[c * 70.0, s * 70.0, 200.0] for c, s in map(circle, (0.8, 1.3, 2.9, 3.4, 5.0, 5.5))])
+    base = np.array(ring(150.0, 0.0, (6, 115, 126, 235, 246, 355)))
+    top = np.array(ring(70.0, 200.0, (46, 74, 166, 195, 286, 315)))
     via = base + [30.0, -10.0, 60.0] + 0.5 * (top - base) * [1, 1, 0]
     made = {"base": base, "platform": top, "via": via, "axis": [0.2, 1.0, 0.1], "reference_point": (0, 0, 200)}
     rigid, sprung = (pf.Mechanism.from_legs(chain, **made) for chain in ("R*-U-S", "R*-U-P*-S"))
@@ -346,10 +342,6 @@ def test_rods_that_stretch_are_as_soft_as_slides_in_them() -> None:
     expected, found = pf.stiffness(same, k), pf.stiffness(here, 4e4, rods=300.0)
     np.testing.assert_allclose(found.compliance, expected.compliance, atol=1e-9 * np.abs(expected.compliance).max())
     assert np.abs(pf.stiffness(here, 4e4).matrix).max() > 1.1 * np.abs(found.matrix).max()
-
-
-def circle(angle: float) -> tuple[float, float]:
-    return float(np.cos(angle)), float(np.sin(angle))
 
 
 def test_rods_of_an_overconstrained_machine_share_what_equilibrium_does_not_tell() -> None:
