@@ -262,9 +262,8 @@ def test_joints_may_be_described_from_their_other_body(name: str) -> None:
     wanted = some_targets(mechanism, 200)
     plain = geometric.solve_ik(mechanism, wanted)
     swapped = {joint.name: {"connects": joint.connects[::-1]} for joint in mechanism.joints}
-    turned_over = {
-        j.name: swapped[j.name] | ({"axis": np.negative(j.axis)} if j.axis else {}) for j in mechanism.joints
-    }
+    negated = {joint.name: {"axis": np.negative(joint.axis)} if joint.axis else {} for joint in mechanism.joints}
+    turned_over = {name: swapped[name] | negated[name] for name in swapped}
     signs = np.where([mechanism.joint(each).along is None for each in mechanism.actuator_names], -1.0, 1.0)
     others = [(redescribed(mechanism, **turned_over), 1.0), (reversed_joints(mechanism), signs)]
     for other, sign in others[: 1 if name == "nrpm" else 2]:

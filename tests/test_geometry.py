@@ -189,6 +189,8 @@ def test_numbers_that_are_not_finite_and_axes_without_a_direction_make_no_record
                 continue  # it is the joint's centre, whatever is given
             if field == "home" and mechanism.coordinates[0].name not in mechanism.actuator_names:
                 continue
+            if field == "points" and mechanism.joints[0].type == "prismatic":
+                continue  # a slide is nowhere
             geometry = geometry_of(mechanism)
             getattr(geometry, field)[0] = number
             assert table_with(mechanism, geometry) is None, field

@@ -128,8 +128,8 @@ def cases() -> Iterator[Any]:
     cylinders = [(105.0 * np.cos(turn), 105.0 * np.sin(turn), 0.0, rod) for turn in np.radians([0.0, 120.0, 240.0])]
     whole = Case(linear, {"within": {"z": (-60.0, 40.0)}}, 100.0 * area(cylinders), cylinders)
     yield pytest.param(whole, id="cylinders")
-    exact = 8.0 * (2.0 - np.sqrt(2.0)) * 310.582854123025**3
-    yield pytest.param(Case(pf.load("orthoglide").without_limits(), {}, exact), id="Steinmetz's solid")
+    exact, machine = 8.0 * (2.0 - np.sqrt(2.0)) * 310.582854123025**3, pf.load("orthoglide").without_limits()
+    yield pytest.param(Case(machine, {"resolution": 20.0}, exact), id="Steinmetz's solid")
 
 
 @pytest.mark.parametrize("case", list(cases()))
@@ -144,7 +144,7 @@ def test_a_size_is_off_by_its_uncertainty_at_most_and_what_is_contained_is_what_
             assert {(name, "min"), (name, "max")} < set(default.shares)
         assert (default.contains(points) == inside).all()
     resolution = next(r for r, unit in zip(default.resolution, default.units, strict=True) if unit != "rad")
-    coarser = [pf.workspace(case.machine, **case.options, resolution=factor * resolution) for factor in (1.37, 2.9)]
+    coarser = [pf.workspace(case.machine, **case.options | {"resolution": f * resolution}) for f in (1.37, 2.9)]
     for found in (default, *coarser):
         assert abs(found.size - case.size) <= found.uncertainty <= 0.25 * case.size
 
@@ -305,11 +305,7 @@ def leaning_five_bar() -> pf.Mechanism:
     [
         ("x, y, z change in 2 directions", leaning_five_bar, {}),
         ("whose task has a tilt", closure.ruu, {"tilt": 0.1}),
-        (
-            "at most 2 coordinates",
-            partial(pf.load, "ankle_ups"),
-            {"over": ("tilt_x", "tilt_y", "yaw")},
-        ),
+        ("at most 2 coordinates", partial(pf.load, "ankle_ups"), {"over": ("tilt_x", "tilt_y", "yaw")}),
         ("'z'.*nothing ends the workspace", lambda: pf.load("linear_delta").without_limits(), {"resolution": 15.0}),
     ],
 )
@@ -366,7 +362,7 @@ def test_orientations_at_a_place_are_those_that_are_reached_there() -> None:
 
 
 def test_a_slice_is_what_a_plane_cuts_out() -> None:
-    whole = pf.workspace(pf.load("stewart"), resolution=6.0)
+    whole = space("stewart")
     cut = whole.slice({"z": 200.0}, resolution=2.0)
     assert cut.names == ("x", "y")
     assert cut.area == pytest.approx(pf.workspace(whole.mechanism, fixed={"z": 200.0}, resolution=2.0).area)
@@ -387,10 +383,8 @@ def test_the_largest_circle_touches_the_border(centre: tuple[float, float] | Non
 
 @pytest.mark.parametrize("kind", ["sphere", "box", "cylinder"])
 def test_all_of_the_largest_shape_is_within(kind: str) -> None:
-    found = pf.workspace(pf.load("delta"), resolution=10.0)
-    largest = found.inscribed(
-        kind, proportions=None if kind == "sphere" else (2, 1) if kind == "cylinder" else (3, 2, 1)
-    )
+    found, proportions = space("delta"), {"sphere": None, "cylinder": (2, 1), "box": (3, 2, 1)}
+    largest = found.inscribed(kind, proportions=proportions[kind])
     share = np.random.default_rng(3).uniform(-0.5, 0.5, (5000, 3))
     if kind == "sphere":
         share = share[np.linalg.norm(share, axis=1) <= 0.5]
