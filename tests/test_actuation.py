@@ -46,18 +46,11 @@ def waist() -> Mechanism:
         Joint("pitch", "revolute", ("torso", "cross"), at=(0, 5, 50), axis=(0, 1, 0), range=(-0.5, 0.5)),
     ]
     for side, y in (("L", 40), ("R", -40)):
-        foot, strut, head = f"A{side}", f"B{side}", f"C{side}"
+        ends, strut = (f"A{side}", f"C{side}"), (f"cylinder{side}", f"rod{side}")
         joints += [
-            Joint(foot, "universal", ("hip", f"cylinder{side}"), at=(-60, y, 0)),
-            Joint(
-                strut,
-                "prismatic",
-                (f"cylinder{side}", f"rod{side}"),
-                along=(foot, head),
-                actuated=True,
-                range=(60, 140),
-            ),
-            Joint(head, "spherical", (f"rod{side}", "torso"), at=(-60, y, 100)),
+            Joint(ends[0], "universal", ("hip", strut[0]), at=(-60, y, 0)),
+            Joint(f"B{side}", "prismatic", strut, along=ends, actuated=True, range=(60, 140)),
+            Joint(ends[1], "spherical", (strut[1], "torso"), at=(-60, y, 100)),
         ]
     return Mechanism(name="waist", joints=joints, end_effector="torso", reference_point=(0, 0, 150), task=["rotation"])
 
@@ -222,9 +215,8 @@ def test_nothing_is_nan_at_and_beyond_dead_points() -> None:
         low, high = (middle, high) if a.margin(middle).margin > 0.0 else (low, middle)
     q = np.vstack([q, low, high])
     margin = a.margin(q)
-    assert (
-        abs(margin.margin[-2]) < 1e-3 and margin.bound[-2] == "dead point" and margin.joint[-2].endswith("motor_joint")
-    )
+    assert abs(margin.margin[-2]) < 1e-3
+    assert margin.bound[-2] == "dead point" and margin.joint[-2].endswith("motor_joint")
     assert margin.bound[last + 1] == "reach" and margin.margin[-1] <= 1e-3
     force = a.torques_to_actuators(q, [1.0, 1.0])
     for values in (a.to_actuators(q).values, a.jacobian(q), force, a.armature(q, 1.0), margin.margin):
@@ -329,22 +321,10 @@ def half_driven() -> Mechanism:
     ("call", "error", "text"),
     [
         # The arms of a redundant hexapod turn while its platform rests.
-        (
-            lambda: pf.actuation(pf.load("nrpm"), "task"),
-            UnsupportedMechanism,
-            "do not determine the actuators: with them at rest, .* can still",
-        ),
+        (lambda: actuation_of("nrpm", "task"), UnsupportedMechanism, "actuators: with them at rest, .* can still"),
         # A way through a strut has six coordinates, of which two are independent.
-        (
-            lambda: pf.actuation(pf.load("ankle_ups"), ("AL", "BL", "CL")),
-            UnsupportedMechanism,
-            r"the loops leave AL\[0\], .* 2 freedoms, not 6",
-        ),
-        (
-            lambda: pf.actuation(half_driven(), ("a", "b")),
-            UnsupportedMechanism,
-            "actuators do not determine the joints: with them locked, b can",
-        ),
+        (lambda: actuation_of("ankle_ups", ("AL", "BL", "CL")), UnsupportedMechanism, r"AL\[0\], .* 2 freedoms, not 6"),
+        (lambda: pf.actuation(half_driven(), ("a", "b")), UnsupportedMechanism, "with them locked, b can"),
         (lambda: pf.actuation(pf.load("g1_ankle"), ("pitch",)), UnknownName, "did you mean 'pitch_joint'"),
         (lambda: pf.actuation(pf.load("g1_ankle"), ("pitch_joint",)), InvalidArgument, "in series"),
         (lambda: ankle().jacobian([0.0, 0.0, 0.0]), InvalidArgument, "shape .3,.; expected .*pitch_joint, roll_joint"),

@@ -268,27 +268,6 @@ def thick_delta() -> pf.Mechanism:
     return machine.with_shapes(machine.shapes, beside)
 
 
-def bar(machine: pf.Mechanism, body: str, ends: tuple[str, str], off: float, width: float) -> pf.Shape:
-    """A flat bar of a planar machine, from joint to joint, in a plane of its own."""
-    start, end = (np.array(machine.joint(name).at) for name in ends)
-    size = (float(np.linalg.norm(end - start)), width, 6)
-    axes = (end - start, np.cross([1, 0, 0], end - start))
-    return pf.Shape(body, "box", at=0.5 * (start + end) + [off, 0, 0], size=size, axes=axes)  # type: ignore[arg-type]
-
-
-def five_bar_of_plates() -> pf.Mechanism:
-    machine = pf.load("five_bar")
-    bars = [
-        bar(machine, "link1", ("p1", "p2"), 0, 20),
-        bar(machine, "link2", ("p2", "p3"), 0, 14),
-        bar(machine, "link3", ("p3", "p4"), 3, 14),
-        bar(machine, "link4", ("p4", "p5"), 3, 20),
-    ]
-    motor = pf.Shape("base", "disc", at=(0, 0, 70), axis=(1, 0, 0.2), diameter=90, thickness=10)
-    tip = pf.Shape("link2", "disc", at=machine.joint("p3").at, axis=(1, 0, 0), diameter=36, thickness=30)
-    return machine.with_shapes([*bars, motor, tip])
-
-
 def struts_around_a_column() -> pf.Mechanism:
     column = pf.Shape("base", "box", at=(0, 0, 60), size=(60, 80, 120), axes=((0.8, 0.6, 0), (-0.6, 0.8, 0)))
     plate = pf.Shape("platform", "disc", at=(0, 0, 150), axis=(0, 0.1, 1), diameter=50, thickness=10)
@@ -347,7 +326,6 @@ def in_mujoco(machine: pf.Mechanism, answers: pf.Solution) -> Array:
 @pytest.mark.parametrize(
     ("make", "shift", "turn"),
     [
-        (five_bar_of_plates, 0.4, 0.0),
         (struts_around_a_column, 0.3, 0.3),
         (thick_delta, 0.5, 0.0),
         pytest.param(hexaglide_with_a_ball, 0.3, 0.4, marks=SLOW),
@@ -434,6 +412,7 @@ def test_what_no_body_can_have_is_named_at_its_place(said: str, place: str, word
     assert len(faults) == 1
 
 
+THICK_LEG = pf.Leg("U-P*-S", (0, 9, 0), (0, 9, 9), thickness={})  # type: ignore[arg-type]
 ONE_BALL = pf.Shape("base", "sphere", at=(0, 0, -50), diameter=1)
 
 
@@ -441,12 +420,7 @@ ONE_BALL = pf.Shape("base", "sphere", at=(0, 0, -50), diameter=1)
     ("make", "words"),
     [
         (lambda: struts(45.0), "leg[0].thickness: found 'BC2', which is 5 deep in 'BC1' at home"),
-        (
-            lambda: pf.Mechanism.from_legs(
-                [pf.Leg("U-P*-S", (0, 9, 0), (0, 9, 9), thickness={})], reference_point=(0, 0, 9)
-            ),
-            "a number",
-        ),
+        (lambda: pf.Mechanism.from_legs([THICK_LEG], reference_point=(0, 0, 9)), "a number"),
         (lambda: struts(clearance=30), "28 from 'BC1' at home; expected links that are at least 30 apart"),
         (lambda: pf.load("stewart").with_shapes([1]), "found [1]"),
         (lambda: pf.load("stewart").with_shapes([ONE_BALL] * 301), "at most 300"),
