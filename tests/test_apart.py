@@ -198,12 +198,8 @@ def test_links_beyond_balls_are_where_joints_have_them_whatever_bodies_have_link
     """Links that are reached in another order than the loops reach them: a box on a carriage, rods, a platform."""
     machine = pf.load("prs")
     length, point = machine.characteristic_length, np.array(machine.reference_point)
-    boxes = [
-        ("carriage2", np.array(machine.joint("B2").at)),
-        ("platform", point),
-        ("base", point + [0, 0, 0.3 * length]),
-    ]
-    shapes = [pf.Shape(body, "box", at=at, size=[0.1 * length] * 3) for body, at in boxes]
+    boxes = {"carriage2": machine.joint("B2").at, "platform": point, "base": point + [0, 0, 0.3 * length]}
+    shapes = [pf.Shape(body, "box", at=at, size=[0.1 * length] * 3) for body, at in boxes.items()]
     rods = [pf.Shape(f"rod{k}", thickness=0.02 * length) for k in (1, 2, 3)]
     machine = machine.with_shapes(shapes + rods).with_clearance(0.15 * length)
     loose = pf.solve_ik(machine.with_clearance(None), around(machine, 2 * COUNT, 0.5), options=FREE)
@@ -348,11 +344,9 @@ def test_the_centre_of_a_sliding_joint_moves_with_its_first_body() -> None:
 
 def test_two_bodies_that_touch_in_several_places_are_named_once() -> None:
     """A plate above two posts of one body, which both stop it."""
-    legs = {"base": [[100, 20, 0], [100, -20, 0]], "platform": [[40, 40, 195], [40, -40, 195]], "stroke": (100, 280)}
     posts = [pf.Shape("base", "sphere", at=(side, 0, 60), diameter=40) for side in (-20, 20)]
     plate = pf.Shape("platform", "disc", at=(0, 0, 190), axis=(0, 0, 1), diameter=60, thickness=4)
-    around = {"copies": {"count": 3, "axis": [0, 0, 1]}, "reference_point": [0, 0, 195]}
-    machine = pf.Mechanism.from_legs("U-P*-S", shapes=[*posts, plate], clearance=1, **legs, **around)  # type: ignore[arg-type]
+    machine = struts(1.0, clearance=1, stroke=(100, 280), shapes=[*posts, plate])
     answer = pf.solve_ik(machine, [0, 0, 60])
     assert answer.pose[2, 3] == pytest.approx(60 + 20 + 1 + 7, abs=1e-6)
     assert [each.joint for each in answer.active_limits] == ["base–platform"] * 2  # type: ignore[union-attr]

@@ -110,19 +110,12 @@ def test_parameters_change_what_they_name() -> None:
     low = pf.solve_ik(delta, [0.0, 0.0, -5.0]).actuators
     zeroed = pf.parameters(delta, "offsets").apply([0.5, 0.0, -0.25])
     np.testing.assert_allclose(pf.solve_ik(zeroed, [0.0, 0.0, -5.0]).actuators, low + [0.5, 0.0, -0.25], atol=1e-9)
-
-
-def test_tied_copies_vary_as_one() -> None:
-    tied = pf.parameters(pf.load("stewart"), ["points", "offsets"], ties="copies")
+    printer = pf.parameters(pf.read_klipper(PRINTER).mechanism, ["delta_radius", "arm_length_a"])
+    assert printer.apply([164.0, 345.0]).dimensions["delta_radius"] == 164.0
+    tied = pf.parameters(pf.load("stewart"), ["points", "offsets"], ties="copies")  # copies vary as one
     assert len(tied) == 14
     changed = tied.apply(tied.values + 0.3)
-    radii = [math.hypot(*changed.joint(f"AL{k}").at[:2]) for k in (1, 2, 3)]
-    assert np.ptp(radii) < 1e-9
-
-
-def test_dimensions_are_parameters_by_name() -> None:
-    own = pf.parameters(pf.read_klipper(PRINTER).mechanism, ["delta_radius", "arm_length_a"])
-    assert own.apply([164.0, 345.0]).dimensions["delta_radius"] == 164.0
+    assert np.ptp([math.hypot(*changed.joint(f"AL{k}").at[:2]) for k in (1, 2, 3)]) < 1e-9
 
 
 @cache
@@ -159,11 +152,14 @@ def test_without_tilt_a_hexapod_shows_what_it_leaves_open() -> None:
     assert abs(x["CL1.x"] - x["AL1.x"]) < 1e-9
 
 
-def test_a_printer_gets_the_values_of_its_firmware() -> None:
+def test_a_printer_gets_the_values_of_its_firmware_and_shows_them() -> None:
     printer = pf.read_klipper(PRINTER)
     found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
     assert dict(zip(found.names, found.values, strict=True)) == pytest.approx(FIRMWARE, abs=1e-3)
     assert found.determined.all() and found.rms < found.rms_before
+    assert "delta_radius" in found._repr_html_() and "arm_length_a" in str(found)
+    assert found.to_dict()["parameters"][0]["name"] == "delta_radius"
+    assert len(pf.plot_calibration(found).axes) == 2
 
 
 def test_heights_alone_leave_the_arms_open() -> None:
@@ -332,15 +328,6 @@ WRONG: list[tuple[type[Exception], str, Callable[[], object]]] = [
 def test_wrong_calls_say_what_is_wrong(error: type[Exception], words: str, call: Callable[[], object]) -> None:
     with pytest.raises(error, match=words):
         call()
-
-
-def test_a_calibration_shows_itself() -> None:
-    printer = pf.read_klipper(PRINTER)
-    found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
-    assert "delta_radius" in found._repr_html_() and "arm_length_a" in str(found)
-    assert found.to_dict()["parameters"][0]["name"] == "delta_radius"
-    figure = pf.plot_calibration(found)
-    assert len(figure.axes) == 2
 
 
 @pytest.mark.parametrize(("name", "free", "has_poses"), [("stewart", "tool", True), ("delta", "frame", False)])
