@@ -36,6 +36,7 @@ from slopes import beside, slopes
 Array = NDArray[np.float64]
 ROWS = 500 if INTERPRETED else 20_000
 SLOW = pytest.mark.slow if INTERPRETED else ()
+KINDS = ("capsule", "box", "disc")
 DELTA = (Path(pf.__file__).parent / "catalog" / "delta.toml").read_text()
 
 
@@ -143,7 +144,7 @@ def measured(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[floa
 
 
 @pytest.mark.parametrize("count", [6 if INTERPRETED else 60, pytest.param(12_000, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize(("first", "second"), itertools.combinations_with_replacement(("capsule", "box", "disc"), 2))
+@pytest.mark.parametrize(("first", "second"), list(itertools.combinations_with_replacement(KINDS, 2)))
 def test_solids_are_as_far_apart_as_separating_planes_say_and_as_deep_as_the_shortest_way_out(
     first: str, second: str, count: int
 ) -> None:
