@@ -170,7 +170,7 @@ def test_a_multiplier_is_what_the_answer_gains_by_less_clearance() -> None:
 # Every answer
 
 
-CATALOGUE = ("hexaglide", "delta", "reachy_mini", "agile_eye", "orthoglide", "nrpm", "panda")
+CATALOGUE = ("hexaglide", "delta", "reachy_mini", "agile_eye", "orthoglide", "nrpm", "panda", "rrr")
 
 
 @pytest.mark.parametrize("name", CATALOGUE[:3] if INTERPRETED else CATALOGUE)

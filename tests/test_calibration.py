@@ -89,7 +89,8 @@ def test_pose_and_actuators_change_as_those_of_machines_with_other_values(make: 
     mechanism = make()
     solution = pf.solve_ik(mechanism, mechanism.home_pose @ pf.pose([10, 5, -5], rotvec=[0.1, -0.15, 0.2]))
     assert solution
-    own = pf.parameters(mechanism, ["side", "tool"] if mechanism.dimensions else ["points", "offsets"])
+    own = pf.parameters(mechanism, "dimensions" if mechanism.dimensions else ["points", "offsets"])
+    assert own.names == ("side", "tool") or not mechanism.dimensions
     found = pf.sensitivity(solution, own)
     for k in range(0, len(own), 9) if len(own) > 2 else (0, 1):
         ends = [own.apply(own.values + sign * 1e-4 * (np.arange(len(own)) == k)) for sign in (1.0, -1.0)]

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import INTERPRETED
+from machines import five_bar as planar_five_bar
 from machines import machine as named
 from machines import planar, redescribed, ring, struts
 from oracles import targets_about
@@ -57,32 +58,17 @@ def sarrus() -> Mechanism:
     return loop(points, [Y] * 3 + [X] * 3, "b3")
 
 
-def four_bar(angle: float = 1.2, crank: float = 2.0, rocker: float = 2.0, base: float = 5.0) -> Mechanism:
-    """A planar four-bar linkage with a coupler of 5; a parallelogram by default."""
-    b = crank * np.array([np.cos(angle), np.sin(angle), 0])
-    d = base * X
-    across = d - b
-    far = np.linalg.norm(across)
-    along = (5.0**2 - rocker**2 + far**2) / (2 * far)
-    height = np.sqrt(max(5.0**2 - along**2, 0.0))
-    c = b + along * across / far + height * np.cross(Z, across / far)
-    return loop([0 * X, b, c, d], [Z] * 4)
+def four_bar(angle: float = 1.2) -> Mechanism:
+    """A parallelogram in a plane."""
+    crank = 2.0 * np.array([np.cos(angle), np.sin(angle), 0])
+    return loop([0 * X, crank, crank + 5 * X, 5 * X], [Z] * 4)
 
 
 def five_bar(first: float, second: float, bend: float) -> Mechanism:
     """Cranks of 1 and forearms at given angles about z, and the right elbow bent by `bend`; the tip is at (0, 2)."""
-    tip = np.array([0.0, 2.0, 0.0])
-    left = tip - np.array([np.cos(first), np.sin(first), 0])
-    right = tip - 1.2 * np.array([np.cos(second), np.sin(second), 0])
-    bases = left - np.array([0.2, 1.0, 0]), right - np.array([np.cos(second - bend), np.sin(second - bend), 0])
-    joints = [
-        Joint("A", "revolute", ("base", "a"), at=bases[0], axis=Z, actuated=True),
-        Joint("B", "revolute", ("a", "b"), at=left, axis=Z),
-        Joint("tip", "revolute", ("b", "d"), at=tip, axis=Z),
-        Joint("D", "revolute", ("e", "d"), at=right, axis=Z),
-        Joint("E", "revolute", ("base", "e"), at=bases[1], axis=Z, actuated=True),
-    ]
-    return Mechanism("five-bar", joints, "tip")
+    tip, turn = np.array([0.0, 2.0]), lambda angle: np.array([np.cos(angle), np.sin(angle)])
+    left, right = tip - turn(first), tip - 1.2 * turn(second)
+    return planar_five_bar([left - [0.2, 1.0], right - turn(second - bend)], [left, right], tip)
 
 
 def hexapod(bases, tops, lower="universal") -> Mechanism:
