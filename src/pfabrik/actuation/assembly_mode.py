@@ -81,13 +81,15 @@ class AssemblyMode:
         for share in np.arange(1, n) / n:
             parts = share if order is None else np.clip(len(order) * share - order, 0.0, 1.0)
             rows = np.flatnonzero(clear)
+            if not len(rows):
+                break
             clear[rows] = self._signs(self._coordinates.home + parts * way[rows]) > 0.0
         return clear
 
     def ends(self, q: Floats) -> Floats:
         """The last points (n, k) of straight motions from home to rows that are beyond."""
         home, near, far = self._coordinates.home, np.zeros((len(q), 1)), np.ones((len(q), 1))
-        for _ in range(HALVINGS):
+        for _ in range(HALVINGS if len(q) else 0):
             middle = 0.5 * (near + far)
             beyond = self.are_beyond(home + middle * (q - home))[:, None]
             near, far = np.where(beyond, near, middle), np.where(beyond, middle, far)
