@@ -62,7 +62,7 @@ def test_sensitivities_are_those_of_machines_made_anew(name: str, kind: str) -> 
     slopes = pf.sensitivity(solution, own)
     home, length = np.array([each.home for each in mechanism.coordinates]), mechanism.characteristic_length
     rng = np.random.default_rng(2)
-    for k in rng.choice(len(own), min(2, len(own)), replace=False):
+    for k in rng.choice(len(own), 1):
         step, poses = 1e-5 * own.scales[k], []
         for sign in (1.0, -1.0):
             values = own.values + sign * step * (np.arange(len(own)) == k)

@@ -181,7 +181,8 @@ def test_the_mesh_is_closed_and_encloses_what_is_contained(name: str) -> None:
 @cache
 def modes() -> list[pf.Solution]:
     """Two working modes of a five-bar."""
-    machine = pf.load("five_bar").without_limits().with_limits(p5=(-0.6, 2.2))
+    machine = pf.load("five_bar").without_limits()
+    machine = machine.with_limits(p2=(np.radians(-140.0), np.radians(-10.0)), p5=(-0.6, 2.2))
     return [each for each in pf.working_modes(machine, [0.0, 10.0, 180.0]) if each][:2]
 
 
