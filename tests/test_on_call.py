@@ -39,50 +39,37 @@ def one(weights: Weights, rows: np.ndarray, out: np.ndarray, i: int) -> int:
     return total(weights, rows[i : i + 1], out[i : i + 1])
 
 
+WEIGHTS, ROWS = Weights(np.linspace(-1.0, 2.0, 5), 1.7), np.linspace(-2.0, 2.0, 200).reshape(40, 5)
+EXPECTED = np.zeros(40)
+total(WEIGHTS, ROWS, EXPECTED)
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(on_call, "KEPT", tmp_path_factory.getbasetemp() / "on_call")
 
 
-def example() -> tuple[Weights, np.ndarray]:
-    rng = np.random.default_rng(0)
-    return Weights(rng.normal(size=5), 1.7), rng.normal(size=(40, 5))
-
-
-def test_compiled_and_plain_answers_are_equal() -> None:
-    weights, rows = example()
-    expected, found = np.zeros(40), np.zeros(40)
-    kernel = on_call.kernel(total)
-    assert total(weights, rows, expected) == kernel(weights, rows, found) == 40
-    np.testing.assert_allclose(found, expected, rtol=1e-15, atol=1e-15)  # the sine is another library's
-    assert len(kernel.compiled) == 1  # type: ignore[attr-defined]
-
-
-def test_other_types_are_compiled_beside_the_first() -> None:
-    weights, rows = example()
-    kernel = on_call.kernel(total)
-    expected, found = np.zeros(40), np.zeros(40)
-    rows.setflags(write=False)
-    kernel(weights, rows, expected)
-    kernel(weights, rows.copy(), found)
-    np.testing.assert_array_equal(found, expected)
+def test_compiled_answers_equal_plain_ones_and_other_types_are_compiled_beside_the_first() -> None:
+    kernel, read_only = on_call.kernel(total), ROWS.copy()
+    read_only.setflags(write=False)
+    for rows in (ROWS, read_only, ROWS.copy()):
+        out = np.zeros(40)
+        assert kernel(WEIGHTS, rows, out) == 40
+        np.testing.assert_allclose(out, EXPECTED, rtol=1e-15, atol=1e-15)  # the sine is another library's
+    assert len(kernel.compiled) == 2  # type: ignore[attr-defined]
 
 
 def test_a_call_for_each_row_is_all_of_them() -> None:
-    weights, rows = example()
-    expected, found = np.zeros(40), np.zeros(40)
-    total(weights, rows, expected)
-    assert on_call.for_each(one)(weights, rows, found, 40) == 40
-    np.testing.assert_allclose(found, expected, rtol=1e-15, atol=1e-15)
+    out = np.zeros(40)
+    assert on_call.for_each(one)(WEIGHTS, ROWS, out, 40) == 40
+    np.testing.assert_allclose(out, EXPECTED, rtol=1e-15, atol=1e-15)
 
 
 def test_without_a_compiler_it_is_plain_python_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    weights, rows = example()
-    expected, found = np.zeros(40), np.zeros(40)
-    total(weights, rows, expected)
+    out = np.zeros(40)
     monkeypatch.setenv("CC", "no-such-compiler")
     on_call.platform.cache_clear()
     with pytest.warns(RuntimeWarning, match="there is no C compiler"):
-        on_call.kernel(total)(weights, rows, found)
+        on_call.kernel(total)(WEIGHTS, ROWS, out)
     on_call.platform.cache_clear()
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(out, EXPECTED)

@@ -8,9 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
-from machines import published
 from machines.published import PUBLISHED
-from oracles import assembly
 from oracles.arms import redundant_margin
 from pfabrik import Mechanism
 
@@ -140,85 +138,3 @@ def test_random_targets_are_on_both_sides_of_the_boundary(name: str) -> None:
     assert np.isfinite(margins).all()
     assert 0.2 < (margins > 0).mean() < 0.8
     assert np.abs(targets[:, :3, 3]).max() > 1000.0
-
-
-# --- forward kinematics ----------------------------------------------------------------------------------------------
-
-
-def test_planar_3rpr_has_as_many_roots_as_its_sextic() -> None:
-    """f is a trigonometric polynomial of degree three: its roots are those of a sextic on the unit circle."""
-    rng = np.random.default_rng(1)
-    counts = []
-    for _ in range(60):
-        geometry = assembly.Planar3RPR(*rng.uniform([2, 2, 0.3, 3, -1, 3], [4, 4, 2.5, 6, 2, 6]))
-        p = geometry.lengths(*rng.uniform([-3, -2, -2], [3, 4, 4]))
-        samples = geometry.f(2 * np.pi * np.arange(16) / 16, p)
-        harmonics = np.fft.fft(samples) / 16
-        assert np.abs(harmonics[4:13]).max() <= 1e-12 * np.abs(harmonics).max()
-        roots = np.roots([harmonics[k] for k in (3, 2, 1, 0, -1, -2, -3)])
-        real = np.sort(np.angle(roots[np.abs(np.abs(roots) - 1) < 1e-8]))
-        np.testing.assert_allclose(geometry.roots(p), real, atol=1e-6)
-        for solution in geometry.solutions(p):
-            np.testing.assert_allclose(geometry.lengths(*solution), p, atol=1e-9)
-        counts.append(len(real))
-    assert {2, 4} <= set(counts)
-
-
-@pytest.mark.parametrize("case", ["sauer_fig1_15", "sauer_p2_5"])
-def test_planar_3rpr_finds_the_published_poses(case: str) -> None:
-    geometry = assembly.Planar3RPR(**PUBLISHED[case]["geometry"])
-    np.testing.assert_allclose(geometry.solutions(PUBLISHED[case]["p"]), PUBLISHED[case]["poses_theta_x_y"], atol=1e-12)
-
-
-def test_planar_3rpr_finds_two_positions_at_one_angle() -> None:
-    """Level, the platform's and the base's corners lie on parallel lines: f touches zero there, and y may be either."""
-    geometry = assembly.Planar3RPR(L2=5.0, L3=3.0, gamma=0.4, x1=2.0, x2=5 * np.cos(0.4) - 2, y2=5 * np.sin(0.4))
-    found = geometry.solutions(geometry.lengths(0.0, 1.0, 2.0))
-    for expected in ((0.0, 1.0, 2.0), (0.0, 1.0, -2.0)):
-        assert min(np.abs(np.subtract(each, expected)).max() for each in found) <= 1e-6
-
-
-@pytest.mark.parametrize("transition, below, above", PUBLISHED["sauer_intervals"]["transitions_p2_from_to"])
-def test_planar_3rpr_counts_change_at_the_published_transitions(transition: float, below: int, above: int) -> None:
-    geometry = assembly.Planar3RPR(**PUBLISHED["sauer_p2_5"]["geometry"])
-    for p2, count in ((transition - 3e-6, below), (transition + 3e-6, above)):
-        assert len(geometry.solutions([5, p2, 3])) == count
-
-
-def test_five_bar_tips_are_a_forearm_from_both_elbows() -> None:
-    mechanism = pf.load("five_bar")
-    tips = assembly.five_bar_tips(mechanism, [0.0, 0.0])
-    assert len(tips) == 2
-    assert min(np.linalg.norm(tip - mechanism.reference_point) for tip in tips) <= 1e-12 * 200
-    assert assembly.five_bar_tips(mechanism, np.radians([60.0, -60.0])) == []
-
-
-def test_three_spheres_meet_in_two_points_at_their_radii() -> None:
-    radii = np.linalg.norm(published.TRIPOD_FEET - published.TRIPOD_TIP, axis=1)
-    found = assembly.spheres_meet(published.TRIPOD_FEET, radii)
-    assert len(found) == 2
-    for point in found:
-        np.testing.assert_allclose(np.linalg.norm(published.TRIPOD_FEET - point, axis=1), radii)
-    assert assembly.spheres_meet(published.TRIPOD_FEET, [10.0, 10.0, 10.0]) == []
-
-
-def test_six_struts_finds_all_40_of_dietmaiers_postures() -> None:
-    found, _ = assembly.gough_modes(
-        published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, published.DIETMAIER_LENGTHS, starts=8000
-    )
-    assert len(found) == 40
-    lengths = oracles.leg_lengths(published.DIETMAIER_BASE, published.DIETMAIER_PLATFORM, found)
-    np.testing.assert_allclose(lengths, np.tile(published.DIETMAIER_LENGTHS, (40, 1)), atol=1e-11)
-
-
-@pytest.mark.parametrize("row", PUBLISHED["rps_leeshah"]["rows_a_b_pz_px_py_d1_d2_d3"])
-def test_3rps_finds_the_published_pose(row: list[float]) -> None:
-    geometry = PUBLISHED["rps_leeshah"]["geometry"]
-    pose, lengths = published.lee_shah_pose(row), row[5:]
-    azimuth = np.radians(geometry["azimuth_deg"])
-    tops = geometry["platform_radius"] * np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
-    tops = tops @ pose[:3, :3].T + pose[:3, 3]
-    side = np.sqrt(3.0) * geometry["platform_radius"]
-    found = assembly.rps_tops(geometry["base_radius"], side, lengths)
-    assert min(np.abs(each - tops).max() for each in found) <= 1e-8
-    assert len(found) % 2 == 0  # each has its mirror image below the base

@@ -1,4 +1,4 @@
-"""A prepared solver: the answers of `solve_ik` and `solve_fk`, in arrays that stay."""
+"""A prepared solver: the answers of `solve_ik` and `solve_fk`, in arrays that stay; and searches with a bound."""
 
 from __future__ import annotations
 
@@ -11,77 +11,69 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from oracles import targets_about
-from pfabrik import Options, Status
+from pfabrik import Options, Solver, Status
 from pfabrik.engine import engine_of
 from pfabrik.errors import InvalidArgument
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
 
-def targets(mechanism: pf.Mechanism, n: int, shift: float, seed: int = 2) -> np.ndarray:
+def targets(mechanism: pf.Mechanism, n: int, shift: float) -> np.ndarray:
     """Poses (n, 4, 4) up to `shift` [L] from home, a little turned."""
-    rng, poses = np.random.default_rng(seed), np.tile(mechanism.home_pose, (n, 1, 1))
-    poses[:, :3, 3] += rng.uniform(-shift, shift, (n, 3)) * mechanism.characteristic_length
-    poses[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.1, 0.1, (n, 3))).as_matrix()
-    return poses
+    return targets_about(mechanism, np.random.default_rng(2), n, shift, 0.1)
 
 
-@pytest.mark.parametrize("name", MACHINES)
-def test_answers_and_statuses_are_those_of_single_calls(name: str) -> None:
-    mechanism = pf.load(name)
-    solver = pf.Solver(mechanism)
-    seen = set()
-    for target in [mechanism.home_pose, *targets(mechanism, 4, 0.05), *targets(mechanism, 2, 1.0)]:
-        expected = pf.solve_ik(mechanism, target)
-        assert solver.ik(target) is solver.status is expected.status
-        np.testing.assert_array_equal(solver.pose, expected.pose)
-        np.testing.assert_array_equal(solver.actuators, expected.actuators)
-        assert solver.solution.to_dict() == expected.to_dict()
-        seen.add(expected.status)
-    assert Status.REACHED in seen
+def assert_same(solver: Solver, expected: pf.Solution, status: Status) -> None:
+    """The arrays, the solution and the Jacobian are those of a single call."""
+    assert status is solver.status is expected.status
+    np.testing.assert_array_equal(solver.pose, expected.pose)
+    np.testing.assert_array_equal(solver.actuators, expected.actuators)
+    np.testing.assert_array_equal(solver.jacobian(), pf.forward_jacobian(expected))
+    assert solver.solution.to_dict() == expected.to_dict()
 
 
 @pytest.mark.parametrize("started", [False, True])
 @pytest.mark.parametrize("name", MACHINES)
-def test_forward_answers_and_jacobians_are_those_of_single_calls(name: str, started: bool) -> None:
+def test_answers_statuses_and_jacobians_are_those_of_single_calls(name: str, started: bool) -> None:
+    """Within reach and out of it, from a start in another working mode than home's where there is one."""
     mechanism = pf.load(name)
     start = pf.solve_ik(mechanism, targets(mechanism, 1, 0.03)[0]) if started else None
-    solver = pf.Solver(mechanism, start=start)
+    solver = Solver(mechanism, start=start)
+    for target in [mechanism.home_pose, *targets(mechanism, 3, 0.05), *targets(mechanism, 2, 1.0)]:
+        assert_same(solver, pf.solve_ik(mechanism, target, start=start), solver.ik(target))
     for share in (0.0, 0.02, 5.0):
         values = pf.solve_ik(mechanism, mechanism.home_pose).actuators + share
-        expected = pf.solve_fk(mechanism, values, start=start)
-        assert solver.fk(values) is solver.status is expected.status
-        np.testing.assert_array_equal(solver.pose, expected.pose)
-        np.testing.assert_array_equal(solver.actuators, expected.actuators)
-        np.testing.assert_array_equal(solver.jacobian(), pf.forward_jacobian(expected))
-        assert solver.solution.to_dict() == expected.to_dict()
+        assert_same(solver, pf.solve_fk(mechanism, values, start=start), solver.fk(values))
 
 
-@pytest.mark.parametrize("target", ["position", "list", "transposed", "joint"])
-def test_any_kind_of_target_is_taken(target: str) -> None:
-    mechanism = pf.load("ankle_ups" if target == "joint" else "delta")
+@pytest.mark.parametrize("kind", ["position", "list", "transposed", "joint"])
+def test_any_kind_of_target_is_taken_and_may_change_afterwards(kind: str) -> None:
+    mechanism = pf.load("ankle_ups" if kind == "joint" else "delta")
     pose = np.array(mechanism.home_pose)
     given = {
         "position": pose[:3, 3].tolist(),
         "list": pose.tolist(),
         "transposed": np.asfortranarray(pose),
         "joint": {"pivot": (0.1, 0.05)},
-    }[target]
-    solver = pf.Solver(mechanism)
+    }[kind]
+    solver, expected = Solver(mechanism), pf.solve_ik(mechanism, given)
     assert solver.ik(given) is Status.REACHED
-    np.testing.assert_array_equal(solver.actuators, pf.solve_ik(mechanism, given).actuators)
+    np.testing.assert_array_equal(solver.actuators, expected.actuators)
+    solver.ik(pose)
+    before = pf.solve_ik(mechanism, pose).actuators
+    pose[:3, 3] = np.nan
+    np.testing.assert_array_equal(solver.solution.actuators, before)
 
 
 def test_views_stay_and_are_overwritten_and_the_solution_is_not() -> None:
     mechanism = pf.load("delta")
-    solver = pf.Solver(mechanism)
+    solver = Solver(mechanism)
     first, second = targets(mechanism, 2, 0.05)
     solver.ik(first)
     pose, actuators, jacobian, kept = solver.pose, solver.actuators, solver.jacobian(), solver.solution
     before = actuators.copy()
     solver.ik(second)
-    assert solver.pose is pose and solver.actuators is actuators
-    assert (actuators != before).any()
+    assert solver.pose is pose and solver.actuators is actuators and (actuators != before).any()
     np.testing.assert_array_equal(actuators, solver.solution.actuators)
     solver.jacobian()
     np.testing.assert_array_equal(jacobian, pf.forward_jacobian(solver.solution))
@@ -91,31 +83,10 @@ def test_views_stay_and_are_overwritten_and_the_solution_is_not() -> None:
             view[0] = 0.0
 
 
-def test_a_target_that_changes_afterwards_does_not_change_the_answer() -> None:
-    mechanism = pf.load("delta")
-    solver, target = pf.Solver(mechanism), targets(mechanism, 1, 0.05)[0]
-    solver.ik(target)
-    before = target.copy()
-    target[:3, 3] = np.nan
-    np.testing.assert_array_equal(solver.solution.actuators, pf.solve_ik(mechanism, before).actuators)
-
-
-def test_a_start_keeps_its_working_mode() -> None:
-    mechanism = pf.load("delta").without_limits()
-    modes = pf.working_modes(mechanism, mechanism.home_pose)
-    home = pf.solve_ik(mechanism, mechanism.home_pose)
-    other = max((mode for mode in modes if mode), key=lambda mode: np.abs(mode.actuators - home.actuators).max())
-    solver = pf.Solver(mechanism, start=other)
-    for target in targets(mechanism, 3, 0.02):
-        assert solver.ik(target) is Status.REACHED
-        np.testing.assert_array_equal(solver.actuators, pf.solve_ik(mechanism, target, start=other).actuators)
-        assert np.abs(solver.actuators - other.actuators).max() < 0.1
-
-
 def test_options_hold_for_every_question() -> None:
     mechanism = pf.load("stewart")
     far = pf.pose(np.array(mechanism.reference_point) * 1.5, rpy=[0.0, 0.2, 0.0])
-    solver = pf.Solver(mechanism, options=Options(hold="position", on_invalid="mark"))
+    solver = Solver(mechanism, options=Options(hold="position", on_invalid="mark"))
     assert solver.ik(far) is Status.PROJECTED
     np.testing.assert_array_equal(solver.pose, pf.solve_ik(mechanism, far, options=Options(hold="position")).pose)
     assert solver.ik(np.full((4, 4), np.nan)) is Status.INVALID
@@ -125,7 +96,7 @@ def test_options_hold_for_every_question() -> None:
 @pytest.mark.parametrize("name", ["delta", "stewart"])
 def test_a_refused_question_leaves_no_answer(name: str) -> None:
     mechanism = pf.load(name)
-    solver = pf.Solver(mechanism)
+    solver = Solver(mechanism)
     assert solver.status is Status.INVALID
     refused = [
         (solver.ik, 2.0 * np.eye(4), "matrix that is not a rotation|last row"),
@@ -149,18 +120,17 @@ def test_a_refused_question_leaves_no_answer(name: str) -> None:
 def test_an_answer_may_be_asked_back_as_it_stands(started: bool) -> None:
     """What it answered in are views, which the next question clears before it looks."""
     mechanism = pf.load("stewart")
-    solver = pf.Solver(mechanism, start=pf.solve_ik(mechanism, mechanism.home_pose) if started else None)
+    solver = Solver(mechanism, start=pf.solve_ik(mechanism, mechanism.home_pose) if started else None)
     wanted = pf.pose(mechanism.reference_point + np.array([4.0, -3.0, 5.0]), rotvec=(0.02, 0.01, -0.03))
-    assert solver.ik(wanted) is pf.Status.REACHED
-    assert solver.fk(solver.actuators) is pf.Status.REACHED
+    assert solver.ik(wanted) is Status.REACHED
+    assert solver.fk(solver.actuators) is Status.REACHED
     np.testing.assert_allclose(solver.pose, wanted, atol=1e-9 * mechanism.characteristic_length)
-    assert solver.ik(solver.pose[:3, 3]) is pf.Status.REACHED
+    assert solver.ik(solver.pose[:3, 3]) is Status.REACHED
     np.testing.assert_allclose(solver.pose[:3, 3], wanted[:3, 3], atol=1e-9 * mechanism.characteristic_length)
 
 
 def test_a_copy_is_prepared_anew_and_shares_nothing() -> None:
-    mechanism = pf.load("stewart")
-    solver = pf.Solver(mechanism, options=Options(hold=None))
+    solver = Solver(pf.load("stewart"), options=Options(hold=None))
     lower, higher = ([0.0, 0.0, z] for z in (190.0, 200.0))
     for twin in (copy.copy(solver), copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
         solver.ik(lower)
@@ -169,55 +139,51 @@ def test_a_copy_is_prepared_anew_and_shares_nothing() -> None:
         assert solver.pose[2, 3] == pytest.approx(190.0) and twin.pose[2, 3] == pytest.approx(200.0)
 
 
+# --- bounded searches ------------------------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize("name", pf.catalog())
 def test_bounded_searches_are_feasible_and_say_whether_they_were_cut(name: str) -> None:
     mechanism = pf.load(name)
-    targets = targets_about(mechanism, np.random.default_rng(4), 4, 0.9, 0.7)
+    asked = targets_about(mechanism, np.random.default_rng(4), 4, 0.9, 0.7)
     if not engine_of(mechanism).bounds_steps:
         with pytest.raises(InvalidArgument, match="most_steps"):
-            pf.solve_ik(mechanism, targets, options=Options(most_steps=64))
+            pf.solve_ik(mechanism, asked, options=Options(most_steps=64))
         return
-    whole = pf.solve_ik(mechanism, targets)
+    whole = pf.solve_ik(mechanism, asked)
     assert np.all(whole.is_complete)
     for most_steps in (1, 8, 64):
-        answer = pf.solve_ik(mechanism, targets, options=Options(most_steps=most_steps))
+        answer = pf.solve_ik(mechanism, asked, options=Options(most_steps=most_steps))
         assert np.array_equal(answer.status, whole.status)
         assert np.all(pf.closure_residual(answer) <= 1e-9 * mechanism.characteristic_length)
         assert np.all(answer.limit_excess <= 1e-9)
         is_projected = answer.status == Status.PROJECTED
         assert np.all(answer.iterations[is_projected] <= most_steps)
         assert np.all(answer.is_complete[~is_projected | answer.certified])
-    solver = pf.Solver(mechanism, most_steps=1)
+    solver = Solver(mechanism, most_steps=1)
     assert solver.options.most_steps == 1
-    solver.ik(targets[0])
-    assert np.array_equal(solver.pose, pf.solve_ik(mechanism, targets[0], options=solver.options).pose)
+    solver.ik(asked[0])
+    assert np.array_equal(solver.pose, pf.solve_ik(mechanism, asked[0], options=solver.options).pose)
 
 
-def test_where_no_step_is_left_the_start_answers() -> None:
-    mechanism = pf.load("stewart")
+def test_where_no_step_is_left_the_start_answers_and_it_must_be_feasible() -> None:
+    mechanism, one = pf.load("stewart"), Options(most_steps=1)
     start = pf.solve_ik(mechanism, (0, 0, 10) + mechanism.home_pose[:3, 3])
     far = mechanism.home_pose.copy()
     far[:3, :3] = Rotation.from_rotvec((1.5, 0.0, 0.0)).as_matrix()
-    answer = pf.solve_ik(mechanism, far, start=start, options=Options(most_steps=1))
-    assert answer.status is Status.PROJECTED
-    assert not answer.is_complete
-    assert answer.held is None
+    answer = pf.solve_ik(mechanism, far, start=start, options=one)
+    assert answer.status is Status.PROJECTED and not answer.is_complete and answer.held is None
     np.testing.assert_array_equal(answer.pose, start.pose)
     np.testing.assert_array_equal(answer.actuators, start.actuators)
+    with pytest.raises(InvalidArgument, match="feasible"):
+        pf.solve_ik(mechanism, mechanism.home_pose, start=start.q + 0.3, options=one)
 
 
 def test_a_bounded_search_bounds_no_later_call() -> None:
     mechanism = pf.load("stewart")
     values = 1.5 * np.asarray(pf.solve_ik(mechanism, mechanism.home_pose).actuators)
     before = pf.solve_fk(mechanism, values)
-    pf.Solver(mechanism, most_steps=1).ik(mechanism.home_pose @ pf.pose((300.0, 0.0, 0.0)))
+    Solver(mechanism, most_steps=1).ik(mechanism.home_pose @ pf.pose((300.0, 0.0, 0.0)))
     after = pf.solve_fk(mechanism, values)
     assert after.status == before.status == Status.PROJECTED
     np.testing.assert_array_equal(after.actuators, before.actuators)
-
-
-def test_a_bounded_search_starts_where_it_may_end() -> None:
-    mechanism = pf.load("stewart")
-    q = pf.solve_ik(mechanism, mechanism.home_pose).q + 0.3
-    with pytest.raises(InvalidArgument, match="feasible"):
-        pf.solve_ik(mechanism, mechanism.home_pose, start=q, options=Options(most_steps=8))

@@ -151,35 +151,13 @@ def published_gough(case: str, p: Sequence[float]) -> Mechanism:
     return gough(geometry["base"], geometry["platform"], home, case)
 
 
-DIETMAIER_BASE = np.array(
-    [
-        [0.0, 0.0, 0.0],
-        [1.107915, 0.0, 0.0],
-        [0.549094, 0.756063, 0.0],
-        [0.735077, -0.223935, 0.525991],
-        [0.514188, -0.526063, -0.368418],
-        [0.590473, 0.094733, -0.205018],
-    ]
-)
-DIETMAIER_PLATFORM = np.array(
-    [
-        [0.0, 0.0, 0.0],
-        [0.542805, 0.0, 0.0],
-        [0.956919, -0.528915, 0.0],
-        [0.665885, -0.353482, 1.402538],
-        [0.478359, 1.158742, 0.107672],
-        [-0.137087, -0.235121, 0.353913],
-    ]
-)
-DIETMAIER_LENGTHS = np.array([1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071])
-"""P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998)."""
-
-
-def dietmaier() -> tuple[Mechanism, Array]:
-    """The platform with 40 real assembly modes at `DIETMAIER_LENGTHS`, at home in one of them, and that home pose."""
-    poses, hits = assembly.gough_modes(DIETMAIER_BASE, DIETMAIER_PLATFORM, DIETMAIER_LENGTHS, starts=100)
-    home = poses[hits.argmax()]
-    return gough(DIETMAIER_BASE, DIETMAIER_PLATFORM, home, "Dietmaier's platform"), home
+def dietmaier() -> Mechanism:
+    """Dietmaier's platform, which has 40 real assembly modes at its published lengths, at home near one of them."""
+    geometry = PUBLISHED["gsp_dietmaier"]["geometry"]
+    home = np.eye(4)
+    home[:3, :3] = Rotation.from_quat([0.765, 0.239, -0.172, -0.572]).as_matrix()
+    home[:3, 3] = 0.478, -0.781, -0.402
+    return gough(geometry["base"], geometry["platform"], home, "Dietmaier's platform")
 
 
 def similar_hexagons() -> Mechanism:

@@ -2,8 +2,8 @@
 
 `ik` has closed forms of legs: cranks, carriages, struts and guides, with all their branches; `arms` the best
 configuration of a redundant mechanism; `targets` draws targets on both sides of the border. `assembly` has closed forms
-and searches of other hands for forward kinematics, `nearest` a general optimiser for the feasible pose nearest to a
-target, `search` a blind search for a configuration that has a pose, `annuli` areas of workspaces.
+for forward kinematics, `nearest` a general optimiser for the feasible pose nearest to a target, `search` a blind search
+for a configuration that has a pose, `annuli` areas of workspaces.
 """
 
 from .arms import ACCURACY, arms
