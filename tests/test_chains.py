@@ -59,7 +59,7 @@ def mixed() -> Mechanism:
         Joint("a", "revolute", ("base", "1"), (0.1, 0, 0), (0, 0.2, 1), actuated=True, range=(-2, 2)),
         Joint("b", "prismatic", ("1", "2"), axis=(0.3, 1, 0), actuated=True, range=(-0.4, 0.5)),
         Joint("f", "fixed", ("2", "2f"), (0.5, 0, 0)),
-        Joint("c", "cylindrical", ("2f", "3"), (1, 0.2, 0.1), (0, 1, 0.4), actuated=True, range=turns_and_slides),
+        Joint("c", "cylindrical", ("2f", "3"), (1, 0.2, 0.1), (0, 1, 0.4), range=turns_and_slides),
         Joint("d", "revolute", ("4", "3"), (1.5, -0.2, 0), (1, 0.5, 0), actuated=True, range=(-1, 0.7)),
         Joint("u", "universal", ("4", "5"), (2, 0, 0), axes=((0, 1, 0), (0, 0, 1)), range=((-1, 1), (-1, 1))),
         Joint("e", "revolute", ("5", "tip"), (2.5, 0, 0.2), (1, 0, 0.1), actuated=True, range=(-1, 1)),

@@ -13,7 +13,6 @@ import machines
 import pfabrik as pf
 from checks import INTERPRETED, excess_of_joints, gap_of_joints
 from machines.trunks import ARMS, TRUNKS
-from oracles import targets_about
 from pfabrik import Mechanism, Status
 from pfabrik.passes import Options
 
@@ -81,9 +80,24 @@ def test_a_path_keeps_its_working_mode_and_goes_on_from_answer_to_answer(name: s
 # --- as far as the default -------------------------------------------------------------------------------------------
 
 
+def targets_about(mechanism: Mechanism, size: float, turn: float, n: int = N) -> np.ndarray:
+    """Poses (n, 4, 4) up to `size` [L] and `turn` [rad] from home; of a planar machine in its plane."""
+    rng, targets = np.random.default_rng(8), np.repeat(mechanism.home_pose[None], n, axis=0)
+    steps, turns = rng.uniform(-size, size, (n, 3)), rng.uniform(-turn, turn, (n, 3))
+    axes = [np.array(joint.axis) for joint in mechanism.joints if joint.type == "revolute"]
+    if len(axes) > 4 and np.ptp(np.abs(axes), axis=0).max() < 1e-9:
+        normal = axes[0] / np.linalg.norm(axes[0])
+        steps -= np.outer(steps @ normal, normal)
+        turns = np.outer(turns @ normal, normal)
+    targets[:, :3, 3] += steps * mechanism.characteristic_length
+    if not mechanism.end_effector_is_joint:
+        targets[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix() @ mechanism.home_pose[:3, :3]
+    return targets
+
+
 def reachable(mechanism: Mechanism, size: float, turn: float, n: int = N) -> np.ndarray:
-    """Targets up to `size` [L] and `turn` [rad] from home that the default reaches."""
-    targets = targets_about(mechanism, np.random.default_rng(8), n, size, turn)
+    """Those of them that the default reaches."""
+    targets = targets_about(mechanism, size, turn, n)
     return targets[pf.solve_ik(mechanism, targets).status == Status.REACHED]
 
 
@@ -134,7 +148,7 @@ def test_arms_are_told_of_every_limit_of_their_struts_and_move_for_those_that_as
 )
 def test_targets_out_of_reach_end_near_the_nearest_pose(name: str, size: float, farther: float) -> None:
     mechanism = pf.load(name)
-    targets = targets_about(mechanism, np.random.default_rng(8), 2 * N, size, 0.2)
+    targets = targets_about(mechanism, size, 0.2, 2 * N)
     answers = pf.passes.solve(mechanism, targets, ACCELERATED)
     nearest = pf.solve_ik(mechanism, targets, options=pf.Options(working_mode="any"))
     held = (nearest.status == Status.PROJECTED) & (nearest.rotation_error <= 1e-6) & (answers.rotation_error <= 1e-6)
@@ -147,7 +161,7 @@ def test_targets_out_of_reach_end_near_the_nearest_pose(name: str, size: float, 
 @compiled_only
 def test_a_leg_that_keeps_its_side_is_not_flipped() -> None:
     mechanism = pf.load("rrr")
-    targets = targets_about(mechanism, np.random.default_rng(8), 2 * N, 0.5, 0.4)
+    targets = targets_about(mechanism, 0.5, 0.4, 2 * N)
     answers = pf.passes.solve(mechanism, targets, replace(ACCELERATED, working_mode="keep"))
     default = pf.solve_ik(mechanism, targets, options=pf.Options(working_mode="keep"))
     reached = answers.status == Status.REACHED
