@@ -1,4 +1,4 @@
-"""The closure kernel against what it computes written out slowly: displacements, limits, derivatives by steps."""
+"""The closure kernel: mathematics that no answer shows. What it closes is measured with every answer (`checks`)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, machine
-from pfabrik.answers.active_limits import active_limits
 from pfabrik.closure.close import HELD, close, platform_poses
 from pfabrik.closure.multistart import random_feasible
 from pfabrik.closure.reaches import reaches_of
-from pfabrik.description.paths import independent_paths
 from pfabrik.model import model_of
-from pfabrik.motion.displacements import columns, displacements, gaps, stepped
+from pfabrik.motion.displacements import columns, stepped
 from pfabrik.tolerances import TOLERANCES
 
 NAMES = ["five_bar", "nrpm", "stewart", *MACHINES]
@@ -43,52 +41,12 @@ def test_a_step_leaves_open_only_the_square_of_what_was_open(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_gaps_and_ends_of_paths_are_those_of_displaced_bodies(name: str) -> None:
-    """Of closed loops none; of open ones the largest difference of any path's end, the tree's path among them."""
+def test_searches_close_most_starts_and_keep_limits_as_bounds(name: str) -> None:
     mechanism = machine(name)
-    closure, length = model_of(mechanism).closure, mechanism.characteristic_length
-    start = around_home(mechanism, 20, 0.3, seed=2)
-    closed = close(closure, start, platform_poses(mechanism, start))
-    is_closed = closed.gap <= 1e-10
-    assert is_closed.mean() > 0.5
-    q = closed.coordinates[is_closed]
-    assert gaps(mechanism, q).max() <= 1e-9 * length
-    np.testing.assert_allclose(platform_poses(mechanism, q), closed.poses[is_closed], rtol=0, atol=1e-9 * length)
-    poses = np.repeat(mechanism.home_pose[None], 20, axis=0)
-    left_open = close(closure, start, poses, limits=True, max_iterations=0)
-    ends = displacements(mechanism, start)[mechanism.end_effector_body] @ mechanism.home_pose
-    off = np.linalg.norm((ends - poses)[:, :3, 3], axis=1) / length
-    turned = np.arccos(np.clip((np.trace(ends[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1))
-    one_path = np.maximum(off, turned)
-    assert (left_open.gap >= one_path - 1e-6).all()
-    if len(independent_paths(mechanism)) == 1:
-        np.testing.assert_allclose(left_open.gap, one_path, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", ["stewart", "nrpm", "five_bar", "hexapod_rus"])
-def test_excesses_are_those_of_the_limits_themselves(name: str) -> None:
-    """Each is by how far the worst of the limits that are exceeded is."""
-    mechanism = machine(name)
-    closure, length = model_of(mechanism).closure, mechanism.characteristic_length
-    start = around_home(mechanism, 60, 1.5, seed=4)
-    closed = close(closure, start, platform_poses(mechanism, start))
-    rows = closed.gap <= 1e-12
-    if any(mechanism.joint(each).along for each in mechanism.actuator_names):
-        rows &= (closure.actuators(closed.coordinates) > 0.0).all(axis=1)  # a strut through its foot points back
-    for excess, limits in zip(closed.excess[rows], active_limits(mechanism, closed.coordinates[rows]), strict=True):
-        worst = 0.0
-        for limit in limits:
-            over = limit.limit - limit.value if limit.bound == "min" else limit.value - limit.limit
-            worst = max(worst, over / (length if mechanism.joint(limit.joint).type == "prismatic" else 1.0))
-        assert excess == pytest.approx(worst, abs=1e-9)
-    assert (closed.excess[rows] > 0.01).any()
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_limits_are_bounds_of_the_search(name: str) -> None:
-    mechanism = machine(name)
-    start = around_home(mechanism, 20, 0.5, seed=5)
-    closing = close(model_of(mechanism).closure, start, platform_poses(mechanism, start), limits=True, margin=1e-10)
+    start = around_home(mechanism, 20, 0.4, seed=5)
+    poses = platform_poses(mechanism, start)
+    assert (close(model_of(mechanism).closure, start, poses).gap <= 1e-10).mean() > 0.5
+    closing = close(model_of(mechanism).closure, start, poses, limits=True, margin=1e-10)
     closed = closing.gap <= TOLERANCES.position
     assert (closing.excess[closed] <= TOLERANCES.limit).mean() > 0.5
     assert np.isfinite(closing.coordinates).all()
@@ -106,19 +64,6 @@ def test_locked_joints_and_a_held_platform_stay_and_rows_that_are_not_finite_do_
     held = close(closure, q, poses, platform=HELD)
     np.testing.assert_allclose(held.poses[1:], poses[1:], rtol=0, atol=1e-12)
     assert held.gap[1:].max() <= 1e-12 and not held.gap[0] <= 1.0
-
-
-def test_actuated_values_survive_the_way_into_coordinates_and_back() -> None:
-    mechanism = pf.load("nrpm")
-    values = np.random.default_rng(7).uniform(50, 150, (4, len(mechanism.actuator_names)))
-    closure = model_of(mechanism).closure
-    q = np.zeros((4, len(closure.scale)))
-    closure.put_actuators(q, values)
-    np.testing.assert_allclose(closure.actuators(q), values)
-
-
-def test_paths_are_as_many_as_loops_and_one() -> None:
-    assert [len(independent_paths(machine(name))) for name in ("five_bar", "nrpm", "stewart")] == [2, 6, 6]
 
 
 @pytest.mark.parametrize("name", ["stewart", "hexaglide", "tricept", "panda"])

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from oracles import assembly
-from pfabrik import Joint, Mechanism
+from pfabrik import Joint, Mechanism, pose
 
-from .positions import struts
+from .positions import ring, struts
 
 Array = NDArray[np.float64]
 
@@ -24,18 +24,15 @@ PUBLISHED: dict[str, Any] = json.loads(
 """Published geometries and answers, each with its source."""
 
 
-def moved_from_home(pose: Array, home_pose: Array) -> Array:
+def moved_from_home(own: Array, home_pose: Array) -> Array:
     """A pose given in the platform's own coordinates, as the library counts it: the rotation from home."""
-    result = np.array(pose, dtype=float)
-    result[..., :3, :3] = pose[..., :3, :3] @ home_pose[:3, :3].T
-    return result
+    return pose(own[..., :3, 3], rotation=own[..., :3, :3] @ home_pose[:3, :3].T)
 
 
 def lee_shah_pose(row: Sequence[float]) -> Array:
     """The pose of a 3-RPS in a row of Lee and Shah's table: two angles, then z, x and y."""
     a, b, pz, px, py = row[:5]
-    turn = Rotation.from_euler("ZYZ", [a, b, -a]).as_matrix()
-    return np.block([[turn, np.array([[px], [py], [pz]])], [np.zeros(3), 1.0]])
+    return pose((px, py, pz), rotation=Rotation.from_euler("ZYZ", [a, b, -a]))
 
 
 # --- planar ----------------------------------------------------------------------------------------------------------
@@ -57,10 +54,7 @@ def planar_3rpr(geometry: assembly.Planar3RPR, p: Sequence[float]) -> tuple[Mech
 def planar_pose(theta_x_y: Sequence[float], home: Array) -> Array:
     """The library's pose of a planar 3-RPR in Sauer's coordinates."""
     theta, x, y = theta_x_y
-    pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_rotvec([0, 0, theta - home[0]]).as_matrix()
-    pose[:2, 3] = x, y
-    return pose
+    return pose((x, y, 0.0), rotvec=(0, 0, theta - home[0]))
 
 
 ARM_LINKS = np.array([300.0, 200.0, 100.0])
@@ -85,16 +79,10 @@ def planar_arm() -> Mechanism:
 def rps(base_radius: float, platform_radius: float, height: float) -> Mechanism:
     """A 3-RPS without limits, feet 120 degrees apart and hinges tangential, level at home."""
     joints = []
-    for i, azimuth in enumerate(np.radians([0.0, 120.0, 240.0]), 1):
-        out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    for i, azimuth in enumerate((0.0, 120.0, 240.0), 1):
+        out, along = (np.array(ring(1.0, 0.0, [azimuth + turn])[0]) for turn in (0.0, 90.0))
         joints += [
-            Joint(
-                f"R{i}",
-                "revolute",
-                ("base", f"cylinder{i}"),
-                at=base_radius * out,
-                axis=(-np.sin(azimuth), np.cos(azimuth), 0.0),
-            ),
+            Joint(f"R{i}", "revolute", ("base", f"cylinder{i}"), at=base_radius * out, axis=along),
             Joint(f"P{i}", "prismatic", (f"cylinder{i}", f"rod{i}"), along=(f"R{i}", f"S{i}"), actuated=True),
             Joint(f"S{i}", "spherical", (f"rod{i}", "platform"), at=platform_radius * out + [0, 0, height]),
         ]
@@ -112,11 +100,10 @@ def tripod() -> Mechanism:
     two postures of the tool.
     """
     a, b, c = TRIPOD_FEET
+    line, length = TRIPOD_TIP - a, float(np.linalg.norm(TRIPOD_TIP - a))
     joints = [
         Joint("A1", "universal", ("base", "cylinder1"), at=a, axes=((1, 0, 0), (0, 1, 0))),
-        Joint(
-            "B1", "prismatic", ("cylinder1", "tool"), axis=TRIPOD_TIP - a, home=_distance(a, TRIPOD_TIP), actuated=True
-        ),
+        Joint("B1", "prismatic", ("cylinder1", "tool"), axis=line, home=length, actuated=True),
     ]
     for i, foot in ((2, b), (3, c)):
         joints += [
@@ -125,10 +112,6 @@ def tripod() -> Mechanism:
             Joint(f"C{i}", "spherical", (f"rod{i}", "tool"), at=TRIPOD_TIP),
         ]
     return Mechanism("tripod", joints, "tool", tuple(TRIPOD_TIP))
-
-
-def _distance(a: Array, b: Array) -> float:
-    return float(np.linalg.norm(np.subtract(a, b)))
 
 
 # --- six struts ------------------------------------------------------------------------------------------------------
@@ -145,18 +128,14 @@ def gough(base: Any, platform: Any, home_pose: Array, name: str = "6-UPS") -> Me
 
 def published_gough(case: str, p: Sequence[float]) -> Mechanism:
     """A published 6-UPS, level at home at position p."""
-    home = np.eye(4)
-    home[:3, 3] = p
     geometry = PUBLISHED[case]["geometry"]
-    return gough(geometry["base"], geometry["platform"], home, case)
+    return gough(geometry["base"], geometry["platform"], pose(p), case)
 
 
 def dietmaier() -> Mechanism:
     """Dietmaier's platform, which has 40 real assembly modes at its published lengths, at home near one of them."""
     geometry = PUBLISHED["gsp_dietmaier"]["geometry"]
-    home = np.eye(4)
-    home[:3, :3] = Rotation.from_quat([0.765, 0.239, -0.172, -0.572]).as_matrix()
-    home[:3, 3] = 0.478, -0.781, -0.402
+    home = pose((0.478, -0.781, -0.402), quat_xyzw=(0.765, 0.239, -0.172, -0.572))
     return gough(geometry["base"], geometry["platform"], home, "Dietmaier's platform")
 
 
@@ -165,89 +144,61 @@ def similar_hexagons() -> Mechanism:
 
     With its struts locked it still moves, from every pose; constructing it warns of that.
     """
-    angles = np.radians([0.0, 40.0, 120.0, 160.0, 240.0, 280.0])
-    corners = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    home = np.eye(4)
-    home[:3, :3] = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_matrix()
-    home[:3, 3] = 3.0, -2.0, 150.0
-    return gough(100.0 * corners, 60.0 * corners, home, "similar hexagons")
+    base, platform = (ring(radius, 0.0, (0, 40, 120, 160, 240, 280)) for radius in (100.0, 60.0))
+    return gough(base, platform, pose((3.0, -2.0, 150.0), rotvec=(0.2, -0.1, 0.3)), "similar hexagons")
 
 
 # --- more actuators than freedoms ------------------------------------------------------------------------------------
 
-STROKE, RAIL, SWING = (160.0, 300.0), 150.0, np.radians(80.0)
+STROKE, RAIL = (160.0, 300.0), 150.0
+QUARTERS = [0.0, 90.0, 180.0, 270.0]
+
+
+def _on_circle(radius: float, degrees: Any) -> Array:
+    return np.array(ring(radius, 0.0, degrees))
+
+
+STRUTS = _on_circle(150.0, [10, 60, 110, 130, 230, 250, 350]), _on_circle(80.0, [50, 60, 75, 170, 190, 290, 310])
+"""Both ends of the struts of `seven_struts`, (7, 3) each, in the base's and in the platform's coordinates."""
+RODS = _on_circle(190.0, np.subtract(QUARTERS, 40.0)), _on_circle(60.0, QUARTERS)
+"""Where the rods of `four_rails` begin and end at home, (4, 3) each."""
+RAILS = _on_circle(1.0, np.add(QUARTERS, 90.0))
 
 
 def seven_struts() -> Mechanism:
     """A 7-UPS: six lengths fix the platform, up to its assembly mode, and the seventh must agree."""
-    home = np.eye(4)
-    home[2, 3] = 200.0
-    return gough(*_struts(), home, "7-UPS").with_limits({f"B{i}": STROKE for i in range(1, 8)})
+    return gough(*STRUTS, pose((0, 0, 200.0)), "7-UPS").with_limits({f"B{i}": STROKE for i in range(1, 8)})
 
 
 def four_rails() -> Mechanism:
     """A planar 4-PRR: rods from carriages on the sides of a square to a platform within; three of them would do."""
-    joints = []
-    for i, (angle, a, c) in enumerate(zip(_QUARTERS, *_rods(), strict=True), 1):
-        along = (-np.sin(angle), np.cos(angle), 0.0)
-        rail, rod = (-RAIL, RAIL), (-SWING, SWING)
-        joints += [
-            Joint(f"A{i}", "prismatic", ("base", f"carriage{i}"), axis=along, range=rail, actuated=True),
-            Joint(f"B{i}", "revolute", (f"carriage{i}", f"rod{i}"), at=a, axis=(0, 0, 1), range=rod),
-            Joint(f"C{i}", "revolute", (f"rod{i}", "platform"), at=c, axis=(0, 0, 1)),
-        ]
-    return Mechanism("planar 4-PRR", joints, "platform", (0, 0, 0), task=("x", "y", "rotation"))
+    rail = {"axis": RAILS.tolist(), "range": (-RAIL, RAIL)}
+    parts = {"base": RODS[0], "platform": RODS[1], "axis": "z", "A": rail, "reference_point": (0, 0, 0)}
+    return Mechanism.from_legs("P*-R-R", name="planar 4-PRR", task=("x", "y", "rotation"), **parts)
 
 
 def seven_struts_readings(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """Random poses (n, 4, 4) of `seven_struts`, turned by up to 2 rad about any axis, and their lengths (n, 7)."""
-    feet, tops = _struts()
     turns = rng.normal(size=(400 * n, 3))
     turns *= (rng.uniform(0.0, 2.0, len(turns)) / np.linalg.norm(turns, axis=1))[:, None]
-    poses = np.tile(np.eye(4), (len(turns), 1, 1))
-    poses[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
-    poses[:, :3, 3] = rng.uniform([-150, -150, 80], [150, 150, 320], (len(turns), 3))
-    lengths = np.linalg.norm(tops @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, None, :3, 3] - feet, axis=2)
-    return _first(n, poses, lengths, ((lengths >= STROKE[0]) & (lengths <= STROKE[1])).all(axis=1))
+    poses = pose(rng.uniform([-150, -150, 80], [150, 150, 320], turns.shape), rotvec=turns)
+    lengths = np.linalg.norm(_lines(poses, *STRUTS), axis=2)
+    kept = ((lengths >= STROKE[0]) & (lengths <= STROKE[1])).all(axis=1)
+    return poses[kept][:n], lengths[kept][:n]
 
 
 def four_rails_readings(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """Random poses (n, 4, 4) of `four_rails` in any of its working modes, and where its carriages are (n, 4)."""
-    feet, tops = _rods()
-    along = np.stack([-np.sin(_QUARTERS), np.cos(_QUARTERS), 0.0 * _QUARTERS], axis=1)
-    turns, modes = rng.uniform(-np.pi, np.pi, 400 * n), rng.choice([-1.0, 1.0], (400 * n, 4))
-    poses = np.tile(np.eye(4), (len(turns), 1, 1))
-    poses[:, :3, :3] = Rotation.from_rotvec(turns[:, None] * [0, 0, 1]).as_matrix()
-    poses[:, :2, 3] = rng.uniform(-80, 80, (len(turns), 2))
-    lines = tops @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, None, :3, 3] - feet
-    middle = (lines * along).sum(axis=2)
-    square = ((tops - feet) ** 2).sum(axis=1) - (lines**2).sum(axis=2) + middle**2
+    turns, modes = rng.uniform(-np.pi, np.pi, (400 * n, 1)), rng.choice([-1.0, 1.0], (400 * n, 4))
+    poses = pose(rng.uniform(-80, 80, (len(turns), 3)) * [1, 1, 0], rotvec=turns * [0, 0, 1])
+    lines = _lines(poses, *RODS)
+    middle = (lines * RAILS).sum(axis=2)
+    square = (np.subtract(*RODS) ** 2).sum(axis=1) - (lines**2).sum(axis=2) + middle**2
     values = middle + modes * np.sqrt(np.maximum(square, 0.0))
-    rods = lines - values[:, :, None] * along
-    sine, cosine = np.cross(tops - feet, rods)[:, :, 2], ((tops - feet) * rods).sum(axis=2)
-    kept = (square >= 0.0) & (np.abs(values) <= RAIL) & (np.abs(np.arctan2(sine, cosine)) <= SWING)
-    return _first(n, poses, values, kept.all(axis=1))
+    kept = ((square >= 0.0) & (np.abs(values) <= RAIL)).all(axis=1)
+    return poses[kept][:n], values[kept][:n]
 
 
-def _struts() -> tuple[Array, Array]:
-    """Both ends of the struts of `seven_struts`, (7, 3) each, in the base's and in the platform's coordinates."""
-    return _on_circle(150.0, [10, 60, 110, 130, 230, 250, 350]), _on_circle(80.0, [50, 60, 75, 170, 190, 290, 310])
-
-
-_QUARTERS = np.radians([0.0, 90.0, 180.0, 270.0])
-
-
-def _rods() -> tuple[Array, Array]:
-    """Where the rods of `four_rails` begin and end at home, (4, 3) each."""
-    return _on_circle(190.0, np.degrees(_QUARTERS) - 40.0), _on_circle(60.0, np.degrees(_QUARTERS))
-
-
-def _on_circle(radius: float, degrees: Any) -> Array:
-    angles = np.radians(degrees)
-    return radius * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
-
-
-def _first(n: int, poses: Array, values: Array, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
-    rows = np.flatnonzero(kept)[:n]
-    assert len(rows) == n
-    return poses[rows], values[rows]
+def _lines(poses: Array, feet: Array, tops: Array) -> Array:
+    """From feet on the base to tops on the platform at poses (n, 4, 4), (n, k, 3)."""
+    return np.asarray(tops @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, None, :3, 3] - feet)
