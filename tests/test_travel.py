@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import oracles
 import pfabrik as pf
-from checks import INTERPRETED
+from checks import INTERPRETED, task_errors
 from links import distances_of_struts, struts
 from machines import machine, tripod_rps
 from pfabrik import Joint, Mechanism, Solution, Status
@@ -24,6 +25,8 @@ BESIDE = 1e-8
 """How far before the end must be reached, and after it must not [L or rad]: it is told to 1e-9, closed forms tell
 limits to 1e-9, and a way may meet a limit at a slant."""
 X, Y, Z = np.eye(3)
+Room = Callable[[Mechanism, np.ndarray], dict[tuple[str, str], float]]
+"""(joint, bound) -> room left to each limit at a pose [length or rad]."""
 
 
 def home_of(mechanism: Mechanism) -> Solution:
@@ -114,7 +117,7 @@ def test_what_nothing_else_determines_gives_way_before_a_limit_stops_it() -> Non
 
 
 def room_of_struts(mechanism: Mechanism, pose: np.ndarray) -> dict[tuple[str, str], float]:
-    """(joint, bound) -> room left to the limit of every strut, and of the cones at its ends [length or rad]."""
+    """Of the length of every strut, and of the cones at its ends."""
     room = {}
     for strut in (joint for joint in mechanism.joints if joint.along):
         foot, head = (mechanism.joint(name) for name in strut.along)
@@ -129,7 +132,7 @@ def room_of_struts(mechanism: Mechanism, pose: np.ndarray) -> dict[tuple[str, st
 
 
 def room_of_ankle(mechanism: Mechanism, pose: np.ndarray) -> dict[tuple[str, str], float]:
-    """The same of the catalogue's 2-UPS/U, whose pivot turns about y and then about x."""
+    """Of the catalogue's 2-UPS/U, whose pivot turns about y and then about x."""
     x, y, z = pose[:3, 2]
     angles = float(np.arctan2(x, z)), float(np.arcsin(-y))
     ends = np.array(mechanism.joint("pivot").range)
@@ -138,7 +141,7 @@ def room_of_ankle(mechanism: Mechanism, pose: np.ndarray) -> dict[tuple[str, str
     return room | room_of_struts(mechanism, tilted)
 
 
-def at(origin: np.ndarray, reach: Reach, distance: float, centre: np.ndarray) -> np.ndarray:
+def at(reach: Reach, distance: float, origin: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """The pose at a distance along a reach's direction from an origin, or about it and a centre."""
     step = distance * np.array(reach.direction)
     if reach.kind == "along":
@@ -147,46 +150,45 @@ def at(origin: np.ndarray, reach: Reach, distance: float, centre: np.ndarray) ->
     return pf.pose(centre + turn @ (origin[:3, 3] - centre), rotation=turn @ origin[:3, :3])
 
 
-@pytest.mark.parametrize("pivot", [None, (0.0, 0.0, 0.0), (30.0, -60.0, 250.0)])
-def test_a_hexapod_goes_along_and_turns_about_a_point_until_its_tightest_limit_is_met(pivot: Any) -> None:
-    """From a turned pose off the middle, to the first root of any strut's length, or cone; those met are named."""
-    mechanism = pf.load("stewart")
-    length = mechanism.characteristic_length
-    origin = pf.pose(np.add(mechanism.reference_point, (10.0, -5.0, 20.0)), rpy=(0.05, -0.1, 0.1))
-    along, about = np.random.default_rng(7).normal(size=(2, 2 if INTERPRETED else 8, 3))
-    answer = pf.travel(pf.solve_ik(mechanism, origin), along=along, about=about, pivot=pivot)
-    assert [reach.kind for reach in answer] == ["along"] * len(along) + ["about"] * len(about)
-    centre = origin[:3, 3] if pivot is None else np.array(pivot)
-    for reach, given in zip(answer, (*along, *about), strict=True):
-        np.testing.assert_allclose(reach.direction, given / np.linalg.norm(given), atol=1e-15)
-        beside = BESIDE * (length if reach.kind == "along" else 1.0)
+def assert_ends_where_room_does(answer: pf.Travel, room_of: Room, pivot: Any = None) -> None:
+    """There is room for every limit up to the end, and not after it; those met there are named."""
+    mechanism, origin = answer.origin.mechanism, answer.origin.pose
+    centre, length = origin[:3, 3] if pivot is None else np.array(pivot), mechanism.characteristic_length
+    for reach in answer:
 
         def room(distance: float, reach: Reach = reach) -> float:
-            return min(room_of_struts(mechanism, at(origin, reach, distance, centre)).values())
+            return min(room_of(mechanism, at(reach, distance, origin, centre)).values())
 
+        beside = BESIDE * (length if reach.kind == "along" else 1.0)
         steps = (*np.linspace(0.0, reach.distance, 30, endpoint=False), reach.distance - beside)
         assert min(map(room, steps)) >= 0.0 > room(reach.distance + beside)
-        np.testing.assert_allclose(
-            reach.end.pose, at(origin, reach, reach.distance, centre), rtol=0, atol=1e-8 * length
-        )
-        left = room_of_struts(mechanism, reach.end.pose).items()
-        near = {limit for limit, room in left if room <= TOLERANCES.active * (1.0 if "cone" in limit else length)}
+        assert task_errors(mechanism, reach.end.pose[None], at(reach, reach.distance, origin, centre)[None]) <= 1e-8
+        near = set()
+        for (joint, bound), left in room_of(mechanism, reach.end.pose).items():
+            unit = length if mechanism.joint(joint).along else 1.0
+            near |= {(joint, bound)} if left <= TOLERANCES.active * unit else set()
         assert set(stops(reach)) == near != set()
 
 
+@pytest.mark.parametrize("pivot", [None, (0.0, 0.0, 0.0), (30.0, -60.0, 250.0)])
+def test_a_hexapod_goes_along_and_turns_about_a_point_until_its_tightest_limit_is_met(pivot: Any) -> None:
+    """From a turned pose off the middle."""
+    mechanism = pf.load("stewart")
+    start = pf.pose(np.add(mechanism.reference_point, (10.0, -5.0, 20.0)), rpy=(0.05, -0.1, 0.1))
+    along, about = np.random.default_rng(7).normal(size=(2, 2 if INTERPRETED else 8, 3))
+    answer = pf.travel(pf.solve_ik(mechanism, start), along=along, about=about, pivot=pivot)
+    assert [reach.kind for reach in answer] == ["along"] * len(along) + ["about"] * len(about)
+    for reach, given in zip(answer, (*along, *about), strict=True):
+        np.testing.assert_allclose(reach.direction, given / np.linalg.norm(given), atol=1e-15)
+    assert_ends_where_room_does(answer, room_of_struts, pivot)
+
+
 def test_an_ankle_tilts_from_a_tilted_pose_until_its_tightest_limit_is_met() -> None:
-    mechanism = pf.load("ankle_ups")
-    start = pf.solve_ik(mechanism, {"pivot": (0.2, -0.1)})
-    for reach, axis in zip(pf.travel(start), start.pose[:3, [0, 0, 1, 1]].T * [[1], [-1], [1], [-1]], strict=True):
-        np.testing.assert_allclose(reach.direction, axis, atol=1e-12)
-
-        def room(angle: float, reach: Reach = reach) -> dict[tuple[str, str], float]:
-            return room_of_ankle(mechanism, at(start.pose, reach, angle, start.pose[:3, 3]))
-
-        steps = (*np.linspace(0.0, reach.distance, 30, endpoint=False), reach.distance - BESIDE)
-        assert min(min(room(step).values()) for step in steps) >= 0.0
-        beyond = {limit for limit, left in room(reach.distance + BESIDE).items() if left < 0.0}
-        assert set(stops(reach)) == beyond != set()
+    start = pf.solve_ik(pf.load("ankle_ups"), {"pivot": (0.2, -0.1)})
+    answer = pf.travel(start)
+    x, y = start.pose[:3, 0], start.pose[:3, 1]
+    np.testing.assert_allclose([reach.direction for reach in answer], [x, -x, y, -y], atol=1e-12)
+    assert_ends_where_room_does(answer, room_of_ankle)
 
 
 def test_a_tilt_stops_where_the_pivot_does_and_by_its_name() -> None:

@@ -17,14 +17,7 @@ from .positions import five_bar, ring
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TURNS = (0.0, 120.0, 240.0)
 POSITION = ("x", "y", "z")
-_TYPES = {
-    "R": "revolute",
-    "P": "prismatic",
-    "U": "universal",
-    "S": "spherical",
-    "C": "cylindrical",
-    "F": "fixed",
-}
+_TYPES = {each[0].upper(): each for each in ("revolute", "prismatic", "universal", "spherical", "cylindrical", "fixed")}
 Step = tuple[Any, ...]
 
 
@@ -68,18 +61,17 @@ def strut(at: Any, end: Any, lower: Any, upper: Any, **slide: Any) -> tuple[Step
     return (lower[0], at, *lower[1:]), drive, (upper[0], end, *upper[1:])
 
 
-def pairs(elbow: Any, wrist: Any, across: Any, bodies: tuple[str, str], leg: int, names: str = "LR", kinds: str = "SS",
-          cone: float | None = None) -> list[Joint]:  # fmt: skip
+def pairs(
+    elbow: Any, wrist: Any, across: Any, bodies: tuple[str, str], leg: int, kinds: str = "SS", cone: float | None = None
+) -> list[Joint]:
     """Two rods side by side between a body and another; their joints are B and C."""
-    joints, across, back = [], np.array(across), names.islower()
-    for sign, name in ((-1, names[0]), (1, names[1])):
-        b, c, rod = elbow + sign * across, wrist + sign * across, f"rod{leg}{name}" if back else f"rod{name}{leg}"
+    joints, across = [], np.array(across)
+    for sign, name in ((-1, f"L{leg}"), (1, f"R{leg}")):
+        b, c, rod = elbow + sign * across, wrist + sign * across, f"rod{name}"
         axes = (across, np.cross(c - b, across))
-        for place, at, ends, kind in (("B", b, (bodies[0], rod), kinds[0]), ("C", c, (rod, bodies[1]), kinds[1])):
-            more = {"cone": Cone(c - b, cone, bodies[0])} if cone is not None and place == "B" else {}
-            direction = None if kind == "S" else axes if place == "B" else axes[::-1]
-            label = f"{place}{leg}{name}" if back else f"{place}{name}{leg}"
-            joints.append(joint(kind, label, ends, at, direction, **more))
+        more = {} if cone is None else {"cone": Cone(c - b, cone, bodies[0])}
+        joints.append(joint(kinds[0], f"B{name}", (bodies[0], rod), b, axes if kinds[0] == "U" else None, **more))
+        joints.append(joint(kinds[1], f"C{name}", (rod, bodies[1]), c, axes[::-1] if kinds[1] == "U" else None))
     return joints
 
 
@@ -107,16 +99,24 @@ def tricept() -> Mechanism:
     return Mechanism("3-UPS/UP", joints, "platform", (0, 0, 230))
 
 
-def delta(rods: str = "SS", linear: bool = False, cone: float | None = 0.9) -> Mechanism:
-    """A delta with two rods to an arm, ball or universal joints at their ends; arms that turn, or carriages."""
+def delta_legs(
+    hip: float, elbow: tuple[float, float], wrist: tuple[float, float], spread: float, swing: tuple[float, float],
+    end: str, kinds: str = "SS", cone: float | None = None,
+) -> list[Joint]:  # fmt: skip
+    """Three arms with two rods each, between points at a radius from the axis and a height."""
     joints = []
     for leg, angle in enumerate(TURNS, 1):
-        side, hip = np.cross(Z, out(angle)), 100 * out(angle)
-        elbow, wrist = 160 * out(angle) - [0, 0, 60], 40 * out(angle) - [0, 0, 240]
-        drive = ("P*", None, Z, {"range": (-90, 90)}) if linear else ("R*", hip, side, {"range": (-1.0, 1.2)})
-        joints.append(joint(drive[0], f"A{leg}", ("base", f"arm{leg}"), *drive[1:3], **drive[3]))
-        joints += pairs(elbow, wrist, 20 * side, (f"arm{leg}", "platform"), leg, "lr", rods, cone)
-    return Mechanism(f"{'linear' if linear else 'rotary'} delta, {rods} rods", joints, "platform", (0, 0, -240))
+        side = np.cross(Z, out(angle))
+        b, c = (radius * out(angle) + [0, 0, height] for radius, height in (elbow, wrist))
+        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), hip * out(angle), side, range=swing))
+        joints += pairs(b, c, spread * side, (f"arm{leg}", end), leg, kinds, cone)
+    return joints
+
+
+def delta(kinds: str = "SS", cone: float | None = 0.9) -> Mechanism:
+    """A delta whose rods have ball or universal joints at their ends."""
+    joints = delta_legs(100, (160, -60), (40, -240), 20, (-1.0, 1.2), "platform", kinds, cone)
+    return Mechanism(f"rotary delta, {kinds} rods", joints, "platform", (0, 0, -240))
 
 
 def _pin_parallelogram(leg: int, arm: str, b: np.ndarray, c: np.ndarray, side: np.ndarray, end: str) -> list[Joint]:
@@ -225,17 +225,6 @@ def planar_4rpr() -> Mechanism:
         home = float(np.linalg.norm(np.subtract(c, a)))
         joints += chain(leg, *strut(a, c, ("R", Z), ("R", Z), range=(home - 60, home + 60)))
     return Mechanism("4-RPR", joints, "platform", (0, 0, 0))
-
-
-def canfield() -> Mechanism:
-    """3-RSR: a pointing joint, its two halves mirror images."""
-    joints = []
-    for leg in (1, 2, 3):
-        ball = {"cone": Cone((0, 0, 1), 1.2, f"{leg}.1")}
-        steps = ("R*", (50, 0, 0), Y, {"range": (-1.2, 1.2)}), ("S", (80, 0, 60), None, ball), ("R", (50, 0, 120), Y)
-        R = Rotation.from_euler("z", TURNS[leg - 1], degrees=True).as_matrix()
-        joints += chain(leg, *(_turned(R, *step) for step in steps))
-    return Mechanism("Canfield joint", joints, "platform", (0, 0, 120))
 
 
 def agile_eye(reference: Sequence[float] = (0, 0, 0)) -> Mechanism:
@@ -402,14 +391,12 @@ MACHINES: dict[str, Callable[[], Mechanism]] = {
     "delta_su": lambda: delta("SU"),
     "delta_uu": lambda: delta("UU", cone=None),
     "delta_small_cones": lambda: delta(cone=0.15),
-    "linear_delta": lambda: delta(linear=True),
     "pinned_delta": pinned_delta,
     "orthoglide": orthoglide,
     "puu": puu,
     "exechon": exechon,
     "cru": cru,
     "planar_4rpr": planar_4rpr,
-    "canfield": canfield,
     "agile_eye": agile_eye,
     "agile_eye_offset": lambda: agile_eye((0, 0, 50)),
     "ankle": ankle,
@@ -564,11 +551,7 @@ def stretched_wrist(tool: tuple[float, float, float] = (0, 0, 270)) -> Mechanism
 
 def picker() -> Mechanism:
     """A delta whose tool a shaft turns: from a motor on the base, through cardan joints and a slide between them."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        across, elbow, wrist = np.cross(Z, out(angle)), 535 * out(angle) - [0, 0, 105], 45 * out(angle) - [0, 0, 800]
-        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), 200 * out(angle), across, range=(-1.2, 1.5)))
-        joints += pairs(elbow, wrist, 50 * across, (f"arm{leg}", "plate"), leg)
+    joints = delta_legs(200, (535, -105), (45, -800), 50, (-1.2, 1.5), "plate")
     joints.append(joint("R", "bearing", ("plate", "tool"), (0, 0, -800), Z))
     joints += chain(
         "shaft",
@@ -591,11 +574,8 @@ def tricept_with_wrist() -> Mechanism:
 
 def stretched_delta() -> Mechanism:
     """A delta whose cranks and rods are in line at home."""
-    joints = []
-    for leg, angle in enumerate(TURNS, 1):
-        across, foot, wrist = np.cross(Z, out(angle)), 200 * out(angle), 45 * out(angle) - [0, 0, 800]
-        joints.append(joint("R*", f"A{leg}", ("base", f"arm{leg}"), foot, across, range=(-1.2, 1.5)))
-        joints += pairs(0.65 * foot + 0.35 * wrist, wrist, 50 * across, (f"arm{leg}", "plate"), leg)
+    elbow = 0.65 * np.array((200, 0)) + 0.35 * np.array((45, -800))
+    joints = delta_legs(200, (elbow[0], elbow[1]), (45, -800), 50, (-1.2, 1.5), "plate")
     return Mechanism("stretched delta", joints, "plate", (0, 0, -800), task=POSITION)
 
 
