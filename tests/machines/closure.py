@@ -314,6 +314,14 @@ def arm() -> Mechanism:
     return Mechanism("6R arm", chain(1, *ARM), "platform", (300, 0, 340))
 
 
+def wrist_arm(**more: Any) -> Mechanism:
+    """A serial arm of six revolutes with a spherical wrist, upright at home, the forearm level; `more` is of each."""
+    wrist = (395, 0, 630)
+    points = [(0, 0, 0), (75, 0, 330), (75, 0, 630), wrist, wrist, wrist]
+    steps = [("R*", at, axis, more) for at, axis in zip(points, (Z, Y, Y, X, Y, X), strict=True)]
+    return Mechanism("6R arm with a wrist", chain(1, *steps, end="tool"), "tool", (475, 0, 630))
+
+
 def welded_tricept() -> Mechanism:
     """The tricept with bodies welded together: the foot to the base, two plates to one."""
     joints = [
