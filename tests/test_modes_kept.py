@@ -12,8 +12,8 @@ import machines
 import pfabrik as pf
 from checks import INTERPRETED, actuator_units, assert_feasible, home_values
 from machines import closure, machine
+from oracles import any_values
 from pfabrik import Joint, Mechanism, Options, Solution, Status
-from pfabrik.files import loads
 from pfabrik.model import model_of
 from pfabrik.platform.answers import sides_at
 from pfabrik.platform.branch import branch_of, same_branch
@@ -282,27 +282,23 @@ def test_legs_with_loops_reach_in_another_mode_what_no_start_leads_to() -> None:
 
 # --- forward: the assembly mode --------------------------------------------------------------------------------------
 
-CRANK = """
-schema = 1
-name = "crank in a four-bar"
-units = { length = "mm", angle = "deg" }
-base = "base"
-end_effector = "coupler"
-reference_point = [60, 80, 0]
-task = ["x"]
-joint = [
-  { name = "A", type = "revolute", actuated = true, connects = ["base", "a"], at = [0, 0, 0], axis = [0, 0, 1] },
-  { name = "B", type = "revolute", connects = ["a", "coupler"], at = [0, 80, 0], axis = [0, 0, 1] },
-  { name = "C", type = "revolute", connects = ["coupler", "c"], at = [100, 80, 0], axis = [0, 0, 1] },
-  { name = "D", type = "revolute", connects = ["c", "base"], at = [120, 0, 0], axis = [0, 0, 1] },
-]
-"""
+
+def crank_in_a_four_bar() -> Mechanism:
+    """It does not go all round; one place along its coupler is asked for."""
+    z = (0, 0, 1)
+    joints = [
+        Joint("A", "revolute", ("base", "a"), at=(0, 0, 0), axis=z, actuated=True),
+        Joint("B", "revolute", ("a", "coupler"), at=(0, 80, 0), axis=z),
+        Joint("C", "revolute", ("coupler", "c"), at=(100, 80, 0), axis=z),
+        Joint("D", "revolute", ("c", "base"), at=(120, 0, 0), axis=z),
+    ]
+    return Mechanism("crank in a four-bar", joints, "coupler", (60, 80, 0), task=("x",))
 
 
 @pytest.mark.parametrize("name", ["rrr", "reachy_mini", "canfield", "crank"])
 def test_forward_kinematics_is_where_small_steps_from_home_lead(name: str) -> None:
     """Without limits, far from home; what is not reached has a reason, and the other mode for who asks for any."""
-    mechanism = loads(CRANK) if name == "crank" else pf.load(name).without_limits()
+    mechanism = crank_in_a_four_bar() if name == "crank" else pf.load(name).without_limits()
     rows, home, here = 3 if INTERPRETED else 16, home_values(mechanism), None
     spans = np.random.default_rng(0).uniform(-0.8, 0.8, (rows, len(home)))
     values = home + spans * actuator_units(mechanism)
@@ -320,7 +316,7 @@ def test_forward_kinematics_is_where_small_steps_from_home_lead(name: str) -> No
 
 def test_a_crank_reaches_in_any_mode_whatever_its_circles_reach() -> None:
     """Coupler and rocker meet if the distance of their ends is at most the sum of both, and at least the difference."""
-    mechanism, coupler, rocker = loads(CRANK), 100.0, np.hypot(20.0, 80.0)
+    mechanism, coupler, rocker = crank_in_a_four_bar(), 100.0, np.hypot(20.0, 80.0)
     angles = np.linspace(-3.1, 3.1, 8 if INTERPRETED else 40)
     ends = 80.0 * np.column_stack([-np.sin(angles), np.cos(angles)])
     distances = np.linalg.norm(ends - [120.0, 0.0], axis=1)
@@ -329,26 +325,14 @@ def test_a_crank_reaches_in_any_mode_whatever_its_circles_reach() -> None:
     np.testing.assert_array_equal(answer.status == Status.REACHED, meets)
 
 
-@pytest.mark.parametrize("has_start", [False, True])
-def test_a_joint_behind_a_parallelogram_does_not_fold_it(has_start: bool) -> None:
-    """A parallelogram's elbow turns by J3 - J2, whatever the wrist does."""
-    y = (0, 1, 0)
-    joints = [
-        Joint("J2", "revolute", ("base", "lower"), (0, 0, 0), y, actuated=True),
-        Joint("J3", "revolute", ("base", "lever"), (0, 0, 0), y, actuated=True),
-        Joint("low", "revolute", ("lever", "rod"), (-400, 0, 0), y),
-        Joint("elbow", "revolute", ("lower", "upper"), (0, 0, 1000), y),
-        Joint("top", "spherical", ("rod", "upper"), (-400, 0, 1000)),
-        Joint("H", "revolute", ("upper", "wrist"), (1200, 0, 1000), y, actuated=True),
-        Joint("J5", "revolute", ("wrist", "hand"), (1300, 0, 1000), (1, 0, 0), actuated=True),
-    ]
-    for end in ("wrist", "hand"):
-        used = joints if end == "hand" else joints[:-1]
-        mechanism = Mechanism("parallelogram and a wrist", used, end, (1300, 0, 1000), task=("x", "z"))
-        n = len(mechanism.actuator_names)
-        values = np.radians(np.random.default_rng(0).uniform(-65.0, 65.0, (20 if INTERPRETED else 1000, n)))
-        values[:, 2] *= 2.0
-        values = values[np.abs(values[:, 1] - values[:, 0]) < np.radians(85.0)]
-        answer = pf.solve_fk(mechanism, values, start=pf.solve_fk(mechanism, np.zeros(n)) if has_start else None)
+@pytest.mark.parametrize("name", ["files.palletizer", "files.parallelogram_robot"])
+def test_a_joint_behind_a_parallelogram_does_not_fold_it(name: str) -> None:
+    """A parallelogram's elbow turns by the lift's angle less the shoulder's, whatever the wrist does."""
+    limited = machine(name)
+    values, mechanism = any_values(limited, 20 if INTERPRETED else 1000, 1.0), limited.without_limits()
+    lift, shoulder = (values[:, mechanism.actuator_names.index(each)] for each in ("lift", "shoulder"))
+    is_unfolded = np.abs(lift - shoulder) < np.radians(85.0)
+    for start in (None, pf.solve_fk(mechanism, home_values(mechanism))):
+        answer = pf.solve_fk(mechanism, values[is_unfolded], start=start)
         assert answer
-        np.testing.assert_allclose(answer.joints["elbow"], values[:, 1] - values[:, 0], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(answer.joints["elbow"], (lift - shoulder)[is_unfolded], rtol=0, atol=1e-6)

@@ -35,7 +35,7 @@ def assert_same(solver: Solver, expected: pf.Solution, status: Status) -> None:
 @pytest.mark.parametrize("started", [False, True])
 @pytest.mark.parametrize("name", MACHINES)
 def test_answers_statuses_and_jacobians_are_those_of_single_calls(name: str, started: bool) -> None:
-    """Within reach and out of it, from a start in another working mode than home's where there is one."""
+    """Within reach and out of it, from home and from a start."""
     mechanism = pf.load(name)
     start = pf.solve_ik(mechanism, targets(mechanism, 1, 0.03)[0]) if started else None
     solver = Solver(mechanism, start=start)
