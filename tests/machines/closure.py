@@ -295,10 +295,6 @@ def five_bar_with_tool() -> Mechanism:
     return Mechanism("5-bar with a tool", joints, "c1", (35, 215, 10), task=("x", "y"))
 
 
-def five_bar_with_limited_tip() -> Mechanism:
-    return five_bar([(-50, 0), (50, 0)], [(-120, 60), (120, 60)], (0, 130), tip=(-0.5, 0.3))
-
-
 ARM = (
     ("R*", (0, 0, 100), Z, {"range": (-2.9, 2.9)}),
     ("R*", (30, 0, 100), Y, {"range": (-1.9, 1.9), "home": 0.3}),
@@ -410,7 +406,7 @@ MACHINES: dict[str, Callable[[], Mechanism]] = {
     "ankle": ankle,
     "four_bar_driven": four_bar_driven,
     "ranged_stewart": ranged_stewart,
-    "limited_tip": five_bar_with_limited_tip,
+    "limited_tip": lambda: five_bar([(-50, 0), (50, 0)], [(-120, 60), (120, 60)], (0, 130), tip=(-0.5, 0.3)),
     "arm": arm,
     "welded_tricept": welded_tricept,
     "spherical_tip": lambda: carried_tip("S"),
