@@ -41,10 +41,8 @@ def five_bar(feet: Sequence[Point], elbows: Sequence[Point], at: Point, **limits
     z, joints = (0, 0, 1), []
     for i, (foot, elbow) in enumerate(zip(feet, elbows, strict=True), 1):
         joints += [
-            Joint(
-                f"A{i}", "revolute", ("base", f"a{i}"), at=(*foot, 0), axis=z, actuated=True, range=limits.get(f"A{i}")
-            ),
-            Joint(f"B{i}", "revolute", (f"a{i}", f"c{i}"), at=(*elbow, 0), axis=z, range=limits.get(f"B{i}")),
+            Joint(f"A{i}", "revolute", ("base", f"a{i}"), (*foot, 0), z, actuated=True, range=limits.get(f"A{i}")),
+            Joint(f"B{i}", "revolute", (f"a{i}", f"c{i}"), (*elbow, 0), z, range=limits.get(f"B{i}")),
         ]
     joints.append(Joint("tip", "revolute", ("c1", "c2"), at=(*at, 0), axis=z, range=limits.get("tip")))
     return Mechanism("5-bar", joints, "tip", task=limits.get("task"))
@@ -152,23 +150,16 @@ def planar(chain: str) -> Mechanism:
 
 def serial_planar(n: int = 4) -> Mechanism:
     """A planar arm of n revolutes with a point tip, bent at home; a gripper hangs on the tip."""
-    points = [np.array([0.0, 0.0, 0.0])]
-    for k in range(n):
-        points.append(points[-1] + 100 * np.array([np.cos(0.3 * k), 0, np.sin(0.3 * k)]))
+    headings, hinge = 0.3 * np.arange(n), {"axis": (0, 1, 0)}
+    links = 100 * np.stack([np.cos(headings), 0 * headings, np.sin(headings)], axis=1)
+    points, bodies = np.vstack([np.zeros(3), np.cumsum(links, axis=0)]), ["base", *(f"link{k + 1}" for k in range(n))]
     joints = [
-        Joint(
-            f"j{k + 1}",
-            "revolute",
-            ("base" if k == 0 else f"link{k}", f"link{k + 1}"),
-            at=points[k],
-            axis=(0, 1, 0),
-            actuated=True,
-            range=(-1.4, 1.4),
-        )
+        Joint(f"j{k + 1}", "revolute", bodies[k : k + 2], at=points[k], actuated=True, range=(-1.4, 1.4), **hinge)
         for k in range(n)
     ]
-    tip = Joint("tip", "revolute", (f"link{n}", "gripper"), at=points[n], axis=(0, 1, 0))
-    return Mechanism("planar arm", [*joints, tip], "tip")
+    return Mechanism(
+        "planar arm", [*joints, Joint("tip", "revolute", (bodies[n], "gripper"), points[n], **hinge)], "tip"
+    )
 
 
 def serial_spherical(n: int = 3) -> Mechanism:
@@ -176,9 +167,8 @@ def serial_spherical(n: int = 3) -> Mechanism:
     joints = [Joint("slide", "prismatic", ("base", "carriage"), axis=(1, 0, 0), actuated=True, range=(-50, 50))]
     before, height = "carriage", 0.0
     for k in range(1, n + 1):
-        joints.append(
-            Joint(f"s{k}", "spherical", (before, f"link{k}"), at=(0, 0, height), cone=Cone((0, 0, 1), 0.9, before))
-        )
+        cone = Cone((0, 0, 1), 0.9, before)
+        joints.append(Joint(f"s{k}", "spherical", (before, f"link{k}"), at=(0, 0, height), cone=cone))
         before, height = f"link{k}", height + 80
     joints.append(Joint("tip", "spherical", (before, "tool"), at=(0, 0, height)))
     return Mechanism("ball-joint chain", joints, "tip")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -16,30 +15,29 @@ from .positions import ring
 def arm_with_elbow(leg: Callable[[str, Any, Any], list[Joint]]) -> Mechanism:
     """A trunk of shoulder, slide and elbow that carries two branches; four struts more hold the platform."""
     joints = [
-        Joint("shoulder", "revolute", ("base", "arm"), at=(100, 0, 0), axis=(0, 1, 0), actuated=True, range=(-1, 1))
-    ]
-    joints += [
+        Joint("shoulder", "revolute", ("base", "arm"), at=(100, 0, 0), axis=(0, 1, 0), actuated=True, range=(-1, 1)),
         Joint("slide", "prismatic", ("slider", "arm"), axis=(-1, 0, 3), actuated=True, range=(-20, 20)),
         Joint("elbow", "revolute", ("bar", "slider"), at=(90, 0, 40), axis=(1, 1, 0), actuated=True, range=(-1, 1)),
     ]
     joints += leg("1", (80, 20, 60), (50, 30, 150)) + leg("2", (80, -20, 60), (50, -30, 150))
-    for i, (foot, head) in enumerate(
-        zip(ring(100, 0, (80, 120, 200, 260)), ring(50, 150, (90, 140, 180, 270)), strict=True)
-    ):
+    ends = zip(ring(100, 0, (80, 120, 200, 260)), ring(50, 150, (90, 140, 180, 270)), strict=True)
+    for i, (foot, head) in enumerate(ends):
         joints += _strut(f"s{i}", "base", foot, head)
     return Mechanism("arm with elbow", joints, "platform", (0, 0, 150))
 
 
-def _strut(name: str, body: str, foot: Any, head: Any) -> list[Joint]:
+def _strut(
+    name: str, body: str, foot: Any, head: Any, cone: float = 0.3, stroke: tuple[float, float] = (0.95, 1.05)
+) -> list[Joint]:
+    """A driven strut from a body to the platform; its stroke relative to its length at home."""
     line = np.subtract(head, foot)
+    limits = tuple(share * float(np.linalg.norm(line)) for share in stroke)
+    bodies, ends = (f"c{name}", f"r{name}"), (f"C{name}", f"E{name}")
     return [
-        Joint(f"C{name}", "universal", (body, f"c{name}"), at=foot, cone=Cone(line, 0.3, body)),
-        Joint(
-            f"D{name}", "prismatic", (f"c{name}", f"r{name}"), along=(f"C{name}", f"E{name}"), actuated=True,
-            range=(0.95 * np.linalg.norm(line), 1.05 * np.linalg.norm(line)),
-        ),
-        Joint(f"E{name}", "spherical", (f"r{name}", "platform"), at=head, cone=Cone(-line, 0.3, "platform")),
-    ]  # fmt: skip
+        Joint(ends[0], "universal", (body, bodies[0]), at=foot, cone=Cone(line, cone, body)),
+        Joint(f"D{name}", "prismatic", bodies, along=ends, actuated=True, range=limits),
+        Joint(ends[1], "spherical", (bodies[1], "platform"), at=head, cone=Cone(-line, cone, "platform")),
+    ]
 
 
 def bar_strut(name: str, foot: Any, head: Any) -> list[Joint]:
@@ -75,16 +73,11 @@ def bar_planar(name: str, foot: Any, head: Any) -> list[Joint]:
 
 def pivoted() -> Mechanism:
     """A platform on a ball joint that is fixed to the base, with three struts."""
-    struts = [
-        _strut(f"{i}", "base", a, c)
-        for i, (a, c) in enumerate(zip(ring(100, 0, (0, 120, 240)), ring(60, 150, (10, 120, 250)), strict=True))
-    ]
-    return Mechanism(
-        "pivoted",
-        [Joint("pivot", "spherical", ("base", "platform"), at=(0, 0, 140)), *chain.from_iterable(struts)],
-        "platform",
-        (0, 0, 150),
-    )
+    joints = [Joint("pivot", "spherical", ("base", "platform"), at=(0, 0, 140))]
+    ends = zip(ring(100, 0, (0, 120, 240)), ring(60, 150, (10, 120, 250)), strict=True)
+    for i, (foot, head) in enumerate(ends):
+        joints += _strut(f"{i}", "base", foot, head)
+    return Mechanism("pivoted", joints, "platform", (0, 0, 150))
 
 
 def arms(
@@ -121,17 +114,7 @@ def arms(
             joints.append(Joint(f"T{i}", "revolute", (f"bar{i}", carrier), at=foot + 80 * z, axis=z, range=(-0.4, 0.4)))
         for k, place in enumerate(places):
             at, head = foot + place * bar + 80 * z, 0.45 * foot + 1.3 * place * bar + 170 * z
-            length = float(np.linalg.norm(head - at))
-            joints += [
-                Joint(f"C{i}{k}", "universal", (carrier, f"c{i}{k}"), at=at, cone=Cone(head - at, 0.75, carrier)),
-                Joint(
-                    f"D{i}{k}", "prismatic", (f"c{i}{k}", f"r{i}{k}"), along=(f"C{i}{k}", f"E{i}{k}"), actuated=True,
-                    range=(0.75 * length, 1.4 * length),
-                ),
-                Joint(
-                    f"E{i}{k}", "spherical", (f"r{i}{k}", "platform"), at=head, cone=Cone(at - head, 0.75, "platform")
-                ),
-            ]  # fmt: skip
+            joints += _strut(f"{i}{k}", carrier, at, head, 0.75, (0.75, 1.4))
     return Mechanism("arms", joints, "platform", (0, 0, 170))
 
 
