@@ -157,9 +157,8 @@ def serial_planar(n: int = 4) -> Mechanism:
         Joint(f"j{k + 1}", "revolute", bodies[k : k + 2], at=points[k], actuated=True, range=(-1.4, 1.4), **hinge)
         for k in range(n)
     ]
-    return Mechanism(
-        "planar arm", [*joints, Joint("tip", "revolute", (bodies[n], "gripper"), points[n], **hinge)], "tip"
-    )
+    joints.append(Joint("tip", "revolute", (bodies[n], "gripper"), at=points[n], **hinge))
+    return Mechanism("planar arm", joints, "tip")
 
 
 def serial_spherical(n: int = 3) -> Mechanism:
