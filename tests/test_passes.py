@@ -68,7 +68,7 @@ def test_limits_are_kept_and_loops_closed_for_any_target(name: str, way: str) ->
 def test_a_path_keeps_its_working_mode_and_goes_on_from_answer_to_answer(name: str) -> None:
     """Out of the workspace and back: the coordinates of all joints end where they began."""
     mechanism = machine(name)
-    way = np.sin(np.linspace(0.0, np.pi, 9 if INTERPRETED else 15))
+    way = np.sin(np.linspace(0.0, np.pi, 9))
     targets = np.repeat(mechanism.home_pose[None], len(way), axis=0)
     targets[:, 0, 3] += 1.2 * way * mechanism.characteristic_length
     for options in (Options.paper(), Options.centroid(), Options.accelerated())[: 2 if INTERPRETED else 3]:

@@ -134,17 +134,16 @@ def test_catalogue_machines_have_the_modes_of_textbooks_the_first_at_home(name: 
     np.testing.assert_allclose(modes[0].actuators, home_values(mechanism), rtol=0, atol=1e-7)
 
 
-MANY_STARTS = ("delta", "linear_delta", "psu")
-"""Machines whose modes are searched from the most starts; of their kind, the orthoglide is asked in every run."""
+OF_EACH_KIND = ("five_bar", "stewart", "rps", "serial_arm", "agile_eye", "ankle_rss", "orthoglide", "reachy_mini")
+"""Machines that are asked in every run, for one target."""
+CONTINUA = ("nrpm", "panda", "snake60")
 
 
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        pytest.param(name, count, marks=pytest.mark.campaign if count > 1 or name in MANY_STARTS else pytest.mark.slow)
-        for name in pf.catalog()
-        if name not in ("nrpm", "panda", "snake60")
-        for count in (1, 5)
+        *(pytest.param(name, 1, marks=pytest.mark.slow) for name in OF_EACH_KIND),
+        *(pytest.param(name, 5, marks=pytest.mark.campaign) for name in pf.catalog() if name not in CONTINUA),
     ],
 )
 def test_what_solve_ik_reaches_is_one_of_the_modes(name: str, count: int) -> None:
