@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -239,7 +240,21 @@ def cranks() -> tuple[Mechanism, np.ndarray]:
     return pf.load("servo_hexapod").without_limits(), np.concatenate([way / np.linalg.norm(way), turn / 1.2])
 
 
-@pytest.mark.parametrize(("make", "steps"), [(rail_and_crank, 101), (three_rrc, 101), (cranks, 21)])
+def pinned_parallelograms(seed: int) -> tuple[Mechanism, np.ndarray]:
+    """A delta without closed forms, and any way: arms and forearms are stretched out on all of them."""
+    way = np.random.default_rng(seed).normal(size=3)
+    return machine("spherical_tip").without_limits(), np.concatenate([1.25 * way / np.linalg.norm(way), np.zeros(3)])
+
+
+@pytest.mark.parametrize(
+    ("make", "steps"),
+    [
+        (rail_and_crank, 101),
+        (three_rrc, 101),
+        (cranks, 21),
+        *((partial(pinned_parallelograms, seed), 25) for seed in (1, 2, 3)),
+    ],
+)
 def test_links_that_were_stretched_out_beyond_reach_bend_back_the_way_they_did(
     make: Callable[[], tuple[Mechanism, np.ndarray]], steps: int
 ) -> None:
