@@ -325,6 +325,15 @@ def test_a_crank_reaches_in_any_mode_whatever_its_circles_reach() -> None:
     np.testing.assert_array_equal(answer.status == Status.REACHED, meets)
 
 
+@pytest.mark.parametrize("name", ["rps", "rrr"])
+def test_in_any_mode_values_are_reached_that_have_an_assembly_mode_at_all(name: str) -> None:
+    mechanism = pf.load(name).without_limits()
+    values = any_values(pf.load(name), 4 if INTERPRETED else 12, 2.0, seed=5)
+    answer = pf.solve_fk(mechanism, values, options=ANY)
+    has_mode = [len(pf.assembly_modes(mechanism, row, most_starts=512)) > 0 for row in values]
+    np.testing.assert_array_equal(answer.status == Status.REACHED, has_mode)
+
+
 @pytest.mark.parametrize("name", ["files.palletizer", "files.parallelogram_robot"])
 def test_a_joint_behind_a_parallelogram_does_not_fold_it(name: str) -> None:
     """A parallelogram's elbow turns by the lift's angle less the shoulder's, whatever the wrist does."""
