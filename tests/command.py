@@ -34,6 +34,11 @@ def pfabrik(line: str | Sequence[str]) -> Result:
     return result
 
 
+def told(result: Result) -> list[str]:
+    """The lines on stderr that do not depend on how quick the machine is: no progress, and no compiling."""
+    return [line for line in result.stderr.splitlines() if not re.match(r"pfabrik: .*(compiling|: \d+%, )", line)]
+
+
 def in_process(line: str, **options: Any) -> subprocess.Popen[str]:
     """Start a command line in a process of its own."""
     command = [sys.executable, "-m", "pfabrik", *shlex.split(line)]

@@ -1,23 +1,18 @@
-"""The page of the catalogue is what its generator writes, its pictures exist, and the page on adding one is true."""
+"""The page of the catalogue is what its generator writes, and its pictures exist."""
 
 from __future__ import annotations
 
 import importlib.util
-import re
-import shlex
 from pathlib import Path
 from types import ModuleType
 
 import pytest
-from click.testing import CliRunner
 
 import pfabrik as pf
-from pfabrik.cli import main
 
 pytest.importorskip("matplotlib")
 
 DOCS = Path(__file__).parents[1] / "docs"
-ADDING = (DOCS / "adding-a-mechanism.md").read_text(encoding="utf-8")
 LARGEST_PICTURE = 25_000  # bytes
 
 
@@ -28,9 +23,6 @@ def generator() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-# The page.
 
 
 def test_the_page_is_what_its_generator_writes() -> None:
@@ -55,19 +47,3 @@ def test_pictures_are_the_same_every_time_and_stale_ones_go(tmp_path: Path, monk
     module.main()
     assert [path.name for path in module.PICTURES.iterdir()] == ["five_bar.png"]
     assert module.picture("five_bar").read_bytes() == first
-
-
-# Adding a mechanism.
-
-
-def test_commands_on_the_new_machine_print_what_the_page_shows(tmp_path: Path) -> None:
-    (text,) = re.findall(r'write_text\("""\\\n(.*?)"""\)', ADDING, re.DOTALL)
-    (tmp_path / "four_rpr.toml").write_text(text, encoding="utf-8")
-    shown = re.findall(r"^\$ pfabrik (.*?)\n(.*?)^```$", ADDING, re.DOTALL | re.MULTILINE)
-    assert len(shown) == 2
-    for line, expected in shown:
-        words = [word.replace("four_rpr.toml", str(tmp_path / "four_rpr.toml")) for word in shlex.split(line)]
-        printed = CliRunner().invoke(main, words).output
-        parts = expected.rstrip("\n").split("\n...\n")
-        assert all(part in printed for part in parts), printed
-        assert len(parts) > 1 or printed.rstrip("\n") == parts[0]

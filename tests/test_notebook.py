@@ -7,6 +7,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from machines import MACHINES, planar, tripod_rps
 from pfabrik.description.sketch import HEIGHT, WIDTH, sketch
 
 MARKED = pf.Options(on_invalid="mark")
+FIVE_BAR = pf.load("five_bar")
 SVG = "{http://www.w3.org/2000/svg}"
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e[-+]?\d+)?|nan|inf", re.IGNORECASE)
 
@@ -61,35 +63,16 @@ def test_every_joint_is_drawn_once_within_the_picture_and_the_actuated_are_marke
             assert np.isfinite([float(number) for number in NUMBER.findall(each.get(name) or "")]).all()
 
 
-def test_names_are_escaped() -> None:
-    joints = [
-        pf.Joint('<b>&"1', "revolute", ("base", "link"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True),
-        pf.Joint("'2'", "revolute", ("link", "tool"), at=(10, 0, 0), axis=(0, 0, 1), actuated=True),
-    ]
-    mechanism = pf.Mechanism("<script>&", joints, "tool", (20, 0, 0), task=("x", "y"))
-    svg = drawing(mechanism._repr_html_())
-    assert set(markers(svg)) == {'<b>&"1*', "'2'*"}
-    assert svg.findtext(f"{SVG}title") == "<script>&"
-    assert "<script>" not in mechanism._repr_html_()
-
-
 def test_a_mechanism_shows_its_name_counts_task_and_actuators_with_limits_in_degrees() -> None:
-    mechanism = pf.load("five_bar")
-    text = mechanism._repr_html_()
+    text = FIVE_BAR._repr_html_()
     assert {"Planar 5-bar", "5 joints, 2 actuators; task x y z"} <= set(ET.fromstring(text).itertext())
-    assert cells(text) == [
-        ["actuator", "min", "max", "unit"],
-        ["p1", "-60", "60", "deg"],
-        ["p5", "-60", "60", "deg"],
-    ]
-
-
-def test_what_has_no_limit_shows_none() -> None:
-    assert cells(pf.load("five_bar").without_limits()._repr_html_())[1] == ["p1", "-", "-", "deg"]
+    rows = [["p1", "-60", "60", "deg"], ["p5", "-60", "60", "deg"]]
+    assert cells(text) == [["actuator", "min", "max", "unit"], *rows]
+    assert cells(FIVE_BAR.without_limits()._repr_html_())[1] == ["p1", "-", "-", "deg"]
 
 
 def test_an_answer_shows_status_errors_and_actuators() -> None:
-    answer = pf.solve_ik(pf.load("five_bar"), (0, 0, 300))
+    answer = pf.solve_ik(FIVE_BAR, (0, 0, 300))
     text = answer._repr_html_()
     words = " ".join(ET.fromstring(text).itertext())
     assert "projected: " in words
@@ -100,7 +83,7 @@ def test_an_answer_shows_status_errors_and_actuators() -> None:
 
 
 def test_a_planar_machine_is_drawn_in_its_plane_at_one_scale() -> None:
-    mechanism = pf.load("five_bar")  # in the plane of y and z
+    mechanism = FIVE_BAR  # in the plane of y and z
     found = markers(drawing(mechanism._repr_html_()))
     spots = np.array([found[joint.name + "*" * joint.actuated] for joint in mechanism.joints])
     places = np.array([joint.at for joint in mechanism.joints])[:, 1:] * (1, -1)
@@ -134,22 +117,23 @@ def test_an_answer_is_drawn_where_its_points_are_and_up_is_up(
     assert all(low < high for low, high in zip(before, after, strict=True))
 
 
-def test_a_batch_shows_how_many_rows_have_each_status_and_no_drawing() -> None:
-    batch = pf.solve_ik(pf.load("five_bar"), [(0, 0, 190), (0, 0, 300), (0, 0, 310)])
-    text = batch._repr_html_()
-    assert cells(text) == [["status", "rows"], ["REACHED", "1"], ["PROJECTED", "2"]]
-    assert not list(ET.fromstring(text).iter(f"{SVG}svg"))
-
-
-def test_a_row_that_was_no_pose_is_shown_without_a_drawing() -> None:
-    marked = pf.solve_ik(pf.load("five_bar"), [(0, np.nan, 190)], options=pf.Options(on_invalid="mark"))[0]
-    text = marked._repr_html_()
-    assert "invalid" in list(ET.fromstring(text).itertext())
-    assert not list(ET.fromstring(text).iter(f"{SVG}svg"))
+def test_what_has_no_single_configuration_is_shown_without_a_drawing() -> None:
+    batch = pf.solve_ik(FIVE_BAR, [(0, 0, 190), (0, 0, 300), (0, 0, 310)])
+    assert cells(batch._repr_html_()) == [["status", "rows"], ["REACHED", "1"], ["PROJECTED", "2"]]
+    stewart = pf.load("stewart")
+    for shown, word in (
+        (batch, "REACHED"),
+        (pf.solve_ik(FIVE_BAR, [(0, np.nan, 190)], options=MARKED)[0], "invalid"),
+        (pf.workspace(stewart, resolution=20.0), "mm³"),
+        (pf.workspace(stewart, fixed={"z": 5000.0}), "nothing within reach"),
+    ):
+        text = shown._repr_html_()
+        assert any(word in each for each in ET.fromstring(text).itertext())
+        assert not list(ET.fromstring(text).iter(f"{SVG}svg"))
 
 
 def test_a_workspace_shows_its_size_ends_limits_and_its_outline_in_the_plane() -> None:
-    found = pf.workspace(pf.load("five_bar"), resolution=8.0)
+    found = pf.workspace(FIVE_BAR, resolution=8.0)
     text = found._repr_html_()
     words = list(ET.fromstring(text).itertext())
     assert any(word.endswith("mm²") for word in words)
@@ -174,27 +158,6 @@ def test_a_workspace_shows_its_size_ends_limits_and_its_outline_in_the_plane() -
     assert ends[np.argmin(ends[:, 1]), 0] == pytest.approx(WIDTH / 2 + top[0] * np.ptp(ends[:, 0]) / y_by_z[0], abs=0.5)
 
 
-def test_a_workspace_of_three_coordinates_and_an_empty_one_show_no_outline() -> None:
-    machine = pf.load("stewart")
-    for found, word in (
-        (pf.workspace(machine, resolution=20.0), "mm³"),
-        (pf.workspace(machine, fixed={"z": 5000.0}), "nothing within reach"),
-    ):
-        text = found._repr_html_()
-        assert any(word in each for each in ET.fromstring(text).itertext())
-        assert not list(ET.fromstring(text).iter(f"{SVG}svg"))
-
-
-def test_names_in_a_workspace_are_escaped() -> None:
-    machine = pf.load("five_bar")
-    joints = [dataclasses.replace(joint, name=joint.name.replace("p1", "<b>&1")) for joint in machine.joints]
-    renamed = pf.Mechanism("<script>&", joints, machine.end_effector, task=machine.task)
-    text = pf.workspace(renamed, resolution=8.0)._repr_html_()
-    assert "<script>" not in text and "<b>&1" not in text
-    assert "<b>&1 max" in [row[1] for row in cells(text)]
-    assert "<b>&1 max" in [path.findtext(f"{SVG}title") for path in drawing(text).iter(f"{SVG}path")]
-
-
 def test_mobility_shows_every_count() -> None:
     machine = pf.load("nrpm")
     found = pf.mobility(machine)
@@ -204,7 +167,7 @@ def test_mobility_shows_every_count() -> None:
 
 
 def test_singularity_shows_every_measure_and_what_is_singular() -> None:
-    machine = pf.load("five_bar").without_limits()
+    machine = FIVE_BAR.without_limits()
     reached = pf.solve_ik(machine, (0, 0, 175))
     assert [row[2] for row in cells(pf.singularity(reached)._repr_html_())] == ["singular", *["no"] * 4]
     stretched = pf.configuration(machine, pf.solve_ik(machine, (0, 0, 1e4)).q)
@@ -235,56 +198,45 @@ def test_margins_show_the_nearest_limit_first_and_of_a_batch_the_least() -> None
     assert {value for *_, value in cells(none._repr_html_())[1:]} == {"-"}
 
 
-def five_bar_modes() -> pf.WorkingModes:
-    return pf.working_modes(pf.load("five_bar"), (0.0, 0.0, 175.0))
+AT = pf.solve_ik(FIVE_BAR, (0, 0, 175))
 
 
-def timed_five_bar() -> pf.Timed:
-    machine = pf.load("five_bar")
+def timed(machine: pf.Mechanism) -> pf.Timed:
     return pf.time_path(pf.track(machine, [(0, y, 175) for y in (0, 5, 10)]), speed=1.0, acceleration=2.0)
 
 
-def five_bar_map() -> pf.SingularityMap:
-    machine = pf.load("five_bar")
-    return pf.singularity_map(machine, pf.workspace(machine, resolution=10.0), resolution=20.0)
+@cache
+def space() -> pf.Workspace:
+    return pf.workspace(FIVE_BAR, resolution=10.0)
 
 
+SINGULARITIES = ["singularities", ""]
+POSE = ["x [mm]", "y [mm]", "z [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"]
+THREE = [(0, 0, 190), (0, 0, 900), (90, 0, 190)]
 RESULTS: dict[str, tuple[Callable[[], Any], list[str]]] = {
-    "working modes": (five_bar_modes, ["mode", "p1 [deg]", "p5 [deg]", "starts", "exceeds"]),
-    "assembly modes": (
-        lambda: pf.assembly_modes(pf.load("five_bar"), pf.solve_ik(pf.load("five_bar"), (0, 0, 175)).actuators),
-        ["mode", "x [mm]", "y [mm]", "z [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]", "starts", "exceeds"],
+    "working modes": (
+        lambda: pf.working_modes(FIVE_BAR, (0, 0, 175)),
+        ["mode", "p1 [deg]", "p5 [deg]", "starts", "exceeds"],
     ),
-    "no mode": (lambda: pf.working_modes(pf.load("five_bar"), (0.0, 0.0, 1e4)), []),
-    "timed path": (timed_five_bar, ["held back by", "limit", "share of the time"]),
-    "feasibility": (
-        lambda: pf.feasibility(pf.load("stewart"), (0, 0, 190)),
-        ["joint", "bound", "margin"],
-    ),
+    "assembly modes": (lambda: pf.assembly_modes(FIVE_BAR, AT.actuators), ["mode", *POSE, "starts", "exceeds"]),
+    "no mode": (lambda: pf.working_modes(FIVE_BAR, (0.0, 0.0, 1e4)), []),
+    "timed path": (lambda: timed(FIVE_BAR), ["held back by", "limit", "share of the time"]),
+    "feasibility": (lambda: pf.feasibility(pf.load("stewart"), THREE[0]), ["joint", "bound", "margin"]),
     "feasibility of a batch": (
-        lambda: pf.feasibility(pf.load("stewart"), [(0, 0, 190), (0, 0, 900), (90, 0, 190)]),
+        lambda: pf.feasibility(pf.load("stewart"), THREE),
         ["joint", "bound", "rows", "least margin"],
     ),
-    "singularity map": (five_bar_map, ["singularities", ""]),
+    "singularity map": (lambda: pf.singularity_map(FIVE_BAR, space(), resolution=20.0), SINGULARITIES),
     "singularities of a path": (
-        lambda: pf.singularity_map(pf.load("five_bar"), pf.track(pf.load("five_bar"), [(0, 0, 175), (0, 5, 180)])),
-        ["singularities", ""],
+        lambda: pf.singularity_map(FIVE_BAR, pf.track(FIVE_BAR, [(0, 0, 175), (0, 5, 180)])),
+        SINGULARITIES,
     ),
-    "singularity": (
-        lambda: pf.singularity(pf.solve_ik(pf.load("five_bar"), (0, 0, 175))),
-        ["kind", "measure", "singular"],
-    ),
-    "mobility": (lambda: pf.mobility(pf.load("five_bar")), ["", "count", "of"]),
-    "margins": (lambda: pf.margins(pf.solve_ik(pf.load("five_bar"), (0, 0, 175))), ["joint", "bound", "margin"]),
-    "workspace": (lambda: pf.workspace(pf.load("five_bar"), resolution=10.0), ["border", "formed by", "joint"]),
-    "largest shape": (
-        lambda: pf.workspace(pf.load("five_bar"), resolution=10.0).inscribed("sphere"),
-        ["coordinate", "centre", "extent"],
-    ),
-    "platform speed": (
-        lambda: pf.platform_speed(pf.solve_ik(pf.load("five_bar"), (0, 0, 175)), speed=1.0),
-        ["", "x", "y", "z", "speed", "unit", "limited by"],
-    ),
+    "singularity": (lambda: pf.singularity(AT), ["kind", "measure", "singular"]),
+    "mobility": (lambda: pf.mobility(FIVE_BAR), ["", "count", "of"]),
+    "margins": (lambda: pf.margins(AT), ["joint", "bound", "margin"]),
+    "workspace": (space, ["border", "formed by", "joint"]),
+    "largest shape": (lambda: space().inscribed("sphere"), ["coordinate", "centre", "extent"]),
+    "platform speed": (lambda: pf.platform_speed(AT, speed=1.0), ["", "x", "y", "z", "speed", "unit", "limited by"]),
 }
 
 
@@ -299,23 +251,28 @@ def test_every_result_is_a_small_table(make: Callable[[], Any], header: list[str
 
 
 def test_modes_are_listed_with_their_actuator_values() -> None:
-    modes = five_bar_modes()
+    modes = pf.working_modes(FIVE_BAR, (0, 0, 175))
     _, *rows = cells(modes._repr_html_())
     assert len(rows) == len(modes) == 4
     for row, mode in zip(rows, modes, strict=True):
         assert [float(cell) for cell in row[1:3]] == pytest.approx(np.degrees(mode.actuators), rel=1e-5)
 
 
-def test_names_in_results_are_escaped() -> None:
-    machine = pf.load("five_bar")
-    name = {joint.name: f"<i>&{joint.name}" for joint in machine.joints}
-    joints = [dataclasses.replace(joint, name=name[joint.name]) for joint in machine.joints]
-    renamed = pf.Mechanism("<script>&", joints, name[machine.end_effector])
-    answer = pf.solve_ik(renamed, (0, 0, 175))
-    modes = pf.working_modes(renamed, (0, 0, 175))
-    shown = (modes, pf.feasibility(renamed, (0, 0, 175)), pf.platform_speed(answer, speed=1.0), pf.margins(answer))
-    for each in shown:
+def test_names_are_escaped_in_all_that_is_shown() -> None:
+    name = {joint.name: f"<i>&\"{joint.name}'" for joint in FIVE_BAR.joints}
+    joints = [dataclasses.replace(joint, name=name[joint.name]) for joint in FIVE_BAR.joints]
+    renamed = pf.Mechanism("<script>&", joints, name[FIVE_BAR.end_effector])
+    answer, modes = pf.solve_ik(renamed, (0, 0, 175)), pf.working_modes(renamed, (0, 0, 175))
+    border = pf.workspace(renamed, resolution=10.0)
+    others = (pf.feasibility(renamed, (0, 0, 175)), pf.platform_speed(answer, speed=1.0), pf.margins(answer))
+    for each in (renamed, answer, modes, border, timed(renamed), *others):
         text = each._repr_html_()
         assert "<i>" not in text and "<script>" not in text
         ET.fromstring(text)
-    assert "<i>&p1 [deg]" in cells(modes._repr_html_())[0]
+    assert "<i>&\"p1' [deg]" in cells(modes._repr_html_())[0]
+    svg = drawing(renamed._repr_html_())
+    assert set(markers(svg)) == {name[joint.name] + "*" * joint.actuated for joint in FIVE_BAR.joints}
+    assert svg.findtext(f"{SVG}title") == "<script>&"
+    paths = drawing(border._repr_html_()).iter(f"{SVG}path")
+    assert "<i>&\"p1' max" in [row[1] for row in cells(border._repr_html_())]
+    assert "<i>&\"p1' max" in [path.findtext(f"{SVG}title") for path in paths]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from command import pfabrik, write_files
+from command import pfabrik, told, write_files
 
 GOLDEN = Path(__file__).with_name("golden")
 CHANCE = re.compile(r"^\d+ starts;.*|\s+\d+(?=\s+(nothing|min of|max of|cone of))", re.MULTILINE)
@@ -20,8 +20,8 @@ def printed(line: str) -> list[str]:
     command, _, most = line.partition(" | head -")
     result = pfabrik(command.removeprefix("$ pfabrik "))
     shown = result.stdout.splitlines()[: int(most) if most else None]
-    told = [f"! {each}" for each in result.stderr.splitlines() if "compiling" not in each]
-    return [*(each.rstrip() for each in shown), *told, *[f"exit code {result.exit_code}"] * (result.exit_code != 0)]
+    code = [f"exit code {result.exit_code}"] * (result.exit_code != 0)
+    return [*(each.rstrip() for each in shown), *(f"! {each}" for each in told(result)), *code]
 
 
 def transcript(text: str) -> str:
