@@ -6,8 +6,6 @@ import ast
 import html.parser
 import json
 import re
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +34,6 @@ def markup(shown: object) -> str:
     """Its HTML, or what is printed of it."""
     as_html = getattr(shown, "_repr_html_", None)
     return (as_html() if as_html else None) or repr(shown)  # a figure of matplotlib has a method that gives None
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder of one's own to work in, and no figure left open behind."""
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    if "matplotlib.pyplot" in sys.modules:
-        sys.modules["matplotlib.pyplot"].close("all")
 
 
 def test_there_are_notebooks() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,37 +10,21 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from in_chromium import MARKS, PATIENCE, chromium
 
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install '.[dev]'")
-
-CHROMIUM = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
-)
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM, reason="needs Chromium, which is not installed (apt install chromium)"),
-]
-SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+pytestmark = MARKS
 SIZE = {"width": 900, "height": 500}
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-PATIENCE = 60_000  # milliseconds
 FOLLOWS = 0.5  # of a millimetre: a pixel is larger
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        sandbox = ["--no-sandbox"] * (hasattr(os, "geteuid") and os.geteuid() == 0)
-        try:
-            chromium = started.chromium.launch(executable_path=CHROMIUM, args=[*SOFTWARE, *sandbox])
-        except playwright.Error as error:
-            pytest.skip(f"Chromium is there and does not start: {str(error).splitlines()[0]}")
-        yield chromium
-        chromium.close()
+    yield from chromium()
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pages")
     for name in ("stewart", "five_bar"):
         pf.export_web(pf.load(name), folder / f"{name}.html")
@@ -71,8 +53,8 @@ def centre(page: Any) -> list[float]:
     return found
 
 
-def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(browser: Any, folder: Path) -> None:
-    page, faults = opened(browser, folder / "stewart.html")
+def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(browser: Any, pages: Path) -> None:
+    page, faults = opened(browser, pages / "stewart.html")
     x, y = centre(page)
     page.mouse.move(x, y)
     page.mouse.down()
@@ -88,18 +70,18 @@ def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(browser: Any,
     assert not faults
 
 
-def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, folder: Path) -> None:
-    page, _ = opened(browser, folder / "stewart.html", "#p=10,-20,200,5,0,10")
+def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, pages: Path) -> None:
+    page, _ = opened(browser, pages / "stewart.html", "#p=10,-20,200,5,0,10")
     page.locator("canvas").press("ArrowRight")
     page.wait_for_function("page.session.past.length === 1")
-    again, _ = opened(browser, folder / "stewart.html", page.evaluate("location.hash"))
+    again, _ = opened(browser, pages / "stewart.html", page.evaluate("location.hash"))
     assert target(again) == pytest.approx(target(page), abs=1e-6)
     page.keyboard.press("Control+z")
     assert target(page)[:3, 3] == pytest.approx([10.0, -20.0, 200.0], abs=1e-6)
 
 
-def test_a_slider_drives_an_actuator(browser: Any, folder: Path) -> None:
-    page, _ = opened(browser, folder / "five_bar.html")
+def test_a_slider_drives_an_actuator(browser: Any, pages: Path) -> None:
+    page, _ = opened(browser, pages / "five_bar.html")
     slider = page.locator("#actuators input").first
     slider.focus()
     for _ in range(3):
@@ -110,8 +92,8 @@ def test_a_slider_drives_an_actuator(browser: Any, folder: Path) -> None:
     assert page.evaluate("page.session.answer.actuators[0]") > machine.drives[0].home
 
 
-def test_a_finger_drags_on_a_phone(browser: Any, folder: Path) -> None:
-    page, faults = opened(browser, folder / "five_bar.html", **PHONE)
+def test_a_finger_drags_on_a_phone(browser: Any, pages: Path) -> None:
+    page, faults = opened(browser, pages / "five_bar.html", **PHONE)
     x, y = centre(page)
     before, touch = target(page), page.context.new_cdp_session(page)
     for kind, points in (("Start", [[x, y]]), ("Move", [[x + 30, y + 30]]), ("End", [])):

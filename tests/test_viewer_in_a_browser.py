@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,34 +14,18 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from in_chromium import MARKS, PATIENCE, chromium
 
 pytest.importorskip("viser", reason="needs the extra view")
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install '.[dev]'")
-
-CHROMIUM = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
-)
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM, reason="needs Chromium, which is not installed (apt install chromium)"),
-]
-SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+pytestmark = MARKS
 SIZE = {"width": 640, "height": 320}  # few pixels: they are drawn without a graphics card
-PATIENCE = 60_000  # milliseconds
 WITHOUT_NOTICES = "[class*=Notification] { display: none !important }"
 UPWARD = 0.3  # where on the upright arrow the mouse takes hold, in the scene's units from its foot
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        sandbox = ["--no-sandbox"] * (hasattr(os, "geteuid") and os.geteuid() == 0)
-        try:
-            chromium = started.chromium.launch(executable_path=CHROMIUM, args=[*SOFTWARE, *sandbox])
-        except playwright.Error as error:
-            pytest.skip(f"Chromium is there and does not start: {str(error).splitlines()[0]}")
-        yield chromium
-        chromium.close()
+    yield from chromium()
 
 
 def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
