@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 from collections import defaultdict
-from collections.abc import Iterator
 from functools import cache
 from itertools import combinations
 from pathlib import Path
@@ -100,68 +99,43 @@ def test_type_checkers_see_every_public_name_where_it_is() -> None:
     assert seen == named | {(None, module) for module in pf._MODULES}
 
 
-def modules_imported(place: str, source: str) -> Iterator[str]:
-    """The modules of the package that a file imports relatively, as places: `kernels/legs/records`."""
-    rooms = Path(place).parts[:-1]
-    for node in nodes(source):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            start = [*rooms[: len(rooms) - node.level + 1], *(node.module or "").split(".")]
-            module = "/".join(part for part in start if part)
-            yield module
-            yield from (f"{module}/{alias.name}" for alias in node.names)
-
-
-def are_twins(one: str, other: str, sources: dict[str, str]) -> bool:
-    """True if a file name may stand for both places.
-
-    They are a kernel file and the file that calls it, which stands in the room of the kernel's or imports it; or a
-    command and the verb that it calls.
-    """
-    for inner, outer in ((one, other), (other, one)):
-        if inner == f"cli/{outer}":
-            return True
-        if inner.startswith("kernels/") and not outer.startswith("kernels/"):
-            calls = inner.removesuffix(".py") in modules_imported(outer, sources[outer])
-            return calls or inner == f"kernels/{outer}"
-    return False
-
-
-def shared_file_names(sources: dict[str, str]) -> list[tuple[str, str]]:
-    """Pairs of places that have the same file name and are not twins."""
-    places = defaultdict(list)
-    for place in sources:
-        places[Path(place).name].append(place)
-    del places["__init__.py"]
-    pairs = (pair for same in places.values() for pair in combinations(same, 2))
-    return [(one, other) for one, other in pairs if not are_twins(one, other, sources)]
-
-
-def shared_class_names(sources: dict[str, str]) -> dict[str, list[str]]:
-    """The names that several classes have, each with the places of these classes."""
+def places_by_class(sources: dict[str, str]) -> dict[str, list[str]]:
     places = defaultdict(list)
     for place, source in sources.items():
         for node in nodes(source):
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(place)
-    return {name: same for name, same in places.items() if len(same) > 1}
+    return places
 
 
-SOURCE_TEXTS = {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in SOURCES}
+def are_twins(one: str, other: str, sources: dict[str, str]) -> bool:
+    """True for a command and its verb, and for a kernel file and its caller, of the same room or with an import."""
+    inner, outer = sorted((one, other), key=lambda place: not place.startswith(("cli/", "kernels/")))
+    is_called = False
+    if inner.startswith("kernels/") and not outer.startswith("kernels/"):
+        room, stem = ".".join(Path(inner).parent.parts), Path(inner).stem
+        is_called = bool(re.search(rf"\.{room}(\.{stem} import| import .*\b{stem}\b)", sources[outer]))
+    return inner in (f"cli/{outer}", f"kernels/{outer}") or is_called
 
 
-def test_no_class_name_stands_twice() -> None:
-    assert shared_class_names(SOURCE_TEXTS) == {}
+def shared_file_names(sources: dict[str, str]) -> list[tuple[str, str]]:
+    """Pairs of places that have the same file name and are not twins."""
+    named = [place for place in sources if Path(place).name != "__init__.py"]
+    pairs = ((one, other) for one, other in combinations(named, 2) if Path(one).name == Path(other).name)
+    return [(one, other) for one, other in pairs if not are_twins(one, other, sources)]
 
 
-def test_no_file_name_stands_twice_but_of_twins() -> None:
-    assert shared_file_names(SOURCE_TEXTS) == []
+def test_no_class_name_and_no_file_name_stands_twice_but_of_twins() -> None:
+    sources = {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in SOURCES}
+    assert {name: places for name, places in places_by_class(sources).items() if len(places) > 1} == {}
+    assert shared_file_names(sources) == []
 
 
-def test_names_that_stand_twice_are_found() -> None:
-    assert shared_class_names({"a.py": "class A: ...", "b/c.py": "class A: ..."}) == {"A": ["a.py", "b/c.py"]}
-    caller = "def f():\n    from ..kernels.legs.rods import place"
-    twins = {"__init__.py": "", "cli/__init__.py": "", "ik.py": "", "cli/ik.py": ""}
-    twins |= {"kernels/x/near.py": "", "x/near.py": "", "kernels/legs/rods.py": "", "x/rods.py": caller}
+def test_file_names_that_stand_twice_are_found() -> None:
+    twins = dict.fromkeys(
+        ["__init__.py", "cli/__init__.py", "ik.py", "cli/ik.py", "kernels/x/near.py", "x/near.py"], ""
+    )
+    twins |= {"kernels/legs/rods.py": "", "x/rods.py": "from ..kernels.legs.rods import place"}
     assert shared_file_names(twins) == []
     assert shared_file_names({**twins, "x/rods.py": ""}) == [("kernels/legs/rods.py", "x/rods.py")]
     for place in ("view/ik.py", "kernels/y/near.py", "y/near.py", "y/rods.py"):  # a third, or beside a stranger

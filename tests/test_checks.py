@@ -18,37 +18,31 @@ from pfabrik.errors import InvalidArgument, PfabrikError, UnknownName
 NAMES = ("A1", "A2")
 
 
-@pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.int64(2), Fraction(4, 2)])
-def test_positive_numbers_of_any_type_are_told_as_floats(value: Any) -> None:
-    found = require_positive("rate", value)
-    assert type(found) is float and found == 2.0
+NUMBERS = [np.nan, -np.inf, True, "2", None, [2.0], 10**400]
+REFUSED: list[tuple[Callable[[str, Any], Any], list[Any], str]] = [
+    (require_finite, NUMBERS, "expected a finite number"),
+    (require_positive, [*NUMBERS, 0, -1.0, np.True_, 2j], "expected a positive number"),
+    (require_path, [None, 3, b"a", "\0", ["a"]], "expected the path of a file"),
+    (require_names, [None, 3, "ab", b"ab", ["a", 3], np.array("ab"), np.eye(2)], "expected a list of names"),
+]
 
 
-@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, True, np.True_, "2", None, 2j, [2.0], 10**400])
-def test_what_is_no_positive_number_is_refused_by_name(value: Any) -> None:
-    with pytest.raises(InvalidArgument, match=r"rate: found .*; expected a positive number"):
-        require_positive("rate", value)
+@pytest.mark.parametrize(("require", "values", "expected"), REFUSED, ids=[expected for *_, expected in REFUSED])
+def test_what_cannot_be_meant_is_refused_by_name(
+    require: Callable[[str, Any], Any], values: list[Any], expected: str
+) -> None:
+    for value in values:
+        with pytest.raises(InvalidArgument, match=rf"x: found .*; {expected}"):
+            require("x", value)
 
 
-@pytest.mark.parametrize("value", [np.nan, -np.inf, True, "2", None, [2.0], 10**400])
-def test_what_is_no_finite_number_is_refused_by_name(value: Any) -> None:
+def test_numbers_paths_and_names_of_any_type_are_taken() -> None:
+    for value in (2, 2.0, np.float32(2), np.int64(2), Fraction(4, 2)):
+        found = require_positive("rate", value)
+        assert type(found) is float and found == 2.0
     assert require_finite("x", np.int8(-3)) == -3.0
-    with pytest.raises(InvalidArgument, match=r"x: found .*; expected a finite number"):
-        require_finite("x", value)
-
-
-@pytest.mark.parametrize("value", [None, 3, b"a", "\0", ["a"]])
-def test_what_is_no_path_is_refused_by_name(value: Any) -> None:
     assert require_path("path", "a") == require_path("path", Path("a")) == Path("a")
-    with pytest.raises(InvalidArgument, match=r"path: found .*; expected the path of a file"):
-        require_path("path", value)
-
-
-@pytest.mark.parametrize("value", [None, 3, "ab", b"ab", ["a", 3], np.array("ab"), np.eye(2)])
-def test_what_are_no_names_is_refused_by_name(value: Any) -> None:
     assert require_names("over", np.array(["a", "b"])) == require_names("over", iter("ab")) == ("a", "b")
-    with pytest.raises(InvalidArgument, match=r"over: found .*; expected a list of names"):
-        require_names("over", value)
 
 
 @pytest.mark.parametrize(("shape", "fits", "others"), [
@@ -138,16 +132,13 @@ def test_what_cannot_be_meant_is_told_by_the_argument_and_what_was_found(said: s
         WRONG[said](pf.load("stewart"))
 
 
-def test_limits_that_are_not_named_stay() -> None:
+def test_limits_that_are_not_named_stay_and_wrong_ones_are_named() -> None:
     limits = np.array([1.0, np.inf])
     put_limits(limits, "speed", None, NAMES)
     put_limits(limits, "speed", {"A2": 3}, NAMES)
     assert limits.tolist() == [1.0, 3.0]
     put_limits(limits, "speed", 4, NAMES)
     assert limits.tolist() == [4.0, 4.0]
-
-
-def test_wrong_limits_are_named() -> None:
     with pytest.raises(UnknownName, match="A3"):
         put_limits(np.zeros(2), "speed", {"A3": 1.0}, NAMES)
     with pytest.raises(InvalidArgument, match=r"speed\['A1'\]"):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import json
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,134 +23,53 @@ from paper.study import cases
 
 ROOT = Path(__file__).parents[1]
 MACHINES = ("five_bar", "stewart", "nrpm")
-SUMMARIES = ("efficacy.csv", "efficiency.csv", "robustness.csv")
 PAGE = f"# Title\n\nbefore\n\n{BEGIN}\nstale numbers\n{END}\n\nafter\n"
 
 
 LINE = ("--quick", "-o", "out", "--page", "page.md")
 
 
-@pytest.fixture(scope="session")
-def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What one quick run writes. A campaign: CI runs the full reproduction, which checks the same."""
-    made = tmp_path_factory.mktemp("reproduce")
-    (made / "page.md").write_text(PAGE, encoding="utf-8")
-    with contextlib.chdir(made):
-        assert command.main([*LINE]) == 0
-    return made
-
-
-@pytest.fixture
-def rows(reproduced: Path) -> Callable[[str], list[dict[str, str]]]:
-    def read(name: str) -> list[dict[str, str]]:
-        with (reproduced / "out" / name).open(newline="", encoding="utf-8") as handle:
-            return list(csv.DictReader(handle))
-
-    return read
-
-
-Rows = Callable[[str], list[dict[str, str]]]
+def rows(name: str) -> list[dict[str, str]]:
+    with Path("out", name).open(newline="", encoding="utf-8") as handle:
+        return list(csv.DictReader(handle))
 
 
 @pytest.mark.campaign
-def test_every_table_and_picture_is_written(reproduced: Path) -> None:
-    names = {path.name for path in (reproduced / "out").iterdir()}
-    assert names >= {"report.md", "efficacy.png", "efficiency.png", "robustness.png", *SUMMARIES}
-    for picture in (reproduced / "out").glob("*.png"):
-        assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.campaign
-def test_the_round_trip_is_exact_by_default_and_as_good_as_the_papers_with_its_tolerance(rows: Rows) -> None:
-    printed = {case.key: case.printed for case in cases()}
-    default = [row for row in rows("efficacy.csv") if row["options"] == "default"]
-    assert [row["mechanism"] for row in default] == list(MACHINES)
-    for row in rows("efficacy.csv"):
-        position, rotation = float(row["position_rmse"]), float(row["orientation_rmse_deg"] or 0.0)
-        if row["options"] == "default":
-            assert row["reached"] == row["steps"]
-            assert max(position, rotation) <= 1e-8
-        elif row["options"] == "paper":
-            paper = printed[row["mechanism"]]
-            assert position <= 10 * paper.position_rmse
-            assert rotation <= 10 * (paper.orientation_rmse or 0.0)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", SUMMARIES)
-def test_every_answer_of_every_experiment_is_feasible(rows: Rows, name: str) -> None:
-    for row in rows(name):
-        assert row["failed"] == "0", row
-        for measure in ("limit_excess", "closure", "independent"):
-            assert float(row[measure]) <= 1e-9, row
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("key", MACHINES)
-def test_every_step_out_of_reach_is_feasible_and_continuous(rows: Rows, key: str) -> None:
-    length = pf.load(key).characteristic_length
-    steps = rows(f"robustness_{key}.csv")
-    assert {row["status"] for row in steps} == {"REACHED", "PROJECTED"}
-    assert max(float(row["limit_excess"]) for row in steps) <= 1e-9
-    assert max(float(row["residual"]) for row in steps) <= 1e-9 * length
-    jumps = {
-        (row["actuators"], row["part"]): float(row["size"]) for row in rows("jumps.csv") if row["mechanism"] == key
-    }
-    for (kind, _), size in jumps.items():
-        assert size <= 3.0 * jumps[kind, "inside"]
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("key", MACHINES)
-def test_projections_are_near_the_nearest_feasible_pose_and_exact_ones_as_near_as_a_general_optimiser(
-    rows: Rows, key: str
+def test_a_quick_study_keeps_its_promises_and_comes_out_the_same_in_another_process(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """The 5-bar's are farther: what its chains agree on beside a stop of a hinge is aside of the way to the target.
-
-    Poses of the target's orientation, where every one of these targets has one that is feasible.
-    """
-    compared = [row for row in rows(f"robustness_{key}.csv") if row["nearest_by_search"]]
-    assert len(compared) >= 5
-    exact, searched, answered = (
-        np.array([float(row[name]) for row in compared])
-        for name in ("exact_projection", "nearest_by_search", "position_error")
-    )
-    near = answered / np.minimum(exact, searched)
-    assert near.min() >= 1.0 - 1e-5 and near.max() <= (1.5 if key == "five_bar" else 1.1)
-    assert np.median(exact / searched) <= 1.0 + 1e-6
-    assert (exact / searched).max() <= 1.01
-
-
-@pytest.mark.campaign
-def test_every_random_target_is_reached_as_the_closed_form_has_it(rows: Rows) -> None:
-    for row in rows("efficiency.csv"):
-        if row["options"] == "default":
-            assert row["reached"] == row["targets"]
-        if row["agreement"]:
-            assert float(row["agreement"]) <= 1e-9
-
-
-@pytest.mark.campaign
-def test_the_page_changes_between_its_marks_only(reproduced: Path) -> None:
-    text = (reproduced / "page.md").read_text(encoding="utf-8")
-    assert text.startswith(f"# Title\n\nbefore\n\n{BEGIN}\n|")
-    assert text.endswith(f"\n{END}\n\nafter\n")
-    assert "stale" not in text
-    assert "position RMSE" in text
-
-
-@pytest.mark.campaign
-def test_the_same_numbers_come_out_of_every_run(reproduced: Path, tmp_path: Path) -> None:
-    (tmp_path / "page.md").write_text(PAGE, encoding="utf-8")
+    """The study checks its promises itself, and its exit code says so; here is what it does not check."""
+    other = tmp_path_factory.mktemp("again")
+    for each in (folder, other):
+        (each / "page.md").write_text(PAGE, encoding="utf-8")
+    assert command.main([*LINE]) == 0
+    names = {path.name for path in Path("out").iterdir()}
+    assert names >= {"report.md", "efficacy.png", "efficiency.png", "robustness.png", "efficacy.csv", "robustness.csv"}
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in Path("out").glob("*.png"))
+    text = Path("page.md").read_text(encoding="utf-8")
+    assert text.startswith(f"# Title\n\nbefore\n\n{BEGIN}\n|") and text.endswith(f"\n{END}\n\nafter\n")
+    assert "stale" not in text and "position RMSE" in text
+    agreements = [float(row["agreement"]) for row in rows("efficiency.csv") if row["agreement"]]
+    assert agreements and max(agreements) <= 1e-9
+    for key in MACHINES:
+        steps = rows(f"robustness_{key}.csv")
+        assert {row["status"] for row in steps} == {"REACHED", "PROJECTED"}
+        compared = [row for row in steps if row["nearest_by_search"]]
+        assert len(compared) >= 5
+        exact, searched, answered = (
+            np.array([float(row[name]) for row in compared])
+            for name in ("exact_projection", "nearest_by_search", "position_error")
+        )
+        # The 5-bar's are farther: what its chains agree on beside a stop of a hinge is aside of the way to the target.
+        assert (answered / np.minimum(exact, searched)).max() <= (1.5 if key == "five_bar" else 1.1)
+        assert np.median(exact / searched) <= 1.0 + 1e-6
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(pf.__file__).parents[1])])}
-    subprocess.run([sys.executable, "-m", "paper", *LINE], cwd=tmp_path, env=environment, check=True)
-    first = {path.name: path.read_bytes() for path in (reproduced / "out").glob("*.csv")}
-    again = {path.name: path.read_bytes() for path in (tmp_path / "out").glob("*.csv")}
-    assert first.keys() == again.keys()
-    numbers = [name for name in first if not name.endswith("_times.csv")]
-    assert len(numbers) == len(first) - 4
-    for name in numbers:
-        assert first[name] == again[name], name
+    subprocess.run([sys.executable, "-m", "paper", *LINE], cwd=other, env=environment, check=True)
+    first, again = (
+        {path.name: path.read_bytes() for path in (each / "out").glob("*.csv") if not path.stem.endswith("_times")}
+        for each in (folder, other)
+    )
+    assert first == again
 
 
 @pytest.mark.parametrize("text", ["no marks", f"{BEGIN}\n", f"{END}\n{BEGIN}\n", PAGE + PAGE])
