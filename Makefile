@@ -37,7 +37,7 @@ test: $(STAMP) $(MODULE)
 # The programs of the pages again, with the linear algebra of other processors.
 test-processors: $(STAMP) $(MODULE)
 	@for core in Haswell Zen Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
-		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal tests/test_docs.py || exit 1; done
+		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal tests/test_docs.py tests/test_transcripts.py || exit 1; done
 
 test-fast: $(STAMP) $(MODULE)
 	@$(BIN)/python -m pytest -m "not slow and not campaign"

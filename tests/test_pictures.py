@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -189,40 +189,44 @@ def test_all_joints_are_named_where_that_is_asked_for(name: str) -> None:
     assert not pf.plot(pf.load(name), names=False).texts
 
 
-FEW = ("stewart", "five_bar", "nrpm", "hexaglide", "delta", "g1_ankle", "agile_eye", "ankle_rss")
+def machine(name: str) -> Any:
+    mechanism = pf.load(name)
+    return pf.plot(mechanism, names=mechanism.actuator_names[:: -(-len(mechanism.actuator_names) // 12)])
+
+
+def workspace(name: str) -> Any:
+    mechanism = pf.load(name)
+    length = mechanism.characteristic_length if set(mechanism.task) & set("xyz") else 1.0
+    return pf.workspace(mechanism, resolution=0.04 * length).plot()
+
+
+def singularities(name: str) -> Any:
+    mechanism = pf.load(name)
+    length = mechanism.characteristic_length
+    space = pf.workspace(mechanism, resolution=0.12 * length)
+    return pf.singularity_map(mechanism, space, resolution=0.24 * length).plot()
+
+
+MACHINES_DRAWN = ("stewart", "five_bar", "nrpm", "hexaglide", "delta", "g1_ankle", "agile_eye", "ankle_rss")
 """Machines of which pictures are drawn every time: in space and in a plane, flat, thin, small, with many joints."""
-
-
-def some_and_all(few: Sequence[str], *without: str, mark: str) -> list[Any]:
-    """All machines of the catalogue, all but a few of them marked."""
-    names = (name for name in pf.catalog() if name not in without)
-    return [name if name in few else pytest.param(name, marks=getattr(pytest.mark, mark)) for name in names]
-
-
-@pytest.mark.parametrize("name", some_and_all(FEW, mark="slow"))
-def test_no_label_hides_another_or_leaves_the_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    machine = pf.load(name)
-    axes = pf.plot(machine, names=machine.actuator_names[:: -(-len(machine.actuator_names) // 12)])
-    assert faults(axes.figure, monkeypatch) == []
-
-
 WORKSPACES = ("five_bar", "ankle_ups", "prr")
+NO_WORKSPACE = ("panda", "serial_arm", "snake60")
 
 
-@pytest.mark.parametrize("name", some_and_all(WORKSPACES, "panda", "serial_arm", "snake60", mark="campaign"))
-def test_no_text_of_a_workspace_hides_another(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    machine = pf.load(name)
-    is_turned = not set(machine.task) & set("xyz")
-    space = pf.workspace(machine, resolution=0.04 * (1.0 if is_turned else machine.characteristic_length))
-    assert faults(space.plot().figure, monkeypatch) == []
+def cases() -> Iterator[Any]:
+    for name in pf.catalog():
+        yield pytest.param(machine, name, marks=[pytest.mark.slow] * (name not in MACHINES_DRAWN))
+        if name not in NO_WORKSPACE:
+            yield pytest.param(workspace, name, marks=[pytest.mark.campaign] * (name not in WORKSPACES))
+    yield pytest.param(singularities, "five_bar")
+    yield pytest.param(singularities, "stewart", marks=pytest.mark.campaign)
 
 
-@pytest.mark.parametrize("name", ["five_bar", pytest.param("stewart", marks=pytest.mark.campaign)])
-def test_no_text_of_a_map_of_singularities_hides_another(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    machine = pf.load(name)
-    length = machine.characteristic_length
-    found = pf.singularity_map(machine, pf.workspace(machine, resolution=0.12 * length), resolution=0.24 * length)
-    assert faults(found.plot().figure, monkeypatch) == []
+@pytest.mark.parametrize(("draw", "name"), cases())
+def test_no_text_hides_another_or_leaves_the_figure(
+    draw: Callable[[str], Any], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert faults(draw(name).figure, monkeypatch) == []
 
 
 # The shape of a machine, and what is drawn of it.
@@ -363,11 +367,8 @@ def test_a_track_is_drawn_with_its_actuators_and_margins(monkeypatch: pytest.Mon
     named = [name for name in drawn if not name.startswith("_")]
     assert np.min([drawn[name] for name in named], axis=0) == pytest.approx(least)
     assert faults(axes["path"].get_figure(root=True), monkeypatch) == []
-
-
-def test_a_machine_without_limits_has_no_margins_to_draw() -> None:
-    track = circle_of(planar("RRR").without_limits(), 5.0)
-    assert "margins" not in pf.plot_track(track, Figure(layout="constrained"))
+    free = circle_of(planar("RRR").without_limits(), 5.0)
+    assert "margins" not in pf.plot_track(free, Figure(layout="constrained"))
 
 
 def frames_of(path: Path) -> tuple[list[np.ndarray], int]:
@@ -419,19 +420,14 @@ def test_mp4_is_written_where_ffmpeg_is(tmp_path: Path) -> None:
 # How far it can go.
 
 
-def test_travel_is_a_table_and_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    machine = pf.load("stewart")
-    found = pf.travel(pf.solve_ik(machine, (0, 20, 200)))
-    table = str(found).splitlines()
-    assert len(table) == 13
-    assert table[1].split() == ["along", "1", "0", "0", "138.585", "mm", "BL3", "max"]
+def test_travel_is_drawn_with_what_stops_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = pf.travel(pf.solve_ik(pf.load("stewart"), (0, 20, 200)))
     assert "<td>BL3 max</td>" in found._repr_html_()
     axes = pf.plot_travel(found)
     assert list(axes) == ["along", "about"]
     widths = [abs(bar.get_width()) for bar in axes["about"].patches]
     assert sorted(widths) == pytest.approx(sorted(np.degrees(found.distances[6:])))
-    told = [text.get_text() for text in axes["along"].texts]
-    assert "138.6\nBL3 max" in told
+    assert "138.6\nBL3 max" in [text.get_text() for text in axes["along"].texts]
     assert faults(axes["along"].figure, monkeypatch) == []
 
 
