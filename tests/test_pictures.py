@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -210,19 +210,19 @@ def singularities(name: str) -> Any:
 MACHINES_DRAWN = ("stewart", "five_bar", "nrpm", "hexaglide", "delta", "g1_ankle", "agile_eye", "ankle_rss")
 """Machines of which pictures are drawn every time: in space and in a plane, flat, thin, small, with many joints."""
 WORKSPACES = ("five_bar", "ankle_ups", "prr")
-NO_WORKSPACE = ("panda", "serial_arm", "snake60")
+OTHER_WORKSPACES = sorted({*pf.catalog()} - {*WORKSPACES, "panda", "serial_arm", "snake60"})
 
 
-def cases() -> Iterator[Any]:
-    for name in pf.catalog():
-        yield pytest.param(machine, name, marks=[pytest.mark.slow] * (name not in MACHINES_DRAWN))
-        if name not in NO_WORKSPACE:
-            yield pytest.param(workspace, name, marks=[pytest.mark.campaign] * (name not in WORKSPACES))
-    yield pytest.param(singularities, "five_bar")
-    yield pytest.param(singularities, "stewart", marks=pytest.mark.campaign)
+CASES = [
+    *(pytest.param(machine, name, marks=[pytest.mark.slow] * (name not in MACHINES_DRAWN)) for name in pf.catalog()),
+    *(pytest.param(workspace, name) for name in WORKSPACES),
+    *(pytest.param(workspace, name, marks=pytest.mark.campaign) for name in OTHER_WORKSPACES),
+    pytest.param(singularities, "five_bar"),
+    pytest.param(singularities, "stewart", marks=pytest.mark.campaign),
+]
 
 
-@pytest.mark.parametrize(("draw", "name"), cases())
+@pytest.mark.parametrize(("draw", "name"), CASES)
 def test_no_text_hides_another_or_leaves_the_figure(
     draw: Callable[[str], Any], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
