@@ -6,7 +6,9 @@ import ast
 import dataclasses
 import json
 import math
+import os
 import re
+import subprocess
 import warnings
 from collections.abc import Callable
 from itertools import pairwise
@@ -19,7 +21,7 @@ import pytest
 from click.shell_completion import BashComplete
 
 import pfabrik as pf
-from command import files, listed, pfabrik, write_files
+from command import files, in_process, listed, pfabrik, write_files
 from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import description, template, templates
@@ -27,6 +29,7 @@ from pfabrik.cli import main
 from pfabrik.cli.fitted import fitted
 from pfabrik.export.rod_lengths import uneven_rods
 from pfabrik.files import loads
+from pfabrik.rotations import to_rpy
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -164,6 +167,12 @@ def test_json_of_check_and_time_is_one_object() -> None:
 
 
 # Numbers
+
+
+def test_rpy_is_the_inverse_of_pose() -> None:
+    for rpy in ([0.1, -0.7, 2.0], [3.0, 1.5, -3.0], [0, math.pi / 2, 0.4], [0, -math.pi / 2, 0.4]):
+        rotated = pf.pose([0, 0, 0], rpy=rpy)
+        np.testing.assert_allclose(pf.pose([0, 0, 0], rpy=to_rpy(rotated[:3, :3])), rotated, atol=1e-12)
 
 
 @pytest.mark.parametrize("position", ["1e300 0 0", "0 0 -1e6", "0 0 0", "5e-324 0 0"])
@@ -471,6 +480,12 @@ def test_names_of_machines_and_kinds_are_completed(line: str, found: list[str]) 
     *words, incomplete = line.split(" ")
     completions = BashComplete(main, {}, "pfabrik", "_PFABRIK_COMPLETE").get_completions(words, incomplete)
     assert [each.value for each in completions] == found
+
+
+def test_a_shell_asks_for_completions_by_the_name_that_the_page_gives() -> None:
+    asked = {"_PFABRIK_COMPLETE": "bash_complete", "COMP_WORDS": "pfabrik tra", "COMP_CWORD": "1"}
+    with in_process("", env=os.environ | asked, stdout=subprocess.PIPE) as process:
+        assert process.communicate(timeout=60)[0].split() == ["plain,track", "plain,travel"]
     page = Path(__file__).parents[1] / "docs" / "cli.md"
     assert "_PFABRIK_COMPLETE=bash_source" in page.read_text(encoding="utf-8")
 

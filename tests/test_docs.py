@@ -262,8 +262,6 @@ def test_commands_of_the_readme_answer(line: str, folder: Path) -> None:
 
 SEEING = ROOT / "docs" / "see-your-machine.md"
 DRAWN = re.compile(r"pfabrik .*figures/[\w.]+\.(?:png|gif)")
-
-
 DRAWING = [line for block in blocks(SEEING, "") for line in block.splitlines() if DRAWN.fullmatch(line)]
 
 
