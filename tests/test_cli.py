@@ -199,6 +199,7 @@ def test_any_finite_actuator_values_get_an_answer(name: str, value: str) -> None
         "ik delta --position 10 0 -90",
         "plot stewart --position 10 0 190",
         "plot five_bar --position 0 20 170",
+        "plot nrpm --position 10 0 200",
         "fk five_bar -20 20",
     ],
 )

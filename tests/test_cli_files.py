@@ -270,7 +270,8 @@ def test_plot_writes_the_names_of_all_joints(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_workspace_is_written_in_every_format() -> None:
-    names = ["a.csv", "a.npz", "a.ply", "a.stl"]
+    pytest.importorskip("matplotlib")
+    names = ["a.csv", "a.npz", "a.ply", "a.png", "a.stl"]
     result = pfabrik(f"workspace stewart --resolution 16 {' '.join(f'-o {name}' for name in names)}")
     assert (result.exit_code, told(result), listed()) == (0, [f"wrote {name}" for name in names], names)
     assert np.load("a.npz")["size"] == pf.workspace(pf.load("stewart"), resolution=16.0).size

@@ -162,7 +162,7 @@ def test_a_value_of_a_wrong_type_ends_in_one_sentence(verb: str, tmp_path: Path,
     named = [each for each in parameters if each.kind not in (each.VAR_KEYWORD, each.VAR_POSITIONAL)]
     usual = {each.name: GOOD.get(each.name) for each in named if each.default is each.empty}
     usual |= {"path": "file"} if "path" in usual and verb.startswith("export") else {}
-    usual |= {"mechanism": FIVE_BAR} if verb == "export_c" else {}  # with the least C
+    usual |= {"parts": ("limits",)} if verb == "export_c" else {}  # the least C
     for each in named:
         for wrong in WRONG_TYPES:
             if (each.name == "on_progress" and wrong is len) or (wrong is None and each.default is None):
