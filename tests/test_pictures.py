@@ -202,7 +202,7 @@ def workspace(name: str) -> Any:
 
 def singularities(name: str) -> Any:
     mechanism = pf.load(name)
-    step = (0.25 if plane_of(mechanism) is None else 0.12) * mechanism.characteristic_length
+    step = (0.18 if plane_of(mechanism) is None else 0.12) * mechanism.characteristic_length
     return pf.singularity_map(mechanism, pf.workspace(mechanism, resolution=step), resolution=2.0 * step).plot()
 
 
