@@ -213,7 +213,10 @@ OTHER_WORKSPACES = sorted({*pf.catalog()} - {*WORKSPACES, "panda", "serial_arm",
 
 
 CASES = [
-    *(pytest.param(machine, name, marks=[pytest.mark.slow] * (name not in MACHINES_DRAWN)) for name in pf.catalog()),
+    *(
+        pytest.param(machine, name, marks=[pytest.mark.campaign] * (name not in MACHINES_DRAWN))
+        for name in pf.catalog()
+    ),
     *(pytest.param(workspace, name) for name in WORKSPACES),
     *(pytest.param(workspace, name, marks=pytest.mark.campaign) for name in OTHER_WORKSPACES),
     pytest.param(singularities, "five_bar"),
