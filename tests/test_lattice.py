@@ -7,8 +7,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pfabrik.workspace.lattice_points import codes, offsets, places_of
-from pfabrik.workspace.numbering import Numbering
+from pfabrik.workspace.lattice_points import Numbering, codes, offsets, places_of
 from pfabrik.workspace.parts import connected
 
 

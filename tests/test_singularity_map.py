@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 import pfabrik as pf
 from oracles.annuli import within
 from pfabrik.errors import InvalidArgument
+from pfabrik.view.singular_picture import Field, slices_of
 from pfabrik.workspace.locus import locus
-from pfabrik.workspace.singular_slices import Field, slices_of
 
 Array = NDArray[np.float64]
 

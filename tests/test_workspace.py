@@ -25,8 +25,8 @@ from links import distances_of_struts, struts
 from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument
+from pfabrik.view.border_parts import patches_of
 from pfabrik.workspace.border import LINK_COLOURS, MOTOR_COLOURS, group_of_limits, groups_of
-from pfabrik.workspace.patches import patches_of
 from pfabrik.workspace.verdicts import MapQuestion
 
 Array = NDArray[np.float64]

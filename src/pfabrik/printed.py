@@ -12,14 +12,15 @@ from .tolerances import TOLERANCES
 
 @dataclass(frozen=True)
 class ResultTable:
-    """Lines of text, a table, and remarks on it. As text it is neither cut nor coloured.
+    """Lines of text, a table, further tables, and remarks. As text it is neither cut nor coloured.
 
     Attributes
     ----------
     title : a name, which notebooks show.
-    lines, remarks : text above the table, and below it.
+    lines, remarks : text above the tables, and below them.
     header, rows : of the table.
     drawing : HTML beside it in notebooks.
+    more : tables below it, each with its own lines and remarks.
     """
 
     title: str
@@ -28,18 +29,22 @@ class ResultTable:
     rows: Sequence[Sequence[str]] = ()
     remarks: Sequence[str] = ()
     drawing: str = ""
+    more: Sequence[ResultTable] = ()
 
     def __str__(self) -> str:
         table = aligned(self.header, self.rows) if self.rows else ""
-        return "\n\n".join(filter(None, ["\n".join(self.lines), table, *self.remarks]))
+        return "\n\n".join(filter(None, ["\n".join(self.lines), table, *map(str, self.more), *self.remarks]))
 
     def _repr_html_(self) -> str:
-        """Words and a table beside the drawing."""
+        """Words and tables beside the drawing."""
+        text = f"<div><b>{escape(self.title)}</b>{self._words_and_tables()}</div>"
+        return f'<div style="display:flex;gap:1em;align-items:flex-start">{text}{self.drawing}</div>'
+
+    def _words_and_tables(self) -> str:
         words = "".join(f"<div>{escape(line)}</div>" for line in (*self.lines, *self.remarks))
         head, body = _html_row(self.header, "th"), "".join(map(_html_row, self.rows))
         table = f"<table><thead>{head}</thead><tbody>{body}</tbody></table>"
-        text = f"<div><b>{escape(self.title)}</b>{words}{table}</div>"
-        return f'<div style="display:flex;gap:1em;align-items:flex-start">{text}{self.drawing}</div>'
+        return words + table + "".join(each._words_and_tables() for each in self.more)
 
 
 class Printed:

@@ -34,9 +34,14 @@ def print_answer(
         print_text(to_text(), to_stderr=to_stderr)
 
 
-def print_result(as_json: bool, result: Result, *, to_stderr: bool = False) -> None:
-    """Print what a result says of itself."""
-    print_answer(as_json, result.to_dict, lambda: str(result.table()), to_stderr=to_stderr)
+def print_result(as_json: bool, result: Result, *, to_stderr: bool = False, **others: Result) -> None:
+    """Print what a result says of itself, and others after it: as JSON, in its object by their names."""
+    print_answer(
+        as_json,
+        lambda: result.to_dict() | {name: other.to_dict() for name, other in others.items()},
+        lambda: "\n\n".join(str(each.table()) for each in (result, *others.values())),
+        to_stderr=to_stderr,
+    )
 
 
 def print_text(text: str, *, to_stderr: bool = False) -> None:

@@ -14,17 +14,13 @@ import pfabrik as pf
 from ..cells import is_finite
 from ..checks import require_ending
 from ..extras import require
-from ..printed import aligned
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, Triple, load, rpy_option
 from .outputs import check_outputs, picture
-from .printing import json_option, note, print_answer
+from .printing import json_option, note, print_result
 
 if TYPE_CHECKING:
     from ..workspace.inscribed import Kind
-
-MOST_LIMITS = 12
-"""Limits that form the border in a table, at most."""
 
 
 @click.command()
@@ -104,7 +100,8 @@ def workspace(
     shape = None if largest is None else space.inscribed(largest, middle)
     for path in outputs:
         write(space, path)
-    print_answer(as_json, lambda: as_object(space, shape), lambda: describe(space, shape))
+    shapes = {} if shape is None else {"largest": shape}
+    print_result(as_json, space, **shapes)
     return 0 if len(space.faces) else 1
 
 
@@ -160,62 +157,3 @@ def write(space: pf.Workspace, path: Path) -> None:
     else:
         space.save(path)
     click.echo(f"wrote {path}", err=True)
-
-
-def as_object(space: pf.Workspace, shape: pf.Inscribed | None) -> dict[str, object]:
-    """A workspace, and the largest shape in it, as plain numbers, lists and dicts."""
-    plain: dict[str, object] = space.to_dict()
-    if shape is not None:
-        centre, extents = shape.centre.tolist(), shape.extents.tolist()
-        plain["largest"] = {"kind": shape.kind, "centre": centre, "extents": extents, "size": shape.size}
-    return plain
-
-
-def describe(space: pf.Workspace, shape: pf.Inscribed | None) -> str:
-    """Size, ends, what forms the border, and parts."""
-    from ..workspace.sizes import in_words
-
-    if not len(space.faces):
-        return "nothing within reach"
-    factors = [180.0 / math.pi if unit == "rad" else 1.0 for unit in space.units]
-    units = ["deg" if unit == "rad" else unit for unit in space.units]
-    rows = [
-        (name, f"{low * factor:.6g}", f"{high * factor:.6g}", unit)
-        for name, low, high, factor, unit in zip(space.names, *space.bounds.tolist(), factors, units, strict=True)
-    ]
-    blocks = [in_words(space), aligned(["", "min", "max", "unit"], rows), border_table(space)]
-    if space.enclosure is not None:
-        lower, upper = space.enclosure.lower, space.enclosure.upper
-        blocks.append(f"proved: at least {lower:,.7g} and at most {upper:,.7g} {space.size_unit}")
-    if len(space.components) > 1:
-        blocks.append("\n".join(describe_component(space, component) for component in space.components))
-    elif space.at_start is None:
-        blocks.append("the start is not within it")
-    if shape is not None:
-        lengths, middle = (
-            ", ".join(f"{value * factor:.4g}" for value, factor in zip(values.tolist(), factors, strict=True))
-            for values in (shape.extents, shape.centre)
-        )
-        blocks.append(f"largest {shape.kind}: {lengths} about {middle} [{', '.join(dict.fromkeys(units))}]")
-    return "\n\n".join(blocks)
-
-
-def border_table(space: pf.Workspace) -> str:
-    """The limits that form the border, each with its share."""
-    from ..answers.words import limit_name
-    from ..workspace.sizes import kind_of
-
-    limits = list(space.shares.items())
-    rows = [
-        (f"{100.0 * share:.1f}%", limit_name(*limit), kind_of(space, limit[0])) for limit, share in limits[:MOST_LIMITS]
-    ]
-    table = aligned(["border", "formed by", "joint"], rows)
-    n_more = len(limits) - len(rows)
-    return f"{table}\nand {n_more} more" if n_more else table
-
-
-def describe_component(space: pf.Workspace, component: pf.Workspace) -> str:
-    """A component of the workspace, for people."""
-    from ..workspace.sizes import in_words
-
-    return f"{'with' if component is space.at_start else 'apart from'} the start: {in_words(component)}"

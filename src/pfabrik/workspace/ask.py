@@ -25,10 +25,9 @@ from ..poses import SupportsMatrix
 from ..telling import OnProgress, telling
 from .border_search import searched, step_of
 from .measuring import Measure
-from .orientations import tilts_up_to
 from .result import Workspace
 from .space import Space, space_of
-from .verdicts import MapQuestion
+from .verdicts import MapQuestion, tilts_up_to
 
 FEWEST_CELLS = 24
 """Cells across the shortest side of a workspace; where the default resolution gives fewer, it is halved."""

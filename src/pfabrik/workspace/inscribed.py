@@ -1,10 +1,11 @@
-"""The largest sphere, box or cylinder within a workspace."""
+"""The largest sphere, box or cylinder within a workspace, and the search that sizes shapes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,20 +15,24 @@ from ..arrays import Floats
 from ..checks import require_known
 from ..errors import InvalidArgument
 from ..printed import Printed, ResultTable
+from .workspace_table import for_people
 
 if TYPE_CHECKING:
     from .region import Region
 
-Kind = Literal["sphere", "box", "cylinder"]
+Kind = Literal["sphere", "ball", "box", "cylinder"]
 
 NEAREST_FACES, POINTS_A_SIDE = 400, 12
 """Number of faces nearest to the shape that are sampled, and points along each of their sides."""
 
-SAMPLES = 4096
-"""Points on the shape that must be within the workspace."""
+POINTS_ACROSS = {2: 1025, 3: 27}
+"""Points along each side of a box that are drawn onto the shape: all must be within the workspace."""
 
 GIVES, MOST_GIVES = 0.998, 50
 """Factor by which the shape shrinks if one of them is not, and the largest number of times."""
+
+GROWTH, FAR, LEAST = 1.02, 1.1, 0.01
+"""Factor by which a shape that fits grows at first, up to the second; then it doubles. The least scale of a shape."""
 
 FIRST_GRID, LOOKED_AT, MOST_STEPS = 13, 4, 60
 """A search for the best centre: points on each axis that it begins with, the best of them that it goes on from."""
@@ -44,24 +49,67 @@ class Inscribed(Printed):
     kind : "sphere" (in a plane: a circle), "box" or "cylinder".
     centre : (d,) [length or rad].
     extents : length along each coordinate, (d,): the sides of a box, diameters, and a cylinder's height last.
+    names, units : of the coordinates, d each.
     """
 
     kind: Kind
     centre: Floats
     extents: Floats
+    names: tuple[str, ...]
+    units: tuple[str, ...]
 
     @property
     def size(self) -> float:
         """Its area or volume [product of the units of the coordinates]."""
-        share = {"box": 1.0, "cylinder": math.pi / 4.0, "sphere": math.pi / (4.0 if len(self.extents) == 2 else 6.0)}
-        return float(share[self.kind] * np.prod(self.extents))
+        rounds = {"box": 1.0, "cylinder": math.pi / 4.0}
+        share = rounds.get(self.kind, math.pi / (4.0 if len(self.extents) == 2 else 6.0))
+        return float(share * np.prod(self.extents))
 
     def table(self) -> ResultTable:
-        """Centre and extents, in the units of the workspace: lengths, or radians."""
-        numbers = zip(self.centre.tolist(), self.extents.tolist(), strict=True)
-        rows = [(str(place), f"{middle:.6g}", f"{extent:.6g}") for place, (middle, extent) in enumerate(numbers, 1)]
-        header = ("coordinate", "centre", "extent")
-        return ResultTable(f"Largest {self.kind}", [f"size {self.size:.6g}"], header, rows)
+        """Centre and extents along each coordinate, angles in degrees."""
+        factors, units = for_people(self.units)
+        numbers = zip(self.names, self.centre.tolist(), self.extents.tolist(), factors, units, strict=True)
+        rows = [
+            (name, f"{middle * factor:.6g}", f"{extent * factor:.6g}", unit)
+            for name, middle, extent, factor, unit in numbers
+        ]
+        return ResultTable(f"Largest {self.kind}", (), (f"largest {self.kind}", "centre", "extent", "unit"), rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, ready for JSON."""
+        centre, extents = self.centre.tolist(), self.extents.tolist()
+        return {"kind": self.kind, "centre": centre, "extents": extents, "size": self.size}
+
+
+def largest_scale(
+    fits: Callable[[float, float, float], bool],
+    accuracy: float,
+    *,
+    most_attempts: int,
+    shrinks: float = 0.5,
+    bound: float = np.inf,
+) -> float:
+    """The largest scale at which a shape fits, to a share of itself; 0 if none from `LEAST` on does.
+
+    Parameters
+    ----------
+    fits : of a scale, the largest that fits, and the least that does not.
+    shrinks : factor to the next scale while none fits.
+    bound : no scale above it fits.
+    """
+    low, high, scale = 0.0, bound, 1.0
+    for _ in range(most_attempts):
+        if fits(scale, low, high):
+            low = scale
+        else:
+            high = scale
+        if high < LEAST or high <= low * (1.0 + accuracy):
+            break
+        if not low:
+            scale = shrinks * high
+        else:
+            scale = 0.5 * (low + high) if high < np.inf else low * (GROWTH if low < FAR else 2.0)
+    return low
 
 
 def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions: ArrayLike | None) -> Inscribed:
@@ -71,21 +119,24 @@ def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions:
     if not len(vertices):
         raise InvalidArgument("workspace", "nothing within reach", "a workspace that a shape fits into")
     middle = _best_centre(region, kind, extents, vertices) if centre is None else _checked_centre(region, centre)
-    scale = _distance_to_faces(region, kind, extents, middle)
-    shell = _shell(kind, extents)
-    for _ in range(MOST_GIVES):
-        if np.all(region.contains(middle + scale * shell)):
-            return Inscribed(kind, middle, scale * extents)
-        scale *= GIVES
-    raise InvalidArgument(
-        "centre", f"{middle.tolist()}", "a point with room around it: here the border is too fine for the mesh"
-    )
+    whole = _distance_to_faces(region, kind, extents, middle) * extents
+    shell = _shell(kind, whole)
+
+    def is_within(scale: float, _low: float, _high: float) -> bool:
+        return bool(np.all(region.contains(middle + scale * shell)))
+
+    accuracy = 1.01 * (1.0 / GIVES - 1.0)
+    scale = largest_scale(is_within, accuracy, most_attempts=MOST_GIVES, shrinks=GIVES, bound=1.0)
+    if not scale:
+        expected = "a point with room around it: here the border is too fine for the mesh"
+        raise InvalidArgument("centre", f"{middle.tolist()}", expected)
+    return Inscribed(kind, middle, scale * whole, region.names, region.units)
 
 
 def _extents(region: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
     """The lengths along each coordinate of the shape of size one, (d,)."""
     d = len(region.names)
-    require_known("shape", [kind], get_args(Kind))
+    require_known("shape", [kind], ("sphere", "box", "cylinder"))
     if kind == "cylinder" and d != 3:
         raise InvalidArgument("kind", "'cylinder'", "a sphere or a box: the workspace lies in a plane")
     alike = len(set(region.units[:2] if kind == "cylinder" else region.units)) == 1
@@ -134,22 +185,16 @@ def _distance_to_faces(region: Region, kind: Kind, extents: Floats, centre: Floa
 
 
 def _shell(kind: Kind, extents: Floats) -> Floats:
-    """Points (n, d) on the shape of size one about zero: evenly spread directions, and those that lead to its edges."""
+    """Points (n, d) on a shape about zero, its edges included: those of a grid on a box, drawn onto the shape."""
     d = len(extents)
-    steps = np.arange(SAMPLES) + 0.5
-    turn = np.pi * (1.0 + math.sqrt(5.0)) * steps
-    if d == 2:
-        directions = np.column_stack([np.cos(2.0 * np.pi * steps / SAMPLES), np.sin(2.0 * np.pi * steps / SAMPLES)])
-    else:
-        height = 1.0 - 2.0 * steps / SAMPLES
-        across = np.sqrt(1.0 - height**2)
-        directions = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
-    ends = np.stack(np.meshgrid(*[[-1.0, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
-    if kind == "cylinder":
-        rim = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
-        ends = np.concatenate([np.column_stack([np.cos(rim), np.sin(rim), np.full(128, side)]) for side in (-1, 1)])
-    directions = np.concatenate([directions, ends]) * extents
-    return directions / _scales(kind, extents, directions)[:, None]
+    side = np.linspace(-1.0, 1.0, POINTS_ACROSS[d])
+    grid = np.stack(np.meshgrid(*[side] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    points = grid[np.abs(grid).max(axis=1) == 1.0]
+    if kind == "cylinder":  # squares become discs, and edges its rims
+        across = np.hypot(points[:, 0], points[:, 1])
+        points[:, :2] *= (np.abs(points[:, :2]).max(axis=1) / np.where(across > 0.0, across, 1.0))[:, None]
+    points = points * extents
+    return points / _scales(kind, extents, points)[:, None]
 
 
 def _best_centre(region: Region, kind: Kind, extents: Floats, vertices: Floats) -> Floats:

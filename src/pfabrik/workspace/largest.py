@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,20 +18,17 @@ from ..certify.question import certify
 from ..checks import require_known, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, PfabrikError
+from ..printed import ResultTable
 from ..telling import OnProgress, telling
 from .ask import workspace
+from .inscribed import LEAST, Inscribed, largest_scale
 
-Kind = Literal["box", "cylinder", "ball"]
-
-BUDGET = 50_000
-"""Cells that each attempt may look at: near the largest, many more would be needed for little."""
-
-GROWTH, FAR, MOST_ATTEMPTS = 1.02, 1.1, 60
-"""Factor by which a shape that is proved grows at first, up to this; then it doubles. The most attempts in all."""
+BUDGET, MOST_ATTEMPTS = 50_000, 60
+"""Cells that each attempt may look at: near the largest, many more would be needed for little. The most attempts."""
 
 
 @dataclass(frozen=True)
-class Largest:
+class Largest(Inscribed):
     """The largest shape found that is proved.
 
     Attributes
@@ -42,9 +39,6 @@ class Largest:
     certificate : of its region; None if it was not asked for.
     """
 
-    kind: Kind
-    centre: Floats
-    extents: Floats
     certificate: Certificate | None
 
     @property
@@ -53,10 +47,14 @@ class Largest:
         assert self.certificate is not None and self.certificate.region is not None
         return self.certificate.region
 
+    def table(self) -> ResultTable:
+        """Centre and extents, and the certificate."""
+        return dataclasses.replace(super().table(), more=[] if self.certificate is None else [self.certificate.table()])
+
 
 def largest(
     mechanism: Mechanism,
-    kind: Kind,
+    kind: Literal["box", "cylinder", "ball"],
     *,
     certified: bool = True,
     centre: ArrayLike | None = None,
@@ -88,60 +86,52 @@ def largest(
     UnsupportedMechanism : as of `certify`.
     InvalidArgument : not even a hundredth of the shape is proved about the centre.
     """
-    require_known("shape", [kind], get_args(Kind))
+    require_known("shape", [kind], ("box", "cylinder", "ball"))
     step = require_positive("accuracy", accuracy)
     middle, half = _first(checked_mechanism(mechanism), kind, centre, extents, certified)
+    spans: Any = ("x", "y", "z"), (mechanism.length_unit,) * 3
     if certified is False:
-        return Largest(kind, middle, 2.0 * half, None)
+        return Largest(kind, middle, 2.0 * half, *spans, None)
+    certificates: list[Certificate] = []
 
-    def attempt(scale: float, tell: OnProgress) -> Certificate:
-        turns: dict[str, Any] = {"rotation": rotation, "tilt": tilt, "yaw": yaw}
-        size = scale * half
-        if kind == "box":
-            region = PoseRegion.box(middle - size, middle + size, **turns)
-        elif kind == "ball":
-            region = PoseRegion.ball(middle, size[0], **turns)
-        else:
-            region = PoseRegion.cylinder(middle, size[0], 2.0 * size[2], **turns)
-        return certify(mechanism, region, budget=BUDGET, on_progress=tell)
+    def is_proved(scale: float, low: float, high: float) -> bool:
+        count = len(certificates)
+        ahead = _attempts_ahead(low, high, step)
 
-    with telling(f"largest {kind}", on_progress) as tell:
-        scale, best = _bisected(attempt, step, tell)
-    extents_found = 2.0 * scale * half
-    extents_found.setflags(write=False)
-    return Largest(kind, middle, extents_found, best)
-
-
-def _bisected(
-    attempt: Callable[[float, OnProgress], Certificate], step: float, tell: OnProgress | None
-) -> tuple[float, Certificate]:
-    """The largest scale that is proved, to a share of itself, and its certificate."""
-    low, high, best, scale = 0.0, np.inf, None, 1.0
-    for count in range(MOST_ATTEMPTS):
-        gap = (high - low) / (max(low, 0.01) * step) if high < np.inf else 1.0 / step
-        ahead = math.ceil(math.log2(max(gap, 1.0)))
-
-        def report(done: int, total: int, count: int = count, ahead: int = ahead) -> None:
+        def report(done: int, total: int) -> None:
             if tell is not None:
                 tell(1000 * count + 1000 * done // total, 1000 * (count + 1 + ahead))
 
-        certificate = attempt(scale, report)
-        if certificate:
-            low, best = scale, certificate
-        else:
-            high = scale
-        if low > 0.0 and high <= low * (1.0 + step):
-            break
-        if high < 0.01:
-            raise InvalidArgument(
-                "centre", f"a shape of which nothing is proved: {certificate}", "a centre within reach"
-            )
-        scale = 0.5 * (low + high) if high < np.inf else low * (GROWTH if low < FAR else 2.0)
-    assert best is not None
-    return low, best
+        region = _region(kind, middle, scale * half, rotation=rotation, tilt=tilt, yaw=yaw)
+        certificates.append(certify(mechanism, region, budget=BUDGET, on_progress=report))
+        return bool(certificates[-1])
+
+    with telling(f"largest {kind}", on_progress) as tell:
+        scale = largest_scale(is_proved, step, most_attempts=MOST_ATTEMPTS)
+    if not scale:
+        nothing = f"a shape of which nothing is proved: {certificates[-1]}"
+        raise InvalidArgument("centre", nothing, "a centre within reach")
+    size = 2.0 * scale * half
+    size.setflags(write=False)
+    best = next(certificate for certificate in reversed(certificates) if certificate)
+    return Largest(kind, middle, size, *spans, best)
 
 
-def _first(mechanism: Mechanism, kind: Kind, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
+def _region(kind: str, middle: Floats, half: Floats, **turns: Any) -> PoseRegion:
+    if kind == "box":
+        return PoseRegion.box(middle - half, middle + half, **turns)
+    if kind == "ball":
+        return PoseRegion.ball(middle, half[0], **turns)
+    return PoseRegion.cylinder(middle, half[0], 2.0 * half[2], **turns)
+
+
+def _attempts_ahead(low: float, high: float, step: float) -> int:
+    """How often an interval is halved to a share of its lower end."""
+    gap = (high - low) / (max(low, LEAST) * step) if high < np.inf else 1.0 / step
+    return math.ceil(math.log2(max(gap, 1.0)))
+
+
+def _first(mechanism: Mechanism, kind: str, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
     """The centre and the half sizes to begin with, (3,) each."""
     middle = None if centre is None else array("centre", centre, "3")
     shape = None if extents is None else array("extents", extents, "3")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .lattice_points import codes, corners, places_around
-from .numbering import Numbering
+from .lattice_points import Numbering, codes, corners, places_around
 from .refining import Cells
 from .result import Workspace
 from .surface import crossed_edges

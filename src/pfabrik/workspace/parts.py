@@ -7,8 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from .lattice_points import Lattice, codes, corners
-from .numbering import Numbering
+from .lattice_points import Lattice, Numbering, codes, corners
 from .refining import Cells, Refined
 from .verdicts import MapQuestion
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from .lattice_points import MIDDLE, Lattice, codes, corners, offsets, places_of
-from .numbering import Numbering
+from .lattice_points import MIDDLE, Lattice, Numbering, codes, corners, offsets, places_of
 
 GROWS = 0.5
 """Share of its size by which a box grows to a side that the workspace touches."""

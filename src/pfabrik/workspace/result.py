@@ -15,7 +15,7 @@ from .border_search import sliced
 from .inscribed import Inscribed, Kind, inscribed
 from .region import Region
 from .saving import save
-from .sizes import in_words
+from .workspace_table import in_words, workspace_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,9 +104,9 @@ class Workspace(Printed, Region):
         InvalidArgument : two-dimensional axes for three coordinates.
         MissingLibrary : matplotlib is not installed.
         """
-        from .picture import plot
+        from ..view.workspace_picture import plot_workspace
 
-        return plot(self, ax)
+        return plot_workspace(self, ax)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write .npz (all arrays), .stl or .ply (the mesh; .ply with limits), or .csv (points of the border)."""
@@ -130,10 +130,18 @@ class Workspace(Printed, Region):
         }
 
     def table(self) -> ResultTable:
-        """Size, ends, what forms the border and, for notebooks and over two coordinates, its outline."""
-        from .workspace_table import workspace_table
-
-        return workspace_table(self)
+        """Size, ends, what forms the border, proved bounds and components; for notebooks its outline in a plane."""
+        remarks = []
+        if self.enclosure is not None:
+            lower, upper = self.enclosure.lower, self.enclosure.upper
+            remarks.append(f"proved: at least {lower:,.7g} and at most {upper:,.7g} {self.size_unit}")
+        if len(self.components) > 1:
+            places = {True: "with", False: "apart from"}
+            parts = [f"{places[each is self.at_start]} the start: {in_words(each)}" for each in self.components]
+            remarks.append("\n".join(parts))
+        elif self.at_start is None:
+            remarks.append("the start is not within it")
+        return workspace_table(self, remarks)
 
     def __repr__(self) -> str:
         over = ", ".join(self.names)

@@ -22,12 +22,10 @@ from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
 from ..printed import Printed, ResultTable
 from ..telling import OnProgress, telling
-from .lattice_points import codes
+from .lattice_points import Numbering, codes
 from .locus import drawn_to_border, locus
-from .numbering import Numbering
 from .parts import connected
 from .result import Workspace
-from .singular_picture import plot_map, plot_track
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,8 +77,9 @@ class SingularityMap(Printed):
         Over three coordinates, the locus in space stands beside slices that show the measure and where they cut the
         locus; on axes that are given, the slices are drawn in space too.
         """
-        locus = self.locus_vertices, self.locus_faces
-        return plot_map(self.workspace, self.step, self.points, self.measures, *locus, ax)
+        from ..view.singular_picture import plot_singular_map
+
+        return plot_singular_map(self, ax)
 
     def table(self) -> ResultTable:
         """The parts between parallel singularities, and the least of each measure."""
@@ -121,7 +120,9 @@ class SingularityTrack(Printed):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
-        return plot_track(self.measures, self.crossings, ax)
+        from ..view.singular_picture import plot_singular_track
+
+        return plot_singular_track(self.measures, self.crossings, ax)
 
 
 def least_measures(measures: Singularity) -> list[tuple[str, str]]:

@@ -1,35 +1,90 @@
-"""A workspace in a notebook, as HTML: its size, its ends, the limits that form its border, and an outline."""
+"""A workspace in words, as a table and, over two coordinates, as an outline in SVG."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..answers.words import limit_name
+from ..arrays import Floats
 from ..description.sketch import HEIGHT, MARGIN, WIDTH
 from ..printed import ResultTable
 from .border import REST, groups_of
-from .sizes import in_words, kind_of
 
 if TYPE_CHECKING:
     from .region import Region
 
-HEADER = ("border", "formed by", "joint")
+BORDER = ("border", "formed by", "joint")
+
+MOST_LIMITS = 12
+"""Limits that form the border in a table, at most."""
 
 
-def workspace_table(region: Region) -> ResultTable:
-    """Size, ends and parts of the border; over two coordinates, a drawing in the colours of its pictures."""
+def workspace_table(region: Region, remarks: Sequence[str]) -> ResultTable:
+    """Size, ends, the limits that form the border, and remarks; over two coordinates, a drawing."""
     if not len(region.faces):
-        return ResultTable(region.mechanism.name, ["nothing within reach"], HEADER)
-    lines = [in_words(region)]
-    for name, low, high, unit in zip(region.names, *region.bounds.tolist(), region.units, strict=True):
-        factor, label = (180.0 / np.pi, "deg") if unit == "rad" else (1.0, unit)
-        lines.append(f"{name} from {low * factor:.6g} to {high * factor:.6g} {label}")
-    rows = [(f"{share:.1%}", limit_name(*limit), kind_of(region, limit[0])) for limit, share in region.shares.items()]
+        return ResultTable(region.mechanism.name, ["nothing within reach"])
+    factors, units = for_people(region.units)
+    rows = [
+        (name, f"{low * factor:.6g}", f"{high * factor:.6g}", unit)
+        for name, low, high, factor, unit in zip(region.names, *region.bounds.tolist(), factors, units, strict=True)
+    ]
     drawing = outline(region) if len(region.names) == 2 else ""
-    return ResultTable(region.mechanism.name, lines, HEADER, rows, drawing=drawing)
+    title, header, border = region.mechanism.name, ("", "min", "max", "unit"), _border_table(region)
+    return ResultTable(title, [in_words(region)], header, rows, remarks, drawing, [border])
+
+
+def for_people(units: Sequence[str]) -> tuple[list[float], list[str]]:
+    """Factors to the units that people read, and these: degrees in place of radians."""
+    factors = [math.degrees(1.0) if unit == "rad" else 1.0 for unit in units]
+    return factors, ["deg" if unit == "rad" else unit for unit in units]
+
+
+def shown(region: Region, points: Floats) -> Floats:
+    """Coordinates (..., d) in the units that people read."""
+    return points * np.array(for_people(region.units)[0])
+
+
+def labels(region: Region) -> list[str]:
+    """The coordinates with the units that people read."""
+    return [f"{name} [{unit}]" for name, unit in zip(region.names, for_people(region.units)[1], strict=True)]
+
+
+def _border_table(region: Region) -> ResultTable:
+    """The limits that form the border, each with its share and the kind of its joint."""
+    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in region.mechanism.joints}
+    rows = [(f"{share:.1%}", limit_name(*limit), kinds.get(limit[0], "")) for limit, share in region.shares.items()]
+    n_more = len(rows) - MOST_LIMITS
+    more = [("", f"and {n_more} more", "")] if n_more > 0 else []
+    return ResultTable("", (), BORDER, rows[:MOST_LIMITS] + more)
+
+
+def in_words(region: Region, *, degrees: bool = True) -> str:
+    """The size of a workspace, to the digit that is uncertain, and a bound of its error: "4,970,000 ± 3,000 mm³".
+
+    Parameters
+    ----------
+    degrees : True for people, who read angles in degrees; else in radians, as `size` has them.
+    """
+    size, uncertainty, unit = region.size, region.uncertainty, region.size_unit
+    if degrees:
+        factor = math.degrees(1.0) ** region.units.count("rad")
+        size, uncertainty, unit = factor * size, factor * uncertainty, unit.replace("rad", "deg")
+    digit = 10.0 ** math.floor(math.log10(uncertainty)) if uncertainty > 0.0 else 1.0
+    bound = digit * math.ceil(uncertainty / digit + 0.5 * (uncertainty > 0.0))  # holds for the rounded size too
+    return f"{rounded(size, uncertainty)} ± {rounded(bound, uncertainty)} {unit}"
+
+
+def rounded(value: float, uncertainty: float) -> str:
+    """A number to the first digit of its uncertainty."""
+    if not uncertainty > 0.0:
+        return f"{value:,.6g}"
+    digits = -math.floor(math.log10(uncertainty))
+    return f"{round(value, digits):,.{max(digits, 0)}f}"
 
 
 def outline(region: Region) -> str:

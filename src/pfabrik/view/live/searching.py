@@ -97,7 +97,7 @@ def border_of(start: Solution, on_progress: Callable[[int, int], None]) -> tuple
     """
     from ...workspace.ask import workspace
     from ...workspace.border import groups_of
-    from ...workspace.sizes import in_words
+    from ...workspace.workspace_table import in_words
 
     space = workspace(start.mechanism, start=start, on_progress=on_progress)
     size = in_words(space)

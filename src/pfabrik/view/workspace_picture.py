@@ -4,32 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..answers.words import limit_name
 from ..arrays import Floats, Ints
 from ..drawing import SMALL, keep_apart
 from ..skeleton import skeleton_of
-from .axes import axes_for
-from .border import Group, group_of_limits, groups_of
-from .patches import patches_of, vertex_normals
-from .sizes import in_words
-from .space import POSITIONS
+from ..workspace.border import Group, group_of_limits, groups_of
+from ..workspace.space import POSITIONS
+from ..workspace.workspace_table import in_words, labels, shown
+from .border_parts import patches_of
+from .surfaces import add_surface, axes_for, frame_solid, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .region import Region
-
-MOST_FACES = 40_000
-"""Faces of a mesh that are drawn one by one; of a finer one, vertices that are near each other are drawn as one."""
-
-LIGHT = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
-DARKEST = 0.55
-"""Brightness of faces that point away from the light."""
+    from ..workspace.region import Region
 
 WITHIN = "#eef3f7"
 """Colour of the area within reach, in a plane."""
@@ -49,22 +41,14 @@ MACHINE = "#404040"
 SMALLEST_WITH_MACHINE = 0.1
 """Least size of a workspace that its machine is drawn with, as a share of the machine's: else it would be a dot."""
 
-NEAR_SIDE = 0.62
-"""Opacity of the near side of a workspace, through which the machine is seen."""
-
-THINNEST, MANY_TICKS = 0.2, 0.6
-"""Least side of a box in space, and the side from which on it has more than three ticks, as shares of its longest."""
-
 MOST_WIDENINGS, EDGE_FREE = 12, 12.0
 """How often axes are widened for names, at most, and the distance of names from their edge [pixels]."""
 
 OFF, SIDEWAYS = 5.0, 0.2
 """Distance of a name from the border [points]; component of a direction from which on it stands to that side."""
 
-Strings: TypeAlias = NDArray[np.str_]
 
-
-def plot(region: Region, ax: Axes | None = None) -> Axes:
+def plot_workspace(region: Region, ax: Axes | None = None) -> Axes:
     """Draw a workspace on matplotlib axes, or on those of a new figure, which is `ax.figure`."""
     d = len(region.names)
     axes = axes_for(ax, d)
@@ -190,42 +174,6 @@ def _draw_solid(axes: Any, region: Region, groups: list[Group]) -> None:
     frame_solid(axes, region, [shown(region, vertices), *machine])
 
 
-def frame_solid(axes: Any, region: Region, drawn: list[Floats], *, zoom: float = 0.86) -> None:
-    """Show all that is drawn, points (n, 3) each, at one scale where all coordinates have one unit, with axes named."""
-    points = np.concatenate(drawn)
-    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.ones(3))
-    spans = np.maximum(high - low, THINNEST * float((high - low).max()))
-    ends = 0.5 * (low + high) + 0.5 * spans * np.array([[-1.0], [1.0]])
-    axes.set(**{f"{name}lim": tuple(pair) for name, pair in zip("xyz", ends.T, strict=True)})
-    box = spans if len(set(region.units)) == 1 else np.ones(3)
-    axes.set_box_aspect(tuple(box / box.max()), zoom=zoom)
-    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels(region), strict=True)))
-    for name, side in zip("xyz", box / box.max(), strict=True):
-        axes.locator_params(axis=name, nbins=5 if side > MANY_TICKS else 3)
-
-
-def add_surface(axes: Any, vertices: Floats, faces: Ints, colours: Strings, *, see_through: bool) -> None:
-    """Add a mesh in the light; where it is seen through, its far side first, then its near side, half transparent."""
-    from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    spans = np.ptp(vertices, axis=0)
-    scaled = vertices / np.where(spans > 0.0, spans, 1.0)
-    corners = scaled[faces]
-    normals = _smooth(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), faces, len(vertices))
-    bright = DARKEST + (1.0 - DARKEST) * 0.5 * (1.0 + normals @ LIGHT)
-    names, of_faces = np.unique(colours, return_inverse=True)
-    shaded = np.array([to_rgb(name) for name in names.tolist()])[of_faces] * bright[:, None]
-    up, turn = np.radians([axes.elev, axes.azim])
-    is_near = normals @ [np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)] > 0.0
-    axes.computed_zorder = False
-    for rows, alpha, zorder in ((~is_near, 1.0, 1), (is_near, NEAR_SIDE if see_through else 1.0, 3)):
-        if rows.any():
-            edges: Any = "none" if alpha < 1.0 else shaded[rows]
-            looks: dict[str, Any] = {"facecolors": shaded[rows], "edgecolors": edges, "alpha": alpha}
-            axes.add_collection3d(Poly3DCollection(vertices[faces[rows]], linewidths=0.2, zorder=zorder, **looks))
-
-
 def draw_machine(axes: Any, region: Region) -> list[Floats]:
     """Draw the machine where the workspace starts, in thin lines; returns their points, (n, d) each.
 
@@ -248,27 +196,6 @@ def draw_machine(axes: Any, region: Region) -> list[Floats]:
     return [*drawn, places]
 
 
-def shown(region: Region, points: Floats) -> Floats:
-    """Coordinates as people read them: angles in degrees."""
-    return points * np.where([unit == "rad" for unit in region.units], 180.0 / np.pi, 1.0)
-
-
-def labels(region: Region) -> list[str]:
-    return [
-        f"{name} [{'deg' if unit == 'rad' else unit}]" for name, unit in zip(region.names, region.units, strict=True)
-    ]
-
-
-def _smooth(normals: Floats, faces: Ints, n: int) -> Floats:
-    """Unit normals of faces, each the mean of those around its corners: so that slivers do not show."""
-    around = np.zeros((n, 3))
-    for corner in faces.T:
-        np.add.at(around, corner, normals)
-    mean = around[faces].sum(axis=1)
-    lengths = np.linalg.norm(mean, axis=1, keepdims=True)
-    return np.asarray(np.divide(mean, lengths, out=np.zeros_like(mean), where=lengths > 0.0))
-
-
 def _loops(segments: Ints) -> list[list[int]]:
     """Closed loops of segments (f, 2), each as the places that it passes."""
     following: dict[int, list[int]] = {}
@@ -286,28 +213,3 @@ def _loops(segments: Ints) -> list[list[int]]:
             here = after
         loops.append(loop)
     return loops
-
-
-def thinned(vertices: Floats, faces: Ints, limits: Ints) -> tuple[Floats, Ints, Ints]:
-    """A mesh with no more faces than are worth drawing: vertices in the same small box become their middle.
-
-    Two sheets of the border that pass through one box stay apart: their normals point to different sides.
-
-    Parameters
-    ----------
-    limits : of the vertices, (v,); the first in each box counts.
-    """
-    cells = 2.0 * np.cbrt(max(len(vertices), 1))
-    while len(faces) > MOST_FACES:
-        span = np.ptp(vertices, axis=0)
-        low = vertices.min(axis=0)
-        boxes = np.floor((vertices - low) / np.where(span > 0.0, span, 1.0) * cells).astype(np.int64)
-        sides = (vertex_normals(vertices, faces) > 0.0) @ np.array([1, 2, 4])
-        keys = boxes @ np.array([8, 1 << 22, 1 << 41]) + sides
-        _, first, group = np.unique(keys, return_index=True, return_inverse=True)
-        counts = np.bincount(group)
-        vertices = np.stack([np.bincount(group, column) / counts for column in vertices.T], axis=1)
-        faces, limits = group[faces], limits[first]
-        faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
-        cells *= 0.8
-    return vertices, faces, limits

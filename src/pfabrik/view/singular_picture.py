@@ -1,4 +1,4 @@
-"""Singularities over three coordinates: the locus as a surface, and slices of the measure across it."""
+"""Pictures of singularities: along a path, in a plane, and in space with slices of the measure across the locus."""
 
 from __future__ import annotations
 
@@ -9,12 +9,24 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..drawing import SMALL, keep_apart, new_figure
-from .axes import AZIMUTH, ELEVATION, axes_for
-from .picture import add_surface, frame_solid, labels, shown, thinned
-from .region import Region
+from ..motion.singularities import Singularity
+from ..workspace.region import Region
+from ..workspace.workspace_table import for_people, labels, shown
+from .surfaces import AZIMUTH, ELEVATION, add_surface, axes_for, frame_solid, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from ..workspace.singular import SingularityMap
+
+MARK = 9.0
+LINES = {
+    "serial": ("#0072b2", "-"),
+    "parallel": ("#e69f00", "--"),
+    "constraint": ("#009e73", "-."),
+    "passive": ("#cc79a7", ":"),
+}
+"""Colour and dashes of each measure along a path; size of the points of a map."""
 
 LOCUS = "#d55e00"
 """Colour of singularities."""
@@ -65,7 +77,43 @@ class Slice:
     locus: Floats
 
 
-def plot_in_space(
+def plot_singular_track(measures: Singularity, crossings: Ints, ax: Axes | None = None) -> Axes:
+    """Draw the measures along a path, one line each, and where it leads through parallel singularities."""
+    axes = axes_for(ax, 2)
+    for name, (colour, dashes) in LINES.items():
+        values = np.asarray(getattr(measures, name))
+        if np.isfinite(values).any():
+            axes.plot(np.arange(1, len(values) + 1), values, color=colour, linestyle=dashes, label=name)
+    for count, row in enumerate(crossings.tolist()):
+        label = "" if count else "parallel singularity"
+        axes.axvline(row + 0.5, color=LOCUS, linewidth=1.2, label=label)
+    axes.set(xlabel="target", ylabel="measure of singularity", ylim=(0.0, None))
+    axes.legend(frameon=False, fontsize=SMALL)
+    return axes
+
+
+def plot_singular_map(found: SingularityMap, ax: Axes | None = None) -> Axes:
+    """Draw the parallel measure at the points of a plane, or in slices of space, and the locus."""
+    space, vertices, faces = found.workspace, found.locus_vertices, found.locus_faces
+    parallel = np.asarray(found.measures.parallel)
+    title = f"{space.mechanism.name}: {'parallel singularities' if len(faces) else 'no parallel singularity'}"
+    if len(space.names) == 3:
+        return _plot_in_space(space, Field(found.points, found.step, parallel), vertices, faces, title, ax)
+    axes = axes_for(ax, 2)
+    from matplotlib.collections import LineCollection
+
+    points = shown(space, found.points)
+    drawn = axes.scatter(points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap=MAP, vmin=0.0)
+    axes.add_collection(LineCollection(list(shown(space, vertices)[faces]), colors=LOCUS, linewidths=2.0))
+    if len(set(space.units)) == 1:
+        axes.set_aspect("equal")
+    axes.figure.colorbar(drawn, ax=axes, label=MEASURE, shrink=0.8, pad=0.03)
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels(space), strict=True)))
+    axes.set_title(title, fontsize=SMALL + 1)
+    return axes
+
+
+def _plot_in_space(
     space: Region, field: Field, vertices: Floats, faces: Ints, title: str, ax: Axes | None = None
 ) -> Axes:
     """Draw the locus, vertices (v, 3) and faces (f, 3), and slices across it: beside it, or on axes that are given."""
@@ -181,7 +229,7 @@ def _draw_slice(panel: Any, space: Region, each: Slice, step: Floats, highest: f
     """A slice in its plane, with the curve in which it cuts the locus."""
     from matplotlib.collections import LineCollection
 
-    factors = np.where([unit == "rad" for unit in space.units], 180.0 / np.pi, 1.0)
+    factors = np.array(for_people(space.units)[0])
     first, second = each.across
     rows, columns = each.grid.shape
     low = (each.low - 0.5 * step[each.across]) * factors[each.across]
