@@ -31,7 +31,7 @@ MAY_NAME_MACHINES = {
     "files/printers/": "the kinematics of firmwares, by their names there",
     "files/__init__.py": "what a printer is",
     "calibration/printer_settings.py": "the kinematics of a firmware, by their names there",
-    "cli/new.py": "other names of kinds to start from",
+    "cli/machines.py": "other names of kinds to start from",
     "cli/export.py": "the printers that a firmware knows",
 }
 """Beginnings of paths, and why names of the catalogue may stand there."""

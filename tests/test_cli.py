@@ -26,7 +26,7 @@ from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import description, template, templates
 from pfabrik.cli import main
-from pfabrik.cli.fitted import fitted
+from pfabrik.cli.printing import fitted
 from pfabrik.export.rod_lengths import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy

@@ -120,7 +120,7 @@ def test_what_stood_in_the_output_stays_when_the_work_fails(monkeypatch: pytest.
 
     write_files("path.csv")
     Path("answers.csv").write_text("precious")
-    monkeypatch.setattr("pfabrik.cli.track_report.TrackRows.write", interrupted)
+    monkeypatch.setattr("pfabrik.paths.track_rows.TrackRows.write", interrupted)
     assert pfabrik("track five_bar path.csv -o answers.csv").exit_code == 130
     assert Path("answers.csv").read_text() == "precious"
     assert listed() == ["answers.csv", "path.csv"]

@@ -11,11 +11,11 @@ import pfabrik as pf
 from command import pfabrik
 from machines import MACHINES
 from pfabrik.chains.chain_engine import ChainEngine
-from pfabrik.cli.info_report import chain_table, clean, vector
 from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.decomposition.decompose import beyond_positions
 from pfabrik.description.home_mobility import universal_axes
 from pfabrik.engine import engine_of as answering_engine
+from pfabrik.overview import chain_table, clean, vector
 from pfabrik.platform.legs_engine import LegsEngine
 
 
@@ -36,16 +36,16 @@ def test_the_engine_shown_is_the_one_that_answers(name: str) -> None:
     engine = answering_engine(mechanism)
     kinds = {LegsEngine: "legs", ChainEngine: "chains", ClosureEngine: "closure"}
     expected = kinds[type(engine)]
-    lines = chain_table(mechanism).splitlines()[1:]
+    lines = str(chain_table(mechanism)).splitlines()[1:]
     assert {re.split(r" {2,}", line.strip())[2] for line in lines} == {expected}
 
 
 def test_an_engine_is_told_with_the_reason() -> None:
-    assert "3  R-P*-S     legs    closed forms; closure where they do not reach" in chain_table(pf.load("rps"))
+    assert "3  R-P*-S     legs    closed forms; closure where they do not reach" in str(chain_table(pf.load("rps")))
     whole = MACHINES["tripod_rps"]()
-    assert chain_table(whole).endswith("3  R-P*-S     legs    closed forms; closure where they do not reach")
-    assert "legs    closed forms; closure where they do not reach" in chain_table(pf.load("nrpm"))
-    assert "chains  no loops, no closed form; closure where" in chain_table(MACHINES["serial_planar"]())
+    assert str(chain_table(whole)).endswith("3  R-P*-S     legs    closed forms; closure where they do not reach")
+    assert "legs    closed forms; closure where they do not reach" in str(chain_table(pf.load("nrpm")))
+    assert "chains  no loops, no closed form; closure where" in str(chain_table(MACHINES["serial_planar"]()))
     axes = [(0.0, 0.0, 1.0), (0.0, 1.0, 0.2), (1.0, 0.3, 0.1), (0.2, 1.0, 0.4), (1.0, 0.1, 0.6), (0.3, 0.2, 1.0)]
     bodies = ["base", "one", "two", "three", "four", "five", "platform"]
     arm = [
@@ -53,7 +53,7 @@ def test_an_engine_is_told_with_the_reason() -> None:
         for i, axis in enumerate(axes)
     ]
     beside = pf.Mechanism("struts and an arm", [*pf.load("stewart").joints, *arm], "platform", (0, 0, 195))
-    assert chain_table(beside).count("closure  no closed forms: sub-chain R-R-R-R-R-R: ") == 2
+    assert str(chain_table(beside)).count("closure  no closed forms: sub-chain R-R-R-R-R-R: ") == 2
 
 
 def test_a_motor_in_no_sub_chain_is_why_the_closure_engine_answers() -> None:
@@ -64,7 +64,7 @@ def test_a_motor_in_no_sub_chain_is_why_the_closure_engine_answers() -> None:
     ]
     mechanism = pf.Mechanism("with a spindle", [*stewart.joints, *bearings], "platform", (0, 0, 195))
     assert beyond_positions(mechanism) == ("actuated joint spindle is in no sub-chain",)
-    assert "closure  no closed forms: joint spindle has a motor" in chain_table(mechanism)
+    assert "closure  no closed forms: joint spindle has a motor" in str(chain_table(mechanism))
 
 
 def carrier(eye: tuple[float, float, float]) -> pf.Mechanism:

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import pfabrik as pf
 from pfabrik.catalog import template, templates
 from pfabrik.cli import main
-from pfabrik.cli.symmetry import crossed_rounds, near_copies
+from pfabrik.description.symmetry import crossed_rounds, near_copies
 from pfabrik.files import dumps, loads
 
 

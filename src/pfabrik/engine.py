@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .closure.closure_engine import ClosureEngine
@@ -21,6 +23,17 @@ def engine_of(mechanism: Mechanism) -> Engine:
     Of a mechanism without loops these are solved in time linear in the number of joints.
     """
     return _engine(model_of(mechanism))
+
+
+def kind_of_engine(mechanism: Mechanism) -> Literal["legs", "chains", "closure"]:
+    """The kind of engine that completes what a task leaves open: closed forms of legs, or joint coordinates."""
+    model = model_of(mechanism)
+    return "legs" if model.has_legs else "chains" if is_chain(model) else "closure"
+
+
+def why_not_measured(mechanism: Mechanism) -> str:
+    """The reason why no closed forms give the margins of poses; empty if they do."""
+    return measured(model_of(mechanism)).why_poses_do_not_suffice
 
 
 def knows_all_modes(mechanism: Mechanism) -> bool:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .answers.answer_fields import PoseRequest
+from .answers.pace import pace_of
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
-from .answers.tracked import Track, pace_of
+from .answers.tracked import Track
 from .arrays import Floats, Mask
 from .batch import put
 from .closure.close import measure_configurations

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..arguments import array, is_not_infinite
 from ..arrays import Floats, Ints, Mask
-from ..checks import put_limits, require_positive
 from ..closure.configurations import Configurations
 from ..closure.on_the_way import least_on_the_way
 from ..description.mechanism import Mechanism
+from ..description.readouts import readouts
 from ..description.task import task_of
 from ..engine import engine_of
-from ..errors import InvalidArgument
+from ..errors import counted
 from ..motion.displacements import actuator_units
 from ..poses import between
+from ..printed import ResultTable, plain
 from ..tolerances import TOLERANCES
 from .active_limits import ActiveLimit
+from .along import Extremes, largest_tilts, least_margins
 from .answer_fields import PoseRequest
+from .pace import Pace
 from .solution import Solution, as_plain
 from .status import Status
 
@@ -35,23 +40,12 @@ SUBSTEPS = 8
 JUMP = 0.5
 """Share of the whole motion that one part makes if it is a jump."""
 
-EVEN = 1e-6
-"""Relative difference up to which time steps count as equal: times in files have so many digits."""
 
+MOST_NAMED = 5
+"""Targets that a summary names by number, at most."""
 
-class Pace(NamedTuple):
-    """Times of the targets, and speed limits of the actuators.
-
-    Attributes
-    ----------
-    times : (n,) [s]; NaN where unknown.
-    sample_time : from each target to the next [s]; None if it varies.
-    speed_limits : (n_a,) [length/s or rad/s].
-    """
-
-    times: Floats
-    sample_time: float | None
-    speed_limits: Floats
+NEARLY_KEPT = 0.99
+"""Share of the clearance from which on it counts as kept between targets: straight ways cut the corners of a limit."""
 
 
 class Track(Solution):
@@ -72,6 +66,9 @@ class Track(Solution):
     accelerations : change of the mean velocity from the step before to this one, per time, (n, n_a) [length/s^2 or
         rad/s^2]; 0 in the first two rows. NaN and None as for speeds.
     too_fast : names of actuators that exceed their speed limits, one tuple per row; None without times.
+    least_margins : the least margin of every row, `values` (n,), and the limit that has it, `names`.
+    largest_tilts : the largest tilt of any rod in every row, `values` (n,) [rad], and the body of that rod, `names`;
+        None for machines without rods.
     """
 
     def __init__(
@@ -167,13 +164,30 @@ class Track(Solution):
 
     def to_dict(self) -> dict[str, Any]:
         """The dict of a `Solution`, with the fields of a track."""
-        plain = super().to_dict()
-        plain["jumps"] = self.jumps.tolist()
+        fields = super().to_dict()
+        fields["jumps"] = self.jumps.tolist()
         for name in ("times", "speeds", "accelerations", *(["passing"] if self.passing is not None else [])):
             value = getattr(self, name)
-            plain[name] = None if value is None else as_plain(value)
-        plain["too_fast"] = None if self.too_fast is None else [list(names) for names in self.too_fast]
-        return plain
+            fields[name] = None if value is None else as_plain(value)
+        fields["too_fast"] = None if self.too_fast is None else [list(names) for names in self.too_fast]
+        for name, extremes in (("margin", self.least_margins), ("tilt", self.largest_tilts)):
+            fields[name] = None if extremes is None else as_plain(extremes.values)
+            fields[f"{name}_of"] = None if extremes is None else extremes.names
+        return fields
+
+    def table(self) -> ResultTable:
+        """How many targets were reached, how far off the others are, where answers jump, and the worst step."""
+        summary = TrackSummary(self.mechanism)
+        summary.add(self)
+        return ResultTable(self.mechanism.name, list(filter(None, (summary.line(), summary.worst()))))
+
+    @cached_property
+    def least_margins(self) -> Extremes:
+        return least_margins(self)
+
+    @cached_property
+    def largest_tilts(self) -> Extremes | None:
+        return largest_tilts(self)
 
     @property
     def speeds(self) -> Floats | None:
@@ -207,49 +221,6 @@ class Track(Solution):
         return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
 
 
-def pace_of(
-    mechanism: Mechanism,
-    count: int,
-    sample_time: float | None,
-    times: ArrayLike | None,
-    speed_limits: float | Mapping[str, float] | None,
-) -> Pace | None:
-    """The checked times and speed limits of a path of `count` targets; None without times."""
-    names = mechanism.actuator_names
-    if sample_time is None and times is None:
-        if speed_limits is not None:
-            expected = "the time between two targets [s], or times"
-            raise InvalidArgument("sample_time", "None beside speed limits", expected)
-        return None
-    if sample_time is not None:
-        sample_time = require_positive("sample_time", sample_time)
-        if times is not None:
-            raise InvalidArgument("times", "times beside a sample time", "one of them")
-        checked = sample_time * np.arange(count, dtype=np.float64)
-    else:
-        checked = _checked_times(times, count)
-        sample_time = _even_step(checked)
-    limits = np.full(len(names), np.inf)
-    put_limits(limits, "speed_limits", speed_limits, names)
-    return Pace(checked, sample_time, limits)
-
-
-def _checked_times(times: ArrayLike | None, count: int) -> Floats:
-    note = ", when each target is to be there [s], NaN where not known"
-    checked = array("times", times, f"{count}", "times", note, is_not_infinite).copy()
-    if (np.diff(checked[~np.isnan(checked)]) < 0.0).any():
-        raise InvalidArgument("times", "times that go back", "times of which none is before one before it")
-    return checked
-
-
-def _even_step(times: Floats) -> float | None:
-    """The step of times that are equally far apart; None for others."""
-    steps = np.diff(times)
-    if not len(steps) or not steps.min() > 0.0 or np.ptp(steps) > EVEN * steps[0]:
-        return None
-    return float(steps.mean())
-
-
 def _durations(steps: Floats) -> Floats:
     """Positive time steps as a column (n, 1), to divide by; NaN where a step is not positive."""
     return np.where(steps > 0.0, steps, np.nan)[:, None]
@@ -265,3 +236,130 @@ def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
 def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
     """Distance that each actuator moves in every step, (n, n_a) [L or rad]."""
     return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / actuator_units(mechanism))
+
+
+@dataclass
+class TargetNumbers:
+    """Some targets of a path: how many, and the numbers of the first, counted from 1."""
+
+    count: int = 0
+    named: list[int] = field(default_factory=list)
+
+    def add(self, numbers: Iterable[int]) -> None:
+        """Add targets that follow."""
+        numbers = list(numbers)
+        self.count += len(numbers)
+        self.named += numbers[: MOST_NAMED - len(self.named)]
+
+    def __str__(self) -> str:
+        more = f", and {self.count - MOST_NAMED} more" if self.count > MOST_NAMED else ""
+        return f"target{'s' * (self.count != 1)} {', '.join(map(str, self.named))}{more}"
+
+
+@dataclass
+class Worst:
+    """The largest value so far, what it is of, and at which target and line."""
+
+    value: float = -math.inf
+    name: str = ""
+    place: str = ""
+
+    def add(self, values: Floats, names: list[str], begin: int, lines: Sequence[int]) -> None:
+        """Add the values of the targets from number `begin` on, and the lines of the path that these come from."""
+        known = np.where(np.isnan(values), -np.inf, values)
+        row = int(known.argmax())
+        if known[row] > self.value:
+            self.value, self.name = float(known[row]), names[row]
+            self.place = _place(begin, row, lines)
+
+
+def _place(begin: int, row: int, lines: Sequence[int]) -> str:
+    """The number of a target and, of those that were read, its line; a path may begin at home."""
+    line = f" ({f'line {lines[row]}' if lines[row] else 'home'})" if lines else ""
+    return f"target {begin + row}{line}"
+
+
+class TrackSummary:
+    """Counts, failures and the worst step of a path."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self._counts: Counter[Status] = Counter()
+        self._n_targets = 0
+        self._farthest = 0.0
+        self._failed, self._jumps, self._near = TargetNumbers(), TargetNumbers(), TargetNumbers()
+        self._first_off = ""
+        self._nearest = math.inf
+        self._too_fast = {name: TargetNumbers() for name in mechanism.actuator_names}
+        self._fastest = dict.fromkeys(mechanism.actuator_names, 0.0)
+        self._margin, self._tilt = Worst(), Worst()
+
+    def add(self, track: Track, first: int = 0, lines: Sequence[int] = ()) -> None:
+        """Add the rows of a track from `first` on, and the lines of the file that each of all its rows comes from."""
+        if first >= len(track):
+            return
+        new, begin = slice(first, None), self._n_targets + 1
+        lines, margins, tilts = lines[first:], track.least_margins, track.largest_tilts
+        status = track.status[new]
+        self._counts += Counter(map(Status, status.tolist()))
+        off = np.flatnonzero(status != Status.REACHED)
+        if len(off) and not self._first_off:
+            self._first_off = _place(begin, int(off[0]), lines)
+        self._farthest = max(self._farthest, float(track.position_error[new].max()))
+        self._failed.add((begin + np.flatnonzero(status >= Status.FAILED)).tolist())
+        self._jumps.add((begin + np.flatnonzero(track.jumps[new])).tolist())
+        if track.passing is not None:
+            is_near = track.passing[new] < NEARLY_KEPT * (self._mechanism.clearance or 0.0)
+            self._near.add((begin + np.flatnonzero(is_near)).tolist())
+            self._nearest = min(self._nearest, float(np.nanmin(track.passing[new], initial=math.inf)))
+        if track.too_fast is not None and track.speeds is not None:
+            self._add_speeds(track.too_fast[new], track.speeds[new], begin)
+        self._margin.add(-margins.values[new], margins.names[new], begin, lines)
+        if tilts is not None:
+            self._tilt.add(tilts.values[new], tilts.names[new], begin, lines)
+        self._n_targets += len(status)
+
+    def _add_speeds(self, too_fast: list[tuple[str, ...]], speeds: Floats, begin: int) -> None:
+        for column, (name, targets) in enumerate(self._too_fast.items()):
+            rows = [row for row, names in enumerate(too_fast) if name in names]
+            if rows:
+                targets.add(begin + row for row in rows)
+                self._fastest[name] = max(self._fastest[name], float(np.nanmax(speeds[:, column])))
+
+    @property
+    def is_well(self) -> bool:
+        """True if all targets were reached, links stay apart on the way, and no actuator has to be too fast."""
+        is_reached = self._counts[Status.REACHED] == self._n_targets
+        return is_reached and not self._near.count and not any(self._fastest.values())
+
+    def line(self) -> str:
+        """The number of targets of each status, how far off they are, and where answers jump or are too fast."""
+        counts = {status: self._counts[status] for status in Status}
+        named = (f"{n} {status.name.lower()}" for status, n in counts.items() if n or status == Status.REACHED)
+        parts = [", ".join(named)]
+        if self._failed.count:
+            parts.append(f"failed at {self._failed}")
+        if counts[Status.PROJECTED]:
+            farthest = f"farthest from its target {self._farthest:.3g} {self._mechanism.length_unit}"
+            parts.append(f"first at {self._first_off}; {farthest}")
+        if self._jumps.count:
+            parts.append(f"{counted(self._jumps.count, 'jump')} ({self._jumps})")
+        if self._near.count:
+            nearest = f"{self._nearest:.3g} {self._mechanism.length_unit}"
+            parts.append(f"links come as near as {nearest} on the way to {self._near}")
+        for drive in readouts(self._mechanism):
+            if self._fastest[drive.name]:
+                fastest = float(drive.display(np.array(self._fastest[drive.name])))
+                parts.append(f"{drive.name} too fast: {fastest:.3g} {drive.unit}/s ({self._too_fast[drive.name]})")
+        return "; ".join(parts)
+
+    def worst(self) -> str:
+        """The step with the least margin, and the one where a rod is tilted most; empty where there is neither."""
+        parts = []
+        if self._margin.name:
+            margin = plain(-self._margin.value, TOLERANCES.active, ".3g")
+            parts.append(f"worst step: {self._margin.place}, margin {margin} of {self._margin.name}")
+        if self._tilt.name:
+            degrees = math.degrees(self._tilt.value)
+            parts.append(f"largest tilt: {degrees:.3g} deg of {self._tilt.name} at {self._tilt.place}")
+        return "; ".join(parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from ..closure.link_distances import least_distances
 from ..closure.placed_links import PlacedLinks
 from ..errors import UnsupportedMechanism
 from ..kinematics import links_of
-from ..printed import Printed, ResultTable
+from ..printed import Printed, ResultTable, plain
 from .gradients import gradients_of
 
 
@@ -67,6 +68,20 @@ class Clearance(Printed):
     def table(self) -> ResultTable:
         """The least distance and its links."""
         return ResultTable("Clearance", [self._words])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Distance, links and points as plain numbers and lists, ready for JSON."""
+        return {"distance": self.distance, "links": self.links, "points": self.points.tolist()}
+
+    @property
+    def in_words(self) -> str:
+        """The least distance of one answer, and the clearance that is kept."""
+        (first, second), distance, mechanism = self.links, float(self.distance), self._solution.mechanism
+        least, size = mechanism.clearance, f"{plain(abs(distance), 1e-9)} {mechanism.length_unit}"
+        kept = "no clearance is kept"
+        if least is not None:
+            kept = f"the clearance kept is {least:.6g} {mechanism.length_unit}"
+        return f"{first} and {second} {f'are {size} apart' if distance >= 0.0 else f'overlap by {size}'} ({kept})"
 
     @property
     def _words(self) -> str:

@@ -95,16 +95,12 @@ def follow(key: str, targets: Floats) -> Run:
 
 def write(run: Run, folder: Path) -> None:
     """Write the CSV file of one run, with the active limits: these take joint coordinates, and more kernels."""
-    from ..paths.along import largest_tilts, least_margins
     from ..paths.follow import TrackPart
     from ..paths.path import Path as Targets
-    from .track_report import TrackRows
+    from ..paths.track_rows import TrackRows
 
-    part = TrackPart(Targets.of(run.targets), run.solution, first=0)
-    margins, tilts = least_margins(run.solution), largest_tilts(run.solution)
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
-        rows = TrackRows(handle, run.solution.mechanism, part.path, has_tilts=tilts is not None)
-        rows.write(part, margins, tilts)
+        TrackRows(handle).write(TrackPart(Targets.of(run.targets), run.solution, first=0))
 
 
 def row(run: Run) -> tuple[str, ...]:

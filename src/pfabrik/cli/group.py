@@ -25,15 +25,16 @@ PIPE_CLOSED = 141
 
 
 class CommandGroup(click.Group):
-    """A group whose subcommand ``name`` is the object ``name`` of the module ``pfabrik.cli.name``.
+    """A group whose subcommand is the object of its name in a module of this folder.
 
     A name that is a word of Python has an underscore behind it there.
     """
 
-    def __init__(self, *args: Any, subcommands: Mapping[str, str], **kwargs: Any) -> None:
-        """Make a group of subcommands: name -> what it does, the first line of its help."""
+    def __init__(self, *args: Any, subcommands: Mapping[str, tuple[str, str]], **kwargs: Any) -> None:
+        """Make a group of subcommands: name -> its module, and what it does, the first line of its help."""
         super().__init__(*args, **kwargs)
-        self.subcommands = dict(subcommands)
+        self.subcommands = {name: line for name, (_, line) in subcommands.items()}
+        self._modules = {name: module for name, (module, _) in subcommands.items()}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the subcommands, in the order of the help."""
@@ -49,7 +50,7 @@ class CommandGroup(click.Group):
         if cmd_name not in self.subcommands:
             return None
         name = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
-        module = importlib.import_module(f".{name}", __package__)
+        module = importlib.import_module(f".{self._modules[cmd_name]}", __package__)
         command: click.Command = getattr(module, name)
         return command
 

@@ -1,4 +1,4 @@
-"""``pfabrik import``: the mechanism in a MuJoCo model or a robot description, as a mechanism file."""
+"""``pfabrik import`` and ``verify``: mechanisms of MuJoCo models and robot descriptions, and MuJoCo as the referee."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import click
 import pfabrik as pf
 
 from ..errors import PfabrikError
-from .arguments import Finite, comma_separated
+from .arguments import MECH, Finite, comma_separated, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
-from .printing import complain, json_option, note, print_json
+from .printing import complain, json_option, note, print_json, print_result
 
 if TYPE_CHECKING:
     from ..interop import Choice, Imported, NoEndEffector
@@ -74,7 +74,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
         raise
     from ..files import dumps
     from ..interop.notes import Note
-    from .check_remarks import remarks_on
+    from ..remarks import remarks_on
 
     said = [*map(str, model.notes)]
     remarks = [Note(remark) for remark in remarks_on(model.mechanism) if not remark.startswith(tuple(said))]
@@ -145,3 +145,42 @@ def imported(
     if loops is not None:
         raise click.UsageError("--loops: a MuJoCo model tells its loops itself; expected none")
     return pf.interop.from_mjcf(file, configuration=configuration, **choices)
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@click.option(
+    "--with", "referee", type=click.Choice(["mujoco"]), default="mujoco", show_default=True, help="The referee."
+)
+@click.option("--poses", type=click.IntRange(min=1), default=100, show_default=True, help="How many to compare.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random poses.")
+@click.option(
+    "--original", type=click.Path(path_type=Path), metavar="FILE", help="The MuJoCo model or URDF it was imported from."
+)
+@click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of the original, if a URDF.")
+@click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of it: home.")
+@json_option()
+def verify(
+    mech: str,
+    referee: str,
+    poses: int,
+    seed: int,
+    original: Path | None,
+    loops: Path | None,
+    configuration: str,
+    as_json: bool,
+) -> int:
+    """Compare answers with those of MuJoCo.
+
+    At random poses that are reached, MuJoCo says how far our loops are open, by its own constraint rows; then it closes
+    the loops by itself, from elsewhere, and the poses are compared. With --original, the file that MECH was imported
+    from closes its own loops there too, from its joints put by their names.
+
+    Exit code 0 if all agree, 1 if some do not, none was found, or all are too near to home to say anything.
+    """
+    mechanism = load(mech)
+    verification = pf.interop.verify(
+        mechanism, poses=poses, seed=seed, original=original, loops=loops, configuration=configuration
+    )
+    print_result(as_json, verification)
+    return 0 if verification else 1

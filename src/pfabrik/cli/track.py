@@ -1,4 +1,4 @@
-"""``pfabrik track``: a path of targets, each answer starting from the one before."""
+"""``pfabrik track`` and ``time``: a path of targets followed, and how fast it may be."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..checks import require_ending
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
+from .answers import own_limits, speed_limits, speed_option
 from .arguments import FINITE, MECH, load, note_left_out, projecting
 from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, whole_file
-from .printing import json_option, note, print_json, print_text
-from .speed import own_limits, speed_limits, speed_option
+from .printing import json_option, note, print_json, print_result, print_text
 
 if TYPE_CHECKING:
+    from ..answers.tracked import TrackSummary
     from ..arrays import Mask
     from ..paths import path as paths
-    from .track_report import Summary
 
 
 MOST_TARGETS = 1_000_000_000
@@ -81,19 +81,19 @@ def track(
     check_pictures(picture_path, film_path)
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
+    from ..answers.tracked import TrackSummary
     from ..paths.read_path import path_blocks
-    from .track_report import Summary
 
     is_whole = as_json or is_drawn
     read = partial(path_blocks, path, mechanism, most=None if is_whole else MOST_TARGETS, **sampling)
     check = partial(checked, mechanism=mechanism, is_timed=bool(limits))
     blocks, n_targets = blocks_of(path if output is not None else STANDARD, read, check, whole=is_whole)
-    summary = Summary(mechanism)
+    summary = TrackSummary(mechanism)
     with nullcontext() if output is None else whole_file(output) as handle:
         solution = follow(mechanism, blocks, options, own_limits(mechanism) | limits, handle, summary, n_targets)
     draw(solution, picture_path, film_path)
     if as_json:
-        print_json(as_object(solution))
+        print_json(solution.to_dict())
     print_text(summary.line(), to_stderr=as_json or output == STANDARD)
     if summary.worst():
         print_text(summary.worst(), to_stderr=True)
@@ -182,24 +182,21 @@ def follow(
     options: pf.Options,
     limits: dict[str, float],
     handle: TextIO | None,
-    summary: Summary,
+    summary: TrackSummary,
     n_targets: int | None,
 ) -> pf.Track:
     """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
-    from ..paths.along import largest_tilts, least_margins
     from ..paths.follow import follow_parts
-    from .track_report import TrackRows
+    from ..paths.track_rows import TrackRows
 
-    rows: TrackRows | None = None
+    rows = None if handle is None else TrackRows(handle)
     with telling(f"tracking {counted(n_targets, 'target') if n_targets else 'targets'}") as tell:
         on_progress = None if tell is None else lambda done: tell(done, n_targets or 0)
         parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
         for part in parts:
-            margins, tilts = least_margins(part.track), largest_tilts(part.track)
-            summary.add(part, margins, tilts)
-            if handle is not None:
-                rows = rows or TrackRows(handle, mechanism, part.path, has_tilts=tilts is not None)
-                rows.write(part, margins, tilts)
+            summary.add(part.track, part.first, part.path.lines)
+            if rows is not None:
+                rows.write(part)
     return part.track
 
 
@@ -214,13 +211,53 @@ def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None) 
         click.echo(f"wrote {film_path}", err=True)
 
 
-def as_object(solution: pf.Track) -> dict[str, object]:
-    """The fields of a track, and in every row the least margin and the largest tilt of a rod [rad]."""
-    from ..answers.solution import as_plain
-    from ..paths.along import largest_tilts, least_margins
+@click.command()
+@click.argument("mech", type=MECH)
+@click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
+@click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
+@speed_option
+@click.option(
+    "--acceleration",
+    "accelerations",
+    multiple=True,
+    metavar="[NAME=]VALUE",
+    help="Highest acceleration, likewise [deg/s² or length/s²]. Default: the file's max_acceleration.",
+)
+@click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s].")
+@click.option("--rate", type=FINITE, default=1000.0, show_default=True, metavar="HZ", help="Samples per second.")
+@json_option("One JSON object on stdout: the time, and what limits it.")
+def time(
+    mech: str,
+    path: Path,
+    output: Path | None,
+    speeds: tuple[str, ...],
+    accelerations: tuple[str, ...],
+    platform_speed: float | None,
+    rate: float,
+    as_json: bool,
+) -> int:
+    """Find the fastest way along a path.
 
-    plain = solution.to_dict()
-    for name, extremes in (("margin", least_margins(solution)), ("tilt", largest_tilts(solution))):
-        plain[name] = None if extremes is None else as_plain(extremes.values)
-        plain[f"{name}_of"] = None if extremes is None else extremes.names
-    return plain
+    PATH is a CSV file or G-code; - is standard input. Every actuator stays within its speed and acceleration; at both
+    ends the machine is at rest. A path with steps that are not reached, that leaps or crosses a parallel singularity
+    is refused.
+    """
+    refuse_both_on_stdout(output, as_json)
+    check_outputs([("-o", output)], [path, Path(mech)], as_json=as_json)
+    mechanism = load(mech)
+    highest_speeds = speed_limits(mechanism, speeds) or None
+    highest_accelerations = speed_limits(mechanism, accelerations, "--acceleration") or None
+    targets = pf.read_path(path, mechanism).targets
+    with nullcontext() if output is None else whole_file(output) as handle:
+        solution = pf.track(mechanism, targets)
+        timed = pf.time_path(
+            solution,
+            speed=highest_speeds,
+            acceleration=highest_accelerations,
+            platform_speed=platform_speed,
+            rate=rate,
+        )
+        if handle is not None:
+            timed.write(handle)
+    print_result(as_json, timed, to_stderr=output == STANDARD)
+    return 0

@@ -107,10 +107,9 @@ def workspace(
 
 def note_slow(mechanism: pf.Mechanism) -> None:
     """Note before the work begins that it takes longer where no closed forms answer, and why."""
-    from ..model import model_of
-    from ..platform.tip_engine import measured
+    from ..engine import why_not_measured
 
-    reason = measured(model_of(mechanism)).why_poses_do_not_suffice
+    reason = why_not_measured(mechanism)
     if reason:
         note(f"no closed forms, {reason}: points are tried one by one, for about a minute")
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import os
 import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
+from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, counted
 from ..files.units import metres_of
+from ..printed import Printed, ResultTable, error_text
 from ..tolerances import TOLERANCES
 from .original import Original, OriginalFile
 from .referee import on_export
@@ -22,6 +25,13 @@ from .referee_configurations import Travelled, reached_at_random, travelled
 FAR = 0.25
 """Share of its range, or of what was tried, that some actuator must have gone through: poses nearer to home than that
 hold for machines that do not move at all."""
+
+TOO_NEAR = (
+    "too near to home to say anything: farther targets were not reached, and no actuator went through "
+    f"{100.0 * FAR:.0f} % of its range; see `pfabrik check` for what may hold the machine"
+)
+
+NUMBERS = ("poses", "loop_gap", "position_difference", "rotation_difference", "tolerance")
 
 
 @dataclass(frozen=True)
@@ -50,11 +60,12 @@ class AgainstOriginal:
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Printed):
     """The comparison with MuJoCo: the largest differences over all poses, lengths in the mechanism's unit.
 
     Attributes
     ----------
+    mechanism : whose answers they are.
     poses : how many configurations were compared, of as many different targets.
     loop_gap : how far MuJoCo finds our answers open, by its own constraint rows [length; angles times L].
     position_difference, rotation_difference : between our pose and the one in which MuJoCo closes the loops by itself,
@@ -64,6 +75,7 @@ class Verification:
     original : the comparison with the original file; None where none was given, or there were no poses.
     """
 
+    mechanism: Mechanism
     poses: int
     loop_gap: float
     position_difference: float
@@ -87,6 +99,59 @@ class Verification:
     def __bool__(self) -> bool:
         """True if there were poses that go far, and the two agree on all."""
         return self.agrees and self.goes_far
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and dicts, ready for JSON; None where a number is not known."""
+        numbers = {name: getattr(self, name) for name in NUMBERS}
+        return {
+            "agree": self.agrees,
+            "far": self.goes_far,
+            **{name: value if value == value else None for name, value in numbers.items()},
+            "travelled": self.travelled._asdict(),
+            "original": None if self.original is None else asdict(self.original),
+        }
+
+    def table(self) -> ResultTable:
+        """The largest differences, those from the original file, and how far the poses went."""
+        name, unit, size = self.mechanism.name, self.mechanism.length_unit, self.mechanism.characteristic_length
+        if not self.poses:
+            return ResultTable(name, [f"{name}: no pose was reached"])
+
+        def length(value: float, of: float | None = None) -> str:
+            return f"{error_text(value, '.1e', size)} {unit}" + ("" if of is None else f", of {of:.1e}")
+
+        def angle(value: float, of: float | None = None) -> str:
+            return f"{error_text(value, '.1e')} rad" + ("" if of is None else f", of {of:.1e}")
+
+        rows = [
+            ("largest loop gap", length(self.loop_gap)),
+            ("largest position difference", length(self.position_difference)),
+            ("largest rotation difference", angle(self.rotation_difference)),
+        ]
+        if (file := self.original) is not None:
+            rows += [
+                ("original file", "agrees" if file else "does not agree"),
+                ("its own loops, open by", length(file.loop_gap, file.position_tolerance)),
+                ("position difference from it", length(file.position_difference, file.position_tolerance)),
+                ("rotation difference from it", angle(file.rotation_difference, file.rotation_tolerance)),
+            ]
+        went, drives = self.travelled, self.mechanism.drives
+        shift = f"{went.position / size:.2g} L ({went.position:.3g} {unit})"
+        rows += [
+            ("actuators went through", ", ".join(_span(drive, went.drives[drive.name], unit) for drive in drives)),
+            ("end effector went up to", f"{shift}, {math.degrees(went.rotation):.2g} deg"),
+        ]
+        agrees = "agrees" if self.agrees else "does not agree"
+        lines = [f"{name}: {agrees} with MuJoCo on {counted(self.poses, 'pose')}"]
+        lines += [f"{label:<29}{text}" for label, text in rows]
+        return ResultTable(name, lines if self.goes_far else [*lines, TOO_NEAR])
+
+
+def _span(drive: JointCoordinate, value: float, unit: str) -> str:
+    """The travel of an actuator, with its share of the range if there is one."""
+    shown = f"{math.degrees(value):.3g} deg" if drive.kind == "angle" else f"{value:.3g} {unit}"
+    width = drive.limits[1] - drive.limits[0]
+    return f"{drive.name} {shown}" + (f" ({100.0 * value / width:.0f} %)" if math.isfinite(width) else "")
 
 
 def verify(
@@ -129,7 +194,7 @@ def verify(
     solutions = reached_at_random(mechanism, poses, rng)
     tolerance = TOLERANCES.position * size
     if not solutions:
-        return Verification(0, np.nan, np.nan, np.nan, tolerance, Travelled({}, {}, 0.0, 0.0))
+        return Verification(mechanism, 0, np.nan, np.nan, np.nan, tolerance, Travelled({}, {}, 0.0, 0.0))
     units, against = np.array([metres, metres, 1.0]), None
     gap, position, rotation = (on_export(mechanism, solutions, rng) / units).tolist()
     if robot is not None and file is not None:
@@ -138,4 +203,5 @@ def verify(
         changed = np.minimum(robot.changes_of_import(file, solutions) / units, explained)
         nearest = float(max(changed[:2])) + tolerance
         against = AgainstOriginal(open_by, apart, turned, nearest, float(changed[2]) + TOLERANCES.rotation)
-    return Verification(len(solutions), gap, position, rotation, tolerance, travelled(mechanism, solutions), against)
+    went = travelled(mechanism, solutions)
+    return Verification(mechanism, len(solutions), gap, position, rotation, tolerance, went, against)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from ..answers.pace import pace_of
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start
-from ..answers.tracked import Track, pace_of
+from ..answers.tracked import Track
 from ..closure.engine_contract import InverseEngine
 from ..decomposition.decompose import positions_express
 from ..derived import derived

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..answers.solution import Solution, checked_solution
+from ..answers.solution import Solution, as_plain, checked_solution
 from ..arrays import Floats, Mask, shaped
 from ..description.mechanism import Mechanism
 from ..frozen import FrozenMapping
 from ..kinematics import actuator_units, end_effector_pose, joint_centres
+from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
 from .first_order_maps import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 from .joint_balance import Balance, about_centres, balance
@@ -38,7 +39,7 @@ class _Question(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Forces:
+class Forces(Printed):
     """Forces in static equilibrium, as `forces` returns them.
 
     Attributes
@@ -54,6 +55,23 @@ class Forces:
     is_least_norm: bool
     reason: str | Reasons
     _question: _Question = field(repr=False)
+
+    def table(self) -> ResultTable:
+        """What each actuator exerts, or why no forces hold the load; of a batch, the largest of each."""
+        mechanism, exerted = self._mechanism, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names)))
+        if isinstance(self.reason, str) and self.reason:
+            return ResultTable(mechanism.name, [f"no forces: {self.reason}"])
+        known = np.where(np.isnan(exerted), 0.0, exerted)
+        largest = known[np.abs(known).argmax(axis=0), np.arange(known.shape[1])]
+        least = 1e-9 * float(np.abs(largest).max(initial=0.0))
+        units = ["force" if drive.kind == "length" else f"force {mechanism.length_unit}" for drive in mechanism.drives]
+        values = [plain(value, least) for value in largest.tolist()]
+        header = ("actuator", "exerts" if np.ndim(self.actuators) == 1 else "exerts at most", "unit")
+        return ResultTable(mechanism.name, (), header, list(zip(mechanism.actuator_names, values, units, strict=True)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What actuators exert, None where unknown, and why: ready for JSON."""
+        return {"actuators": as_plain(self.actuators), "reason": as_plain(self.reason)}
 
     @cached_property
     def reactions(self) -> Mapping[str, Floats]:

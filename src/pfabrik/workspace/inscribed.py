@@ -25,8 +25,8 @@ Kind = Literal["sphere", "ball", "box", "cylinder"]
 NEAREST_FACES, POINTS_A_SIDE = 400, 12
 """Number of faces nearest to the shape that are sampled, and points along each of their sides."""
 
-POINTS_ACROSS = {2: 1025, 3: 27}
-"""Points along each side of a box that are drawn onto the shape: all must be within the workspace."""
+SAMPLES = 4096
+"""Points on the shape that must be within the workspace."""
 
 GIVES, MOST_GIVES = 0.998, 50
 """Factor by which the shape shrinks if one of them is not, and the largest number of times."""
@@ -70,7 +70,7 @@ class Inscribed(Printed):
         factors, units = for_people(self.units)
         numbers = zip(self.names, self.centre.tolist(), self.extents.tolist(), factors, units, strict=True)
         rows = [
-            (name, f"{middle * factor:.6g}", f"{extent * factor:.6g}", unit)
+            (name, f"{middle * factor + 0.0:.6g}", f"{extent * factor:.6g}", unit)
             for name, middle, extent, factor, unit in numbers
         ]
         return ResultTable(f"Largest {self.kind}", (), (f"largest {self.kind}", "centre", "extent", "unit"), rows)
@@ -86,29 +86,30 @@ def largest_scale(
     accuracy: float,
     *,
     most_attempts: int,
-    shrinks: float = 0.5,
+    first: float = 1.0,
     bound: float = np.inf,
+    shrinks: float = 0.5,
 ) -> float:
-    """The largest scale at which a shape fits, to a share of itself; 0 if none from `LEAST` on does.
+    """The largest scale at which a shape fits, to a share of itself; 0 if none does down to `LEAST` of the first.
 
     Parameters
     ----------
     fits : of a scale, the largest that fits, and the least that does not.
+    first, bound : the scale to begin with, and one above which none fits.
     shrinks : factor to the next scale while none fits.
-    bound : no scale above it fits.
     """
-    low, high, scale = 0.0, bound, 1.0
+    low, high, scale = 0.0, bound, first
     for _ in range(most_attempts):
         if fits(scale, low, high):
             low = scale
         else:
             high = scale
-        if high < LEAST or high <= low * (1.0 + accuracy):
+        if high < LEAST * first or high <= low * (1.0 + accuracy):
             break
         if not low:
             scale = shrinks * high
         else:
-            scale = 0.5 * (low + high) if high < np.inf else low * (GROWTH if low < FAR else 2.0)
+            scale = 0.5 * (low + high) if high < np.inf else low * (GROWTH if low < FAR * first else 2.0)
     return low
 
 
@@ -119,18 +120,17 @@ def inscribed(region: Region, kind: Kind, centre: ArrayLike | None, proportions:
     if not len(vertices):
         raise InvalidArgument("workspace", "nothing within reach", "a workspace that a shape fits into")
     middle = _best_centre(region, kind, extents, vertices) if centre is None else _checked_centre(region, centre)
-    whole = _distance_to_faces(region, kind, extents, middle) * extents
-    shell = _shell(kind, whole)
+    whole, shell = _distance_to_faces(region, kind, extents, middle), _shell(kind, extents)
 
     def is_within(scale: float, _low: float, _high: float) -> bool:
         return bool(np.all(region.contains(middle + scale * shell)))
 
     accuracy = 1.01 * (1.0 / GIVES - 1.0)
-    scale = largest_scale(is_within, accuracy, most_attempts=MOST_GIVES, shrinks=GIVES, bound=1.0)
+    scale = largest_scale(is_within, accuracy, most_attempts=MOST_GIVES, first=whole, bound=whole, shrinks=GIVES)
     if not scale:
         expected = "a point with room around it: here the border is too fine for the mesh"
         raise InvalidArgument("centre", f"{middle.tolist()}", expected)
-    return Inscribed(kind, middle, scale * whole, region.names, region.units)
+    return Inscribed(kind, middle, scale * extents, region.names, region.units)
 
 
 def _extents(region: Region, kind: Kind, proportions: ArrayLike | None) -> Floats:
@@ -185,16 +185,22 @@ def _distance_to_faces(region: Region, kind: Kind, extents: Floats, centre: Floa
 
 
 def _shell(kind: Kind, extents: Floats) -> Floats:
-    """Points (n, d) on a shape about zero, its edges included: those of a grid on a box, drawn onto the shape."""
+    """Points (n, d) on the shape of size one about zero: evenly spread directions, and those that lead to its edges."""
     d = len(extents)
-    side = np.linspace(-1.0, 1.0, POINTS_ACROSS[d])
-    grid = np.stack(np.meshgrid(*[side] * d, indexing="ij"), axis=-1).reshape(-1, d)
-    points = grid[np.abs(grid).max(axis=1) == 1.0]
-    if kind == "cylinder":  # squares become discs, and edges its rims
-        across = np.hypot(points[:, 0], points[:, 1])
-        points[:, :2] *= (np.abs(points[:, :2]).max(axis=1) / np.where(across > 0.0, across, 1.0))[:, None]
-    points = points * extents
-    return points / _scales(kind, extents, points)[:, None]
+    steps = np.arange(SAMPLES) + 0.5
+    turn = np.pi * (1.0 + math.sqrt(5.0)) * steps
+    if d == 2:
+        directions = np.column_stack([np.cos(2.0 * np.pi * steps / SAMPLES), np.sin(2.0 * np.pi * steps / SAMPLES)])
+    else:
+        height = 1.0 - 2.0 * steps / SAMPLES
+        across = np.sqrt(1.0 - height**2)
+        directions = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
+    ends = np.stack(np.meshgrid(*[[-1.0, 1.0]] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    if kind == "cylinder":
+        rim = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
+        ends = np.concatenate([np.column_stack([np.cos(rim), np.sin(rim), np.full(128, side)]) for side in (-1, 1)])
+    directions = np.concatenate([directions, ends]) * extents
+    return directions / _scales(kind, extents, directions)[:, None]
 
 
 def _best_centre(region: Region, kind: Kind, extents: Floats, vertices: Floats) -> Floats:

@@ -19,14 +19,12 @@ from ..closure.configurations import Configurations
 from ..closure.engine_contract import Engine
 from ..closure.link_distances import pair_names
 from ..description.mechanism import Mechanism
-from ..engine import engine_of
+from ..engine import engine_of, why_not_measured
 from ..feasibility import feasibility
 from ..ik import solve_ik
 from ..kernels.platform.search_records import Starts
 from ..kernels.rows import POSITION_ERROR
-from ..model import model_of
 from ..options import Options
-from ..platform.tip_engine import measured
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 from .space import Space
@@ -74,7 +72,7 @@ class MapQuestion:
     @property
     def has_margins(self) -> bool:
         """True if closed forms give margins; else points are solved one by one, and only known as reached or not."""
-        return self.hold == "orientation" and not measured(model_of(self.mechanism)).why_poses_do_not_suffice
+        return self.hold == "orientation" and not why_not_measured(self.mechanism)
 
     @property
     def limits(self) -> Limits:

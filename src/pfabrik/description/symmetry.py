@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..description.joints import Joint
-from ..description.structure import Structure
+from .joints import Joint
+from .structure import Structure
 
 EXACT, NEAR = 1e-3, 2e-2
 """Distance up to which a joint counts as a copy, as files give lengths to some digits, and as nearly one [L]."""

@@ -1,7 +1,8 @@
-"""``pfabrik new``: a starting file for a machine of one's own."""
+"""``pfabrik catalog``, ``new``, ``info`` and ``check``: machines and their files."""
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import tomllib
@@ -11,15 +12,29 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from ..catalog import catalog, catalog_file, template, templates, title
-from ..errors import UnknownName
+import pfabrik as pf
+
+from ..catalog import catalog_file, description, template, templates, title
+from ..errors import InvalidMechanism, UnknownName, counted
 from ..printed import aligned
 from .arguments import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
-from .printing import json_option, print_answer
+from .printing import json_option, note, print_answer, print_json, print_result, print_text
 
 ALIASES = {"hexapod": "6-UPS", "five-bar": "5-bar", "servo-hexapod": "6-RUS", "hexaglide": "6-PUS", "tripod": "3-RPS"}
 """Other names of kinds."""
+
+
+@click.command()
+@json_option("One JSON object on stdout.")
+def catalog(as_json: bool) -> int:
+    """List the mechanisms supplied.
+
+    Each file begins with more about its mechanism: whose dimensions it has, what home is, what its joints count.
+    """
+    described = {name: description(name) for name in pf.catalog()}
+    print_answer(as_json, lambda: described, lambda: aligned(("name", "mechanism"), described.items()))
+    return 0
 
 
 def complete_kind(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -81,14 +96,14 @@ def starting_file(kind: str) -> str:
     """The text of a starting file; if only a machine of the catalogue has that name, the error says so."""
     kind = ALIASES.get(kind.lower(), kind)
     name = kind.lower().replace("-", "_")
-    if kind.lower() not in map(str.lower, templates()) and name in catalog():
+    if kind.lower() not in map(str.lower, templates()) and name in pf.catalog():
         raise click.UsageError(f"no KIND '{kind}'; a machine of the catalogue is called so: --from {name}")
     return template(kind)
 
 
 def file_of(machine: str) -> str:
     """The text of a mechanism file: one of the catalogue as it is there, or what a file describes."""
-    if machine in catalog() or not os.path.exists(machine):
+    if machine in pf.catalog() or not os.path.exists(machine):
         return catalog_file(machine).read_text(encoding="utf-8")
     from ..files import dumps
 
@@ -120,3 +135,47 @@ def with_dimensions(text: str, options: Sequence[str]) -> str:
 
     loads(text)
     return text
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@json_option()
+def info(mech: str, as_json: bool) -> int:
+    """Show what a mechanism is made of.
+
+    Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
+    """
+    from ..overview import Overview
+
+    print_result(as_json, Overview(load(mech)))
+    return 0
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@json_option("One JSON object on stdout: faults, or what there is, and notes.")
+def check(mech: str, as_json: bool) -> int:
+    """Check a mechanism file.
+
+    Says "ok", or names every fault, one a line. What is sound but may not be what was meant is noted on stderr.
+    """
+    from ..remarks import remarks_on
+
+    try:
+        mechanism = load(mech)
+    except InvalidMechanism as error:
+        if as_json:
+            print_json({"ok": False, "faults": [dataclasses.asdict(fault) for fault in error.faults]})
+        raise
+    remarks = list(remarks_on(mechanism))
+    name, task = mechanism.name, mechanism.task
+    joints, actuators, chains = len(mechanism.joints), len(mechanism.actuator_names), len(pf.decompose(mechanism))
+    if as_json:
+        counts = {"joints": joints, "actuators": actuators, "sub_chains": chains}
+        print_json({"ok": True, "name": name, **counts, "task": task, "notes": remarks})
+        return 0
+    for remark in remarks:
+        note(remark)
+    parts = f"{counted(joints, 'joint')}, {actuators} actuated, {counted(chains, 'sub-chain')}"
+    print_text(f"ok: {name}: {parts}, task {' '.join(task)}")
+    return 0

@@ -7,19 +7,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-import pfabrik as pf
-
-from ..description.graph import leaves, next_joints, steps_from_base
-from ..description.home_mobility import ends_of_default_axes, universal_axes
-from ..export.rod_lengths import odd_rods, uneven_rods, with_lengths
-from ..motion.fitting_task import has_dependent_coordinates, task_remark
-from .info_report import NOT_COUNTED, counted_mobility, nearly_free, vector
-from .symmetry import crossed_rounds, near_copies
+from .description.graph import leaves, next_joints, steps_from_base
+from .description.home_mobility import ends_of_default_axes, universal_axes
+from .description.mechanism import Joint, Mechanism
+from .description.symmetry import crossed_rounds, near_copies
+from .export.rod_lengths import odd_rods, uneven_rods, with_lengths
+from .motion.fitting_task import has_dependent_coordinates, task_remark
+from .overview import NOT_COUNTED, counted_mobility, nearly_free, vector
 
 FULL_TURN = 2.0 * math.pi
 
 
-def remarks_on(mechanism: pf.Mechanism) -> Iterator[str]:
+def remarks_on(mechanism: Mechanism) -> Iterator[str]:
     """Remarks on what a description's author may not have meant."""
     mobility = counted_mobility(mechanism)
     if mobility is None:
@@ -40,7 +39,7 @@ def remarks_on(mechanism: pf.Mechanism) -> Iterator[str]:
         yield f"no range of an angle is wider than {math.degrees(widest):.3g} degrees; were radians meant?"
 
 
-def axes_notes(mechanism: pf.Mechanism) -> Iterator[str]:
+def axes_notes(mechanism: Mechanism) -> Iterator[str]:
     """Remarks on universal joints whose axes are left out, and do not follow from where the joints beyond them are."""
     steps = steps_from_base(mechanism)
     for joint in mechanism.joints:
@@ -58,7 +57,7 @@ def axes_notes(mechanism: pf.Mechanism) -> Iterator[str]:
             )
 
 
-def rod_notes(mechanism: pf.Mechanism) -> Iterator[str]:
+def rod_notes(mechanism: Mechanism) -> Iterator[str]:
     """Remarks on rods that are not as long as those beside them, or as those of other legs."""
     unit = mechanism.length_unit
     for rods in uneven_rods(mechanism):
@@ -73,7 +72,7 @@ def rod_notes(mechanism: pf.Mechanism) -> Iterator[str]:
         yield f"{name} {with_lengths(odd, unit)}: the {len(like)} others alike are {length} long"
 
 
-def symmetry_notes(mechanism: pf.Mechanism) -> Iterator[str]:
+def symmetry_notes(mechanism: Mechanism) -> Iterator[str]:
     """Remarks on joints that are nearly copies of others, and on numbered ones that go round the other way."""
     for slip in near_copies(mechanism):
         turn = f"a turn of {math.degrees(slip.angle):.6g} deg about {vector(slip.axis)} through {vector(slip.centre)}"
@@ -94,7 +93,7 @@ def quoted(names: Sequence[str]) -> str:
     return ", ".join(f"'{name}'" for name in names)
 
 
-def angular_widths(joint: pf.Joint) -> Iterator[float]:
+def angular_widths(joint: Joint) -> Iterator[float]:
     """The width of each range of an angle, and of a cone from side to side [rad]."""
     if joint.cone is not None:
         yield 2.0 * joint.cone.half_angle

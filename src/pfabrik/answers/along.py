@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.margins import margins
-from ..answers.solution import Solution
 from ..arrays import Floats
 from ..decomposition.elementary_joints import ElementaryJoint
 from ..decomposition.leg_forms import Rod
 from ..description.mechanism import Mechanism
-from ..kinematics import displacements, home_coordinates, model_of
+from ..model import model_of
+from ..motion.displacements import displacements, home_coordinates
+from .margins import margins
+from .solution import Solution
 
 
 class Extremes(NamedTuple):
