@@ -16,10 +16,10 @@ from ..checks import require_ending
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
-from .answers import own_limits, speed_limits, speed_option
 from .arguments import FINITE, MECH, load, note_left_out, projecting
 from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, whole_file
 from .printing import json_option, note, print_json, print_result, print_text
+from .questions import own_limits, speed_limits, speed_option
 
 if TYPE_CHECKING:
     from ..answers.tracked import TrackSummary
