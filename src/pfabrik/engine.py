@@ -1,4 +1,4 @@
-"""The choice of the engine that solves a mechanism, made nowhere else."""
+"""The choice of the engine that solves a mechanism, made nowhere else, and what rooms above need to speak with it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from typing import Literal
 from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .closure.closure_engine import ClosureEngine
-from .closure.engine_contract import Engine
+from .closure.configurations import Configurations as Configurations
+from .closure.engine_contract import Engine as Engine
 from .derived import derived
 from .description.mechanism import Mechanism
+from .kernels.platform.search_records import Starts as Starts
+from .kernels.rows import POSITION_ERROR as POSITION_ERROR
 from .model import Model, model_of
 from .platform.legs_engine import LegsApartByJoints, LegsEngine
 from .platform.links_of_legs import keeps_links

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..batch import joined, take
-from ..kernels.platform.search_records import Starts
+from ..engine import Starts
 from .lines import Lines, lines_between, narrow
 from .measuring import Measure
 from .verdicts import OUTSIDE

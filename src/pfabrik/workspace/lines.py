@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
 from ..batch import put, take
-from ..kernels.platform.search_records import Starts
+from ..engine import Starts
 from ..tolerances import TOLERANCES
 from .measuring import Measure
 

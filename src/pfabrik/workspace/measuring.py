@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..batch import joined, take, take_each
 from ..checks import require_method
-from ..kernels.platform.search_records import Starts
+from ..engine import Starts
 from ..telling import OnProgress
 from .verdicts import MapQuestion
 

@@ -11,19 +11,17 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..answers.active_limits import active_limits
+from ..answers.margins import margins
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats, Ints, Mask
 from ..batch import put, take_each
-from ..closure.configurations import Configurations
-from ..closure.engine_contract import Engine
-from ..closure.link_distances import pair_names
+from ..configuration import configuration
 from ..description.mechanism import Mechanism
-from ..engine import engine_of, why_not_measured
+from ..engine import POSITION_ERROR, Configurations, Engine, Starts, engine_of, why_not_measured
 from ..feasibility import feasibility
 from ..ik import solve_ik
-from ..kernels.platform.search_records import Starts
-from ..kernels.rows import POSITION_ERROR
+from ..motion.displacements import home_coordinates
 from ..options import Options
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
@@ -77,8 +75,14 @@ class MapQuestion:
     @property
     def limits(self) -> Limits:
         """The limits that borders are formed by, in the order of `measure`."""
-        limits = _known_limits(self.mechanism, self.has_margins)
-        return limits + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
+        return self._known_limits + tuple((name, bound) for name in self.space.names for bound in ("min", "max"))
+
+    @cached_property
+    def _known_limits(self) -> Limits:
+        if self.has_margins:
+            return feasibility(self.mechanism, self.mechanism.home_pose).limits
+        home = configuration(self.mechanism, home_coordinates(self.mechanism))
+        return (*margins(home), GEOMETRY)
 
     @property
     def _grower(self) -> Engine:
@@ -144,7 +148,7 @@ class MapQuestion:
 
     def _cut(self, points: Floats, margins: Floats, bindings: Ints) -> tuple[Floats, Ints]:
         """Margins and bindings with the ends of the map as limits too."""
-        n_limits = len(_known_limits(self.mechanism, self.has_margins))
+        n_limits = len(self._known_limits)
         lengths = self.lengths
         for axis, column in enumerate(points.T):
             for side, end in enumerate((self.lowest[axis], self.highest[axis])):
@@ -175,7 +179,7 @@ class MapQuestion:
 
     @property
     def _unknown(self) -> int:
-        return len(_known_limits(self.mechanism, self.has_margins)) - 1
+        return len(self._known_limits) - 1
 
     def name_limits(self, points: Floats, known: Starts) -> Ints:
         """Which of `limits` points (n, d) just beyond the border are beyond, (n,).
@@ -198,20 +202,11 @@ class MapQuestion:
 
     def _active(self, coordinates: Floats) -> Ints:
         """The first limit that each row of joint coordinates is on, by its place in `limits`; that of reach if none."""
-        place = {limit: index for index, limit in enumerate(_known_limits(self.mechanism, self.has_margins))}
+        place = {limit: index for index, limit in enumerate(self._known_limits)}
         held = active_limits(self.mechanism, coordinates)
         return np.array(
             [place[limits[0].joint, limits[0].bound] if limits else self._unknown for limits in held], np.int64
         )
-
-
-def _known_limits(mechanism: Mechanism, has_margins: bool) -> Limits:
-    if has_margins:
-        return feasibility(mechanism, mechanism.home_pose).limits
-    ranges = [(joint.name, bound) for joint in mechanism.joints if joint.range is not None for bound in ("min", "max")]
-    cones = [(joint.name, "cone") for joint in mechanism.joints if joint.cone is not None]
-    pairs = () if mechanism.clearance is None else pair_names(mechanism)
-    return (*ranges, *cones, *((name, "clearance") for name in pairs), GEOMETRY)
 
 
 def tilts_up_to(angle: float) -> Floats:
