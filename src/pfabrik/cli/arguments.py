@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -135,6 +135,17 @@ def joint_coordinates(mechanism: pf.Mechanism, words: str) -> tuple[str, float |
     numbers = zip(map(float, values), kinds, strict=True)
     coordinates = [math.radians(number) if kind == "angle" else number for number, kind in numbers]
     return name, coordinates if len(coordinates) > 1 else coordinates[0]
+
+
+def numbers_of(option: str, words: str, counts: Sequence[int], between: str = ",") -> list[float]:
+    """The numbers of an option such as ``0,0,200``; as many as one of `counts`."""
+    values = words.split(between)
+    if len(values) not in counts or not all(map(is_finite, values)):
+        expected = " or ".join(map(str, counts))
+        raise click.UsageError(
+            f"{option}: found '{words}'; expected {expected} finite numbers with '{between}' between"
+        )
+    return [float(value) for value in values]
 
 
 def comma_separated(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import pfabrik as pf
 
-from ..cells import is_finite
-from .arguments import FINITE, MECH, load
+from .arguments import FINITE, MECH, load, numbers_of
 from .outputs import check_outputs
 from .printing import json_option, print_result
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @click.command()
@@ -80,31 +76,20 @@ def _region(
     """The region that options describe, its angles in degrees."""
     turns: dict[str, Any] = {}
     if rotation is not None:
-        sizes = [math.radians(size) for size in _numbers("--rotation", rotation, (1, 3), ",")]
+        sizes = [math.radians(size) for size in numbers_of("--rotation", rotation, (1, 3))]
         turns["rotation"] = sizes if len(sizes) == 3 else sizes[0]
     if tilt is not None:
         turns["tilt"] = math.radians(tilt)
     if yaw is not None:
-        ends = [math.radians(end) for end in _numbers("--yaw", yaw, (1, 2), ":")]
+        ends = [math.radians(end) for end in numbers_of("--yaw", yaw, (1, 2), ":")]
         turns["yaw"] = [ends[0], ends[-1]]
     if box is not None:
-        sides = [_numbers("--box", side, (1, 2), ":") for side in box.split(",")]
+        sides = [numbers_of("--box", side, (1, 2), ":") for side in box.split(",")]
         if len(sides) != 3:
             raise click.UsageError(f"--box: found '{box}'; expected three ranges or values with commas between")
         return pf.PoseRegion.box([side[0] for side in sides], [side[-1] for side in sides], **turns)
     if cylinder is not None:
-        *centre, radius, height = _numbers("--cylinder", cylinder, (5,), ",")
+        *centre, radius, height = numbers_of("--cylinder", cylinder, (5,))
         return pf.PoseRegion.cylinder(centre, radius, height, **turns)
-    *centre, radius = _numbers("--ball", ball or "", (4,), ",")
+    *centre, radius = numbers_of("--ball", ball or "", (4,))
     return pf.PoseRegion.ball(centre, radius, **turns)
-
-
-def _numbers(option: str, words: str, counts: Sequence[int], between: str) -> list[float]:
-    """The numbers of an option."""
-    values = words.split(between)
-    if len(values) not in counts or not all(map(is_finite, values)):
-        expected = " or ".join(map(str, counts))
-        raise click.UsageError(
-            f"{option}: found '{words}'; expected {expected} finite numbers with '{between}' between"
-        )
-    return [float(value) for value in values]

@@ -15,7 +15,7 @@ from ..cells import is_finite
 from ..checks import require_ending
 from ..extras import require
 from ..view.save_picture import PICTURES
-from .arguments import FINITE, MECH, Triple, load, rpy_option
+from .arguments import FINITE, MECH, Triple, load, numbers_of, rpy_option
 from .outputs import check_outputs, picture
 from .printing import json_option, note, print_result
 
@@ -140,11 +140,7 @@ def in_its_unit(
 
 def point(space: pf.Workspace, words: str) -> list[float]:
     """A point [length or rad] from words such as ``0,0,200``."""
-    values = words.split(",")
-    if len(values) != len(space.names) or not all(map(is_finite, values)):
-        expected = f"{len(space.names)} finite numbers with commas between"
-        raise click.UsageError(f"--centre: found '{words}'; expected {expected}")
-    numbers = zip(map(float, values), space.units, strict=True)
+    numbers = zip(numbers_of("--centre", words, [len(space.names)]), space.units, strict=True)
     return [math.radians(number) if unit == "rad" else number for number, unit in numbers]
 
 
