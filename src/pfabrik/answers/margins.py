@@ -23,7 +23,8 @@ class Margins(Printed, FrozenMapping[tuple[str, str], float | Floats]):
         order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
         rows = [(*limit, plain(least[limit], TOLERANCES.active, ".4g")) for limit in order]
         is_one = all(np.ndim(margin) == 0 for margin in self.values())
-        return ResultTable("Margins", (), ("joint", "bound", "margin" if is_one else "least margin"), rows)
+        lines = [] if rows else ["no limits"]
+        return ResultTable("Margins", lines, ("joint", "bound", "margin" if is_one else "least margin"), rows)
 
 
 def _least(margins: Floats) -> float:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from ..certify.enclosure import Enclosure
+from ..errors import counted
 from ..printed import Printed, ResultTable
 from .border_search import sliced
 from .inscribed import Inscribed, Kind, inscribed
 from .region import Region
 from .saving import save
-from .workspace_table import in_words, workspace_table
+from .workspace_table import LEAST_SHARE, in_words, workspace_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,7 +138,10 @@ class Workspace(Printed, Region):
             remarks.append(f"proved: at least {lower:,.7g} and at most {upper:,.7g} {self.size_unit}")
         if len(self.components) > 1:
             places = {True: "with", False: "apart from"}
-            parts = [f"{places[each is self.at_start]} the start: {in_words(each)}" for each in self.components]
+            large = [each for each in self.components if each.size >= LEAST_SHARE * self.size]
+            parts = [f"{places[each is self.at_start]} the start: {in_words(each)}" for each in large]
+            if small := len(self.components) - len(large):
+                parts.append(f"and {counted(small, 'part')} of less than {LEAST_SHARE:.1%}")
             remarks.append("\n".join(parts))
         elif self.at_start is None:
             remarks.append("the start is not within it")

@@ -26,6 +26,7 @@ from .lattice_points import Numbering, codes
 from .locus import drawn_to_border, locus
 from .parts import connected
 from .result import Workspace
+from .workspace_table import LEAST_SHARE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,9 +35,6 @@ POINTS = 20_000
 """Approximate number of points of a map by default."""
 
 ROWS_A_BLOCK = 512
-
-LEAST_SHARE = 1e-3
-"""Share of the points below which a part is not counted in words: single points at the border are such."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 BORDER = ("border", "formed by", "joint")
 
+LEAST_SHARE = 1e-3
+"""Share of the whole below which parts are not named in words: single points at the border are such."""
+
 MOST_LIMITS = 12
 """Limits that form the border in a table, at most."""
 
