@@ -136,14 +136,15 @@ class Workspace(Printed, Region):
         if self.enclosure is not None:
             lower, upper = self.enclosure.lower, self.enclosure.upper
             remarks.append(f"proved: at least {lower:,.7g} and at most {upper:,.7g} {self.size_unit}")
+        at_start = self.at_start
         if len(self.components) > 1:
-            places = {True: "with", False: "apart from"}
-            large = [each for each in self.components if each.size >= LEAST_SHARE * self.size]
-            parts = [f"{places[each is self.at_start]} the start: {in_words(each)}" for each in large]
+            large = [each for each in self.components if each is at_start or each.size >= LEAST_SHARE * self.size]
+            places = ["with" if each is at_start else "apart from" for each in large]
+            parts = [f"{place} the start: {in_words(each)}" for place, each in zip(places, large, strict=True)]
             if small := len(self.components) - len(large):
                 parts.append(f"and {counted(small, 'part')} of less than {LEAST_SHARE:.1%}")
             remarks.append("\n".join(parts))
-        elif self.at_start is None:
+        elif at_start is None:
             remarks.append("the start is not within it")
         return workspace_table(self, remarks)
 
