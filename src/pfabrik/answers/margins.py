@@ -21,7 +21,7 @@ class Margins(Printed, FrozenMapping[tuple[str, str], float | Floats]):
         """Every limit, the nearest first; of a batch, the least margin of each."""
         least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
         order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
-        rows = [(*limit, plain(least[limit], TOLERANCES.active, ".4g")) for limit in order]
+        rows = [(*limit, plain(least[limit], TOLERANCES.active)) for limit in order]
         is_one = all(np.ndim(margin) == 0 for margin in self.values())
         lines = [] if rows else ["no limits"]
         return ResultTable("Margins", lines, ("joint", "bound", "margin" if is_one else "least margin"), rows)

@@ -68,12 +68,13 @@ class Inscribed(Printed):
     def table(self) -> ResultTable:
         """Centre and extents along each coordinate, angles in degrees."""
         factors, units = for_people(self.units)
-        numbers = zip(self.names, self.centre.tolist(), self.extents.tolist(), factors, units, strict=True)
+        numbers = zip(self.names, units, self.centre.tolist(), self.extents.tolist(), factors, strict=True)
         rows = [
-            (name, f"{middle * factor + 0.0:.6g}", f"{extent * factor:.6g}", unit)
-            for name, middle, extent, factor, unit in numbers
+            (f"{name} [{unit}]", f"{middle * factor + 0.0:.6g}", f"{extent * factor:.6g}")
+            for name, unit, middle, extent, factor in numbers
         ]
-        return ResultTable(f"Largest {self.kind}", (), (f"largest {self.kind}", "centre", "extent", "unit"), rows)
+        title = f"Largest {self.kind}"
+        return ResultTable(title, [f"{title.lower()}, size {self.size:.6g}"], ("coordinate", "centre", "extent"), rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, ready for JSON."""

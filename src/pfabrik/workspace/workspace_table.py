@@ -31,14 +31,15 @@ def workspace_table(region: Region, remarks: Sequence[str]) -> ResultTable:
     """Size, ends, the limits that form the border, and remarks; over two coordinates, a drawing."""
     if not len(region.faces):
         return ResultTable(region.mechanism.name, ["nothing within reach"])
-    factors, units = for_people(region.units)
-    rows = [
-        (name, f"{low * factor:.6g}", f"{high * factor:.6g}", unit)
-        for name, low, high, factor, unit in zip(region.names, *region.bounds.tolist(), factors, units, strict=True)
-    ]
+    lines, ends = [in_words(region)], shown(region, region.bounds).T.tolist()
+    for name, (low, high), unit in zip(region.names, ends, for_people(region.units)[1], strict=True):
+        lines.append(f"{name} from {low:.6g} to {high:.6g} {unit}")
+    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in region.mechanism.joints}
+    rows = [(f"{share:.1%}", limit_name(*limit), kinds.get(limit[0], "")) for limit, share in region.shares.items()]
+    n_more = len(rows) - MOST_LIMITS
+    rows[MOST_LIMITS:] = [("", f"and {n_more} more", "")] if n_more > 0 else []
     drawing = outline(region) if len(region.names) == 2 else ""
-    title, header, border = region.mechanism.name, ("", "min", "max", "unit"), _border_table(region)
-    return ResultTable(title, [in_words(region)], header, rows, remarks, drawing, [border])
+    return ResultTable(region.mechanism.name, lines, BORDER, rows, remarks, drawing)
 
 
 def for_people(units: Sequence[str]) -> tuple[list[float], list[str]]:
@@ -55,15 +56,6 @@ def shown(region: Region, points: Floats) -> Floats:
 def labels(region: Region) -> list[str]:
     """The coordinates with the units that people read."""
     return [f"{name} [{unit}]" for name, unit in zip(region.names, for_people(region.units)[1], strict=True)]
-
-
-def _border_table(region: Region) -> ResultTable:
-    """The limits that form the border, each with its share and the kind of its joint."""
-    kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in region.mechanism.joints}
-    rows = [(f"{share:.1%}", limit_name(*limit), kinds.get(limit[0], "")) for limit, share in region.shares.items()]
-    n_more = len(rows) - MOST_LIMITS
-    more = [("", f"and {n_more} more", "")] if n_more > 0 else []
-    return ResultTable("", (), BORDER, rows[:MOST_LIMITS] + more)
 
 
 def in_words(region: Region, *, degrees: bool = True) -> str:
