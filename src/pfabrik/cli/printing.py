@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import click
@@ -44,12 +44,14 @@ def print_answer(
         print_text(to_text(), to_stderr=to_stderr)
 
 
-def print_result(as_json: bool, result: Result, *, to_stderr: bool = False, **others: Result) -> None:
+def print_result(
+    as_json: bool, result: Result, others: Mapping[str, Result] | None = None, *, to_stderr: bool = False
+) -> None:
     """Print what a result says of itself, and others after it: as JSON, in its object by their names."""
     print_answer(
         as_json,
-        lambda: result.to_dict() | {name: other.to_dict() for name, other in others.items()},
-        lambda: "\n\n".join(str(each.table()) for each in (result, *others.values())),
+        lambda: result.to_dict() | {name: other.to_dict() for name, other in (others or {}).items()},
+        lambda: "\n\n".join(str(each.table()) for each in (result, *(others or {}).values())),
         to_stderr=to_stderr,
     )
 

@@ -100,8 +100,7 @@ def workspace(
     shape = None if largest is None else space.inscribed(largest, middle)
     for path in outputs:
         write(space, path)
-    shapes = {} if shape is None else {"largest": shape}
-    print_result(as_json, space, **shapes)
+    print_result(as_json, space, {} if shape is None else {"largest": shape})
     return 0 if len(space.faces) else 1
 
 

@@ -73,8 +73,9 @@ class Inscribed(Printed):
             (f"{name} [{unit}]", f"{middle * factor + 0.0:.6g}", f"{extent * factor:.6g}")
             for name, unit, middle, extent, factor in numbers
         ]
-        title = f"Largest {self.kind}"
-        return ResultTable(title, [f"{title.lower()}, size {self.size:.6g}"], ("coordinate", "centre", "extent"), rows)
+        size = f", size {self.size:.6g}" if self.size else ""  # a box in a plane of space has none
+        header = ("coordinate", "centre", "extent")
+        return ResultTable(f"Largest {self.kind}", [f"largest {self.kind}{size}"], header, rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, ready for JSON."""

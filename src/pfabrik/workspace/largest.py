@@ -21,7 +21,7 @@ from ..errors import InvalidArgument, PfabrikError
 from ..printed import ResultTable
 from ..telling import OnProgress, telling
 from .ask import workspace
-from .inscribed import LEAST, Inscribed, largest_scale
+from .inscribed import LEAST, Inscribed, Kind, largest_scale
 
 BUDGET, MOST_ATTEMPTS = 50_000, 60
 """Cells that each attempt may look at: near the largest, many more would be needed for little. The most attempts."""
@@ -89,9 +89,9 @@ def largest(
     require_known("shape", [kind], ("box", "cylinder", "ball"))
     step = require_positive("accuracy", accuracy)
     middle, half = _first(checked_mechanism(mechanism), kind, centre, extents, certified)
-    spans: Any = ("x", "y", "z"), (mechanism.length_unit,) * 3
+    names, units = ("x", "y", "z"), (mechanism.length_unit,) * 3
     if certified is False:
-        return Largest(kind, middle, 2.0 * half, *spans, None)
+        return Largest(kind, middle, 2.0 * half, names, units, None)
     certificates: list[Certificate] = []
 
     def is_proved(scale: float, low: float, high: float) -> bool:
@@ -114,7 +114,7 @@ def largest(
     size = 2.0 * scale * half
     size.setflags(write=False)
     best = next(certificate for certificate in reversed(certificates) if certificate)
-    return Largest(kind, middle, size, *spans, best)
+    return Largest(kind, middle, size, names, units, best)
 
 
 def _region(kind: str, middle: Floats, half: Floats, **turns: Any) -> PoseRegion:
@@ -131,7 +131,7 @@ def _attempts_ahead(low: float, high: float, step: float) -> int:
     return math.ceil(math.log2(max(gap, 1.0)))
 
 
-def _first(mechanism: Mechanism, kind: str, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
+def _first(mechanism: Mechanism, kind: Kind, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
     """The centre and the half sizes to begin with, (3,) each."""
     middle = None if centre is None else array("centre", centre, "3")
     shape = None if extents is None else array("extents", extents, "3")

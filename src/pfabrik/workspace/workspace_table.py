@@ -50,7 +50,7 @@ def for_people(units: Sequence[str]) -> tuple[list[float], list[str]]:
 
 def shown(region: Region, points: Floats) -> Floats:
     """Coordinates (..., d) in the units that people read."""
-    return points * np.array(for_people(region.units)[0])
+    return np.asarray(points * np.array(for_people(region.units)[0]))
 
 
 def labels(region: Region) -> list[str]:
