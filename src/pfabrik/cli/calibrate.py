@@ -50,8 +50,6 @@ def calibrate(
     DATA is a CSV file with a column for each actuator and for what was measured: x, y, z, roll, pitch, yaw, height,
     distance and distance_to, other joints. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it.
     """
-    from ..calibration.least_squares import calibrate as calibrated
-
     written = {form: path for form, path in settings.items() if path is not None}
     outputs = [("-o", output), ("--plot", plot), *((f"--{form}", path) for form, path in written.items())]
     check_outputs(outputs, [Path(mech), *([data] if data else [])], as_json=as_json)
@@ -60,7 +58,7 @@ def calibrate(
         if path is not None:
             refuse_existing(path, force)
     mechanism, measurements, names = _given(mech, data, free, sigma)
-    result = calibrated(mechanism, measurements, free=names, ties="copies" if tied else None)
+    result = pf.calibrate(mechanism, measurements, free=names, ties="copies" if tied else None)
     if output is not None:
         from ..files import dumps
 
@@ -71,10 +69,8 @@ def calibrate(
         with whole_file(path) as file:
             file.write(text)
     if plot is not None:
-        from ..calibration.plot_calibration import plot_calibration
-
         with picture(plot):
-            plot_calibration(result)
+            pf.plot_calibration(result)
     print_result(as_json, result)
     if not result.determined.all():
         note("the data leave parameters open: measure other poses or quantities, or free fewer")
@@ -86,9 +82,7 @@ def _given(
 ) -> tuple[pf.Mechanism, pf.Measurements, tuple[str, ...] | None]:
     """The machine, what was measured of it, and what may vary."""
     if data is None and mech.endswith(".cfg"):
-        from ..calibration.printer_settings import read_klipper
-
-        printer = read_klipper(mech)
+        printer = pf.read_klipper(mech)
         if printer.measurements is None:
             raise click.ClickException(f"{mech}: no measurements; run DELTA_CALIBRATE and SAVE_CONFIG first")
         return printer.mechanism, printer.measurements, free or printer.free

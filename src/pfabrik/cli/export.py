@@ -34,9 +34,7 @@ def text_of(
 ) -> str:
     """The text of a mechanism in a format."""
     if form == "mjcf":
-        from ..interop import to_mjcf
-
-        return to_mjcf(mechanism)
+        return pf.interop.to_mjcf(mechanism)
     if form == "linuxcnc":
         from ..export.linuxcnc import linuxcnc
 

@@ -12,7 +12,6 @@ import click
 
 import pfabrik as pf
 
-from ..errors import PfabrikError
 from .arguments import MECH, Finite, comma_separated, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import complain, json_option, note, print_json, print_result
@@ -58,26 +57,23 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
     """
     refuse_existing(output, force)
     check_outputs([("-o", output)], [file])
-    from ..interop import NoEndEffector
-
     try:
         model = imported(file, **choices)
-    except NoEndEffector as error:
+    except pf.interop.NoEndEffector as error:
         if as_json:
             print_json({"choices": [choice_as_object(each, file, choices) for each in error.choices]})
         elif error.choices:
             click.echo(listing(error, file, choices), err=True)
         raise
-    except PfabrikError as error:
+    except pf.errors.PfabrikError as error:
         for remark in getattr(error, "__notes__", []):
             complain(remark)
         raise
     from ..files import dumps
-    from ..interop.notes import Note
     from ..remarks import remarks_on
 
     said = [*map(str, model.notes)]
-    remarks = [Note(remark) for remark in remarks_on(model.mechanism) if not remark.startswith(tuple(said))]
+    remarks = [pf.interop.Note(remark) for remark in remarks_on(model.mechanism) if not remark.startswith(tuple(said))]
     model = dataclasses.replace(model, notes=(*model.notes, *remarks))
     name = "".join(letter for letter in file.name if letter.isprintable())
     text = f"# imported from {name}; to compare: pfabrik verify THIS --original {name}\n\n{dumps(model.mechanism)}"

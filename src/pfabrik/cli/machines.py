@@ -15,7 +15,7 @@ from click.shell_completion import CompletionItem
 import pfabrik as pf
 
 from ..catalog import catalog_file, description, template, templates, title
-from ..errors import InvalidMechanism, UnknownName, counted
+from ..errors import counted
 from ..printed import aligned
 from .arguments import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
@@ -124,7 +124,7 @@ def with_dimensions(text: str, options: Sequence[str]) -> str:
         if dimension not in known:
             options_of_all = ["--from", "--output", "--force", "--list", "--json"]
             of_kind = [f"--{each.replace('_', '-')}" for each in known]
-            raise UnknownName("dimension or option", name, [*of_kind, *options_of_all])
+            raise pf.errors.UnknownName("dimension or option", name, [*of_kind, *options_of_all])
         try:
             value = float(number)
         except ValueError:
@@ -163,7 +163,7 @@ def check(mech: str, as_json: bool) -> int:
 
     try:
         mechanism = load(mech)
-    except InvalidMechanism as error:
+    except pf.errors.InvalidMechanism as error:
         if as_json:
             print_json({"ok": False, "faults": [dataclasses.asdict(fault) for fault in error.faults]})
         raise

@@ -30,7 +30,6 @@ from .printing import complain, json_option, note, print_answer, print_result
 
 if TYPE_CHECKING:
     from ..arrays import Floats
-    from ..modes.lists import Modes
     from ..targets import Target
 
 
@@ -101,7 +100,7 @@ def ik(
     return 0 if solution else 1
 
 
-def print_modes(search: Callable[[], Modes], as_json: bool) -> int:
+def print_modes(search: Callable[[], pf.WorkingModes | pf.AssemblyModes], as_json: bool) -> int:
     """Print all modes that a search finds; the exit code."""
     try:
         modes = search()
