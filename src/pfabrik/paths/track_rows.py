@@ -14,7 +14,7 @@ from ..answers.tracked import Track
 from ..answers.words import short_names
 from ..arrays import Floats
 from ..cells import CsvWriter
-from ..description.readouts import readouts
+from ..kinematics import readouts
 from ..rotations import to_rpy
 from .follow import TrackPart
 from .path import AngleUnit, Path

@@ -18,9 +18,8 @@ from ..certify.provable import require_no_clearance
 from ..checks import require_angle, require_known, require_mapping, require_positive
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..description.task import task_of
 from ..errors import InvalidArgument, UnsupportedMechanism
-from ..model import model_of
+from ..kinematics import model_of, task_of
 from ..poses import SupportsMatrix
 from ..telling import OnProgress, telling
 from .border_search import searched, step_of

@@ -13,11 +13,8 @@ from ..arguments import array
 from ..arrays import Floats
 from ..checks import require_finite, require_known, require_mapping, require_names
 from ..description.mechanism import Mechanism
-from ..description.task import task_of
 from ..errors import InvalidArgument
-from ..motion.displacements import columns, home_coordinates
-from ..motion.mobility import generic_of
-from ..motion.tilt_axis import tilt_axis
+from ..kinematics import columns, generic_of, home_coordinates, task_of, tilt_axis
 from ..poses import SupportsMatrix, is_rotation
 from ..rotations import from_rotvec
 from ..targets import as_targets, carrying_joint

@@ -21,7 +21,7 @@ from ..description.mechanism import Mechanism
 from ..engine import POSITION_ERROR, Configurations, Engine, Starts, engine_of, why_not_measured
 from ..feasibility import feasibility
 from ..ik import solve_ik
-from ..motion.displacements import home_coordinates
+from ..kinematics import home_coordinates
 from ..options import Options
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
