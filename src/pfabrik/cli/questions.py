@@ -113,7 +113,7 @@ def print_modes(search: Callable[[], pf.WorkingModes | pf.AssemblyModes], as_jso
 
 def note_only_tilt(mechanism: pf.Mechanism, target: Target) -> None:
     """Note what does not count of a tilt where the end effector tilts about one axis alone."""
-    from ..motion.tilt_axis import tilt_axis
+    from ..kinematics import tilt_axis
     from ..overview import vector
     from ..poses import as_poses
     from ..targets import as_targets
@@ -177,7 +177,7 @@ def coordinates(mechanism: pf.Mechanism, values: tuple[float, ...]) -> Floats:
     """The values as coordinates (n_a,) [length or rad]; a usage error for too few or too many."""
     import numpy as np
 
-    from ..description.readouts import readouts
+    from ..kinematics import readouts
 
     shown = readouts(mechanism)
     if len(values) != len(shown):
@@ -252,7 +252,7 @@ def speed(mech: str, target: TargetOptions, speeds: tuple[str, ...], as_json: bo
 
 def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "--speed") -> dict[str, float]:
     """Speeds by name [rad/s or length/s] from words such as ``5`` or ``A1=5``; those with a name prevail."""
-    from ..description.readouts import readouts
+    from ..kinematics import readouts
 
     shown = {readout.name: readout for readout in readouts(mechanism)}
     limits: dict[str, float] = {}

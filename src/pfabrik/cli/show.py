@@ -28,7 +28,7 @@ class TorqueMap:
 
     def draw(self, mechanism: pf.Mechanism) -> Any:
         """Draw it; of the passive joints in series, if none are named."""
-        from ..motion.joint_series import passive_series
+        from ..kinematics import passive_series
 
         names = self.joints or passive_series(mechanism)
         if not names:
