@@ -239,8 +239,8 @@ def test_a_workspace_tells_its_size_its_border_and_angles_in_degrees() -> None:
     told = printed_json(slice_)
     assert told["units"] == ["rad"] * 3
     for name, (low, high) in told["bounds"].items():
-        assert [float(number) for number in rows[name][1:3]] == pytest.approx(np.degrees([low, high]), rel=1e-5)
-        assert rows[name][3] == "deg"
+        assert [float(number) for number in rows[name][2:5:2]] == pytest.approx(np.degrees([low, high]), rel=1e-5)
+        assert rows[name][5] == "deg"
     nothing = pfabrik("workspace stewart --fix z=5000")
     assert (nothing.exit_code, nothing.stdout) == (1, "nothing within reach\n")
 
