@@ -65,6 +65,9 @@ axis = [0, 0, 1]
 """
 
 
+LOOSE = '[[joint]]\nname = "D"\ntype = "fixed"\nconnects = ["{}", "{}"]\nat = [1, 1, 1]\n'
+
+
 def faults_of(text: str) -> dict[str, str]:
     """The faults of a text: place to what was found and expected."""
     with pytest.raises(InvalidMechanism) as caught:
@@ -81,140 +84,118 @@ def edited(*edits: tuple[str, str], text: str = TRIPOD) -> str:
     return text
 
 
-class TestReading:
-    @pytest.mark.parametrize("name", catalog())
-    def test_every_catalogue_machine_loads_and_survives_the_round_trip(self, name):
-        machine = load(name)
-        with catalog_file(name).open("rb") as file:
-            assert loads(file.read().decode()) == machine
-        assert loads(dumps(machine)) == machine
-
-    def test_catalogue_names_are_sorted_and_refuse_others(self):
-        assert list(catalog()) == sorted(catalog()) and "stewart" in catalog()
-        with pytest.raises(UnknownName, match="did you mean 'stewart'"):
-            catalog_file("stewrat")
-
-    def test_angles_are_converted_and_lengths_are_not(self):
-        limits = CRANK + "home = 30\nrange = [-90, 180]\n"
-        joint = loads(HEAD + limits).joints[0]
-        assert joint.home == math.radians(30) and joint.range == (math.radians(-90), math.radians(180))
-        units = 'units = { length = "in", angle = "rad" }\n'
-        joint = loads(HEAD + units + CRANK + "home = 1\nrange = [-1, 3]").joints[0]
-        assert joint.home == 1.0 and joint.range == (-1.0, 3.0)
-
-    def test_speeds_are_in_the_unit_of_the_coordinate(self):
-        machine = loads(HEAD + CRANK + "max_speed = 90\nmax_acceleration = 180\n")
-        assert machine.joints[0].max_speed == math.pi / 2 and machine.joints[0].max_acceleration == math.pi
-        assert "max_speed = 90.0" in dumps(machine) and loads(dumps(machine)) == machine
-        struts = loads(edited(("range = [2, 4]", "range = [2, 4]\nmax_speed = 0.5")))
-        assert [struts.joint(f"B{leg}").max_speed for leg in (1, 2, 3)] == [0.5] * 3
-        assert loads(dumps(struts)) == struts
-
-    def test_only_the_first_coordinate_of_a_cylindrical_joint_is_an_angle(self):
-        text = edited(("revolute", "cylindrical"), ("actuated = true\n", ""), text=CRANK)
-        text += "home = [90, 5]\nrange = [[0, 180], [4, 6]]\n"
-        text += edited(('"A"', '"B"'), text=CRANK)
-        joint = loads(HEAD + text).joints[0]
-        assert joint.home == (math.pi / 2, 5.0) and joint.range == ((0.0, math.pi), (4.0, 6.0))
-
-    @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-    def test_either_coordinate_of_a_cylindrical_joint_is_driven_and_its_speed_is_in_its_own_unit(self):
-        said = {"true": "[90, 5]", "[true, true]": "[90, 5]", "[true, false]": "90", "[false, true]": "5"}
-        names = {"true": ("A[0]", "A[1]"), "[true, false]": ("A[0]",), "[false, true]": ("A[1]",)}
-        speeds = {"true": (math.pi / 2, 5.0), "[true, false]": math.pi / 2, "[false, true]": 5.0}
-        for driven, speed in said.items():
-            text = edited(("revolute", "cylindrical"), ("actuated = true\n", f"actuated = {driven}\n"), text=CRANK)
-            machine = loads(HEAD + text + f"max_speed = {speed}\n")
-            driven = driven.replace("[true, true]", "true")
-            assert machine.actuator_names == names[driven] and machine.joints[0].max_speed == speeds[driven]
-            assert loads(dumps(machine)) == machine and f"actuated = {driven}\n" in dumps(machine)
-
-    def test_universal_ranges_are_angles(self):
-        limits = "axes = [[0, 1, 0], [1, 0, 0]]\nrange = [[-90, 90], [-45, 45]]\n"
-        with pytest.warns(MobilityWarning):
-            machine = loads(edited(("revolute", "universal"), ("axis = [0, 1, 0]\n", limits)))
-        assert machine.joint("A1").range == ((-math.pi / 2, math.pi / 2), (-math.pi / 4, math.pi / 4))
-
-    def test_byte_order_mark_and_windows_line_ends_are_accepted(self, tmp_path):
-        path = tmp_path / "m.toml"
-        path.write_bytes(b"\xef\xbb\xbf" + TRIPOD.replace("\n", "\r\n").encode())
-        assert load(path) == load(str(path)) == loads(TRIPOD)
-
-    def test_missing_actuators_warn_with_the_numbers(self):
-        with pytest.warns(MobilityWarning, match="2 actuators leave the end effector 1 freedom"):
-            text = dumps(loads(TRIPOD)).replace("actuated = true\n", "", 1)
-            loads(text)
+@pytest.mark.parametrize("name", catalog())
+def test_every_catalogue_machine_loads_and_survives_the_round_trip(name: str) -> None:
+    machine = load(name)
+    assert loads(catalog_file(name).read_bytes().decode()) == machine
+    assert loads(dumps(machine)) == machine
 
 
-class TestCopies:
-    def test_copies_are_numbered_and_the_base_and_end_effector_are_not(self):
-        machine = loads(TRIPOD)
-        assert [joint.name for joint in machine.joints] == [f"{name}{n}" for name in "ABC" for n in range(1, 4)]
-        assert machine.joint("A2").connects == ("base", "cylinder2")
-        assert machine.joint("B3").along == ("A3", "C3")
-        assert machine.joint("C2").connects == ("rod2", "platform")
-        assert machine.joint("C3").cone.fixed_to == "platform"
+def test_catalogue_names_are_sorted_and_refuse_others() -> None:
+    assert list(catalog()) == sorted(catalog()) and "stewart" in catalog()
+    with pytest.raises(UnknownName, match="did you mean 'stewart'"):
+        catalog_file("stewrat")
 
-    def test_cone_of_a_copy_turns_and_follows_its_copied_body(self):
-        text = edited(
-            ('["rod", "platform"]', '["rod", "rider"]'),
-            ("axis = [0, 0, -1]", "axis = [1, 0, 3]"),
-            ('fixed_to = "platform"', 'fixed_to = "rod"'),
-        )
-        text += edited(("base", "rider"), ("[0, 0, 0]", "[1, 0, 6]"), ('"A"', '"D"'), text=CRANK)
-        cone = loads(text + "copies = { count = 3, axis = [0, 0, 1] }\n").joint("C2").cone
-        assert cone.fixed_to == "rod2"
-        assert cone.axis == pytest.approx(np.array([-0.5, math.sqrt(0.75), 3]) / math.sqrt(10), abs=1e-15)
 
-    def test_first_copy_is_the_original_to_the_last_bit(self):
-        text = edited(("[2, 0, 0]", "[0.1, 0.7, 0.3]"), ("[0, 0, 1] }\n", "[1, 2, 3] }\n"))
-        assert loads(text).joint("A1").at == (0.1, 0.7, 0.3)
+CYLINDER = edited(("revolute", "cylindrical"), ("actuated = true\n", ""), text=CRANK)
+DRIVEN = edited(("revolute", "cylindrical"), ("= true", "= {}"), text=CRANK)
+RAD = 'units = { length = "in", angle = "rad" }\n'
+RIGHT = math.pi / 2
 
-    def test_copies_are_turned_right_handed_about_the_axis(self):
-        machine = loads(TRIPOD)
-        assert machine.joint("A2").at == pytest.approx((-1, math.sqrt(3), 0), abs=1e-15)
-        assert machine.joint("A2").axis == pytest.approx((-math.sqrt(0.75), -0.5, 0), abs=1e-15)
 
-    def test_turns_are_exact_where_sines_are(self):
-        assert [cos_sin(step, 4) for step in range(4)] == [(1, 0), (0, 1), (-1, 0), (0, -1)]
-        assert [cos_sin(step, 3)[0] for step in range(3)] == [1.0, -0.5, -0.5]
-        assert [cos_sin(step, 12)[1] for step in (1, 5, 7, 11)] == [0.5, 0.5, -0.5, -0.5]
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (CRANK + "home = 30\nrange = [-90, 180]\n", {"home": math.radians(30), "range": (-RIGHT, math.pi)}),
+        (RAD + CRANK + "home = 1\nrange = [-1, 3]\n", {"home": 1.0, "range": (-1.0, 3.0)}),
+        (CRANK + "max_speed = 90\nmax_acceleration = 180\n", {"max_speed": RIGHT, "max_acceleration": math.pi}),
+        (
+            CYLINDER + "home = [90, 5]\nrange = [[0, 180], [4, 6]]\n" + CRANK.replace('"A"', '"B"'),
+            {"home": (RIGHT, 5.0), "range": ((0.0, math.pi), (4.0, 6.0))},
+        ),
+        (DRIVEN.format("true") + "max_speed = [90, 5]\n", {"actuated": True, "max_speed": (RIGHT, 5.0)}),
+        (DRIVEN.format("[true, true]") + "max_speed = [90, 5]\n", {"actuated": True, "max_speed": (RIGHT, 5.0)}),
+        (DRIVEN.format("[true, false]") + "max_speed = 90\n", {"actuated": (True, False), "max_speed": RIGHT}),
+        (DRIVEN.format("[false, true]") + "max_speed = 5\n", {"actuated": (False, True), "max_speed": 5.0}),
+    ],
+)
+def test_angles_are_converted_lengths_are_not_and_both_are_written_back(text: str, expected: dict) -> None:
+    """Of a cylindrical joint the first coordinate is an angle, the second a length: its limits and its speeds."""
+    machine = loads(HEAD + text)
+    assert {name: getattr(machine.joints[0], name) for name in expected} == expected
+    assert loads(dumps(machine)) == machine
 
-    def test_different_numbers_of_copies_of_one_body_are_a_fault(self):
-        faults = faults_of(edited(("count = 3", "count = 5")))
-        assert "3, but 'cylinder' has 5 copies at joint 'A' -> 5" in faults["joint[1].copies.count"]
 
-    def test_joint_without_copies_must_say_which_copy_it_means(self):
-        loose = '[[joint]]\nname = "D"\ntype = "fixed"\nconnects = ["cylinder{}", "base"]\nat = [1, 1, 1]\n'
-        assert "did you mean 'cylinder1'?" in faults_of(TRIPOD + loose.format(""))["joint[3].connects"]
-        assert loads(TRIPOD + loose.format("1")).joint("D").connects == ("cylinder1", "base")
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_limits_and_speeds_of_copies_are_those_of_the_first() -> None:
+    limits = "axes = [[0, 1, 0], [1, 0, 0]]\nrange = [[-90, 90], [-45, 45]]\n"
+    machine = loads(
+        edited(("revolute", "universal"), ("axis = [0, 1, 0]\n", limits), ("[2, 4]", "[2, 4]\nmax_speed = 0.5"))
+    )
+    assert machine.joint("A1").range == ((-RIGHT, RIGHT), (-RIGHT / 2, RIGHT / 2))
+    assert [machine.joint(f"B{leg}").max_speed for leg in (1, 2, 3)] == [0.5] * 3
 
-    def test_most_copies_and_joints_are_accepted_and_no_more(self):
-        strut = TRIPOD.replace("count = 3", f"count = {MOST_COPIES}")
-        assert len(loads(strut).joints) == 3 * MOST_COPIES
-        assert (
-            "from 1 to 100"
-            in faults_of(TRIPOD.replace("count = 3", f"count = {MOST_COPIES + 1}"))["joint[0].copies.count"]
-        )
-        many = "".join(
-            f'[[joint]]\nname = "{name}"\ntype = "spherical"\nconnects = ["base", "platform"]\nat = [1, 2, 3]\n'
-            f"copies = {{ count = {MOST_COPIES}, axis = [0, 0, 1] }}\n"
-            for name in "DEFGHIJ"
-        )
-        assert len(loads(strut + many).joints) == MOST_JOINTS
-        assert f"at most {MOST_JOINTS}" in faults_of(strut + many + CRANK.replace('"A"', '"K"'))["joint"]
 
-    def test_zero_axis_of_copies_is_a_fault(self):
-        assert "not zero" in faults_of(edited(("[0, 0, 1] }\n\n", "[0, 0, 0] }\n\n")))["joint[0].copies.axis"]
+def test_byte_order_mark_and_windows_line_ends_are_accepted(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + TRIPOD.replace("\n", "\r\n").encode())
+    assert load(path) == load(str(path)) == loads(TRIPOD)
+
+
+def test_copies_are_numbered_and_the_base_and_end_effector_are_not() -> None:
+    machine = loads(TRIPOD)
+    assert [joint.name for joint in machine.joints] == [f"{name}{n}" for name in "ABC" for n in range(1, 4)]
+    assert machine.joint("A2").connects == ("base", "cylinder2")
+    assert machine.joint("B3").along == ("A3", "C3")
+    assert machine.joint("C2").connects == ("rod2", "platform")
+    assert machine.joint("C3").cone.fixed_to == "platform"
+
+
+def test_copies_are_turned_right_handed_about_the_axis_exactly_where_sines_are() -> None:
+    machine = loads(TRIPOD)
+    assert machine.joint("A2").at == pytest.approx((-1, math.sqrt(3), 0), abs=1e-15)
+    assert machine.joint("A2").axis == pytest.approx((-math.sqrt(0.75), -0.5, 0), abs=1e-15)
+    text = edited(("[2, 0, 0]", "[0.1, 0.7, 0.3]"), ("[0, 0, 1] }\n", "[1, 2, 3] }\n"))
+    assert loads(text).joint("A1").at == (0.1, 0.7, 0.3)  # the first is the original to the last bit
+    assert [cos_sin(step, 4) for step in range(4)] == [(1, 0), (0, 1), (-1, 0), (0, -1)]
+    assert [cos_sin(step, 3)[0] for step in range(3)] == [1.0, -0.5, -0.5]
+    assert [cos_sin(step, 12)[1] for step in (1, 5, 7, 11)] == [0.5, 0.5, -0.5, -0.5]
+
+
+def test_the_cone_of_a_copy_turns_and_follows_its_copied_body() -> None:
+    text = edited(
+        ('["rod", "platform"]', '["rod", "rider"]'),
+        ("axis = [0, 0, -1]", "axis = [1, 0, 3]"),
+        ('fixed_to = "platform"', 'fixed_to = "rod"'),
+    )
+    text += edited(("base", "rider"), ("[0, 0, 0]", "[1, 0, 6]"), ('"A"', '"D"'), text=CRANK)
+    cone = loads(text + "copies = { count = 3, axis = [0, 0, 1] }\n").joint("C2").cone
+    assert cone.fixed_to == "rod2"
+    assert cone.axis == pytest.approx(np.array([-0.5, math.sqrt(0.75), 3]) / math.sqrt(10), abs=1e-15)
+
+
+def test_a_joint_without_copies_says_which_copy_it_means() -> None:
+    assert loads(TRIPOD + LOOSE.format("cylinder1", "base")).joint("D").connects == ("cylinder1", "base")
+
+
+def test_most_copies_and_joints_are_accepted_and_no_more() -> None:
+    strut = TRIPOD.replace("count = 3", f"count = {MOST_COPIES}")
+    assert len(loads(strut).joints) == 3 * MOST_COPIES
+    many = "".join(
+        LOOSE.replace('"D"', f'"{name}"').format("base", "platform").replace("fixed", "spherical")
+        + f"copies = {{ count = {MOST_COPIES}, axis = [0, 0, 1] }}\n"
+        for name in "DEFGHIJ"
+    )
+    assert len(loads(strut + many).joints) == MOST_JOINTS
+    assert f"at most {MOST_JOINTS}" in faults_of(strut + many + CRANK.replace('"A"', '"K"'))["joint"]
 
 
 HOSTILE = [
     ("", "schema", "nothing -> 1"),
     ("schema = 2", "schema", "2 -> 1"),
-    ("schema = true", "schema", "True -> 1"),
     ("schema = ", "file", "no TOML: Invalid value (at end of document)"),
     ("a = 1\nb == 2", "file", "line 2, column 4"),
-    ("a = 1\na = 2\n", "file", "line 2"),
     ("x = " + "[" * 100_000, "file", "nested too deeply"),
     (".".join("a" * (MOST_DOTS + 2)) + " = 1", "file", "nested too deeply"),
     ("x = " + "9" * 10_000, "file", "no TOML"),
@@ -222,7 +203,6 @@ HOSTILE = [
     ("#" * (LARGEST_FILE + 1), "file", f"at most {LARGEST_FILE}"),
     (HEAD + "joint = 5", "joint", "5 -> [[joint]] tables"),
     (HEAD + "[joint]\nname = 'A'", "joint", "-> [[joint]] tables"),
-    (HEAD + "joint = [7]", "joint[0]", "7 -> a [[joint]] table"),
     (HEAD, "joint", "no joints"),
     (HEAD + "legs = 1", "legs", "did you mean 'leg'?"),
     (HEAD + "task = 'x'", "task", "'x' -> some of x, y, z"),
@@ -233,135 +213,115 @@ HOSTILE = [
     ("[[joint]]\n" * (MOST_JOINTS + 1), "joint", f"{MOST_JOINTS + 1} joints -> at most {MOST_JOINTS}"),
     (HEAD + CRANK + "at = 5\n", "file", "(at line "),
     (HEAD + CRANK.replace("[0, 0, 0]", '"0"'), "joint[0].at", "'0' -> three numbers"),
-    (HEAD + CRANK.replace("[0, 0, 0]", '["0", 0, 0]'), "joint[0].at", "['0', 0, 0] -> three numbers"),
-    (HEAD + CRANK.replace("[0, 0, 0]", "[true, 0, 0]"), "joint[0].at", "[True, 0, 0] -> three numbers"),
     (HEAD + CRANK.replace("[0, 0, 0]", "[nan, 0, 0]"), "joint[0].at", "finite"),
-    (HEAD + CRANK.replace("[0, 0, 0]", "[1e400, 0, 0]"), "joint[0].at", "finite"),
-    (HEAD + CRANK.replace("[0, 0, 0]", f"[{'9' * 400}, 0, 0]"), "joint[0].at", "three numbers"),
-    (HEAD + CRANK.replace("[0, 0, 0]", "{ x = 1 }"), "joint[0].at", "{'x': 1} -> three numbers"),
-    (HEAD + CRANK.replace("= true", "= 1"), "joint[0].actuated", "1 -> true or false"),
     (HEAD + CRANK.replace("actuated", "acutated"), "joint[0].acutated", "did you mean 'actuated'?"),
     (HEAD + CRANK + "task = ['x']\n", "joint[0].task", "it is one of the file, above its first table"),
     (HEAD + "[[leg]]\nchain = 'U-P*-S'\ntask = ['x']\n", "leg[0].task", "it is one of the file"),
     (HEAD + "[units]\ntask = ['x']\n" + CRANK, "units.task", "it is one of the file"),
     (HEAD + CRANK.replace('"A"', "2020-01-01"), "joint[0].name", "a text"),
-    (HEAD + CRANK.replace('"revolute"', "[]"), "joint[0].type", "[] -> one of revolute, prismatic"),
-    (HEAD + CRANK + "home = { a = 1 }", "joint[0].home", "a number"),
-    (HEAD + CRANK + "range = { a = 1 }", "joint[0].range", "two numbers"),
-    (HEAD + CRANK + "range = [[1, 2], 3]", "joint[0].range", "two numbers"),
     (HEAD + CRANK + "range = [90, 45]", "joint[0].range", "(90 deg) to "),
     (HEAD + CRANK + "cone = 5", "joint[0].cone", "a table"),
     (HEAD + CRANK + "copies = {}", "joint[0].copies.count", "nothing -> a whole number"),
     (HEAD + CRANK + "copies = { count = 2.5, axis = [0, 0, 1] }", "joint[0].copies.count", "2.5 -> a whole number"),
     (HEAD + CRANK + "copies = { count = 0, axis = [0, 0, 1] }", "joint[0].copies.count", "0 -> a whole number"),
-    (HEAD + CRANK.replace('["base", "platform"]', '["base"]'), "joint[0].connects", "['base'] -> the names of two"),
     (edited(("half_angle", "half_agle")), "joint[2].cone.half_agle", "did you mean 'half_angle'?"),
-    (edited(("half_angle = 60", 'half_angle = "60"')), "joint[2].cone.half_angle", "'60' -> a number"),
     (edited(("half_angle = 60", "half_angle = 6")), "joint[2].cone.half_angle", "(6 deg) -> at least the angle"),
-    (edited(("half_angle = 60", "half_angle = 181")), "joint[2].cone.half_angle", "at most half a turn"),
     (edited(('end_effector = "platform"', 'end_effector = "platfrom"')), "end_effector", "did you mean 'platform'?"),
     (HEAD.replace('"m"', '"m"\nbase = "bse"') + CRANK, "base", "did you mean 'base'?"),
-    (edited(('["A", "C"]', '["A", "Cc"]')), "joint[1].along", "'Cc': no such joint"),
     (edited(('["rod", ', '["rood", ')), "joint[2].connects", "'rood', which no other joint connects; did you mean "),
+    (edited(("count = 3", "count = 5")), "joint[1].copies.count", "3, but 'cylinder' has 5 copies at joint 'A' -> 5"),
+    (edited(("count = 3", f"count = {MOST_COPIES + 1}")), "joint[0].copies.count", "from 1 to 100"),
+    (edited(("[0, 0, 1] }\n\n", "[0, 0, 0] }\n\n")), "joint[0].copies.axis", "not zero"),
+    (TRIPOD + LOOSE.format("cylinder", "base"), "joint[3].connects", "did you mean 'cylinder1'?"),
+    (TRIPOD + LOOSE.format("cylinder1", "platfrom"), "joint[3].connects",
+     "'platfrom', which no other joint connects; did you mean 'platform'?"),
 ]  # fmt: skip
+"""A text, the place of its fault, and what is said there of what was found and expected."""
+
+ALONE = [
+    (edited(("range = [2, 4]", "range = [3.5, 4]")), ["joint[1].range"]),  # of three copies
+    (edited(('end_effector = "platform"', 'end_effector = "platfrom"')), ["end_effector"]),
+    (edited(('end_effector = "platform"\n', ""), ("[2, 4]", "[4, 2]")), ["end_effector", "joint[1].range"]),
+    (edited(('name = "m"', 'nmae = "m"'), ("at = [2, 0, 0]", 'at = [2, 0, "0"]'), ("[2, 4]", "[4, 2]\nrnage = 1"),
+            ('"C"\ntype = "spherical"', '"C"\ntype = "spherica"')),
+     ["nmae", "name", "joint[0].at", "joint[1].range", "joint[1].rnage", "joint[2].type"]),
+]  # fmt: skip
+"""A text, and the places of all its faults: those of the schema and of the meaning, once each, in order."""
 
 
-class TestFaults:
-    @pytest.mark.parametrize(("text", "place", "fault"), HOSTILE, ids=range(len(HOSTILE)))
-    def test_hostile_text_is_refused_with_a_fault_at_its_place(self, text, place, fault):
-        assert fault in faults_of(text)[place]
+@pytest.mark.parametrize(("text", "place", "fault"), HOSTILE, ids=range(len(HOSTILE)))
+def test_hostile_text_is_refused_with_a_fault_at_its_place(text: str, place: str, fault: str) -> None:
+    assert fault in faults_of(text)[place]
 
-    def test_one_mistake_in_a_copied_joint_is_reported_once(self):
-        assert list(faults_of(edited(("range = [2, 4]", "range = [3.5, 4]")))) == ["joint[1].range"]
 
-    def test_copied_joint_is_named_in_the_words_of_the_file(self):
-        assert "'rood', which no" in faults_of(edited(('["rod", ', '["rood", ')))["joint[2].connects"]
+@pytest.mark.parametrize(("text", "places"), ALONE)
+def test_faults_come_in_one_go_in_order_without_what_follows_from_them(text: str, places: list[str]) -> None:
+    assert list(faults_of(text)) == places
 
-    def test_misspelt_end_effector_is_not_taken_for_a_copied_body(self):
-        faults = faults_of(edited(('end_effector = "platform"', 'end_effector = "platfrom"')))
-        assert list(faults) == ["end_effector"]
-        other = '[[joint]]\nname = "D"\ntype = "spherical"\nconnects = ["cylinder1", "platfrom"]\nat = [1, 1, 1]\n'
-        found = "'platfrom', which no other joint connects; did you mean 'platform'?"
-        assert found in faults_of(TRIPOD + other)["joint[3].connects"]
 
-    def test_faults_of_schema_and_of_meaning_come_in_one_go_and_in_order(self):
-        text = edited(
-            ('name = "m"', 'nmae = "m"'),
-            ("at = [2, 0, 0]", 'at = [2, 0, "0"]'),
-            ("range = [2, 4]", "range = [4, 2]"),
-            ("range = [4, 2]", "range = [4, 2]\nrnage = 1"),
-            ('name = "C"\ntype = "spherical"', 'name = "C"\ntype = "spherica"'),
-        )
-        faults = faults_of(text)
-        assert list(faults) == [
-            "nmae", "name", "joint[0].at", "joint[1].range", "joint[1].rnage", "joint[2].type",
-        ]  # fmt: skip
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_no_edit_of_a_file_escapes_as_another_error(data: st.DataObject) -> None:
+    text = TRIPOD
+    for _ in range(data.draw(st.integers(1, 3))):
+        old = data.draw(st.sampled_from(re.findall(r'\[[^\[\]]*\]|"[^"]*"|(?<= )\d+|true|\w+ =', text)))
+        new = data.draw(st.sampled_from(['"base"', '"rod"', "[0, 0]", "[]", "{}", "-1e300", "nan", "0", "x ="]))
+        text = text.replace(old, new, data.draw(st.integers(1, 3)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MobilityWarning)
+        try:
+            assert loads(dumps(loads(text))) == loads(text)
+        except InvalidMechanism as error:
+            assert error.faults
 
-    def test_missing_end_effector_leaves_only_faults_that_do_not_follow_from_it(self):
-        faults = faults_of(edited(('end_effector = "platform"\n', ""), ("range = [2, 4]", "range = [4, 2]")))
-        assert list(faults) == ["end_effector", "joint[1].range"]
 
-    @given(st.data())
-    @settings(max_examples=200, deadline=None)
-    def test_no_edit_of_a_file_escapes_as_another_error(self, data):
-        text = TRIPOD
-        for _ in range(data.draw(st.integers(1, 3))):
-            old = data.draw(st.sampled_from(re.findall(r'\[[^\[\]]*\]|"[^"]*"|(?<= )\d+|true|\w+ =', text)))
-            new = data.draw(st.sampled_from(['"base"', '"rod"', "[0, 0]", "[]", "{}", "-1e300", "nan", "0", "x ="]))
-            text = text.replace(old, new, data.draw(st.integers(1, 3)))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MobilityWarning)
-            try:
-                assert loads(dumps(loads(text))) == loads(text)
-            except InvalidMechanism as error:
-                assert error.faults
+def test_unknown_keys_beyond_number_are_counted() -> None:
+    faults = faults_of(HEAD + CRANK + "".join(f"k{number} = 1\n" for number in range(1000)))
+    assert len(faults) == MOST_FAULTS + 1
+    assert f"{1000 - MOST_FAULTS} more faults" in faults["joint[0]"]
 
-    def test_unknown_keys_beyond_number_are_counted(self):
-        text = HEAD + CRANK + "".join(f"k{number} = 1\n" for number in range(1000))
-        faults = faults_of(text)
-        assert len(faults) == MOST_FAULTS + 1
-        assert f"{1000 - MOST_FAULTS} more faults" in faults["joint[0]"]
 
-    def test_wrong_calls_are_refused(self):
-        with pytest.raises(InvalidArgument, match="source"):
-            load(5)
-        with pytest.raises(InvalidArgument, match="text"):
-            loads(None)
+@pytest.mark.parametrize("name", ["stewrat", "no/such/file.toml", "", "a\0b", "x" * 5000, Path("stewart"), 5])
+def test_neither_file_nor_catalogue_name_is_refused(
+    name: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    error = {"": InvalidMechanism, 5: InvalidArgument}.get(name, UnknownName)
+    with pytest.raises(error, match="source" if name == 5 else "mechanism file"):
+        load(name)
+    with pytest.raises(InvalidArgument, match="text"):
+        loads(None)
 
-    @pytest.mark.parametrize("name", ["stewrat", "no/such/file.toml", "", "a\0b", "x" * 5000, Path("stewart")])
-    def test_neither_file_nor_catalogue_name_is_refused(self, name, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        expected = InvalidMechanism if name == "" else UnknownName
-        with pytest.raises(expected, match="mechanism file"):
-            load(name)
 
-    @pytest.mark.parametrize(("content", "fault"), [
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
         (b"\xff\xfe", "no UTF-8 text at byte 0"),
         (b"name = '\xe9'", "no UTF-8 text at byte 8"),
         (b"\x7fELF\x00\x01", "no TOML"),
         (b"#" * 10_000_000, "more than 1000000 bytes"),
-    ])  # fmt: skip
-    def test_files_that_are_no_text_or_too_large_are_refused(self, tmp_path, content, fault):
-        path = tmp_path / "m.toml"
-        path.write_bytes(content)
-        with pytest.raises(InvalidMechanism, match=fault) as caught:
-            load(path)
-        assert caught.value.source == str(path) and len(caught.value.faults) == 1
+        (None, "a directory or device"),
+    ],
+)
+def test_files_that_are_no_text_or_too_large_are_refused(tmp_path: Path, content: bytes | None, fault: str) -> None:
+    path = tmp_path / "m.toml"
+    path.mkdir() if content is None else path.write_bytes(content)
+    with pytest.raises(InvalidMechanism, match=fault) as caught:
+        load(path)
+    assert caught.value.source == str(path) and len(caught.value.faults) == 1
+    with pytest.raises(InvalidMechanism, match="a directory or device"):
+        load(os.devnull)
 
-    def test_directories_devices_and_unreadable_files_are_refused(self, tmp_path, monkeypatch):
-        with pytest.raises(InvalidMechanism, match="a directory or device"):
-            load(tmp_path)
-        with pytest.raises(InvalidMechanism, match="a directory or device"):
-            load(os.devnull)
-        path = tmp_path / "m.toml"
-        path.write_text(TRIPOD)
 
-        def refuse(*_: object) -> None:
-            raise PermissionError(13, "Permission denied")
+def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr(Path, "open", refuse)
-        with pytest.raises(InvalidMechanism, match="cannot be read \\(Permission denied\\)"):
-            load(path)
+    path = tmp_path / "m.toml"
+    path.write_text(TRIPOD)
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(InvalidMechanism, match="cannot be read \\(Permission denied\\)"):
+        load(path)
 
 
 names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8).filter(str.strip)
@@ -371,7 +331,7 @@ vectors = st.tuples(numbers, numbers, numbers)
 directions = vectors.filter(lambda vector: max(map(abs, vector)) > 1e-3)
 
 
-DRIVEN: list[dict[str, object]] = [
+DRIVES: list[dict[str, object]] = [
     {}, {"actuated": True}, {"actuated": (True, False)}, {"actuated": (False, True), "max_acceleration": 3.5},
     {"actuated": (True, False), "max_speed": 1.25}, {"actuated": True, "max_speed": (0.3, 70)},
 ]  # fmt: skip
@@ -392,7 +352,7 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
         Joint(labels[0], "revolute", links[0], centres[0], axis=axis, actuated=True, home=turn, range=around,
               max_speed=draw(st.one_of(st.none(), st.floats(0.1, 9)))),
         Joint(labels[1], "cylindrical", links[1], centres[1], axis=axis, home=(turn, shift), range=(around, across),
-              **draw(st.sampled_from(DRIVEN))),
+              **draw(st.sampled_from(DRIVES))),
         Joint(labels[2], "universal", links[2], centres[2], axes=(np.eye(3)[np.abs(axis).argmin()], axis),
               home=(turn, turn), range=(around, around)),
         Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(toward_next, half_angle, bodies[3])),
@@ -404,51 +364,42 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
     return Mechanism(draw(names), joints, bodies[3], draw(vectors), bodies[0], draw(names), unit)
 
 
-class TestWriting:
-    @given(st.data())
-    @settings(max_examples=100, deadline=None)
-    def test_what_is_saved_is_what_is_loaded(self, data):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MobilityWarning)
-            machine = data.draw(mechanisms())
-            again = loads(dumps(machine))
-        assert again == machine and hash(again) == hash(machine)
+@given(st.data())
+@settings(max_examples=30, deadline=None)
+def test_what_is_saved_is_what_is_loaded(data: st.DataObject) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MobilityWarning)
+        machine = data.draw(mechanisms())
+        again = loads(dumps(machine))
+    assert again == machine and hash(again) == hash(machine)
 
-    def test_end_effector_joint_survives_the_round_trip(self):
-        machine = load("five_bar")
-        assert "reference_point" not in dumps(machine)
-        assert loads(dumps(machine)) == machine
 
-    def test_angles_are_written_in_round_degrees_where_these_are_exact(self):
-        text = dumps(loads(TRIPOD))
-        assert 'angle = "deg"' in text and "half_angle = 60.0" in text
+def test_numbers_are_written_as_a_person_would_where_these_are_exact() -> None:
+    text = dumps(loads(TRIPOD))
+    assert 'angle = "deg"' in text and "half_angle = 60.0" in text
+    assert "max_speed = 90.0" in dumps(loads(HEAD + CRANK + "max_speed = 90\n"))
+    assert "reference_point" not in dumps(load("five_bar"))  # its end effector is a joint
+    angle = next(angle for angle in np.linspace(0.5, 1, 1000).tolist() if exact_degrees(angle) is None)
+    machine = loads(HEAD + CRANK).with_limits(A=(-angle, angle))
+    assert 'angle = "rad"' in dumps(machine) and repr(angle) in dumps(machine)
+    assert loads(dumps(machine)) == machine
 
-    def test_angle_without_exact_degrees_is_written_in_radians(self):
-        angle = next(angle for angle in np.linspace(0.5, 1, 1000).tolist() if exact_degrees(angle) is None)
-        machine = loads(HEAD + CRANK).with_limits(A=(-angle, angle))
-        text = dumps(machine)
-        assert 'angle = "rad"' in text and repr(angle) in text
-        assert loads(text) == machine
 
-    def test_save_replaces_the_file_as_a_whole_and_leaves_nothing_behind(self, tmp_path):
-        path = tmp_path / "m.toml"
-        path.write_text("old")
-        path.chmod(0o640)
-        save(loads(TRIPOD), path)
-        assert load(path) == loads(TRIPOD)
-        assert os.listdir(tmp_path) == ["m.toml"] and path.stat().st_mode & 0o777 == 0o640
+def test_save_replaces_the_file_as_a_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text("old")
+    path.chmod(0o640)
+    save(loads(TRIPOD), path)
+    assert load(path) == loads(TRIPOD)
+    assert os.listdir(tmp_path) == ["m.toml"] and path.stat().st_mode & 0o777 == 0o640
 
-    def test_failed_save_keeps_the_old_file(self, tmp_path, monkeypatch):
-        path = tmp_path / "m.toml"
-        path.write_text("old")
+    def refuse(*_: object) -> None:
+        raise OSError("disk full")
 
-        def refuse(*_: object) -> None:
-            raise OSError("disk full")
-
-        monkeypatch.setattr(os, "replace", refuse)
-        with pytest.raises(OSError, match="disk full"):
-            save(loads(TRIPOD), path)
-        assert path.read_text() == "old" and os.listdir(tmp_path) == ["m.toml"]
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(OSError, match="disk full"):
+        save(loads(HEAD + CRANK), path)
+    assert load(path) == loads(TRIPOD) and os.listdir(tmp_path) == ["m.toml"]
 
 
 def test_two_writers_of_one_file_do_not_write_into_each_other(tmp_path: Path) -> None:
