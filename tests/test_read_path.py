@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from machines import machine as made
 from pfabrik.cells import marked
 from pfabrik.errors import InvalidArgument
 from pfabrik.paths import path as path_module
@@ -16,7 +17,7 @@ from pfabrik.paths import path as path_module
 
 def read(tmp_path: Path, text: str, name: str = "path.nc", machine: str = "stewart", **options: float) -> Any:
     (tmp_path / name).write_text(text)
-    return pf.read_path(tmp_path / name, pf.load(machine), **options)
+    return pf.read_path(tmp_path / name, made(machine), **options)
 
 
 def positions(found: Any) -> np.ndarray:
@@ -37,7 +38,7 @@ def test_straight_moves_in_both_ways_of_counting_and_both_units(tmp_path: Path) 
 @pytest.mark.parametrize(("plane", "axes", "offsets"), [("G17", "XY", "IJ"), ("G18", "ZX", "KI"), ("G19", "YZ", "JK")])
 @pytest.mark.parametrize("code", ["G2", "G3"])
 def test_arcs_stay_on_their_circle(plane: str, axes: str, offsets: str, code: str, tmp_path: Path) -> None:
-    home = dict(zip("XYZ", pf.load("stewart").home_pose[:3, 3], strict=True))
+    home = dict(zip("XYZ", made("stewart").home_pose[:3, 3], strict=True))
     begin, (u, v) = dict(home), axes
     end = {u: begin[u] + 10.0, v: begin[v] + 10.0}
     text = f"{plane} {code} {u}{end[u]} {v}{end[v]} {offsets[0]}10 {offsets[1]}0 F100"
@@ -68,15 +69,13 @@ def test_words_of_a_printers_settings_are_no_places(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.feeds, plain.feeds)
 
 
-def test_a_line_that_ends_a_program_is_followed_first(tmp_path: Path) -> None:
-    found = read(tmp_path, "G1 X10 F600\nG0 X0 M30\nX99\n", longest=1000.0)
-    assert positions(found)[1:, 0].tolist() == [10.0, 0.0]
-
-
-def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
-    found = read(tmp_path, "G1 Z185 A5 B-3 C2 F100", longest=1000.0)
-    expected = pf.pose([*pf.load("stewart").home_pose[:2, 3], 185.0], rpy=[5, -3, 2], degrees=True)
+def test_a_program_is_followed_to_its_end_with_turns_as_roll_pitch_and_yaw(tmp_path: Path) -> None:
+    found = read(tmp_path, "G1 Z185 A5 B-3 C2 F100 M30\nX99\n", longest=1000.0)
+    expected = pf.pose([*made("stewart").home_pose[:2, 3], 185.0], rpy=[5, -3, 2], degrees=True)
+    assert len(found.targets) == 2
     np.testing.assert_allclose(found.targets[-1], expected, atol=1e-12)
+    (tmp_path / "a.nc").write_bytes("(Stück für Stück)\nG1 X1 F60\n".encode("latin-1"))
+    assert len(pf.read_path(tmp_path / "a.nc", made("stewart")).targets) >= 2
 
 
 @pytest.mark.parametrize(
@@ -92,7 +91,6 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("G1 X=4", "line 1: found '"),
         ("hello world", "found 'HELLO'"),
         ("", "no moves"),
-        ("(nothing but words)", "no moves"),
         ("G1 X99999999999", "line 1: found X"),
         ("G1 X1 " + "X" * 200_000, "no text of a path"),
         ("G1 X1\0", "no text of a path"),
@@ -101,9 +99,6 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("G1 X1 Y2 X3", "line 1: found X twice"),
         ("G1 X1\nG4 X2", "line 2: found G4"),
         ("G1 X1\nM98 P100", "line 2: found M98, a call of a subroutine"),
-        ('G1 X1\nN20 M98 P"probe.g"', "line 2: found M98, a call of a subroutine"),
-        ("G1 X1\nM99", "line 2: found M99, the end of a subroutine"),
-        ("G1 X1\nM198 P3", "line 2: found M198, a call of a subroutine"),
         ("G1 X1\nG65 P9000 A1", "line 2: found G65, a call of a subroutine"),
         ("O100 sub\nG1 X1\no100 endsub", "line 1: found O100 SUB, a subroutine"),
         ("G1 X1\no<corner> call [1]", "line 2: found O<"),
@@ -111,13 +106,9 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("O1\nG1 X1\nO2\nG1 X2", "line 3: found O2, another program"),
         ("IF [#1 EQ 2] GOTO 10", "line 1: found IF, a condition"),
         ("G1 X1\nG55\nG1 X2", "line 2: found G55, a work offset that the program does not say"),
-        ("G1 X1\nG59.3", "line 2: found G59.3, a work offset"),
         ("G54.1 P2\nG1 X1", "line 1: found G54.1, a work offset"),
         ("G1 X1\nG92 X0", "line 2: found G92, an offset of all positions"),
-        ("G1 X1\nG92", "line 2: found G92, an offset of all positions"),
-        ("G1 X1\nG92.1", "line 2: found G92.1, an offset of all positions"),
         ("G10 L2 P1 X5\nG1 X1", "line 1: found G10, offsets or tool data"),
-        ("G10 P1 Z5\nG1 X1", "line 1: found G10, offsets or tool data"),
         ("G1 X1\nG52 X1", "line 2: found G52, a local work offset"),
         ("G1 X1\nG53 G0 X0", "line 2: found G53, a move past the work offset"),
         ("G1 X1\nG43 H1", "line 2: found G43, an offset by the tool's length"),
@@ -125,6 +116,10 @@ def test_turns_are_roll_pitch_and_yaw(tmp_path: Path) -> None:
         ("G93 G1 X1 F1", "line 1: found G93, feeds as shares of a move"),
         ("G1 X1\nM206 X5", "line 2: found M206, an offset of all positions"),
         ("G90\nM70\nG91\nM72\nG1 X1", "line 4: found M72, a return to modes"),
+        ("G1 X1\nSET_GCODE_OFFSET Z=0.1", "line 2: found SET_GCODE_OFFSET, an offset of all positions"),
+        ("G1 X1\nRESTORE_GCODE_STATE NAME=x MOVE=1", "a return to modes that were saved"),
+        ("G1 X1\nG29 X", "line 2: found 'X'; expected words such as X12.5"),
+        ("G1 X1\nCALL", "line 2: found CALL, a call of a subroutine"),
     ],
 )
 def test_gcode_that_cannot_be_followed_is_one_sentence(text: str, said: str, tmp_path: Path) -> None:
@@ -141,13 +136,13 @@ def test_words_that_set_no_place_are_passed_over(tmp_path: Path) -> None:
     np.testing.assert_allclose(positions(read(tmp_path, text, longest=5.0))[1:, 0], [1, 2])
 
 
-@pytest.mark.parametrize("tolerance", [5e-324, 1e-300, 1e-17, 1e-12])
+@pytest.mark.parametrize("tolerance", [5e-324, 1e-17, 1e-12])
 def test_a_tolerance_that_no_number_of_steps_keeps_is_refused(tolerance: float, tmp_path: Path) -> None:
     with pytest.raises(InvalidArgument, match=r"line 2: .*(too many steps|more than 1000000 targets)"):
         read(tmp_path, "G0 X0 Y0\nG2 X0 Y0 I20 J0 F600\n", tolerance=tolerance)
 
 
-@pytest.mark.parametrize("tolerance", [1e-7, 1e-3, 1.0, 1e300])
+@pytest.mark.parametrize("tolerance", [1e-5, 1.0, 1e300])
 def test_chords_are_as_far_off_their_arc_as_the_tolerance_says(tolerance: float, tmp_path: Path) -> None:
     found = positions(read(tmp_path, "G0 X0 Y0\nG2 X0 Y0 I20 J0 F600\n", tolerance=tolerance, longest=1e9))[1:]
     middles = (found[1:, :2] + found[:-1, :2]) / 2.0
@@ -180,17 +175,12 @@ def test_tables_as_spreadsheets_of_any_country_write_them(
     (tmp_path / name).write_bytes(text.encode(encoding))
     with (tmp_path / name).open(encoding="utf-8") as standard:
         monkeypatch.setattr("sys.stdin", standard)
-        for found in (pf.read_path(tmp_path / name, pf.load("stewart")), pf.read_path("-", pf.load("stewart"))):
+        for found in (pf.read_path(tmp_path / name, made("stewart")), pf.read_path("-", made("stewart"))):
             assert positions(found).tolist() == [[1.5, 2, 180], [-2.25, 0.3, 181]]
             assert found.times is not None and found.times.tolist() == [0.0, 0.5]
             assert list(found.others["note"]) == ["a", "Größe"]
             assert list(found.others["t"]) == ["0", "0.5"]
         assert not standard.closed
-
-
-def test_a_comment_in_latin_1_is_no_fault_of_a_program(tmp_path: Path) -> None:
-    (tmp_path / "a.nc").write_bytes("(Stück für Stück)\nG1 X1 F60\n".encode("latin-1"))
-    assert len(pf.read_path(tmp_path / "a.nc", pf.load("stewart")).targets) >= 2
 
 
 FORMULAS = ["=1+1", "+note", "-x", "@me", "'=1", "''-a"]
@@ -241,29 +231,15 @@ def test_turns_as_quaternions_of_any_length_and_columns_in_capitals(tmp_path: Pa
     assert list(capitals.others) == ["T"]
 
 
-@pytest.mark.parametrize(
-    ("header", "said"),
-    [
-        ("qx,qy,qz", "line 1: found columns qx, qy, qz"),
-        ("qx,qy,qz,qw,yaw", "line 1: found columns yaw, qx, qy, qz, qw"),
-        ("qx,qy,qz,qw", "line 2: found a zero quaternion"),
-        ("rx,ry,rz", "line 1: found columns rx, ry, rz for turns"),
-    ],
-)
-def test_turns_that_could_be_misread_are_refused(header: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(InvalidArgument, match=said):
-        read(tmp_path, f"x,y,z,{header}\n1,2,180{',0' * len(header.split(','))}\n", "path.csv")
+def test_turns_and_times_by_the_names_of_machine_tools(tmp_path: Path) -> None:
     handed_on = read(tmp_path, "x,y,z,rx\n1,2,-100,5\n", "path.csv", "delta")  # whose task has no turns
     assert [*handed_on.others["rx"]] == ["5"]
-
-
-def test_turns_and_times_by_the_names_of_machine_tools(tmp_path: Path) -> None:
     table = read(tmp_path, "b_rad,x,y,z,a_deg\n0.1,0,0,190,3\n", "path.csv")
     np.testing.assert_allclose(table.targets, pf.pose([[0, 0, 190]], rpy=[[np.radians(3), 0.1, 0]]), atol=1e-12)
     assert table.angle_units == ("deg", "rad", "deg")
     turned = read(tmp_path, "G21 G1 Z190 F600\nA30 F60\n", longest=1000.0)
     assert turned.times is not None
-    height = pf.load("stewart").home_pose[2, 3]
+    height = made("stewart").home_pose[2, 3]
     np.testing.assert_allclose(turned.times, [0.0, abs(190 - height) / 10.0, abs(190 - height) / 10.0 + 30.0])
 
 
@@ -285,25 +261,34 @@ def test_steps_are_divided_or_made_at_a_rate(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("machine", "text", "said"),
     [
-        ("x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
-        ("x,y,z\n1,2\n", "line 2: found 2 cells"),
-        ("x,y,zz\n1,2,3\n", "did you mean 'zz'"),
-        ("x,y,z,x\n1,2,3,4\n", "column 'x' appears twice"),
-        ("x,y,z,roll,roll_rad\n1,2,3,4,5\n", "expected one of them"),
-        ("x,y,z\n", "no targets"),
-        ("x,y,z,t\n1,2,180,1\n1,2,180,1\n", "times that grow"),
-        ("x,y,z,feed\n1,2,180,0\n", "a feed above zero"),
-        ("x;y;z\n1,5;2;180\n1.5;2;180\n", "line 3: column 'x': found '1.5'; expected decimals with ','"),
-        ("x;y;z\n1.234,5;2;180\n", "line 2: column 'x': found '1.234,5'"),
-        ('x,y,z\n"1,5",2,180\n', "line 2: column 'x': found '1,5'"),
-        ("x,y,z\n1,5,2,180\n", "line 2: found 4 cells; expected 3"),
+        ("stewart", "x,y,z\n1,2,nan\n", "line 2: column 'z': found 'nan'"),
+        ("stewart", "x,y,z\n1,2\n", "line 2: found 2 cells"),
+        ("stewart", "x,y,zz\n1,2,3\n", "did you mean 'zz'"),
+        ("stewart", "x,y,z,x\n1,2,3,4\n", "column 'x' appears twice"),
+        ("stewart", "x,y,z,roll,roll_rad\n1,2,3,4,5\n", "expected one of them"),
+        ("stewart", "x,y,z\n", "no targets"),
+        ("stewart", "x,y,z,t\n1,2,180,1\n1,2,180,1\n", "times that grow"),
+        ("stewart", "x,y,z,feed\n1,2,180,0\n", "a feed above zero"),
+        ("stewart", "x;y;z\n1,5;2;180\n1.5;2;180\n", "line 3: column 'x': found '1.5'; expected decimals with ','"),
+        ("stewart", "x;y;z\n1.234,5;2;180\n", "line 2: column 'x': found '1.234,5'"),
+        ("stewart", 'x,y,z\n"1,5",2,180\n', "line 2: column 'x': found '1,5'"),
+        ("stewart", "x,y,z\n1,5,2,180\n", "line 2: found 4 cells; expected 3"),
+        ("stewart", "x,y,z,qx,qy,qz\n1,2,180,0,0,0\n", "line 1: found columns qx, qy, qz"),
+        ("stewart", "x,y,z,qx,qy,qz,qw,yaw\n1,2,180,0,0,0,1,0\n", "line 1: found columns yaw, qx, qy, qz, qw"),
+        ("stewart", "x,y,z,qx,qy,qz,qw\n1,2,180,0,0,0,0\n", "line 2: found a zero quaternion"),
+        ("stewart", "x,y,z,rx,ry,rz\n1,2,180,0,0,0\n", "line 1: found columns rx, ry, rz for turns"),
+        ("g1_ankle", "pitch_joint\n1\n", "no column of a pose; expected "),
+        ("g1_ankle", "pitch_joint\n1\n", ", or pitch_joint, roll_joint"),
+        ("g1_ankle", "pitch_joint,roll_joint\n1,x\n", "line 2: column 'roll_joint': found 'x'; expected a finite"),
+        ("g1_ankle", "pitch_joint,roll_joint,roll_joint_rad\n1,2,3\n", "no column of a pose"),
+        ("g1_ankle", "pitch_joint,pitch_joint,roll_joint\n1,2,3\n", "column 'pitch_joint' appears twice"),
     ],
 )
-def test_tables_that_are_no_path_are_one_sentence(text: str, said: str, tmp_path: Path) -> None:
+def test_tables_that_are_no_path_are_one_sentence(machine: str, text: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(InvalidArgument) as caught:
-        read(tmp_path, text, "path.csv")
+        read(tmp_path, text, "path.csv", machine)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -312,37 +297,22 @@ def test_a_table_gives_targets_by_joints_in_series(tmp_path: Path) -> None:
     """In degrees, as roll and pitch are, or as a name says; further columns are handed on."""
     text = "t,roll_joint_rad,pitch_joint,note\n0,0.1,-10,a\n1,-0.05,5,b\n"
     (tmp_path / "joints.csv").write_text(text)
-    machine = pf.load("g1_ankle")
+    machine = made("g1_ankle")
     path = pf.read_path(tmp_path / "joints.csv", machine)
     answers = pf.track(machine, path.targets)
     np.testing.assert_allclose(answers.joints["pitch_joint"], np.radians([-10.0, 5.0]), atol=1e-9)
     np.testing.assert_allclose(answers.joints["roll_joint"], [0.1, -0.05], atol=1e-9)
     assert path.times is not None and path.times.tolist() == [0.0, 1.0] and path.others["note"] == ["a", "b"]
     (tmp_path / "joints.csv").write_text("pivot[1],pivot[0]\n5,10\n")
-    ankle = pf.load("ankle_ups")
+    ankle = made("ankle_ups")
     found = pf.solve_ik(ankle, pf.read_path(tmp_path / "joints.csv", ankle).targets)
     np.testing.assert_allclose(np.degrees(found.joints["pivot"]), [[10.0, 5.0]], atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("pitch_joint\n1\n", "no column of a pose; expected .*, or pitch_joint, roll_joint"),
-        ("pitch_joint,roll_joint\n1,x\n", "line 2: column 'roll_joint': found 'x'; expected a finite number"),
-        ("pitch_joint,roll_joint,roll_joint_rad\n1,2,3\n", "no column of a pose"),
-        ("pitch_joint,pitch_joint,roll_joint\n1,2,3\n", "column 'pitch_joint' appears twice"),
-    ],
-)
-def test_tables_of_joints_that_make_no_target_are_refused(text: str, said: str, tmp_path: Path) -> None:
-    (tmp_path / "joints.csv").write_text(text)
-    with pytest.raises(InvalidArgument, match=said):
-        pf.read_path(tmp_path / "joints.csv", pf.load("g1_ankle"))
 
 
 def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "binary.nc").write_bytes(bytes(range(256)) * 1000)
     with pytest.raises(InvalidArgument, match="no text"):
-        pf.read_path(tmp_path / "binary.nc", pf.load("stewart"))
+        pf.read_path(tmp_path / "binary.nc", made("stewart"))
     for module in ("pfabrik.paths.sampling", "pfabrik.paths.read_path"):
         monkeypatch.setattr(f"{module}.MOST_STEPS", 1000)
     assert path_module.MOST_STEPS == 1_000_000
@@ -389,20 +359,3 @@ def test_what_slicers_write_passes_and_is_named(tmp_path: Path) -> None:
         "PAUSE": 20,
         "END_PRINT": 21,
     }
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("SET_GCODE_OFFSET Z=0.1", "SET_GCODE_OFFSET, an offset of all positions"),
-        ("RESTORE_GCODE_STATE NAME=x MOVE=1", "a return to modes that were saved"),
-        ("G92 X0", "an offset of all positions"),
-        ("G10 L2 P1 X5", "offsets or tool data that are set"),
-        ("G29 X", "expected words such as X12.5"),
-        ("hello world", "expected words such as X12.5"),
-        ("CALL", "a call of a subroutine"),
-    ],
-)
-def test_what_changes_the_meaning_of_a_path_does_not_pass(line: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(InvalidArgument, match=said):
-        read(tmp_path, f"G1 X10 Y0 F3000\n{line}\nG1 X12\n", name="part.gcode")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import closure
+from machines import closure, planar
 from pfabrik.arrays import Floats
 from pfabrik.description.task import task_of
 from pfabrik.errors import InvalidArgument, UnknownName
@@ -23,8 +24,6 @@ from pfabrik.timing.time_path import limits_of
 
 KEPT = 1.0 + 2e-6
 """Share of a limit that counts as kept."""
-
-MACHINES = ("stewart", "five_bar", "servo_hexapod", "linear_delta", "rrr")
 
 
 @lru_cache
@@ -53,14 +52,13 @@ def limits(name: str) -> dict[str, float]:
     return {"speed": 0.4 * unit, "acceleration": 3.0 * unit}
 
 
-@pytest.mark.parametrize("turns", [pytest.param(1, marks=pytest.mark.campaign), 3])
-@pytest.mark.parametrize("name", MACHINES)
-def test_the_time_is_that_of_toppra(name: str, turns: int) -> None:
+@pytest.mark.parametrize("name", ["stewart", "five_bar", "servo_hexapod", "linear_delta", "rrr"])
+def test_the_time_is_that_of_toppra(name: str) -> None:
     pytest.importorskip("toppra", reason="no toppra here: its wheels are for Linux")
     import toppra
     from scipy.interpolate import CubicSpline
 
-    track = followed(name, turns)
+    track = followed(name, 3)
     given = limits(name)
     curve = curve_of(track)
     grid = curve.grid()
@@ -68,12 +66,9 @@ def test_the_time_is_that_of_toppra(name: str, turns: int) -> None:
     path = toppra.SplineInterpolator(curve.s, track.actuators[curve.steps], bc_type="natural")
     spline = CubicSpline(curve.s, track.actuators[curve.steps], bc_type="natural")
     np.testing.assert_allclose(curve.at(grid)[0][:, :n_a], spline(grid), atol=1e-9)
-    both = [
-        toppra.constraint.JointVelocityConstraint(np.array([[-given["speed"], given["speed"]]] * n_a)),
-        toppra.constraint.JointAccelerationConstraint(
-            np.array([[-given["acceleration"], given["acceleration"]]] * n_a)
-        ),
-    ]
+    speed, acceleration = (np.array([[-most, most]] * n_a) for most in given.values())
+    kinds = toppra.constraint
+    both = [kinds.JointVelocityConstraint(speed), kinds.JointAccelerationConstraint(acceleration)]
     _, speeds, _ = toppra.algorithm.TOPPRA(both, path, gridpoints=grid).compute_parameterization(0.0, 0.0)
     expected = (2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])).sum()
     timed = pf.time_path(track, **given)
@@ -132,32 +127,13 @@ def test_a_spline_that_leaves_a_range_between_the_steps_is_refused_with_the_step
     assert pf.time_path(pf.track(mechanism, corner - [1, 0, 0]), speed=10.0).actuators[:, 0].max() > 59.0
 
 
-@pytest.mark.parametrize("name", MACHINES)
-def test_it_is_never_slower_than_the_best_constant_speed(name: str) -> None:
-    track, given = followed(name, 3), limits(name)
-    curve = curve_of(track)
-    grid = curve.grid()
-    _, slopes, bends = curve.at(grid)
-    slopes, bends = np.abs(slopes[:, : curve.n_actuators]), np.abs(bends[:, : curve.n_actuators])
-    fastest = given["speed"] / slopes.max()
-    assert pf.time_path(track, speed=given["speed"]).duration <= curve.s[-1] / fastest * (1.0 + 1e-9)
-    # from rest to rest: up and down with half of the acceleration, the other half left for the bends
-    cruising = min(fastest, np.sqrt(0.5 * given["acceleration"] / bends.max()))
-    push = 0.5 * given["acceleration"] / slopes.max()
-    trapezoid = curve.s[-1] / cruising + cruising / push
-    assert pf.time_path(track, **given).duration <= trapezoid * (1.0 + 1e-9)
-
-
-@pytest.mark.parametrize("name", MACHINES)
-def test_some_limit_is_met_at_all_times_and_named(name: str) -> None:
-    timed = pf.time_path(followed(name, 1), **limits(name))
+def test_some_limit_is_met_at_all_times_and_named() -> None:
+    timed = pf.time_path(followed("stewart", 1), **limits("stewart"))
     assert (timed.used[1:-1] > 0.99).mean() > 0.95
     assert timed.used.max() <= KEPT
-    held = timed.held_back
-    assert sum(held.values()) == pytest.approx(1.0, abs=0.1)
-    actuator, what = next(iter(held))
-    assert actuator in (*pf.load(name).actuator_names, "platform")
-    assert what in ("speed", "acceleration")
+    assert sum(timed.held_back.values()) == pytest.approx(1.0, abs=0.1)
+    assert {each for each, _ in timed.held_back} <= {*pf.load("stewart").actuator_names}
+    assert {what for _, what in timed.held_back} == {"speed", "acceleration"}
 
 
 def test_the_platform_keeps_its_own_speed() -> None:
@@ -196,29 +172,32 @@ def test_limits_come_from_the_file_and_from_the_call() -> None:
     assert pf.time_path(track).duration == pytest.approx(max(np.pi / 2 / 2.0, 20.0 / 30.0), rel=1e-6)
 
 
-def test_paths_that_no_machine_follows_are_refused_with_the_step() -> None:
+def along_five_bar(*ways: float) -> pf.Track:
     mechanism = pf.load("five_bar")
-    home = mechanism.home_pose[:3, 3]
-    far = pf.track(mechanism, [home, home + [0, 1e4, 0], home])
-    with pytest.raises(InvalidArgument, match=r"not reached.*first bad row: 1"):
-        pf.time_path(far, speed=1.0)
-    with pytest.raises(InvalidArgument, match="does not move"):
-        pf.time_path(pf.track(mechanism, [home, home]), speed=1.0)
-    with pytest.raises(InvalidArgument, match="a limit"):
-        pf.time_path(slide())
-    with pytest.raises(InvalidArgument, match="samples"):
-        pf.time_path(slide(), speed=1e-9)
-    with pytest.raises(InvalidArgument, match="track"):
-        pf.time_path(pf.solve_ik(mechanism, home), speed=1.0)  # type: ignore[arg-type]
-    for wrong in ({"speed": -1.0}, {"rate": 0.0}, {"acceleration": float("nan")}, {"platform_speed": True}):
-        with pytest.raises(InvalidArgument, match=next(iter(wrong))):
-            pf.time_path(slide(), **{"speed": 1.0, **wrong})
+    return pf.track(mechanism, [mechanism.home_pose[:3, 3] + [0, way, 0] for way in ways])
+
+
+@pytest.mark.parametrize(
+    ("path", "asked", "said"),
+    [
+        (lambda: along_five_bar(0, 1e4, 0), {}, r"not reached.*first bad row: 1"),
+        (lambda: along_five_bar(0, 0), {}, "does not move"),
+        (lambda: along_five_bar(0, 1)[0], {}, "track"),
+        (slide, {"speed": None}, "a limit"),
+        (slide, {"speed": 1e-9}, "samples"),
+        (slide, {"speed": -1.0}, "speed"),
+        (slide, {"rate": 0.0}, "rate"),
+        (slide, {"acceleration": float("nan")}, "acceleration"),
+        (slide, {"platform_speed": True}, "platform_speed"),
+    ],
+)
+def test_paths_that_no_machine_follows_are_refused_with_the_step(path: Any, asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(InvalidArgument, match=said):
+        pf.time_path(path(), **{"speed": 1.0, **asked})
 
 
 def test_a_path_across_a_parallel_singularity_is_refused_with_the_step() -> None:
     """A planar 3-RPR with like triangles, turned past where its legs meet in a point."""
-    from machines.positions import planar
-
     mechanism = planar("RPR").without_limits()
     angles = np.radians(np.linspace(0.0, 170.0, 60))
     targets = pf.pose(np.tile(mechanism.home_pose[:3, 3], (60, 1)), rotvec=angles[:, None] * [0.0, 0.0, 1.0])
@@ -231,26 +210,22 @@ def test_a_path_across_a_parallel_singularity_is_refused_with_the_step() -> None
     assert signs[step] != signs[step - 1]
 
 
-def test_a_timed_path_goes_to_a_file_whole_or_not_at_all(tmp_path: Path) -> None:
+def test_a_timed_path_goes_to_a_file_whole_or_not_at_all_and_to_a_picture(tmp_path: Path) -> None:
     timed = pf.time_path(followed("five_bar", 1), speed=1.0, rate=20)
     timed.to_csv(tmp_path / "timed.csv")
     header, *rows = (tmp_path / "timed.csv").read_text().splitlines()
     assert header.startswith("t,step,x,y,z,roll_deg,pitch_deg,yaw_deg,actuator_")
     assert len(rows) == len(timed.times)
-    first = dict(zip(header.split(","), rows[3].split(","), strict=True))
+    fourth = dict(zip(header.split(","), rows[3].split(","), strict=True))
     name = timed.mechanism.actuator_names[0]
-    assert float(first[f"actuator_{name}_deg"]) == pytest.approx(np.degrees(timed.actuators[3, 0]))
+    assert float(fourth[f"actuator_{name}_deg"]) == pytest.approx(np.degrees(timed.actuators[3, 0]))
     with pytest.raises(FileNotFoundError):
         timed.to_csv(tmp_path / "no" / "timed.csv")
-
-
-def test_curves_are_drawn_over_time() -> None:
     pytest.importorskip("matplotlib")
-    figure = pf.time_path(followed("five_bar", 1), speed=1.0, rate=20).plot()
-    assert [len(axes.lines) for axes in figure.axes] == [2, 2, 2]
+    assert [len(axes.lines) for axes in timed.plot().axes] == [2, 2, 2]
 
 
-@pytest.mark.parametrize("name", ["rps", "ankle_ups", "stewart", "delta", "rrr", "five_bar", "five_bar_with_tool"])
+@pytest.mark.parametrize("name", ["rps", "ankle_ups", "stewart", "rrr", "five_bar_with_tool"])
 def test_the_speed_of_a_platform_is_that_at_which_an_actuator_meets_its_limit(name: str) -> None:
     """Away from home too, where what a task leaves out moves along: by central differences of inverse kinematics."""
     machine = closure.five_bar_with_tool() if name == "five_bar_with_tool" else pf.load(name)
@@ -292,7 +267,7 @@ def arms(count: int, joints: int) -> pf.Mechanism:
     return pf.Mechanism(name="arms", joints=made, base="base", end_effector="platform", reference_point=(0, 0, 300))
 
 
-@pytest.mark.parametrize("machine", [pf.load("nrpm"), arms(1, 9), arms(2, 7), arms(2, 15)], ids=str)
+@pytest.mark.parametrize("machine", [pf.load("nrpm"), arms(1, 9), arms(2, 15)], ids=str)
 def test_internal_motions_take_load_off_the_actuator_that_limits_a_platform(machine: pf.Mechanism) -> None:
     """A redundant machine goes as fast as a linear program over the rates of all its actuators says, and nowhere
     slower than in the direction that is told; with 30 actuators and 18 internal motions as well."""
