@@ -1,4 +1,4 @@
-"""MuJoCo by itself: loops closed by Newton's method on its own rows, led from where a model starts. No code of ours."""
+"""MuJoCo by itself: loops closed by Newton's method on its own rows, led from where a model starts; and compared with."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+import pfabrik as pf
+from pfabrik.interop import Imported
+
 mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo, whole: pip install '.[dev]'", exc_type=ImportError)
 
 LED = 15
@@ -15,7 +18,7 @@ LED = 15
 
 
 class Model:
-    """A MuJoCo model with its driven joints led to values, and its loops closed."""
+    """A MuJoCo model with its driven joints led to values, and its loops closed. No code of ours."""
 
     def __init__(self, model: Any, held: Mapping[str, float] | None = None) -> None:
         self.model, self.data = model, mujoco.MjData(model)
@@ -74,3 +77,24 @@ class Model:
         found = getattr(self.data, kind)(name)
         position = found.xpos
         return np.array(position), np.array(found.xmat).reshape(3, 3)
+
+
+def notes_of(imported: Imported) -> str:
+    return "\n".join(map(str, imported.notes))
+
+
+def agrees(found: Imported, model: Model, body: str, reach: float = 0.3, poses: int = 8) -> None:
+    """The end effector is where MuJoCo has it, in metres, at random values of the drives around home."""
+    mechanism, random = found.mechanism, np.random.default_rng(0)
+    names = mechanism.actuator_names
+    home = np.array([mechanism.home_coordinate(name) for name in names])
+    model.lead(names, home)
+    _, begin = model.pose(body)
+    limits = np.transpose([drive.limits for drive in mechanism.drives])
+    for values in np.clip(home + random.uniform(-reach, reach, (poses, len(names))), *limits):
+        solution = pf.solve_fk(mechanism, values)
+        assert solution
+        assert model.lead(names, values) <= 1e-13
+        position, turned = model.pose(body)
+        assert np.linalg.norm(solution.pose[:3, 3] - position) <= 1e-11
+        assert np.abs(solution.pose[:3, :3] - turned @ begin.T).max() <= 1e-10

@@ -11,35 +11,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, agrees, notes_of
 from pfabrik.errors import InvalidArgument, InvalidMechanism
 from pfabrik.files import dumps, loads
-from pfabrik.interop import Imported, from_sdf, from_urdf, verify
+from pfabrik.interop import from_sdf, from_urdf, verify
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
-
-POSES = 50
-
-
-def notes_of(imported: Imported) -> str:
-    return "\n".join(map(str, imported.notes))
-
-
-def agrees(found: Imported, model: Model, body: str, reach: float = 0.5) -> None:
-    """The end effector is where MuJoCo has it, to 1e-9 m, at random values of the drives around home."""
-    mechanism, rng = found.mechanism, np.random.default_rng(0)
-    names = mechanism.actuator_names
-    home = np.array([mechanism.home_coordinate(name) for name in names])
-    model.lead(names, home)
-    _, begin = model.pose(body)
-    for values in home + rng.uniform(-reach, reach, (POSES, len(names))):
-        solution = pf.solve_fk(mechanism, values)
-        assert solution
-        assert model.lead(names, values) <= 1e-12
-        position, turned = model.pose(body)
-        assert np.linalg.norm(solution.pose[:3, 3] - position) <= 1e-9
-        assert np.abs(solution.pose[:3, :3] - turned @ begin.T).max() <= 1e-9
-
 
 # A four-bar: hinges A and D at the base, B and C at the ends of the coupler.
 
