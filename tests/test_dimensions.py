@@ -56,21 +56,14 @@ def test_expressions_are_computed_in_the_units_of_the_file() -> None:
     np.testing.assert_allclose(shoulder.range, np.radians([-105, 105]), rtol=1e-15)
 
 
-def test_another_dimension_changes_what_follows_from_it() -> None:
-    arm = loads(PENDULUM).with_dimensions(upper=400)
-    assert arm == loads(PENDULUM.replace("upper = 300", "upper = 400"))
-    assert arm.dimensions["lower"] == 200
+def test_another_dimension_changes_what_follows_from_it_also_after_it_was_saved(tmp_path: Path) -> None:
+    pf.save(loads(PENDULUM).with_dimensions(tilt=20), tmp_path / "arm.toml")
+    assert '"upper*cos(tilt)"' in (tmp_path / "arm.toml").read_text(encoding="utf-8")
+    arm = pf.load(tmp_path / "arm.toml").with_dimensions(upper=400)
+    assert arm == loads(PENDULUM.replace("upper = 300", "upper = 400").replace("tilt = 30", "tilt = 20"))
+    assert (arm.dimensions["lower"], arm.dimensions["tilt"]) == (200, 20)
     held = loads(PENDULUM).with_dimensions({"lower": 1}, upper=400)  # a dimension that follows may be set too
     assert held.dimensions["lower"] == 1 and held.reference_point[0] == pytest.approx(400 * math.cos(math.pi / 6) + 1)
-
-
-def test_dimensions_and_expressions_are_kept_in_a_file(tmp_path: Path) -> None:
-    arm = loads(PENDULUM).with_dimensions(tilt=20)
-    pf.save(arm, tmp_path / "arm.toml")
-    again = pf.load(tmp_path / "arm.toml")
-    assert again == arm and again.dimensions == arm.dimensions
-    assert '"upper*cos(tilt)"' in (tmp_path / "arm.toml").read_text(encoding="utf-8")
-    assert again.with_dimensions(upper=1) == arm.with_dimensions(upper=1)
 
 
 def test_a_machine_changed_in_python_has_numbers_alone() -> None:
@@ -87,16 +80,13 @@ def test_a_machine_changed_in_python_has_numbers_alone() -> None:
         ('"upper / 2"', '"stop / 2"', "dimensions.lower", "it comes later"),
         ('"upper / 2"', '"lower / 2"', "dimensions.lower", "it comes later"),
         ('"upper / 2"', '"upper / 0"', "dimensions.lower", "has no finite value"),
-        ('"upper / 2"', '"sqrt(-upper)"', "dimensions.lower", "has no finite value"),
         ('"upper / 2"', '"9**9**9**9"', "dimensions.lower", "has no finite value"),
         ('"upper / 2"', '"sqr(upper)"', "dimensions.lower", "did you mean 'sqrt'?"),
         ('"upper / 2"', '"sqrt(upper, 2)"', "dimensions.lower", "sqrt of 2 arguments"),
         ('"upper / 2"', "\"__import__('os').system('x')\"", "dimensions.lower", "more than an expression may have"),
-        ('"upper / 2"', '"upper if tilt else 2"', "dimensions.lower", "more than an expression may have"),
         ('"upper / 2"', '"(((upper"', "dimensions.lower", "'(((upper'"),
         ('"upper / 2"', '"1' + "+1" * 100 + '"', "dimensions.lower", "an expression of 201 characters"),
         ('"upper / 2"', "true", "dimensions.lower", "True"),
-        ('"upper / 2"', "inf", "dimensions.lower", "has no finite value"),
         ("tilt = 30", '"my tilt" = 30', "dimensions.my tilt", "the name 'my tilt'"),
         ("tilt = 30", "tilt = 30\nsin = 3", "dimensions.sin", "the name 'sin'"),
         ('["-stop", "stop"]', '["-stopp", "stop"]', "joint[0].range", "did you mean 'stop'?"),

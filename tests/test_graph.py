@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-import pytest
 
 from pfabrik import Joint
 from pfabrik.decomposition.graph_blocks import blocks_between, is_tree
@@ -40,10 +39,9 @@ def ways(edges: list[Edge], passed: tuple[str, ...] = (START,)) -> Iterator[tupl
                 yield bodies, (edge.joint.name, *joints)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_blocks_are_what_every_path_passes_in_that_order(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    for _ in range(20):
+def test_blocks_are_what_every_path_passes_in_that_order() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(100):
         edges = random_edges(random)
         all_ways = list(ways(edges))
         common = set.intersection(*(set(bodies) for bodies, _ in all_ways))
@@ -55,14 +53,6 @@ def test_blocks_are_what_every_path_passes_in_that_order(seed: int) -> None:
             for bodies, joints in all_ways:
                 passed |= set(joints[bodies.index(block.inward) : bodies.index(block.outward)])
             assert [edge.joint.name for edge in block.edges] == [e.joint.name for e in edges if e.joint.name in passed]
-
-
-def test_what_hangs_on_a_way_without_leading_anywhere_is_left_out() -> None:
-    edges = edges_of((START, "a"), ("a", "b"), ("b", "c"), ("c", "a"), ("a", GOAL), (GOAL, "d"))
-    assert [[edge.joint.name for edge in block.edges] for block in blocks_between(edges, START, GOAL)] == [
-        ["j0"],
-        ["j4"],
-    ]
 
 
 def test_groups_keep_the_order_of_the_description() -> None:

@@ -195,7 +195,7 @@ def test_a_file_comes_back_with_its_numbers(name: str, form: str, unsaid: str) -
 
 
 def delta_above_its_bed(name: str, up: float) -> pf.Mechanism:
-    """A delta of the catalogue, raised above its bed and turned; its arms stop before they are in line with the rods."""
+    """A delta of the catalogue, raised above its bed and turned; its arms stop before they are in line with rods."""
     limits = {f"A{leg}": (-0.5, 1.4) for leg in (1, 2, 3)} if name == "delta" else {}
     turn = Rotation.from_euler("z", 17.0, degrees=True).as_matrix()
     return moved(pf.load(name).with_limits(limits), turn, np.array([0.0, 0.0, up]))
