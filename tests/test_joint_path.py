@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from machines import machine
 from pfabrik import Joint, Mechanism
 from pfabrik.errors import InvalidArgument, MobilityWarning, UnknownName
 from pfabrik.motion.displacements import end_effector_pose, home_coordinates
@@ -41,7 +42,7 @@ def path_of_all_kinds() -> JointPath:
 
 
 def test_hinges_in_series_turn_the_pose_one_after_the_other() -> None:
-    path = joint_path(pf.load("g1_ankle"), ("pitch_joint", "roll_joint"))
+    path = joint_path(machine("g1_ankle"), ("pitch_joint", "roll_joint"))
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 2))
     poses = path.poses(q)
     np.testing.assert_allclose(poses[:, :3, :3], Rotation.from_euler("YX", q).as_matrix(), atol=1e-14)
@@ -49,6 +50,9 @@ def test_hinges_in_series_turn_the_pose_one_after_the_other() -> None:
     where = np.stack([drop * np.sin(q[:, 0]), 0.0 * q[:, 0], 0.15 + drop * np.cos(q[:, 0])], axis=1)
     np.testing.assert_allclose(poses[:, :3, 3], where, atol=1e-15)
     np.testing.assert_array_equal(path.low, [-0.87267, -0.2618])
+    np.testing.assert_allclose(path.coordinates_at(poses), q, atol=1e-12)
+    poses[0, 0, 3] += 1e-3  # off the path
+    assert np.isnan(path.coordinates_at(poses)[0]).all() and not np.isnan(path.coordinates_at(poses)[1:]).any()
 
 
 def test_joints_of_every_kind_give_the_pose_that_all_coordinates_give() -> None:
@@ -75,34 +79,26 @@ def test_twists_are_the_poses_finite_differences() -> None:
     np.testing.assert_array_equal(poses, path.poses(q))
 
 
-def test_coordinates_follow_from_poses_and_are_nan_off_the_path() -> None:
-    path = joint_path(pf.load("g1_ankle"), ("pitch_joint", "roll_joint"))
-    q = np.random.default_rng(3).uniform(-1.2, 1.2, (50, 2))
-    poses = path.poses(q)
-    np.testing.assert_allclose(path.coordinates_at(poses), q, atol=1e-12)
-    poses[0, 0, 3] += 1e-3
-    assert np.isnan(path.coordinates_at(poses)[0]).all() and not np.isnan(path.coordinates_at(poses)[1:]).any()
-
-
 def test_a_tip_is_reached_over_either_of_its_bodies() -> None:
-    machine = pf.load("five_bar")
-    answer = pf.solve_ik(machine, machine.home_pose[:3, 3] + [5.0, -8.0, 0.0])
+    five_bar = machine("five_bar")
+    answer = pf.solve_ik(five_bar, five_bar.home_pose[:3, 3] + [5.0, -8.0, 0.0])
     for names in (("p1", "p2"), ("p5", "p4")):
-        path = joint_path(machine, names)
+        path = joint_path(five_bar, names)
         q = answer.q[None, path.columns]
         np.testing.assert_allclose(path.poses(q)[0], answer.pose, atol=1e-9)
         assert path.poses_and_twists(q)[1].shape == (1, 3, 2)
 
 
 def test_the_order_of_names_is_that_of_coordinates() -> None:
-    machine = pf.load("g1_ankle")
-    one, other = (
-        joint_path(machine, names) for names in (("pitch_joint", "roll_joint"), ("roll_joint", "pitch_joint"))
-    )
+    ankle, struts = machine("g1_ankle"), machine("ankle_ups")
+    one, other = (joint_path(ankle, names) for names in (("pitch_joint", "roll_joint"), ("roll_joint", "pitch_joint")))
     q = np.array([[0.3, -0.1]])
     np.testing.assert_array_equal(one.poses(q), other.poses(q[:, ::-1]))
-    pivot = joint_path(pf.load("ankle_ups"), ("pivot[1]", "pivot[0]"))
-    np.testing.assert_array_equal(pivot.poses(q), joint_path(pf.load("ankle_ups"), "pivot").poses(q[:, ::-1]))
+    pivot = joint_path(struts, ("pivot[1]", "pivot[0]"))
+    np.testing.assert_array_equal(pivot.poses(q), joint_path(struts, "pivot").poses(q[:, ::-1]))
+    assert passive_series(ankle) == ("pitch_joint", "roll_joint")  # found where nothing is asked for
+    assert passive_series(struts) == ("pivot",)
+    assert passive_series(machine("stewart")) == ()
 
 
 @pytest.mark.parametrize(
@@ -119,10 +115,4 @@ def test_the_order_of_names_is_that_of_coordinates() -> None:
 )
 def test_names_that_make_no_series_are_refused(names: tuple[str, ...], error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
-        joint_path(pf.load("g1_ankle"), names)
-
-
-def test_passive_joints_in_series_are_found() -> None:
-    assert passive_series(pf.load("g1_ankle")) == ("pitch_joint", "roll_joint")
-    assert passive_series(pf.load("ankle_ups")) == ("pivot",)
-    assert passive_series(pf.load("stewart")) == ()
+        joint_path(machine("g1_ankle"), names)

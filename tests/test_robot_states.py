@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import math
+import re
+from functools import cache
 from typing import Any
 
 import mujoco
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from machines import ring
 from pfabrik.errors import InvalidArgument, UnknownName
 from pfabrik.interop import from_mjcf, qpos, verify
 
@@ -50,11 +52,13 @@ ROBOT = """
 LOOPS = ("left", "right")
 
 
+@cache
 def machine_of(text: str = ROBOT, **how: Any) -> pf.Mechanism:
-    return from_mjcf(text, base="shin", end_effector="foot", actuated=["motor_l", "motor_r"], **how).mechanism
+    return from_mjcf(text, base="shin", end_effector="foot", actuated=("motor_l", "motor_r"), **how).mechanism
 
 
-def samples(machine: pf.Mechanism, n: int = 20) -> tuple[np.ndarray, pf.Solution]:
+@cache
+def samples(machine: pf.Mechanism, n: int = 5) -> tuple[np.ndarray, pf.Solution]:
     pitch_and_roll = np.random.default_rng(1).uniform(-0.25, 0.25, (n, 2))
     answers = pf.actuation(machine, joints="pitch+roll").to_actuators(pitch_and_roll).solution
     assert answers
@@ -83,7 +87,7 @@ def test_states_of_the_robot_are_closed_and_all_else_is_as_it_was(unit: str) -> 
     (model, data), machine = compiled(), machine_of(length_unit=unit)
     wanted, answers = samples(machine)
     states = qpos(answers, model)
-    assert states.shape == (20, model.nq) and gaps(model, data, states) < 1e-9
+    assert states.shape == (5, model.nq) and gaps(model, data, states) < 1e-9
     place = {name: int(model.joint(name).qposadr[0]) for name in ("pitch", "roll", "toe", "motor_l", "motor_r")}
     np.testing.assert_allclose(states[:, [place["pitch"], place["roll"]]], wanted, atol=1e-12)
     np.testing.assert_allclose(states[:, [place["motor_l"], place["motor_r"]]], answers.actuators, atol=1e-15)
@@ -91,8 +95,10 @@ def test_states_of_the_robot_are_closed_and_all_else_is_as_it_was(unit: str) -> 
     np.testing.assert_allclose(states[:, place["toe"]], 0.05 - 0.5 * pitch + 0.3 * pitch**2, atol=1e-15)
     ours = [*place.values(), *(int(model.joint(f"knuckle_{side}").qposadr[0]) + k for side in "lr" for k in range(4))]
     others = np.setdiff1d(np.arange(model.nq), ours)
-    np.testing.assert_array_equal(states[:, others], np.broadcast_to(model.qpos0[others], (20, len(others))))
+    np.testing.assert_array_equal(states[:, others], np.broadcast_to(model.qpos0[others], (5, len(others))))
     np.testing.assert_array_equal(qpos(answers[3], model), states[3])
+    sample = pf.actuation(machine, joints="pitch+roll").sample(30, seed=2, model=model)
+    assert sample.qpos.shape == (30, model.nq) and gaps(model, data, sample.qpos) < 1e-9
 
 
 def test_other_joints_are_as_they_are_given(tmp_path: Any) -> None:
@@ -102,56 +108,49 @@ def test_other_joints_are_as_they_are_given(tmp_path: Any) -> None:
     (tmp_path / "robot.xml").write_text(ROBOT)
     states = qpos(answers, tmp_path / "robot.xml", qpos=given)
     assert gaps(model, data, states) < 1e-9
-    np.testing.assert_array_equal(states[:, :8], np.broadcast_to(given[:8], (20, 8)))
-    each = np.tile(given, (20, 1))
-    each[:, 7] = np.linspace(-1.0, 1.0, 20)
+    np.testing.assert_array_equal(states[:, :8], np.broadcast_to(given[:8], (5, 8)))
+    each = np.tile(given, (5, 1))
+    each[:, 7] = np.linspace(-1.0, 1.0, 5)
     assert (qpos(answers, ROBOT, qpos=each)[:, 7] == each[:, 7]).all()
 
 
 def test_balls_turn_as_the_mechanism_s_do_with_no_equality_to_close_them() -> None:
     """Loops by sites alone: MuJoCo has no row to close, so it is the quaternions that have to."""
-    text = ROBOT.replace('<connect name="left" site1="end_l" site2="heel_l"/>', "").replace(
-        '<connect name="right" site1="end_r" site2="heel_r"/>', ""
+    text = re.sub(r'<connect name="(left|right)".*/>', "", ROBOT).replace(
+        'name="rod_l" pos="-0.05 0 0"', 'name="rod_l" pos="-0.05 0 0" quat="0.6 0 0 0.8"'
     )
-    for side in "lr":
-        text = text.replace(
-            f'<site name="end_{side}"', f'<site name="closing_{side}_1" pos="0 0 -0.2"/><site name="end_{side}"'
-        )
-        text = text.replace(
-            f'<site name="heel_{side}" pos="-0.05 {"" if side == "l" else "-"}0.04 0"/>',
-            f'<site name="heel_{side}" pos="-0.05 {"" if side == "l" else "-"}0.04 0"/>'
-            f'<site name="closing_{side}_2" pos="-0.05 {"" if side == "l" else "-"}0.04 0"/>',
-        )
-    turned = text.replace('name="rod_l" pos="-0.05 0 0"', 'name="rod_l" pos="-0.05 0 0" quat="0.6 0 0 0.8"')
-    (model, data), machine = compiled(turned), machine_of(turned)
+    for number, end in ((1, "end"), (2, "heel")):
+        text = re.sub(rf'<site name="{end}_(.)" (.*?)/>', rf'<site name="closing_\1_{number}" \2/>\g<0>', text)
+    (model, data), machine = compiled(text), machine_of(text)
     _, answers = samples(machine)
     assert gaps(model, data, qpos(answers, model, qpos=model.key("sat").qpos)) < 1e-9
 
 
+def text_of(values: np.ndarray) -> str:
+    return " ".join(map(repr, values.tolist()))
+
+
 def test_a_free_joint_in_the_mechanism_is_its_place_and_turn() -> None:
     """A plate that floats in the file, held by six rods, each driven where it stands."""
-    feet = [(math.cos(a), math.sin(a)) for a in np.radians([10, 110, 130, 230, 250, 350]).tolist()]
-    tops = [(0.5 * math.cos(a), 0.5 * math.sin(a)) for a in np.radians([50, 70, 170, 190, 290, 310]).tolist()]
-    legs, sites, closing = "", "", ""
-    for k, ((x, y), (u, v)) in enumerate(zip(feet, tops, strict=True)):
-        length = np.linalg.norm([u - x, v - y, 1.0])
-        direction = np.array([u - x, v - y, 1.0]) / length
-        axis = " ".join(map(repr, direction.tolist()))
+    feet = ring(1.0, 0.0, [10, 110, 130, 230, 250, 350])
+    tops = ring(0.5, 1.0, [50, 70, 170, 190, 290, 310])
+    legs, sites, closing, motors = "", "", "", ""
+    for k, (foot, top) in enumerate(zip(np.array(feet, float), np.array(tops, float), strict=True)):
+        axis = (top - foot) / np.linalg.norm(top - foot)
         legs += (
-            f'<body name="leg{k}" pos="{x!r} {y!r} 0"><joint name="U{k}" type="ball"/><geom size="0.01"/>'
-            f'<body name="rod{k}"><joint name="P{k}" type="slide" axis="{axis}" range="-0.5 0.5"/><geom size="0.01"/>'
-            f'<site name="top{k}" pos="{" ".join(map(repr, (direction * length).tolist()))}"/></body></body>'
+            f'<body name="leg{k}" pos="{text_of(foot)}"><joint name="U{k}" type="ball"/><geom size="0.01"/>'
+            f'<body name="rod{k}"><joint name="P{k}" type="slide" axis="{text_of(axis)}" range="-0.5 0.5"/>'
+            f'<geom size="0.01"/><site name="top{k}" pos="{text_of(top - foot)}"/></body></body>'
         )
-        sites += f'<site name="at{k}" pos="{u!r} {v!r} 0"/>'
+        sites += f'<site name="at{k}" pos="{text_of(top - [0, 0, 1])}"/>'
         closing += f'<connect name="S{k}" site1="top{k}" site2="at{k}"/>'
+        motors += f'<motor joint="P{k}"/>'
     text = (
         f'<mujoco><worldbody>{legs}<body name="plate" pos="0 0 1"><freejoint name="float"/><geom size="0.1"/>{sites}'
-        f"</body></worldbody><equality>{closing}</equality>"
-        f"<actuator>{''.join(f'<motor joint={chr(34)}P{k}{chr(34)}/>' for k in range(6))}</actuator></mujoco>"
+        f"</body></worldbody><equality>{closing}</equality><actuator>{motors}</actuator></mujoco>"
     )
-    machine = from_mjcf(text, end_effector="plate", length_unit="mm").mechanism
     pose = pf.pose([30.0, -20.0, 1040.0], rpy=[5, -4, 8], degrees=True)
-    answer = pf.solve_ik(machine, pose)
+    answer = pf.solve_ik(from_mjcf(text, end_effector="plate", length_unit="mm").mechanism, pose)
     assert answer
     model, data = compiled(text)
     data.qpos[:] = qpos(answer, model)
@@ -170,26 +169,21 @@ def test_loops_that_are_not_the_mechanism_s_do_not_hold_it_in_its_original(tmp_p
     assert against and max(against.position_tolerance, against.rotation_tolerance) <= 1e-8
 
 
-def test_samples_are_states_of_the_robot() -> None:
-    model, data = compiled()
-    sample = pf.actuation(machine_of(), joints="pitch+roll").sample(30, seed=2, model=model)
-    assert sample.qpos.shape == (30, model.nq) and gaps(model, data, sample.qpos) < 1e-9
+RENAMED = ROBOT.replace('"pitch"', '"p"').replace('"roll"', '"r"').replace('"knuckle_l"', '"k"')
+LONGER = ROBOT.replace('name="end_l" pos="0 0 -0.2"', 'name="end_l" pos="0 0 -0.9"')
 
 
-def test_what_cannot_be_known_is_an_error_by_name() -> None:
-    machine = machine_of()
-    _, answers = samples(machine)
-    with pytest.raises(UnknownName, match="no actuator in the model named 'motor_l'"):
-        qpos(answers, ROBOT.replace("motor_l", "drive_l"))
-    renamed = ROBOT.replace('"pitch"', '"p"').replace('"roll"', '"r"').replace('"knuckle_l"', '"k"')
-    with pytest.raises(UnknownName, match=r"no joint in the model named '(pitch|roll|knuckle_l)"):
-        qpos(answers, renamed)
-    longer = ROBOT.replace('name="end_l" pos="0 0 -0.2"', 'name="end_l" pos="0 0 -0.9"')
-    with pytest.raises(InvalidArgument, match=r"row 0: a loop that stays open by 0\.\d+ \(left\)"):
-        qpos(answers, longer)
-    with pytest.raises(InvalidArgument, match="qpos: found shape"):
-        qpos(answers, ROBOT, qpos=np.zeros(3))
-    with pytest.raises(InvalidArgument, match="qpos: found a value that is not finite"):
-        qpos(answers, ROBOT, qpos=np.full(mujoco.MjModel.from_xml_string(ROBOT).nq, np.nan))
-    with pytest.raises(InvalidArgument, match="model: found int"):
-        qpos(answers, 3)
+@pytest.mark.parametrize(
+    ("model", "others", "error", "said"),
+    [
+        (ROBOT.replace("motor_l", "drive_l"), None, UnknownName, "no actuator in the model named 'motor_l'"),
+        (RENAMED, None, UnknownName, r"no joint in the model named '(pitch|roll|knuckle_l)"),
+        (LONGER, None, InvalidArgument, r"row 0: a loop that stays open by 0\.\d+ \(left\)"),
+        (ROBOT, np.zeros(3), InvalidArgument, "qpos: found shape"),
+        (ROBOT, np.full(26, np.nan), InvalidArgument, "qpos: found a value that is not finite"),
+        (3, None, InvalidArgument, "model: found int"),
+    ],
+)
+def test_what_cannot_be_known_is_an_error_by_name(model: Any, others: Any, error: type, said: str) -> None:
+    with pytest.raises(error, match=said):
+        qpos(samples(machine_of())[1], model, qpos=others)

@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 import pfabrik as pf
-from in_mujoco import Model
+from in_mujoco import Model, notes_of
+from oracles import any_values
 from pfabrik.cli import main
 from pfabrik.errors import UnknownName
 from pfabrik.interop import Imported, from_mjcf, to_mjcf, verify
@@ -23,10 +24,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"
 
 MAGNIFIED = 60.0
 """How many units of the last digit poses may be off: loops add up the roundings of all their joints."""
-
-
-def notes_of(imported: Imported) -> str:
-    return "\n".join(map(str, imported.notes))
 
 
 def imported(linkage: Linkage, text: str, **asked: str) -> Imported:
@@ -50,8 +47,9 @@ def answers_as_mujoco_does(found: Imported, linkage: Linkage, tolerance: float, 
 
 
 WRITTEN = [
-    *((name, digits, "quat", 1.0) for name in LINKAGES for digits in (7, 6, 4)),
-    *((name, 6, turned, 1.0) for name in ("spherical", "mixture") for turned in ("euler", "xyaxes")),
+    *((name, digits, "quat", 1.0) for name in LINKAGES for digits in (7, 4)),
+    ("spherical", 6, "euler", 1.0),
+    ("mixture", 6, "xyaxes", 1.0),
     ("spherical", 6, "quat", 1e3),
 ]
 """Linkages, the digits of their files, how bodies are turned there, and the unit of length over a metre."""
@@ -67,29 +65,21 @@ def test_what_rounding_locks_moves_as_the_exact_machine_does(name: str, digits: 
     answers_as_mujoco_does(found, linkage, MAGNIFIED * 10.0**-digits, scale)
 
 
-def test_what_was_made_exact_is_named_with_how_much() -> None:
+def test_what_was_made_exact_is_named_with_how_much_and_is_exact() -> None:
     linkage = spherical_three_legs()
     found = imported(linkage, model_text(linkage, 7))
-    notes = [note for note in found.notes if "made to meet in one point" in note.what]
-    assert [sorted(note.names) for note in notes] == [
-        sorted(f"{hinge.name}_0" if hinge.name in ("q1", "q2") else hinge.name for hinge in linkage.hinges)
-    ]
-    by = float(notes[0].what.split("up to ")[1].split()[0])
-    assert 1e-9 < by < 1e-6
-    planar = notes_of(imported(planar_four_bar(), model_text(planar_four_bar(), 7)))
-    assert "axes made parallel within the digits of the file, turned by up to" in planar
-    assert "made the nearest machine that moves" in notes_of(
-        imported(LINKAGES["bennett"](), model_text(LINKAGES["bennett"](), 6))
-    )
-
-
-def test_axes_of_a_spherical_linkage_meet_to_the_last_bit() -> None:
-    linkage = spherical_three_legs()
-    mechanism = imported(linkage, model_text(linkage, 7)).mechanism
-    points, axes = (np.array([getattr(joint, key) for joint in mechanism.joints]) for key in ("at", "axis"))
+    (note,) = (note for note in found.notes if "made to meet in one point" in note.what)
+    assert len(note.names) == len(linkage.hinges)
+    assert 1e-9 < float(note.what.split("up to ")[1].split()[0]) < 1e-6
+    points, axes = (np.array([getattr(joint, key) for joint in found.mechanism.joints]) for key in ("at", "axis"))
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     centre = np.linalg.solve(across.sum(axis=0), np.einsum("nij,nj->i", across, points))
-    assert np.abs(np.cross(axes, points - centre)).max() <= 1e-15
+    assert np.abs(np.cross(axes, points - centre)).max() <= 1e-15  # they meet to the last bit
+    for name, digits, said in (
+        ("planar", 7, "axes made parallel within the digits of the file, turned by up to"),
+        ("bennett", 6, "made the nearest machine that moves"),
+    ):
+        assert said in notes_of(imported(LINKAGES[name](), model_text(LINKAGES[name](), digits)))
 
 
 @pytest.mark.parametrize("by", [1e-3, 1e-4])
@@ -118,7 +108,7 @@ def test_parallel_hinges_that_are_tilted_by_more_than_rounding_stay_tilted() -> 
     )
 
 
-@pytest.mark.parametrize("name", ["agile_eye", "five_bar", "delta", "stewart", "psu", "canfield"])
+@pytest.mark.parametrize("name", ["agile_eye", "five_bar", "delta", "canfield"])
 def test_machines_of_the_catalogue_in_six_digits_answer_as_they_are(name: str, tmp_path: Path) -> None:
     mechanism = pf.load(name)
     words = to_mjcf(mechanism).split('"')
@@ -128,14 +118,9 @@ def test_machines_of_the_catalogue_in_six_digits_answer_as_they_are(name: str, t
     found = from_mjcf('"'.join(words), length_unit=mechanism.length_unit).mechanism
     assert pf.mobility(found).mobility == pf.mobility(mechanism).mobility
     assert not pf.mobility(found).nearly_free
-    rng, length = np.random.default_rng(2), mechanism.characteristic_length
-    most = np.array([0.1 if drive.kind == "angle" else 0.03 * length for drive in mechanism.drives])
-    low, high = np.transpose([drive.limits for drive in mechanism.drives])
-    home = np.array([drive.home for drive in mechanism.drives])
-    values = np.clip(home + rng.uniform(-most, most, (6, len(most))), low, high)
-    one, other = (
-        pf.solve_fk(each, dict(zip(mechanism.actuator_names, values.T, strict=True))) for each in (mechanism, found)
-    )
+    length, names = mechanism.characteristic_length, mechanism.actuator_names
+    values = dict(zip(names, any_values(mechanism, 6, 0.3).T, strict=True))
+    one, other = pf.solve_fk(mechanism, values), pf.solve_fk(found, values)
     reached = np.asarray(one.status) == 0
     assert (np.asarray(other.status)[reached] == 0).all()
     assert np.linalg.norm((one.pose - other.pose)[reached][:, :3, 3], axis=1).max(initial=0.0) <= 1e-4 * length
@@ -153,11 +138,8 @@ def test_machines_of_the_catalogue_in_six_digits_answer_as_they_are(name: str, t
 )
 def test_the_last_digit_of_a_file_is_found(texts: list[str], value: float, error: float) -> None:
     assert digits_of(texts).error([value]) == pytest.approx(error, abs=1e-16)
-
-
-def test_a_quarter_turn_in_radians_is_rounded_wherever_it_stands() -> None:
-    digits = digits_of(["0.123456789012345 1.1234567890123456", "1.5708"])
-    assert digits.error([1.5708], 3) == pytest.approx(0.5e-4)
+    quarter = digits_of(["0.123456789012345 1.1234567890123456", "1.5708"])  # rounded wherever it stands
+    assert quarter.error([1.5708], 3) == pytest.approx(0.5e-4)
 
 
 def spoiled(by: float) -> pf.Mechanism:
@@ -172,7 +154,7 @@ def spoiled(by: float) -> pf.Mechanism:
     return pf.Mechanism("spoiled", joints, "coupler", (0.0, 0.0, 0.0), "world", length_unit="m")
 
 
-def test_nearly_free_motions_are_named_with_how_hard_the_loops_resist() -> None:
+def test_nearly_free_motions_are_named_with_how_hard_the_loops_resist(tmp_path: Path) -> None:
     """To first order the resistance grows as the angle by which an axis leans; of exact axes there is none."""
     small, twice, exact = (pf.mobility(spoiled(by)).nearly_free for by in (1e-5, 2e-5, 0.0))
     assert exact == ()
@@ -181,14 +163,10 @@ def test_nearly_free_motions_are_named_with_how_hard_the_loops_resist() -> None:
     assert 1e-7 < small[0].singular_value < 1e-5
     assert set(small[0].joints) == {"h0", "h1", "h2", "h3"}
     assert pf.mobility(spoiled(1e-5)).mobility == 0
-
-
-def test_the_commands_show_what_is_nearly_free(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     pf.save(spoiled(1e-5), path)
     shown = CliRunner().invoke(main, ["info", str(path)]).output
-    assert "nearly free" in shown
-    assert "not counted as a motion" in shown
+    assert "nearly free" in shown and "not counted as a motion" in shown
     value = json.loads(CliRunner().invoke(main, ["info", str(path), "--json"]).output)["mobility"]["nearly_free"][0]
     assert value["singular_value"] == pf.mobility(pf.load(path)).nearly_free[0].singular_value
     assert "the loops hardly resist a motion of" in CliRunner().invoke(main, ["check", str(path)]).output
@@ -237,7 +215,7 @@ def test_the_original_file_is_the_referee_too(tmp_path: Path) -> None:
         verify(pf.load(machine), poses=1, original=original)
 
 
-@pytest.mark.parametrize(("digits", "by"), [(17, 1e-5), (17, 1e-2), (7, 1e-4), (5, 1e-2)])
+@pytest.mark.parametrize(("digits", "by"), [(17, 1e-5), (7, 1e-4), (5, 1e-2)])
 def test_a_joint_out_of_place_by_more_than_import_moves_it_is_no_agreement(
     digits: int, by: float, tmp_path: Path
 ) -> None:
@@ -246,13 +224,11 @@ def test_a_joint_out_of_place_by_more_than_import_moves_it_is_no_agreement(
     original.write_text(model_text(linkage, digits))
     right = imported(linkage, str(original), task=["x"]).mechanism
     assert verify(right, poses=5, original=original)
-    place = [joint.name for joint in right.joints].index("h1")
-    at = right.joints[place].at + by * right.characteristic_length * linkage.hinges[0].axis[[1, 2, 0]]
-    moved = (*right.joints[:place], dataclasses.replace(right.joints[place], at=at), *right.joints[place + 1 :])
-    found = verify(dataclasses.replace(right, joints=moved), poses=5, original=original)
-    assert found.original is not None
-    assert not found.original
-    assert found.original.position_difference > found.original.position_tolerance
+    shift = by * right.characteristic_length * linkage.hinges[0].axis[[1, 2, 0]]
+    moved = [dataclasses.replace(each, at=each.at + shift) if each.name == "h1" else each for each in right.joints]
+    against = verify(dataclasses.replace(right, joints=moved), poses=5, original=original).original
+    assert against is not None and not against
+    assert against.position_difference > against.position_tolerance
 
 
 def test_a_machine_typed_to_six_digits_says_by_how_much_it_differs(tmp_path: Path) -> None:
