@@ -6,7 +6,6 @@ import math
 import os
 import re
 import warnings
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -324,44 +323,34 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, monkeypatch: pyte
         load(path)
 
 
-names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8).filter(str.strip)
-numbers = st.floats(-1e6, 1e6)
-angles = st.one_of(st.integers(-360, 360).map(math.radians), st.floats(-7, 7))
-vectors = st.tuples(numbers, numbers, numbers)
-directions = vectors.filter(lambda vector: max(map(abs, vector)) > 1e-3)
-
-
-DRIVES: list[dict[str, object]] = [
-    {}, {"actuated": True}, {"actuated": (True, False)}, {"actuated": (False, True), "max_acceleration": 3.5},
-    {"actuated": (True, False), "max_speed": 1.25}, {"actuated": True, "max_speed": (0.3, 70)},
-]  # fmt: skip
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8).filter(str.strip)
+NUMBERS = st.floats(-1e6, 1e6)
+VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
+DIRECTIONS = VECTORS.filter(lambda vector: max(map(abs, vector)) > 1e-3)
 
 
 @st.composite
 def mechanisms(draw: st.DrawFn) -> Mechanism:
-    """A chain of joints of every type, with limits that home keeps."""
-    bodies = draw(st.lists(names, min_size=6, max_size=6, unique=True))
-    labels = draw(st.lists(names.filter(lambda name: name not in bodies), min_size=6, max_size=6, unique=True))
-    turn, shift, low, high = draw(angles), draw(numbers), draw(st.floats(0, 9)), draw(st.floats(0, 9))
+    """A chain of joints of every type with any names, angles and numbers, and limits that home keeps."""
+    bodies = draw(st.lists(NAMES, min_size=6, max_size=6, unique=True))
+    labels = draw(st.lists(NAMES.filter(lambda name: name not in bodies), min_size=6, max_size=6, unique=True))
+    turn, shift, low, high = draw(st.floats(-7, 7)), draw(NUMBERS), draw(st.floats(0, 9)), draw(st.floats(0, 9))
     around, across = (turn - low, turn + high), (shift - low, shift + high)
-    centres = draw(st.lists(vectors, min_size=5, max_size=5, unique=True))
-    half_angle = draw(st.one_of(st.just(math.pi), st.floats(3, math.pi)))
-    axis, links = draw(directions), list(pairwise(bodies))
-    toward_next = tuple(np.copysign(axis, np.subtract(centres[4], centres[3])))
+    centres, axis = draw(st.lists(VECTORS, min_size=5, max_size=5, unique=True)), draw(DIRECTIONS)
+    cone = Cone(np.subtract(centres[4], centres[3]), draw(st.floats(3, math.pi)), bodies[3])
     joints = [
-        Joint(labels[0], "revolute", links[0], centres[0], axis=axis, actuated=True, home=turn, range=around,
-              max_speed=draw(st.one_of(st.none(), st.floats(0.1, 9)))),
-        Joint(labels[1], "cylindrical", links[1], centres[1], axis=axis, home=(turn, shift), range=(around, across),
-              **draw(st.sampled_from(DRIVES))),
-        Joint(labels[2], "universal", links[2], centres[2], axes=(np.eye(3)[np.abs(axis).argmin()], axis),
+        Joint(labels[0], "revolute", bodies[0:2], centres[0], axis=axis, actuated=True, home=turn, range=around),
+        Joint(labels[1], "cylindrical", bodies[1:3], centres[1], axis=axis, home=(turn, shift), range=(around, across)),
+        Joint(labels[2], "universal", bodies[2:4], centres[2], axes=(np.eye(3)[np.abs(axis).argmin()], axis),
               home=(turn, turn), range=(around, around)),
-        Joint(labels[3], "spherical", links[3], centres[3], cone=Cone(toward_next, half_angle, bodies[3])),
-        Joint(labels[4], "fixed", links[4], centres[4]),
-        Joint(labels[5], "prismatic", (bodies[0], bodies[5]), axis=axis, home=shift, range=across, actuated=True,
+        Joint(labels[3], "spherical", bodies[3:5], centres[3], cone=cone),
+        Joint(labels[4], "fixed", bodies[4:6], centres[4]),
+        Joint(labels[5], "prismatic", bodies[0::5], axis=axis, home=shift, range=across, actuated=True,
               max_acceleration=draw(st.one_of(st.none(), st.floats(0.1, 9)))),
     ]  # fmt: skip
-    unit = draw(st.sampled_from(["deg", "rad"]))
-    return Mechanism(draw(names), joints, bodies[3], draw(vectors), bodies[0], draw(names), unit)
+    return Mechanism(
+        draw(NAMES), joints, bodies[3], draw(VECTORS), bodies[0], draw(NAMES), draw(st.sampled_from(["deg", "rad"]))
+    )
 
 
 @given(st.data())

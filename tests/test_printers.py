@@ -80,88 +80,58 @@ class Arms(NamedTuple):
         return [self.arm(k, 0.0, 0.0, top) for k, top in enumerate(self.tops or ())]
 
 
-PRINTERS: dict[str, tuple[Towers | Arms, float, tuple[float, float]]] = {
-    "per_tower.cfg": (
-        Towers((128.375,) * 3, (209.125, 330.5, 90.25), (271.5, 271.75, 270.875), (286.25, 286.25, 285.5)),
-        80.0,
-        (0.0, 200.0),
+PRINTERS: dict[str, Towers | Arms] = {
+    "per_tower.cfg": Towers((128.375,) * 3, (209.125, 330.5, 90.25), (271.5, 271.75, 270.875), (286.25, 286.25, 285.5)),
+    "saved.cfg": Towers(  # arm_length of stepper_a is said above the block, which holds elsewhere
+        (104.718281,) * 3,
+        (210.057721, 329.842654, 90.0),
+        (241.0, 240.693147, 240.577215),
+        (251.331415, 251.173205, 251.414213),
     ),
-    "saved.cfg": (  # arm_length of stepper_a is said above the block, which holds elsewhere
-        Towers(
-            (104.718281,) * 3,
-            (210.057721, 329.842654, 90.0),
-            (241.0, 240.693147, 240.577215),
-            (251.331415, 251.173205, 251.414213),
-        ),
-        80.0,
-        (0.0, 180.0),
+    "rotary.cfg": Arms(
+        41.25,
+        (362.5,) * 3,
+        (30.0, 151.25, 270.0),
+        (140.5, 141.125, 140.5),
+        (301.25, 301.25, 300.5),
+        tops=(187.5, 187.5, 186.75),
     ),
-    "rotary.cfg": (
-        Arms(
-            41.25,
-            (362.5,) * 3,
-            (30.0, 151.25, 270.0),
-            (140.5, 141.125, 140.5),
-            (301.25, 301.25, 300.5),
-            tops=(187.5, 187.5, 186.75),
-        ),
-        60.0,
-        (0.0, 150.0),
+    # endstop = homed height + adjustment; towers at -150, -30 and 90 deg
+    "config.g": Towers(
+        (121.062,) * 3, (-149.688, -30.125, 90.0), (250.125, 250.375, 249.875), (259.0, 259.999, 259.312)
     ),
-    "config.g": (  # endstop = homed height + adjustment; towers at -150, -30 and 90 deg
-        Towers((121.062,) * 3, (-149.688, -30.125, 90.0), (250.125, 250.375, 249.875), (259.0, 259.999, 259.312)),
-        80.0,
-        (0.0, 180.0),
+    "rotary.g": Arms(
+        48.5,
+        (270.0, 270.125, 270.25),
+        (-149.25, -30.5, 90.0),
+        (110.0, 110.25, 109.75),
+        (230.0,) * 3,
+        highest=(40.25, 39.5, 40.0),
     ),
-    "rotary.g": (
-        Arms(
-            48.5,
-            (270.0, 270.125, 270.25),
-            (-149.25, -30.5, 90.0),
-            (110.0, 110.25, 109.75),
-            (230.0,) * 3,
-            highest=(40.25, 39.5, 40.0),
-        ),
-        40.0,
-        (70.0, 120.0),
+    # homed height = DELTA_HEIGHT - probe offset; a carriage retraces its adjustment from the stop
+    "Configuration.h": Towers(
+        (132.25, 131.75, 131.5), (210.375, 329.75, 90.0), (268.75, 268.125, 268.625), (303.0, 302.75, 303.875)
     ),
-    "Configuration.h": (  # homed height = DELTA_HEIGHT - probe offset; a carriage retraces its adjustment from the stop
-        Towers(
-            (132.25, 131.75, 131.5),
-            (210.375, 329.75, 90.0),
-            (268.75, 268.125, 268.625),
-            (303.0, 302.75, 303.875),
-        ),
-        80.0,
-        (0.0, 200.0),
-    ),
-    "m503.gcode": (
-        Towers((131.75,) * 3, (210.38, 329.75, 90.0), (268.75, 268.12, 268.63), (301.5, 301.25, 302.38)),
-        80.0,
-        (0.0, 200.0),
-    ),
+    "m503.gcode": Towers((131.75,) * 3, (210.38, 329.75, 90.0), (268.75, 268.12, 268.63), (301.5, 301.25, 302.38)),
 }
-"""File -> the firmware's formula with the file's numbers; radius and heights [mm] within which positions are drawn."""
+"""File -> the firmware's formula with the file's numbers."""
 
 
 @pytest.mark.parametrize("name", PRINTERS)
 def test_actuators_are_where_the_firmware_has_them(name: str) -> None:
-    firmware, radius, heights = PRINTERS[name]
-    machine, rng = pf.load(FILES / name), np.random.default_rng(3)
-    turns, out = rng.uniform(0.0, 2.0 * math.pi, 100), radius * np.sqrt(rng.uniform(0.0, 1.0, 100))
-    positions = np.stack([out * np.cos(turns), out * np.sin(turns), rng.uniform(*heights, 100)], axis=1)
-    answers = pf.solve_ik(machine, positions)
+    firmware, machine, random = PRINTERS[name], pf.load(FILES / name), np.random.default_rng(3)
     unit = np.degrees if isinstance(firmware, Arms) else np.asarray
-    assert answers
-    np.testing.assert_allclose(unit(answers.actuators), [firmware(*place) for place in positions], rtol=0, atol=EXACT)
-    ends = [machine.joint(actuator).range[1] for actuator in machine.actuator_names]
-    np.testing.assert_allclose(unit(ends), firmware.endstops, rtol=0, atol=EXACT)
+    turns, out = random.uniform(0.0, 2.0 * math.pi, 100), 40.0 * np.sqrt(random.uniform(0.0, 1.0, 100))
+    around = np.stack([out * np.cos(turns), out * np.sin(turns), random.uniform(70.0, 120.0, 100)], axis=1)
     # a firmware knows one place of each carriage or arm: far above the endstops nothing is within reach
     column = np.array([(0.0, 0.0, height) for height in np.linspace(-1000.0, 2000.0, 61)])
-    answers = pf.solve_ik(machine, column)
+    answers = pf.solve_ik(machine, np.concatenate([around, column]))
     reached = answers.status == pf.Status.REACHED
-    expected = [firmware(*place) for place in column[reached]]
+    assert reached[:100].all()
+    expected = [firmware(*place) for place in np.concatenate([around, column])[reached]]
     np.testing.assert_allclose(unit(answers.actuators[reached]), expected, rtol=0, atol=EXACT)
+    ends = [machine.joint(actuator).range[1] for actuator in machine.actuator_names]
+    np.testing.assert_allclose(unit(ends), firmware.endstops, rtol=0, atol=EXACT)
 
 
 def numbers(text: str) -> dict[str, list[float]]:
