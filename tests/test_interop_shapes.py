@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -51,35 +54,49 @@ def shapes_by_kind(found: Imported) -> dict[tuple[str, str], pf.Shape]:
     return {(shape.body, shape.kind): shape for shape in found.mechanism.shapes}
 
 
+KINDS = {2: "sphere", 3: "capsule", 5: "disc", 6: "box"}
+
+
+def kinematics(text: str) -> tuple[Any, Any]:
+    """MuJoCo's model, and its data at the first keyframe, if there is one."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_kinematics(model, data)
+    return model, data
+
+
+def assert_where_mujoco_has_them(shapes: Sequence[pf.Shape], model: Any, data: Any, solids: Sequence[int]) -> None:
+    """Shapes in millimetres are the solids with these numbers."""
+    assert len(shapes) == len(solids)
+    for number in solids:
+        at, axes = 1e3 * data.geom_xpos[number], data.geom_xmat[number].reshape(3, 3).T
+        size, kind = 2e3 * model.geom_size[number], KINDS[int(model.geom_type[number])]
+        middles = [(shape, shape.at if shape.ends is None else np.mean(shape.ends, axis=0)) for shape in shapes]
+        (shape,) = (shape for shape, middle in middles if np.allclose(middle, at, atol=1e-9) and shape.kind == kind)
+        if kind == "box":
+            np.testing.assert_allclose(shape.size, size)
+            np.testing.assert_allclose(shape.axes or np.eye(3)[:2], axes[:2], atol=1e-12)
+        elif kind == "capsule":
+            off = np.subtract(*shape.ends)
+            assert (shape.thickness, np.linalg.norm(off)) == pytest.approx((size[0], size[1]))
+            assert abs(off @ axes[2]) == pytest.approx(size[1])
+        else:
+            assert shape.diameter == pytest.approx(size[0])
+        if kind == "disc":
+            assert (shape.thickness, abs(shape.axis @ axes[2])) == pytest.approx((size[1], 1.0))
+
+
 def test_geoms_that_collide_are_shapes_of_the_merged_bodies_where_mujoco_has_them() -> None:
     found = from_mjcf(WEIGHTY, end_effector="tool", configuration="bent", length_unit="mm")
     text = WEIGHTY.replace('<geom class="seen" mesh="m"/>', "").replace('<geom type="mesh" mesh="m"/>', "")
     text = text.replace('<geom type="box" mesh="m"/>', "").replace('<mesh name="m" file="nowhere.stl"/>', "")
-    model = mujoco.MjModel.from_xml_string(text.replace("<compiler", '<compiler boundmass="1" boundinertia="1"'))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_kinematics(model, data)
-    shapes = shapes_by_kind(found)
-    assert set(shapes) == {
-        ("world", "box"),
-        ("upper", "capsule"),
-        ("tool", "disc"),
-        ("tool", "sphere"),
-        ("tool", "box"),
-    }
-    for name, body, kind in (("shell", "tool", "disc"), ("tip", "tool", "sphere"), ("block", "tool", "box")):
-        np.testing.assert_allclose(shapes[body, kind].at, 1e3 * data.geom(name).xpos, atol=1e-9)
-    axes = {name: data.geom(name).xmat.reshape(3, 3).T for name in ("wall", "bone", "shell", "block")}
-    assert (shapes["tool", "disc"].diameter, shapes["tool", "disc"].thickness) == pytest.approx((40, 200))
-    assert abs(axes["shell"][2] @ shapes["tool", "disc"].axis) == pytest.approx(1)
-    assert shapes["tool", "sphere"].diameter == pytest.approx(60)
-    for name, body, size in (("block", "tool", (20, 40, 60)), ("wall", "world", (40, 600, 400))):
-        np.testing.assert_allclose(shapes[body, "box"].axes, axes[name][:2], atol=1e-12)
-        np.testing.assert_allclose(shapes[body, "box"].size, size)
-    half = 1e3 * model.geom("bone").size[1] * axes["bone"][2]
-    middle = 1e3 * data.geom("bone").xpos
-    np.testing.assert_allclose(shapes["upper", "capsule"].ends, [middle + half, middle - half], atol=1e-9)
-    assert shapes["upper", "capsule"].thickness == pytest.approx(20)
+    model, data = kinematics(text.replace("<compiler", '<compiler boundmass="1" boundinertia="1"'))
+    solids = [model.geom(name).id for name in ("wall", "bone", "shell", "tip", "block")]
+    assert_where_mujoco_has_them(found.mechanism.shapes, model, data, solids)
+    tool = {("tool", "disc"), ("tool", "sphere"), ("tool", "box")}
+    assert set(shapes_by_kind(found)) == {("world", "box"), ("upper", "capsule"), *tool}
     for note in ("ellipsoid (1), mesh (2), plane (1)", "touch nothing are left out (1)", "(5), of: tool, upper, world"):
         assert note in notes_of(found), note
 
@@ -220,29 +237,9 @@ def test_collision_geometry_of_a_description_is_where_mujoco_has_it() -> None:
     found = from_urdf(SOLID_URDF.format(more=more), actuated=["q1", "q2"], end_effector="tool", length_unit="mm")
     text = SOLID_URDF.format(more="").replace("<collision><geometry><mesh", "<visual><geometry><mesh")
     text = text.replace('y.stl"/></geometry></collision>', 'y.stl"/></geometry></visual>')
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    kinds = {int(kind): name for kind, name in ((2, "sphere"), (5, "disc"), (6, "box"))}
-    shapes = [(each.kind, *np.round(each.at, 6)) for each in found.mechanism.shapes]
-    solid = [i for i in range(model.ngeom) if model.geom_contype[i]]
-    assert sorted(shapes) == sorted(
-        (kinds[int(model.geom_type[i])], *np.round(1e3 * data.geom_xpos[i], 6)) for i in solid
-    )
-    for i in solid:
-        shape = next(each for each in found.mechanism.shapes if np.allclose(each.at, 1e3 * data.geom_xpos[i]))
-        axes, size = data.geom_xmat[i].reshape(3, 3).T, 1e3 * model.geom_size[i]
-        if shape.kind == "box":
-            np.testing.assert_allclose(shape.size, 2 * size)
-            np.testing.assert_allclose(shape.axes or np.eye(3)[:2], axes[:2], atol=1e-12)
-        else:
-            assert shape.diameter == pytest.approx(2 * size[0])
-        if shape.kind == "disc":
-            assert shape.axis == pytest.approx(axes[2])
-            assert shape.thickness == pytest.approx(2 * size[1])
-    for note in (
-        "geometry (1), mesh (1), sphere without its numbers (1)",
-        "without a volume",
-        "(5), of: base, tool, upper",
-    ):
+    model, data = kinematics(text)
+    solids = np.flatnonzero(model.geom_contype).tolist()
+    assert_where_mujoco_has_them(found.mechanism.shapes, model, data, solids)
+    left_out = "geometry (1), mesh (1), sphere without its numbers (1)"
+    for note in (left_out, "without a volume", "(5), of: base, tool, upper"):
         assert note in notes_of(found), note
