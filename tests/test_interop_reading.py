@@ -294,7 +294,8 @@ POST = """<robot name="post"><link name="base"/><link name="a"/><link name="b"/>
     <limit lower="-3" upper="3" velocity="2" effort="1"/></joint>
   <joint name="C[1]" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
     <limit lower="-1" upper="1" velocity="0.5" effort="1"/></joint>
-  <joint name="last" type="continuous"><parent link="c"/><child link="d"/><axis xyz="0 1 0"/></joint></robot>"""
+  <joint name="last" type="continuous"><parent link="c"/><child link="d"/><axis xyz="0 1 0"/>
+    <limit velocity="0" effort="1"/></joint></robot>"""
 
 
 def test_actuators_come_in_the_order_asked_for_as_fast_as_the_file_says() -> None:
@@ -302,6 +303,8 @@ def test_actuators_come_in_the_order_asked_for_as_fast_as_the_file_says() -> Non
     assert found.joint("C").type == "cylindrical"
     assert found.actuator_names == ("last", "C[0]", "C[1]", "turn")
     assert (found.joint("C").max_speed, found.joint("last").max_speed) == ((2.0, 500.0), None)
+    passive = from_urdf(POST, end_effector="d", actuated=["C[1]"], length_unit="mm").mechanism
+    assert (passive.actuator_names, passive.joint("C").max_speed) == (("C[1]",), 500.0)
 
 
 def with_frame(urdf: str, name: str, parent: str, at: Sequence[float]) -> str:
@@ -583,13 +586,6 @@ def test_of_coupled_joints_one_is_driven_or_all_that_are_asked_for(
     found = from_urdf(MIMIC, **asked)
     assert found.mechanism.actuator_names == drives
     assert_noted(found, note, COUPLED)
-
-
-def test_speeds_are_read_of_what_is_driven_in_the_unit_asked_for() -> None:
-    uncoupled, joints = MIMIC.replace("mimic", "x"), ("shoulder", "elbow", "grip")
-    for driven, speeds in ((joints, [3.0, None, 1000.0]), (["grip"], [None, None, 1000.0])):
-        found = from_urdf(uncoupled, end_effector="finger", actuated=driven, length_unit="mm").mechanism
-        assert [found.joint(name).max_speed for name in joints] == speeds
 
 
 GEARS = """
