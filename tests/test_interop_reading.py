@@ -170,6 +170,55 @@ def test_of_a_whole_leg_the_ankle_alone_is_taken_and_hinges_that_cross_are_unive
     assert "R*-S-S" in " ".join(chains(asked))
 
 
+# A delta with five closures and a wrist behind its platform.
+
+
+def delta() -> str:
+    arms, equalities = [], []
+    for index, angle in enumerate(np.radians([0, 120, 240])):
+        degrees = np.degrees(angle)
+        rods = ""
+        for side, shift in (("a", -0.03), ("b", 0.03)):
+            plate = ""
+            if (index, side) == (0, "a"):
+                plate = PLATE
+            else:
+                equalities.append(f'<connect name="c{index}{side}" site1="r{index}{side}" site2="p{index}{side}"/>')
+            rods += f"""<body name="rod{index}{side}" pos="0.1 {shift} 0"><joint name="b{index}{side}" type="ball"/>
+                <site name="r{index}{side}" pos="-0.06 0 -0.2"/>{plate}</body>"""
+        arms.append(
+            f"""<body euler="0 0 {degrees}"><body name="arm{index}" pos="0.06 0 0">
+            <joint name="q{index}" axis="0 1 0" range="-60 60"/>{rods}</body></body>"""
+        )
+    motors = "".join(f'<position joint="q{index}"/>' for index in range(3))
+    return f"""<mujoco model="delta">{BOUND}<worldbody>{"".join(arms)}</worldbody>
+        <equality>{"".join(equalities)}</equality><actuator>{motors}<motor joint="wrist"/></actuator></mujoco>"""
+
+
+PLACES = [
+    (index, side, np.round([0.1 * np.cos(a) - s * np.sin(a), 0.1 * np.sin(a) + s * np.cos(a), 0.0], 17))
+    for index, a in enumerate(np.radians([0, 120, 240]))
+    for side, s in (("a", -0.03), ("b", 0.03))
+]
+PLATE = (
+    '<body name="plate" pos="-0.16 0.03 -0.2"><joint name="plate" type="ball" pos="0.1 -0.03 0"/>'
+    + "".join(f'<site name="p{i}{s}" pos="{" ".join(map(repr, at.tolist()))}"/>' for i, s, at in PLACES)
+    + '<body name="tool" pos="0 0 -0.02"><joint name="wrist" axis="0 0 1"/></body></body>'
+)
+
+
+def test_a_delta_with_five_closures_and_a_wrist() -> None:
+    text = delta()
+    found = from_mjcf(text, end_effector="tool", task=["x", "y", "z", "yaw"])
+    assert found.gap <= 1e-15
+    assert pf.mobility(found.mechanism).platform == 4
+    assert found.mechanism.actuator_names == ("q0", "q1", "q2", "wrist")  # as in its actuators
+    agrees(found, Model.of(text), "tool")
+    plate = from_mjcf(text, end_effector="plate", task=["x", "y", "z"])
+    assert_noted(plate, "wrist")
+    assert pf.solve_ik(plate.mechanism, np.array(plate.mechanism.reference_point) + [0.02, 0.01, -0.03])
+
+
 def test_rods_as_free_bodies_that_equalities_hold() -> None:
     """A pendulum of two rods, of which the second is free in the air but for its connects; two make a hinge."""
     text = f"""<mujoco>{BOUND}<worldbody>
