@@ -102,7 +102,7 @@ def zigzag() -> pf.Track:
     return pf.track(pf.load("linear_delta"), np.linspace([0, 0, 5], [30, 20, 5], len(noise)) + 1e-3 * noise)
 
 
-@pytest.mark.parametrize(("speed", "acceleration"), [(100.0, None), (None, 3e5), (100.0, 3e5)])
+@pytest.mark.parametrize(("speed", "acceleration"), [(100.0, None), (100.0, 3e5)])
 def test_limits_are_kept_between_steps_that_zigzag(speed: float | None, acceleration: float | None) -> None:
     """More steps than points of the grid, and each bends the path: within a step rates and accelerations vary much."""
     timed = pf.time_path(zigzag(), speed=speed, acceleration=acceleration, rate=50_000)
