@@ -1,4 +1,4 @@
-"""MuJoCo by itself: loops closed by Newton's method on its own rows, led from where a model starts; compared with ours."""
+"""MuJoCo by itself: loops closed by Newton's method on its own rows, led from where a model starts; and against us."""
 
 from __future__ import annotations
 
