@@ -247,6 +247,7 @@ def test_parallelograms_tell_their_rods() -> None:
     assert (found.rods, found.width, found.pinned) == ((("KB1", "KC1"), ("KB2", "KC2")), 10, False)
     (found,) = pinned.parallelograms
     assert (found.rods, found.pinned) == ((("QB1", "QC1"), ("QB2", "QC2")), True)
+    assert found.joints == ("QB1", "QC1", "QB2", "QC2")
     assert (found.length, found.width) == pytest.approx((50, 20), abs=1e-12)
 
 

@@ -87,6 +87,7 @@ def test_a_machine_changed_in_python_has_numbers_alone() -> None:
         ('"upper / 2"', '"(((upper"', "dimensions.lower", "'(((upper'"),
         ('"upper / 2"', '"1' + "+1" * 100 + '"', "dimensions.lower", "an expression of 201 characters"),
         ('"upper / 2"', "true", "dimensions.lower", "True"),
+        ('"upper / 2"', "inf", "dimensions.lower", "has no finite value"),
         ("tilt = 30", '"my tilt" = 30', "dimensions.my tilt", "the name 'my tilt'"),
         ("tilt = 30", "tilt = 30\nsin = 3", "dimensions.sin", "the name 'sin'"),
         ('["-stop", "stop"]', '["-stopp", "stop"]', "joint[0].range", "did you mean 'stop'?"),

@@ -227,6 +227,7 @@ HOSTILE = [
     (edited(("half_angle = 60", "half_angle = 6")), "joint[2].cone.half_angle", "(6 deg) -> at least the angle"),
     (edited(('end_effector = "platform"', 'end_effector = "platfrom"')), "end_effector", "did you mean 'platform'?"),
     (HEAD.replace('"m"', '"m"\nbase = "bse"') + CRANK, "base", "did you mean 'base'?"),
+    (edited(('"m"', '"m"\nbase = "bse"')), "base", "did you mean 'base'?"),
     (edited(('["rod", ', '["rood", ')), "joint[2].connects", "'rood', which no other joint connects; did you mean "),
     (edited(("count = 3", "count = 5")), "joint[1].copies.count", "3, but 'cylinder' has 5 copies at joint 'A' -> 5"),
     (edited(("count = 3", f"count = {MOST_COPIES + 1}")), "joint[0].copies.count", "from 1 to 100"),

@@ -14,9 +14,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pfabrik.description.enclosing import enclosing_radius
+from pfabrik.description.graph import cone_line
 from pfabrik.description.home_mobility import universal_axes
 from pfabrik.description.mechanism import Cone, Joint, Mechanism
-from pfabrik.errors import InvalidMechanism, MobilityWarning, UnknownName
+from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
 from pfabrik.files import loads
 from pfabrik.tolerances import TOLERANCES
 
@@ -146,6 +147,9 @@ def test_home_coordinates_and_axes_follow_from_where_the_joints_are() -> None:
     axes = universal_axes(machine, machine.joint("A0"))  # without axes, it keeps its link from spinning
     assert axes @ machine.home_axis("B0") == pytest.approx([0, 0], abs=1e-15)
     assert axes @ axes.T == pytest.approx(np.eye(2), abs=1e-15)
+    assert [joint.name for joint in cone_line(machine, machine.joint("A0"))] == ["A0", "C0"]  # through the strut
+    with pytest.raises(InvalidArgument, match="C0"):
+        cone_line(machine, machine.joint("C0"))
 
 
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

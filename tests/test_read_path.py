@@ -95,6 +95,7 @@ def test_a_program_is_followed_to_its_end_with_turns_as_roll_pitch_and_yaw(tmp_p
         ("G1 X1 " + "X" * 200_000, "no text of a path"),
         ("G1 X1\0", "no text of a path"),
         ("G1 X1\nG3 X1 I5 P3", "line 2: found P3"),
+        ("G1 X1 U5", "line 1: found U5"),
         ("G1 X1 Y2 X3", "line 1: found X twice"),
         ("G1 X1\nG4 X2", "line 2: found G4"),
         ("G1 X1\nM98 P100", "line 2: found M98, a call of a subroutine"),
