@@ -226,6 +226,19 @@ def test_feasibility_of_one_target_is_a_number_of_no_pose_unknown_and_without_cl
     assert np.isnan(found.margin[1]) and found.binding[1] == -1
     with pytest.raises(pf.errors.UnsupportedMechanism, match="no legs in closed form"):
         pf.feasibility(machine("nrpm"), machine("nrpm").home_pose)
-    with pytest.warns(pf.errors.MobilityWarning):
-        crooked = closure.crooked_upr()
-    assert model_of(crooked).why_no_legs.startswith("sub-chain R*-U-P*-U: ")
+
+
+@pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
+def test_a_chain_that_is_no_leg_is_named_with_the_reason_and_answered_all_the_same() -> None:
+    assert model_of(closure.crooked_upr()).why_no_legs.startswith("sub-chain R*-U-P*-U: ")
+    clavel = closure.pinned_delta()
+    along = {leg: np.subtract(clavel.joint(f"C{leg}").at, clavel.joint(f"B{leg}").at) for leg in "123"}
+    inward = {"D": 0.1, "E": -0.1}  # pins off the hinges beside them, as in Tsai's
+    joints = [
+        replace(joint, at=joint.at + inward.get(joint.name[0], 0.0) * along[joint.name[1]]) for joint in clavel.joints
+    ]
+    tsai = replace(clavel, joints=joints)
+    assert "not as long as the hinges beside it are apart" in model_of(tsai).why_no_legs
+    answers = pf.solve_ik(tsai, oracles.targets_about(tsai, np.random.default_rng(2), 10, 0.1, 0.0))
+    assert (answers.status == pf.Status.REACHED).all()
+    assert pf.closure_residual(answers).max() <= 1e-9 * tsai.characteristic_length
