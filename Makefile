@@ -29,9 +29,8 @@ docs: $(STAMP)
 	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@$(BIN)/zensical build --clean --strict
 
-# In parallel. What kernels with handles are made of is tested as plain Python.
+# In parallel.
 test: $(STAMP) $(MODULE)
-	@PFABRIK_KERNELS=python $(BIN)/python -m pytest tests/test_platform_kernels.py
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 # The programs of the pages again, with the linear algebra of other processors.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +14,21 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from exported import (
+    COMPILERS,
+    EXACT,
+    KEEP,
+    PASSED,
+    STRICT,
+    Truth,
+    answers_of,
+    asked,
+    checks_itself,
+    compiled,
+    needs_compiler,
+    sanitizers_of,
+    slack_of,
+)
 from pfabrik.description.links import links_of
 from pfabrik.errors import UnsupportedMechanism
 from pfabrik.export.export_c import c_source
@@ -22,13 +37,9 @@ from pfabrik.export.linuxcnc import linuxcnc
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.tensors import tensor_source
 from test_controllers import STUBS
-from test_export_c import COMPILERS, MATHEMATICS, STRICT, compiled, flat, needs_compiler, slack_of
 
 Array = np.ndarray
-SANITIZED = ("-std=c99", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-KEEP = pf.Options(working_mode="keep")
 PAIR = 10_000
-EXACT = {"double": 1e-12, "float": 1e-5}
 
 
 def hexaglide() -> pf.Mechanism:
@@ -121,37 +132,34 @@ MACHINES = {
 }
 
 
-@lru_cache
+@cache
 def machine(name: str) -> pf.Mechanism:
     return MACHINES[name]()
 
 
-@lru_cache
+@cache
 def text_of(name: str, precision: Any = "double") -> str:
     return c_source(machine(name), precision=precision)
 
 
-class Truth(NamedTuple):
+class Measured(NamedTuple):
     """Poses that legs reach, and what the library measures there, limits and clearance left out."""
 
-    poses: Array
-    actuators: Array
-    slack: Array
+    known: Truth
     distances: Array
     pairs: Array
 
 
-@lru_cache
-def truth(name: str, count: int = 400) -> Truth:
+@cache
+def measured(name: str, count: int = 300) -> Measured:
     mechanism = machine(name)
     free = mechanism.with_clearance(None).without_limits()
     found = pf.solve_ik(free, targets_around_home(mechanism, count, np.random.default_rng(5)), options=KEEP)
     found = found[found.status == 0]
-    apart = pf.clearance(found)
-    home = np.concatenate([np.ravel(mechanism.home_coordinate(joint.name)) for joint in mechanism.joints])
-    slack = slack_of(mechanism, found.q, home)
+    apart, poses = pf.clearance(found), found.pose.copy()
+    known = Truth(poses, poses, found.status == 0, found.actuators.copy(), slack_of(mechanism, found.q))
     names = np.array([" and ".join(names) for names in np.asarray(apart.links)])
-    return Truth(found.pose.copy(), found.actuators.copy(), slack, np.asarray(apart.distance), names)
+    return Measured(known, np.asarray(apart.distance), names)
 
 
 def distances_between(mechanism: pf.Mechanism, names: str, poses: Array) -> Array:
@@ -162,177 +170,126 @@ def distances_between(mechanism: pf.Mechanism, names: str, poses: Array) -> Arra
     return np.asarray(pf.clearance(pf.solve_ik(alone, poses, options=KEEP)).distance)
 
 
-DRIVER = """
-#include EXPORTED
-#include <stdio.h>
-int main(void)
-{
-    double x[12], codes[4], measured[2];
-    while (fread(x, sizeof(double), 12, stdin) == 12) {
-        pfk_real actuators[PFK_ACTUATORS], slack[PFK_LIMITS + 1], distance = 0;
-        pfk_pose target, pose, back;
-        int i, j, pair = 0;
-        for (i = 0; i < 3; ++i)
-            for (target.p[i] = (pfk_real)x[i], j = 0; j < 3; ++j)
-                target.R[i][j] = (pfk_real)x[3 + 3 * i + j];
-        for (i = 0; i < PFK_ACTUATORS; ++i)
-            actuators[i] = 0;
-        pfk_home(&pose);
-        codes[0] = pfk_ik(&target, &pose, actuators);
-        codes[1] = pfk_limits(&target, slack);
-        codes[2] = pfk_clearance(&target, &distance, &pair);
-        for (i = 0; i < PFK_ACTUATORS; ++i) {
-            double given;
-            if (fread(&given, sizeof(double), 1, stdin) != 1)
-                return 1;
-            actuators[i] = (pfk_real)given;
-        }
-        back = target;
-        codes[3] = pfk_fk(actuators, &back, 0);
-        measured[0] = (double)distance;
-        measured[1] = pair;
-        fwrite(codes, sizeof(double), 4, stdout);
-        fwrite(measured, sizeof(double), 2, stdout);
-        for (i = 0; i < 3; ++i) {
-            measured[0] = (double)(back.p[i] - target.p[i]);
-            fwrite(measured, sizeof(double), 1, stdout);
-        }
-        fprintf(stderr, "%s\\n", pfk_what(PFK_PAIR + pair));
-    }
-    return 0;
-}
-"""
-
-
-class Answers(NamedTuple):
-    """What a file said, one row a pose; `words` of the nearest pair."""
-
-    ik: Array
-    limits: Array
-    clearance: Array
-    fk: Array
-    distances: Array
-    pairs: Array
-    back: Array
-    words: list[str]
-
-
-def answers_of(name: str, folder: Path, precision: str = "double", options: tuple[str, ...] = SANITIZED) -> Answers:
-    known, driver = truth(name), folder / "driver.c"
-    driver.write_text(DRIVER)
-    program = compiled(folder, text_of(name, precision), COMPILERS[0], *options, driver=driver)
-    given = np.concatenate([flat(known.poses), known.actuators], axis=1)
-    run = subprocess.run([str(program)], input=given.tobytes(), capture_output=True)
-    assert run.returncode == 0, run.stderr.decode()[-2000:]
-    said = np.frombuffer(run.stdout).reshape(len(given), -1)
-    return Answers(*said[:, :4].astype(int).T, *said[:, 4:6].T, said[:, 6:], run.stderr.decode().splitlines())
-
-
 @needs_compiler
 @pytest.mark.parametrize(
-    ("name", "precision"), [*((name, "double") for name in MACHINES), ("delta", "float"), ("solids", "float")]
+    ("name", "precision"),
+    [
+        ("between balls", "double"),
+        ("delta", "float"),
+        ("solids", "double"),
+        ("all bodies", "double"),
+        *(
+            pytest.param(*each, marks=pytest.mark.campaign)
+            for each in (("hexaglide", "double"), ("delta", "double"), ("solids", "float"))
+        ),
+    ],
 )
-def test_the_file_measures_what_the_library_does_and_answers_where_links_are_apart(
-    name: str, precision: str, tmp_path: Path
-) -> None:
-    mechanism, known = machine(name), truth(name)
+def test_the_file_measures_what_the_library_does_and_answers_where_links_are_apart(name: str, precision: str) -> None:
+    mechanism, (known, distances, pairs) = machine(name), measured(name)
     size, exact = mechanism.characteristic_length, EXACT[precision]
-    said = answers_of(name, tmp_path, precision, SANITIZED if precision == "double" else ("-std=c99", "-O1"))
-    np.testing.assert_allclose(said.distances / size, known.distances / size, rtol=0, atol=exact)
+    options = sanitizers_of(COMPILERS[0]) if name == "solids" else ()
+    program = compiled(text_of(name, precision), *options)
+    said = answers_of(program, mechanism, known, "there")
+    codes, measured_there, numbers = said.distances.T
+    np.testing.assert_allclose(measured_there / size, distances / size, rtol=0, atol=exact)
     # the verdict, but where rounding decides
-    room = (known.distances - mechanism.clearance) / size
+    room = (distances - mechanism.clearance) / size
     is_sure, is_apart = np.abs(room + 1e-9) > exact, room >= -1e-9
     is_within = (known.slack >= -1e-9).all(axis=1)
     is_sure &= (np.abs(known.slack + 1e-9) > exact).all(axis=1)
     assert 0.02 < np.mean(~is_apart) < 0.98 and (is_apart & is_within).any() and (~is_apart & is_within).any()
-    for codes in (said.ik, said.limits):
-        np.testing.assert_array_equal((codes == 0)[is_sure], (is_apart & is_within)[is_sure])
-        np.testing.assert_array_equal((codes > PAIR)[is_sure], (~is_apart & is_within)[is_sure])
-    for codes in (said.clearance, said.fk):
-        np.testing.assert_array_equal((codes == 0)[is_sure], is_apart[is_sure])
-        np.testing.assert_array_equal((codes > PAIR)[is_sure], ~is_apart[is_sure])
+    for verdicts in (said.ik, said.limits):
+        np.testing.assert_array_equal((verdicts == 0)[is_sure], (is_apart & is_within)[is_sure])
+        np.testing.assert_array_equal((verdicts > PAIR)[is_sure], (~is_apart & is_within)[is_sure])
+    for verdicts in (codes, said.fk):
+        np.testing.assert_array_equal((verdicts == 0)[is_sure], is_apart[is_sure])
+        np.testing.assert_array_equal((verdicts > PAIR)[is_sure], ~is_apart[is_sure])
     # which pair it is, by its number and in words
-    too_near = said.clearance > PAIR
-    np.testing.assert_array_equal(said.clearance[too_near], PAIR + said.pairs[too_near])
+    too_near = codes > PAIR
+    np.testing.assert_array_equal(codes[too_near], PAIR + numbers[too_near])
     named = np.array([words.removeprefix("links too near: ") for words in said.words])
-    assert np.mean(named == known.pairs) > 0.3
-    for names in set(named[named != known.pairs]):  # pairs that are as near, by symmetry
+    assert np.mean(named == pairs) > 0.3
+    for names in set(named[named != pairs]):  # pairs that are as near, by symmetry
         rows = named == names
-        np.testing.assert_allclose(
-            distances_between(mechanism, names, known.poses[rows]) / size, said.distances[rows] / size, atol=2 * exact
-        )
+        there = distances_between(mechanism, names, known.whole[rows])
+        np.testing.assert_allclose(there / size, measured_there[rows] / size, atol=2 * exact)
     # forward kinematics tell the pose all the same
-    assert np.abs(said.back[said.fk != -3]).max() <= 100 * exact * size
+    apart = said.back[:, :3] - known.whole[:, :3, 3] / size
+    assert np.abs(apart[said.fk != -3]).max() <= 100 * exact
+    assert checks_itself(program) == (0, PASSED)
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["hexapod", "solids"])
-def test_the_file_checks_its_distances_and_finds_links_of_another_thickness(name: str, tmp_path: Path) -> None:
-    text = text_of(name)
+def test_the_self_test_compares_distances_and_finds_links_of_another_thickness() -> None:
+    text = text_of("solids")
     rows = re.findall(r"^    \{\{\{.*, ([01]), (\S+)\},?$", text, re.MULTILINE)
     assert len(rows) == 50 and {kept for kept, _ in rows} == {"0", "1"}
-    assert any(float(distance) < machine(name).clearance for _, distance in rows)
-    program = compiled(tmp_path, text, COMPILERS[0], *SANITIZED, driver=None)
-    run = subprocess.run([str(program)], capture_output=True, text=True)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "50 poses, 0 wrong\n", "")
+    assert any(float(distance) < machine("solids").clearance for _, distance in rows)
     wrong = re.sub(r"(pfk_reaching_links_sizes\[\d+\] = \{\s+\S+ )", r"\1 0.001 + ", text)  # of the first, all around
-    run = subprocess.run([str(compiled(tmp_path, wrong, COMPILERS[0], driver=None))], capture_output=True, text=True)
-    assert run.returncode == 1 and ", links: " in run.stdout
+    code, words = checks_itself(compiled(wrong, driver=None))
+    assert code == 1 and ", links: " in words
 
 
 def test_a_machine_without_a_clearance_is_exported_as_one_without_thickness() -> None:
     bare, thick = hexapod(clearance=None).with_shapes(()), hexapod(clearance=None)
-    assert c_source(thick) == c_source(bare)
-    assert "PAIR" not in c_source(bare)
+    text = c_source(bare, parts=("limits",))
+    assert c_source(thick, parts=("limits",)) == text
+    assert "PAIR" not in text
 
 
 def test_links_are_kept_apart_where_limits_are() -> None:
-    text = c_source(hexapod(), parts=("ik", "fk"))
+    text = c_source(hexapod(), parts=("fk",))
     assert "PFK_PAIR" not in text
     assert "Links may be too near: the clearance of the machine is kept where limits are." in text
-    text = c_source(hexapod())
+    text = c_source(hexapod(), parts=("limits",))
     assert re.search(r"^   2 +BC1 and BC3 +8.5 mm$", text, re.MULTILINE)
     assert re.search(r"^#define PFK_CLEARANCE 8.5 ", text, re.MULTILINE)
 
 
+def test_machines_whose_links_other_searches_keep_apart_have_no_nearest() -> None:
+    assert "int pfk_nearest(" not in text_of("all bodies")
+    with pytest.raises(UnsupportedMechanism, match="leave 'nearest' out"):
+        c_source(machine("all bodies"), parts=("ik", "limits", "nearest"))
+
+
 @needs_compiler
-@pytest.mark.parametrize("parts", [("limits",), ("ik", "limits"), ("limits", "fk"), ("limits", "rates")])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        ("limits", "rates"),
+        *(pytest.param(each, marks=pytest.mark.campaign) for each in (("limits",), ("ik", "limits"), ("limits", "fk"))),
+    ],
+)
 def test_any_choice_of_parts_with_links_compiles_without_a_warning(parts: Any, tmp_path: Path) -> None:
-    for name in ("hexapod", "solids"):
-        exported = tmp_path / "exported.c"
-        exported.write_text(c_source(machine(name), parts=parts))
-        command = [COMPILERS[0], "-std=c99", *STRICT, "-c", str(exported), "-o", str(tmp_path / "exported.o")]
-        assert subprocess.run(command, capture_output=True, text=True).stderr == ""
-
-
-@pytest.mark.skipif(not all(map(shutil.which, ("g++", "gcc", "nm"))), reason="no gcc, g++ and nm here")
-def test_the_file_with_links_is_cpp_too_and_needs_mathematics_alone(tmp_path: Path) -> None:
-    program = compiled(tmp_path, text_of("solids"), "g++", "-std=c++11", "-xc++", driver=None)
-    assert subprocess.run([str(program)], capture_output=True, text=True).stdout == "50 poses, 0 wrong\n"
-    subprocess.run(["gcc", "-std=c99", "-O1", "-c", "exported.c"], cwd=tmp_path, check=True)
-    listed = subprocess.run(["nm", "exported.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-    symbols = [line.split()[-2:] for line in listed.splitlines()]
-    assert not [name for kind, name in symbols if kind in "BDC"]  # none that another file could see
-    assert {name for kind, name in symbols if kind == "U"} <= MATHEMATICS
+    (tmp_path / "exported.c").write_text(c_source(machine("solids"), parts=parts))
+    command = [COMPILERS[0], "-std=c99", *STRICT, "-c", "exported.c", "-o", "exported.o"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stderr == ""
 
 
 JOINTS_DRIVER = """
+#undef PFK_SELF_TEST
 #include EXPORTED
 #include <stdio.h>
 int main(void)
 {
-    double q[PFK_JOINTS], out[2 + PFK_JOINTS];
+    double q[PFK_JOINTS], rates[PFK_JOINTS] = {1.0, 2.0};
     while (fread(q, sizeof(double), PFK_JOINTS, stdin) == PFK_JOINTS) {
-        double x[PFK_ACTUATORS] = {0};
+        double x[PFK_ACTUATORS] = {0}, given[PFK_ACTUATORS], back[PFK_JOINTS] = {0}, power = 0.0, codes[2];
+        double J[PFK_ACTUATORS][PFK_JOINTS], speeds[PFK_ACTUATORS], torques[PFK_ACTUATORS];
         int j;
-        out[0] = pfk_to_actuators(q, x);
+        if (fread(given, sizeof(double), PFK_ACTUATORS, stdin) != PFK_ACTUATORS)
+            return 1;
+        codes[0] = pfk_to_actuators(q, x);
+        codes[1] = pfk_to_joints(given, back, 0);
+        if (pfk_jacobian(q, J) || pfk_speeds(q, rates, speeds) || pfk_torques(q, rates, torques))
+            return 1;
         for (j = 0; j < PFK_ACTUATORS; ++j)
-            if (fread(&x[j], sizeof(double), 1, stdin) != 1)
-                return 1;
-        for (j = 0; j < PFK_JOINTS; ++j)
-            out[2 + j] = 0.0;
-        out[1] = pfk_to_joints(x, out + 2, 0);
-        fwrite(out, sizeof(double), 2 + PFK_JOINTS, stdout);
+            power += speeds[j] * torques[j];
+        fwrite(codes, sizeof(double), 2, stdout);
+        fwrite(x, sizeof(double), PFK_ACTUATORS, stdout);
+        fwrite(J, sizeof(double), PFK_ACTUATORS * PFK_JOINTS, stdout);
+        fwrite(back, sizeof(double), PFK_JOINTS, stdout);
+        fwrite(&power, sizeof(double), 1, stdout);
     }
     return 0;
 }
@@ -340,30 +297,41 @@ int main(void)
 
 
 @needs_compiler
-def test_joints_in_series_are_answered_where_links_are_apart(tmp_path: Path) -> None:
+def test_joints_in_series_are_coordinates_too_and_answered_where_links_are_apart(tmp_path: Path) -> None:
+    """In C++, where there is a compiler of it."""
     joints, free = ("pitch_joint", "roll_joint"), pf.load("g1_ankle")
     rods = [
         pf.Shape(f"{side}_connect_link", between=(f"{side}_connect_joint", closing), thickness=0.006)
         for side, closing in (("right", "closure_1"), ("left", "closure_2"))
     ]
     free = free.with_shapes([*rods, pf.Shape("base", "sphere", at=(0.05, 0.0, 0.22), diameter=0.03)])
-    mechanism, driver = free.with_clearance(0.0083), tmp_path / "driver.c"
+    mechanism = free.with_clearance(0.0083)
     q = np.random.default_rng(0).uniform([-0.5, -0.2], [0.4, 0.2], (300, 2))
-    poses = np.tile(np.eye(4), (len(q), 1, 1))
-    poses[:, :3, :3] = Rotation.from_euler("YX", q).as_matrix()
-    found = pf.solve_ik(free, poses)
+    found = pf.solve_ik(free, poses_at(q))
     assert (found.status == 0).all()
     is_apart = np.asarray(pf.clearance(found).distance) >= 0.0083
     assert 0.2 < is_apart.mean() < 0.8
-    driver.write_text(JOINTS_DRIVER)
-    program = compiled(tmp_path, c_source(mechanism, joints=joints), COMPILERS[0], *SANITIZED, driver=driver)
-    given = np.concatenate([q, found.actuators], axis=1)
-    run = subprocess.run([str(program)], input=given.tobytes(), capture_output=True, check=True)
-    said = np.frombuffer(run.stdout).reshape(-1, 4)
+    (tmp_path / "driver.c").write_text(JOINTS_DRIVER)
+    compiler, options = ("g++", ("-std=c++11", "-xc++")) if shutil.which("g++") else (COMPILERS[0], ())
+    text = c_source(mechanism, joints=joints)
+    program = compiled(text, *options, compiler=compiler, driver=tmp_path / "driver.c")
+    said, _ = asked(program, np.concatenate([q, found.actuators], axis=1))
     for codes in said[:, :2].T:
         np.testing.assert_array_equal(codes == 0, is_apart)
         np.testing.assert_array_equal(codes > PAIR, ~is_apart)
-    np.testing.assert_allclose(said[:, 2:], q, atol=1e-9)
+    np.testing.assert_allclose(said[is_apart, 2:4], found.actuators[is_apart], atol=1e-12)
+    np.testing.assert_allclose(said[:, 8:10], q, atol=1e-9)
+    np.testing.assert_allclose(said[:, 10], 5.0, rtol=1e-12)  # 1 * 1 + 2 * 2: power in is power out
+    for column, step in enumerate(1e-6 * np.eye(2)):
+        slope = (pf.solve_ik(free.without_limits(), poses_at(q + step)).actuators - found.actuators) / 1e-6
+        np.testing.assert_allclose(said[:, [4 + column, 6 + column]], slope, rtol=1e-4, atol=1e-4)
+
+
+def poses_at(q: Array) -> Array:
+    """Poses of the ankle at its joints."""
+    poses = np.tile(np.eye(4), (len(q), 1, 1))
+    poses[:, :3, :3] = Rotation.from_euler("YX", q).as_matrix()
+    return poses
 
 
 def test_links_that_turn_as_no_leg_says_are_refused_by_name() -> None:
@@ -409,13 +377,13 @@ def test_a_module_for_linuxcnc_refuses_what_is_too_near(tmp_path: Path) -> None:
     (tmp_path / "module.c").write_text(linuxcnc(mechanism) + MAIN)
     command = [COMPILERS[0], "-std=c99", "-Wall", "-I.", "module.c", "-o", "module", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
-    known = truth("hexapod")
+    known, distances, _ = measured("hexapod")
     rows = (known.slack > 1e-6).all(axis=1)
-    angles = Rotation.from_matrix(known.poses[rows, :3, :3]).as_euler("xyz", degrees=True)
-    given = np.concatenate([known.poses[rows, :3, 3], angles, known.actuators[rows]], axis=1)
+    angles = Rotation.from_matrix(known.whole[rows, :3, :3]).as_euler("xyz", degrees=True)
+    given = np.concatenate([known.whole[rows, :3, 3], angles, known.actuators[rows]], axis=1)
     run = subprocess.run([str(tmp_path / "module")], input=given.tobytes(), capture_output=True, check=True)
     said = np.array(run.stdout.split(), int).reshape(-1, 2)
-    expected = np.where(known.distances[rows] >= mechanism.clearance, 0, -1)
+    expected = np.where(distances[rows] >= mechanism.clearance, 0, -1)
     assert set(expected) == {0, -1}
     np.testing.assert_array_equal(said, np.stack([expected, expected], axis=1))
 

@@ -1,59 +1,139 @@
-/* Reads poses in double precision and writes what an exported file answers: see tests/test_export_c.py. */
+/* Runs an exported file: see tests/exported.py.
+       check                          its own test
+       nearest STEPS STARTS IS_WARM   the nearest poses to targets, each from home or from the one before
+       home, there                    all else; forward kinematics start there
+   Numbers are read and written in double precision, whatever the file's. */
 
+#define main pfk_checks_itself
 #include EXPORTED
+#undef main
 
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
-static void load(const double numbers[12], pfk_pose *pose)
+static int read_numbers(pfk_real *numbers, int n)
+{
+    double number;
+    int i;
+    for (i = 0; i < n && fread(&number, sizeof number, 1, stdin) == 1; ++i)
+        numbers[i] = (pfk_real)number;
+    return i == n;
+}
+
+static int read_pose(pfk_pose *pose)
+{
+    return read_numbers(pose->p, 3) && read_numbers(pose->R[0], 3) && read_numbers(pose->R[1], 3) &&
+           read_numbers(pose->R[2], 3);
+}
+
+static void write_numbers(const pfk_real *numbers, int n)
 {
     int i;
-    for (i = 0; i < 12; ++i) {
-        if (i < 3)
-            pose->p[i] = (pfk_real)numbers[i];
-        else
-            pose->R[(i - 3) / 3][i % 3] = (pfk_real)numbers[i];
+    for (i = 0; i < n; ++i) {
+        const double number = (double)numbers[i];
+        fwrite(&number, sizeof number, 1, stdout);
     }
 }
 
-static void store(const pfk_pose *pose, double numbers[12])
+static void write_code(int code)
 {
-    int i;
-    for (i = 0; i < 12; ++i)
-        numbers[i] = i < 3 ? (double)pose->p[i] : (double)pose->R[(i - 3) / 3][i % 3];
+    const double number = code;
+    fwrite(&number, sizeof number, 1, stdout);
 }
 
-int main(void)
+static void write_pose(const pfk_pose *pose)
 {
-    double given[24], told[28];
-    pfk_real actuators[PFK_ACTUATORS], slack[PFK_LIMITS + 1];
+    int i;
+    write_numbers(pose->p, 3);
+    for (i = 0; i < 3; ++i)
+        write_numbers(pose->R[i], 3);
+}
+
+#ifdef HAS_jacobian
+static void write_rates(const pfk_pose *pose)
+{
+    const pfk_real w[6] = {1, 2, 3, 4, 5, 6};
+    pfk_real J[PFK_ACTUATORS][6] = {{0}}, torques[PFK_ACTUATORS] = {0}, speeds[PFK_ACTUATORS] = {0};
+    pfk_real wrench[6] = {0}, twist[6] = {0};
+    int i;
+    write_code(pfk_jacobian(pose, J));
+    pfk_speeds(pose, w, speeds);
+    pfk_speeds_back(pose, speeds, twist);
+    pfk_torques(pose, w, torques);
+    pfk_torques_back(pose, torques, wrench);
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        write_numbers(J[i], 6);
+    write_numbers(torques, PFK_ACTUATORS);
+    write_numbers(twist, 6);
+    write_numbers(wrench, 6);
+}
+#endif
+
+#ifdef HAS_nearest
+static int find_nearest(int steps, int starts, int is_warm)
+{
+    pfk_pose target, pose;
+    pfk_real actuators[PFK_ACTUATORS] = {0};
+    char holding[PFK_LIMITS + 1] = {0};
+    int i, code;
+    pfk_home(&pose);
+    while (read_pose(&target)) {
+        if (!is_warm)
+            pfk_home(&pose);
+        code = pfk_ik_or_nearest(&target, &pose, actuators, steps, starts, holding);
+        write_code(code);
+        write_code(strlen(pfk_what(code)) > 0);
+        write_pose(&pose);
+        for (i = 0; i < PFK_LIMITS; ++i)
+            write_code(holding[i]);
+    }
+    return 0;
+}
+#endif
+
+int main(int argc, char **argv)
+{
+    pfk_real actuators[PFK_ACTUATORS], given[PFK_ACTUATORS], slack[PFK_LIMITS + 1];
     pfk_pose target, whole, pose, back;
-    double number;
     int i, steps;
-    while (fread(given, sizeof(double), 24, stdin) == 24) {
-        load(given, &target);
-        load(given + 12, &whole);
+    if (argc > 1 && !strcmp(argv[1], "check"))
+        return pfk_checks_itself();
+#ifdef HAS_nearest
+    if (argc > 4 && !strcmp(argv[1], "nearest"))
+        return find_nearest(atoi(argv[2]), atoi(argv[3]), atoi(argv[4]));
+#endif
+    while (read_pose(&target) && read_pose(&whole) && read_numbers(given, PFK_ACTUATORS)) {
         pfk_home(&pose);
-        pfk_home(&back);
+        back = pose;
+        if (argc > 1 && !strcmp(argv[1], "there"))
+            back = whole;
         for (i = 0; i < PFK_ACTUATORS; ++i)
             actuators[i] = 0;
         for (i = 0; i < PFK_LIMITS; ++i)
             slack[i] = 0;
         steps = 0;
-        told[0] = pfk_ik(&target, &pose, actuators);
-        told[1] = pfk_limits(&whole, slack);
-        told[2] = pfk_fk(actuators, &back, &steps);
-        told[3] = steps;
-        store(&pose, told + 4);
-        store(&back, told + 16);
-        fwrite(told, sizeof(double), 28, stdout);
-        for (i = 0; i < PFK_ACTUATORS; ++i) {
-            number = (double)actuators[i];
-            fwrite(&number, sizeof(double), 1, stdout);
+        write_code(pfk_ik(&target, &pose, actuators));
+        write_code(pfk_limits(&whole, slack));
+        write_code(pfk_fk(given, &back, &steps));
+        write_code(steps);
+        write_pose(&pose);
+        write_pose(&back);
+        write_numbers(actuators, PFK_ACTUATORS);
+        write_numbers(slack, PFK_LIMITS);
+#ifdef HAS_jacobian
+        write_rates(&whole);
+#endif
+#ifdef HAS_clearance
+        {
+            pfk_real distance = 0;
+            int pair = 0;
+            write_code(pfk_clearance(&target, &distance, &pair));
+            write_numbers(&distance, 1);
+            write_code(pair);
+            fprintf(stderr, "%s\n", pfk_what(PFK_PAIR + pair));
         }
-        for (i = 0; i < PFK_LIMITS; ++i) {
-            number = (double)slack[i];
-            fwrite(&number, sizeof(double), 1, stdout);
-        }
+#endif
     }
     return 0;
 }
