@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -78,24 +77,14 @@ WRONG = {
 
 
 @compiled
-@pytest.mark.parametrize("arguments", WRONG.values(), ids=WRONG)
-def test_arguments_of_other_types_are_refused(arguments: tuple[Any, ...]) -> None:
+def test_arguments_of_other_types_are_refused_and_what_is_only_read_may_be_read_only() -> None:
     assert LIBRARY is not None
-    with pytest.raises(TypeError, match=r"^kernels_join: argument \d: expected "):
-        LIBRARY.kernel("kernels.join")(*arguments)
-
-
-@compiled
-def test_what_is_only_read_may_be_read_only() -> None:
-    assert LIBRARY is not None
-    lowest = LOWEST.copy()
-    LIBRARY.kernel("kernels.join")(np.frombuffer(PAIRS.tobytes(), np.int64).reshape(2, 2), lowest)
+    join, lowest = LIBRARY.kernel("kernels.join"), LOWEST.copy()
+    join(np.frombuffer(PAIRS.tobytes(), np.int64).reshape(2, 2), lowest)
     assert lowest.tolist() == [0, 0, 2, 2]
-
-
-@compiled
-def test_numbers_and_records_of_other_types_are_refused() -> None:
-    assert LIBRARY is not None
+    for arguments in WRONG.values():
+        with pytest.raises(TypeError, match=r"^kernels_join: argument \d: expected "):
+            join(*arguments)
     number, codes = LIBRARY.kernel("kernels.number_points"), np.zeros(1, np.int64)
     for count in ("1", 1.5, 2**70, None):
         with pytest.raises(TypeError, match="argument 4: expected an integer"):

@@ -62,8 +62,8 @@ OTHERS += [name for name in closure.ON_ARMS if name not in REFUSED]
 AMBIGUOUS = "R + 3-RPS + RR"
 """A machine far from whose home arms follow from poses in more than one way."""
 
-DIFFERENT = ("stewart", "five_bar", "serial_arm", "tricept", "seven_struts", "Par4")
-"""Machines with struts, cranks, pivots, arms, implicit joints and legs that repeat each other."""
+DIFFERENT = ("stewart", "five_bar", "serial_arm", "seven_struts", "Par4")
+"""Machines with struts, cranks, arms, implicit joints, more legs than freedoms; with a pivot: joints in series."""
 
 FILES = [*((name, "double") for name in DIFFERENT), ("delta", "float"), ("agile_eye", "float")]
 

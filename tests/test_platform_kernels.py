@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from machines import closure, published
+from machines import machine, published
 from pfabrik.closure.links_on_paths import links_on_paths
 from pfabrik.decomposition.leg_table import LegTable
 from pfabrik.kernels.clearance.link_limits import new_link_limits, pair_excess
@@ -17,7 +17,6 @@ from pfabrik.kernels.closure.descend import move
 from pfabrik.kernels.closure.loops import BALL, BASE_AXES, PoseObjective
 from pfabrik.kernels.closure.path_kinematics import LAYOUT, new_equations, new_state
 from pfabrik.kernels.holding import limit_multipliers
-from pfabrik.kernels.legs.records import Table
 from pfabrik.kernels.platform import equations as E
 from pfabrik.kernels.platform import leg_links
 from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
@@ -46,13 +45,6 @@ def moved(state: E.PlatformState, unknown: int, step: float, columns: np.ndarray
     return E.PlatformState(pose, q, state.sides)
 
 
-def table_of(name: str) -> tuple[pf.Mechanism, LegTable, Table]:
-    """A machine, its legs, and their kernel table."""
-    mechanism = closure.ON_ARMS[name]() if name in closure.ON_ARMS else pf.load(name)
-    legs = model_of(mechanism).legs
-    return mechanism, legs, kernel_table(legs)
-
-
 def random_configuration(mechanism: pf.Mechanism, table: LegTable, rng: np.random.Generator) -> E.PlatformState:
     """A random configuration about home; loops may be open."""
     state = E.new_platform_state(len(table.legs))
@@ -67,8 +59,9 @@ def random_configuration(mechanism: pf.Mechanism, table: LegTable, rng: np.rando
 @pytest.mark.parametrize("name", ["stewart", "nrpm", "Par4"])
 def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> None:
     """The gradient from legs with multipliers, and what carries them, equals that from all legs."""
-    mechanism, legs, table = table_of(name)
-    rng = np.random.default_rng(1)
+    mechanism, rng = machine(name), np.random.default_rng(1)
+    legs = model_of(mechanism).legs
+    table = kernel_table(legs)
     search, n = new_search_scratch(table, NO_LINKS), E.count_unknowns(table)
     objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
     objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)

@@ -42,12 +42,12 @@ def table_of(name: str) -> K.Table:
 
 
 def poses_of(name: str) -> np.ndarray:
-    """Poses (n, 4, 4) [L]: two near home, two anywhere, and what a machine answers to the first."""
+    """Poses (n, 4, 4) [L]: one near home, two anywhere, and what a machine answers to the first."""
     mechanism, rng = machine(name), np.random.default_rng(1)
-    poses, L = np.tile(mechanism.home_pose, (4, 1, 1)), mechanism.characteristic_length
-    sizes = np.array([[0.15], [0.15], [3.0], [3.0]])
-    poses[:, :3, :3] = Rotation.from_rotvec(sizes * rng.uniform(-1.0, 1.0, (4, 3))).as_matrix() @ poses[:, :3, :3]
-    poses[:, :3, 3] += 0.5 * L * sizes * rng.uniform(-1.0, 1.0, (4, 3))
+    poses, L = np.tile(mechanism.home_pose, (3, 1, 1)), mechanism.characteristic_length
+    sizes = np.array([[0.15], [3.0], [3.0]])
+    poses[:, :3, :3] = Rotation.from_rotvec(sizes * rng.uniform(-1.0, 1.0, (3, 3))).as_matrix() @ poses[:, :3, :3]
+    poses[:, :3, 3] += 0.5 * L * sizes * rng.uniform(-1.0, 1.0, (3, 3))
     poses = np.concatenate([poses, pf.solve_ik(mechanism, poses[:1]).pose])
     poses[:, :3, 3] /= L
     return poses
