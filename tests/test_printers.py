@@ -178,6 +178,24 @@ WRITTEN = {
 }
 
 
+@pytest.mark.parametrize("degrees", range(10, 60, 10))
+def test_an_endstop_is_written_where_klipper_takes_the_arm_that_is_there(degrees: int) -> None:
+    """Of the two arms that have the nozzle at a height, Klipper takes the one farther out."""
+    up = math.radians(degrees)
+    machine = delta_above_its_bed("delta", 200.0).with_limits({f"A{leg}": (-up, 1.4) for leg in (1, 2, 3)})
+    says = numbers(text_of(machine, "klipper", ""))
+    sections = ("[stepper_a]", "[printer]")
+    one = {key.split()[-1]: value[0] for key, value in says.items() if key.startswith(sections)}
+    radius, height = one["shoulder_radius"], one["shoulder_height"]
+    arms = Arms(
+        radius, (height,) * 3, (one["angle"],) * 3, (one["upper_arm_length"],) * 3, (one["lower_arm_length"],) * 3
+    )
+    out = radius + arms.upper[0] * math.cos(up)
+    top = height + arms.upper[0] * math.sin(up) - math.sqrt(arms.lower[0] ** 2 - out**2)
+    is_there = abs(arms.arm(0, 0.0, 0.0, top) - degrees) < 1e-5
+    assert one.get("position_endstop") == (pytest.approx(top, abs=1e-5) if is_there else None)
+
+
 @pytest.mark.parametrize("form", ["klipper", "reprap", "marlin"])
 @pytest.mark.parametrize("name", WRITTEN)
 def test_what_is_written_is_the_same_machine(name: str, form: str, tmp_path: Path) -> None:

@@ -117,12 +117,25 @@ def _klipper_rotary_delta(mechanism: Mechanism, thighs: list[Thigh]) -> Iterator
     for letter, thigh in zip(TOWERS, thighs, strict=True):
         yield from ("", f"[stepper_{letter}]", f"angle: {_text(angle_of(thigh.hip))}")
         yield from (f"upper_arm_length: {_text(thigh.length)}", f"lower_arm_length: {_text(thigh.shin)}")
-        reach = radius + thigh.length * math.cos(thigh.least) if math.isfinite(thigh.least) else math.inf
-        if reach < thigh.shin:
-            elbow = height - thigh.length * math.sin(thigh.least)
-            yield f"position_endstop: {_text(elbow - math.sqrt(thigh.shin**2 - reach**2))}"
-        else:
-            yield "# position_endstop: the arm has no upper end of its range with the nozzle in the middle"
+        yield _rotary_endstop(thigh, radius, height)
+
+
+def _rotary_endstop(thigh: Thigh, radius: float, height: float) -> str:
+    """The height of the nozzle in the middle with an arm at the upper end of its range, or why there is none.
+
+    An arm at angle a below the horizontal has its elbow at (radius + length cos a, height - length sin a); the rod from
+    there descends by d = sqrt(shin² - out²) to the middle. Beyond the angle at which arm and rod are in line,
+    d cos a + out sin a = 0, Klipper takes the other arm of the same height.
+    """
+    out = radius + thigh.length * math.cos(thigh.least) if math.isfinite(thigh.least) else math.inf
+    if out >= thigh.shin:
+        return "# position_endstop: the arm has no upper end of its range with the nozzle in the middle"
+    descent = math.sqrt(thigh.shin**2 - out**2)
+    if descent * math.cos(thigh.least) + out * math.sin(thigh.least) <= 0.0:
+        return (
+            "# position_endstop: at the upper end of its range the arm is past its rod's line, where Klipper has no arm"
+        )
+    return f"position_endstop: {_text(height - thigh.length * math.sin(thigh.least) - descent)}"
 
 
 def _reprap_linear(mechanism: Mechanism, towers: list[Tower]) -> Iterator[str]:
