@@ -18,7 +18,7 @@ from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 
 RESTARTS = 24
-"""Random starts for rows whose joint coordinates do not fit the joint centres; each start fits most legs."""
+"""Random starts for rows whose joint coordinates do not fit the joint centres; every start fits most legs."""
 
 
 def positions_of(mechanism: Mechanism, compiled: CompiledPlan, coordinates: Floats) -> P.Seeds:
@@ -52,23 +52,23 @@ def new_pass_results(compiled: CompiledPlan, n: int) -> P.PassResults:
     )
 
 
-def place(closure: Closure, compiled: CompiledPlan, begin: Floats, results: P.PassResults) -> Closing:
-    """Joint coordinates that fit joint centres and platform poses, by least squares from a start (n, columns).
+def place(closure: Closure, compiled: CompiledPlan, start: Floats, results: P.PassResults) -> Closing:
+    """Fit joint coordinates to joint centres and platform poses by least squares from a start (n, columns).
 
-    What the centres leave open (a rod's spin) stays near the start. Loops are open by about the gap of the chains; rows
-    that fit worse are repeated from random starts.
+    Coordinates that the centres do not determine (a rod's spin) stay near the start. Loops remain open by about the gap
+    of the chains; rows that fit worse are repeated from random starts.
     """
     mechanism, poses = closure.mechanism, results.poses
     platform, centres = holding(mechanism), _centres(mechanism, compiled, results)
-    placed = close(closure, begin, poses, platform=platform, centres=centres)
+    placed = close(closure, start, poses, platform=platform, centres=centres)
     near = 2.0 * results.gaps / mechanism.characteristic_length + TOLERANCES.position
     rng = np.random.default_rng(0)
     for _ in range(RESTARTS):
         unsolved = np.flatnonzero(_misfit(placed) > near)
         if not len(unsolved):
             break
-        turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, begin.shape[1]) * closure.turning)
-        trial = close(closure, begin[unsolved] + turns, poses[unsolved], platform=platform, centres=centres[unsolved])
+        turns = np.where(closure.idle, 0.0, rng.uniform(-np.pi, np.pi, start.shape[1]) * closure.turning)
+        trial = close(closure, start[unsolved] + turns, poses[unsolved], platform=platform, centres=centres[unsolved])
         is_better = _misfit(trial) < _misfit(placed)[unsolved]
         put(placed, unsolved[is_better], trial, is_better)
     return placed
@@ -92,7 +92,7 @@ def _centres(mechanism: Mechanism, compiled: CompiledPlan, results: P.PassResult
 
 @derived
 def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
-    """Names of joints whose centres follow from node positions: not those merged with others into one joint."""
+    """Names of joints whose centres follow from node positions, without those merged into one joint."""
     compiled = compile_plan(mechanism)
     home = new_pass_results(compiled, 1)._replace(**compiled.home_seed._asdict())
     near = TOLERANCES.position * mechanism.characteristic_length

@@ -12,15 +12,15 @@ from ..options import Options
 
 @dataclass(frozen=True)
 class PassOptions(Options):
-    """How `pfabrik.passes` works; further fields are those of `pfabrik.Options`.
+    """Options of `pfabrik.passes`, in addition to the fields of `pfabrik.Options`.
 
     Attributes
     ----------
-    method : "plain", the paper's passes and its projection to the centroid of the chains' ends; "accelerated", exact
-        meetings, half-spaces in place of points, and a projection to where these hold, as near as it can be;
+    method : "plain", the paper's passes and its projection to the centroid of the chains' ends; "accelerated",
+        closed-form intersections, half-spaces in place of points, and projection to the nearest pose in these;
         "centroid", the paper's projection alone, of targets that `solve_ik` does not reach, exact to rounding.
-    max_iterations : K, forward and backward passes a chain may take for one target.
-    max_rounds : how often the projection may revise a target.
+    max_iterations : K, most iterations (forward and backward pass) of a chain for one target.
+    max_rounds : most revisions of a target by the projection.
     """
 
     method: Literal["plain", "accelerated", "centroid"] = "plain"
@@ -30,23 +30,23 @@ class PassOptions(Options):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.most_steps is not None:
-            found, expected = repr(self.most_steps), "None: passes are bounded by max_iterations and max_rounds"
-            raise InvalidArgument("options.most_steps", found, expected)
+            expected = "None: passes are bounded by max_iterations and max_rounds"
+            raise InvalidArgument("options.most_steps", repr(self.most_steps), expected)
         require_choice("options.method", self.method, ("plain", "accelerated", "centroid"))
         for name in ("max_iterations", "max_rounds"):
             require_count(f"options.{name}", getattr(self, name))
 
     @classmethod
     def paper(cls) -> PassOptions:
-        """The paper's K = 100 and E = 1e-2 [length]."""
+        """Options of the paper: K = 100 and E = 1e-2 [length]."""
         return cls(tolerance=1e-2, max_rounds=1000)
 
     @classmethod
     def accelerated(cls) -> PassOptions:
-        """P-FABRIK with exact meetings and half-spaces, to the usual tolerances."""
+        """Options of P-FABRIK with closed-form intersections and half-spaces, to the usual tolerances."""
         return cls(method="accelerated", max_rounds=200)
 
     @classmethod
     def centroid(cls) -> PassOptions:
-        """The usual answers within reach, and the paper's projection beyond it, finished exactly."""
+        """Options for `solve_ik` within reach and the paper's projection beyond it, exact to rounding."""
         return cls(method="centroid")

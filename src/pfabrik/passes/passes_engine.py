@@ -1,6 +1,6 @@
-"""The paper's method: passes on joint positions that reach targets, and its projection of those they do not reach.
+"""The engine of the paper's method: passes on joint positions, and projection of unreached targets.
 
-Plain, as the paper has it, or with exact meetings and half-spaces.
+Passes are plain, as in the paper, or use closed-form intersections and half-spaces.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from .joint_positions import holding, new_pass_results, place, positions_of
 from .pass_options import PassOptions
 
 NEAR = 1e-3
-"""Tolerance of the passes [L] if exact answers follow: loops are closed from there."""
+"""Tolerance of the passes [L] if the loops are closed exactly afterwards."""
 
 STEPS = 8
-"""Steps of each round that bring the ends of chains as near as possible."""
+"""Steps of a round that bring the ends of chains as near as possible to the target."""
 
 ROWS_A_BLOCK = 64
 
 
 class PassesEngine(InverseEngine):
-    """The paper's method, for mechanisms whose chains can be expressed by joint positions.
+    """The paper's method, for mechanisms that joint positions express.
 
-    Passes bring the ends of chains to the target, or else move the target; from there the loops are closed exactly.
-    The usual engine answers targets for which that ends in no feasible configuration, and by the "centroid" method
-    those within reach.
+    Passes bring the ends of chains to the target or move the target; the loops are then closed exactly.
+    The fallback engine answers targets for which that fails; with the "centroid" method it answers all targets within
+    reach.
     """
 
-    def __init__(self, mechanism: Mechanism, usual: Engine, options: PassOptions) -> None:
-        self.mechanism, self._usual, self._options = mechanism, usual, options
+    def __init__(self, mechanism: Mechanism, fallback: Engine, options: PassOptions) -> None:
+        self.mechanism, self._fallback, self._options = mechanism, fallback, options
         self._model = model_of(mechanism if mechanism.clearance is None else mechanism.with_clearance(None))
         self._compiled, self._held = compile_plan(mechanism), holding(mechanism)
 
@@ -66,14 +66,14 @@ class PassesEngine(InverseEngine):
             solutions = self._by_passes(made_exact(targets), start, keep_mode)
             failed = np.flatnonzero(solutions.rows.status == FAILED)
             if len(failed):
-                usual = self._usual.answer(targets[failed], _at(start, failed), options, keep_mode=keep_mode)
-                solutions.put(failed, usual, np.ones(len(failed), bool))
+                fallback = self._fallback.answer(targets[failed], _at(start, failed), options, keep_mode=keep_mode)
+                solutions.put(failed, fallback, np.ones(len(failed), bool))
             return solutions.scatter(is_valid)
-        solutions = self._usual.answer(targets, start, options, keep_mode=keep_mode)
+        solutions = self._fallback.answer(targets, start, options, keep_mode=keep_mode)
         missed = np.flatnonzero(solutions.rows.status != REACHED)
         if len(missed):
             starts = _at(start, missed)
-            projected = self._usual.rested(self._by_passes(made_exact(targets[missed]), starts, keep_mode), starts)
+            projected = self._fallback.rested(self._by_passes(made_exact(targets[missed]), starts, keep_mode), starts)
             is_feasible = projected.rows.status != FAILED
             solutions = Configurations(solutions.rows, solutions.coordinates)
             solutions.put(missed[is_feasible], projected, is_feasible)
@@ -99,37 +99,37 @@ class PassesEngine(InverseEngine):
 
     def _by_passes(self, targets: Floats, start: Configurations | None, keep_mode: bool) -> Configurations:
         """Solve for poses by passes; FAILED where infeasible, or where the working mode is to be kept and is not."""
-        begin = start_coordinates(self._model, start)
-        begin = np.repeat(begin, len(targets), axis=0) if len(begin) == 1 else begin
-        solutions = self._solve_from(targets, begin, keep_mode)
+        coordinates = start_coordinates(self._model, start)
+        coordinates = np.repeat(coordinates, len(targets), axis=0) if len(coordinates) == 1 else coordinates
+        solutions = self._solve_from(targets, coordinates, keep_mode)
         if keep_mode:
-            has_left_mode = (self._sides(solutions) * self._sides(start) < 0.0).any(axis=1)
+            has_left_mode = (self._branches_of(solutions) * self._branches_of(start) < 0.0).any(axis=1)
             solutions.rows.status[has_left_mode] = FAILED
         return solutions
 
-    def _sides(self, configurations: Configurations | None) -> Floats:
-        """The working mode of configurations, or of home: the side of each leg, (n, legs); 0 for legs without one."""
+    def _branches_of(self, configurations: Configurations | None) -> Floats:
+        """Working mode of configurations or of home: the branch of each leg, (n, legs); 0 of legs with one solution."""
         if not self._model.has_legs:
             return np.zeros((1, 0))
         legs, home = self._model.legs.legs, self._model.legs.home_sides
-        sides = home if configurations is None else sides_at(self._model, configurations)
-        return np.where(legs["implicit"] == 1, 0.0, sides)
+        branches = home if configurations is None else sides_at(self._model, configurations)
+        return np.where(legs["implicit"] == 1, 0.0, branches)
 
-    def _solve_from(self, targets: Floats, begin: Floats, keep_mode: bool) -> Configurations:
-        """Solve for poses by passes from joint coordinates (n, columns); FAILED where that ends in none feasible."""
+    def _solve_from(self, targets: Floats, coordinates: Floats, keep_mode: bool) -> Configurations:
+        """Solve for poses by passes from joint coordinates (n, columns); FAILED where the result is infeasible."""
         closure, options = self._model.path_closure, self._options
         projection = projection_modes(closure, options.hold, options.rotation_length)[0]
-        settings = settings_of(self._model, options, projection)._replace(keep_sides=int(keep_mode))
+        settings = settings_of(self._model, options, projection)._replace(keep_mode=int(keep_mode))
         clipped = clip_targets(self.mechanism, targets)
-        if options.method == "centroid" and not self._is_struts:
-            placed, results = self._move_to_fit(clipped, begin, settings)
+        if options.method == "centroid" and not self._has_only_struts:
+            placed, results = self._move_to_fit(clipped, coordinates, settings)
         else:
-            results = self._run(clipped, begin, settings)
-            placed = place(closure, self._compiled, begin, results)
+            results = self._run(clipped, coordinates, settings)
+            placed = place(closure, self._compiled, coordinates, results)
         margin = TOLERANCES.inside
         closed = close(closure, placed.coordinates, placed.poses, platform=projection.held, limits=True, margin=margin)
         errors = self._model.task.errors(closed.poses, targets)
-        shifted = np.flatnonzero((results.rounds == 0) & (errors[0] > settings.enough))
+        shifted = np.flatnonzero((results.rounds == 0) & (errors[0] > settings.tolerance))
         if len(shifted):  # the chains came near this target, but closing the loops moved the platform: hold it
             start = placed.coordinates[shifted], placed.poses[shifted]
             closed.put_better(shifted, close(closure, *start, platform=self._held, limits=True, margin=margin))
@@ -139,18 +139,18 @@ class PassesEngine(InverseEngine):
         solutions.rows.counters[:, ITERATIONS] = results.iterations
         solutions.rows.counters[:, ROUNDS] = results.rounds
         if self.mechanism.clearance is not None:
-            solutions.rows.status[~self._usual.as_configurations(closed).is_within_limits] = FAILED
+            solutions.rows.status[~self._fallback.as_configurations(closed).is_within_limits] = FAILED
         return solutions
 
-    def _move_to_fit(self, targets: Floats, begin: Floats, settings: P.Settings) -> tuple[Closing, P.PassResults]:
-        """Move the platform round by round to where all chains reach it, each chain fitted by least squares.
+    def _move_to_fit(self, targets: Floats, coordinates: Floats, settings: P.Settings) -> tuple[Closing, P.PassResults]:
+        """Move the platform round by round to where all chains reach it; fit every chain by least squares.
 
-        This replaces passes, which can get stuck at the ranges of joints. The remaining gap of a chain is at its end.
+        The fits replace passes, which can stall at joint limits. The remaining gap of a chain is at its end.
         """
         closure = self._model.path_closure
         results, unsolved = new_pass_results(self._compiled, len(targets)), np.arange(len(targets))
         results.rounds[:] = 0
-        placed = close(closure, begin, targets, platform=self._held, limits=True, max_iterations=0)
+        placed = close(closure, coordinates, targets, platform=self._held, limits=True, max_iterations=0)
         once = settings._replace(max_iterations=0, max_rounds=1)
         for _ in range(settings.max_rounds):
             start, poses = placed.coordinates[unsolved], placed.poses[unsolved]
@@ -164,25 +164,25 @@ class PassesEngine(InverseEngine):
             for array, revised_array in zip(results, revised, strict=True):
                 array[unsolved] = revised_array
             results.rounds[unsolved] = rounds
-            unsolved = unsolved[revised.gaps > settings.enough]
+            unsolved = unsolved[revised.gaps > settings.tolerance]
             if not len(unsolved):
                 break
         results.iterations[:] = results.rounds
         return placed, results
 
     @cached_property
-    def _is_struts(self) -> bool:
-        """True if all branches are single segments on the base, whose ends one pass brings as near as possible."""
+    def _has_only_struts(self) -> bool:
+        """True if all branches are single segments on the base: one pass brings their ends as near as possible."""
         branches = self._compiled.plan.branches
         return bool((branches["last"] - branches["first"] <= 1).all() and (branches["carrier"] == 0).all())
 
-    def _run(self, targets: Floats, begin: Floats, settings: P.Settings) -> P.PassResults:
-        """Run the kernel on all rows, on all cores; rotations of targets of a joint end effector are overwritten."""
+    def _run(self, targets: Floats, coordinates: Floats, settings: P.Settings) -> P.PassResults:
+        """Run the kernel on all rows, on all cores; overwrite the rotations of targets of a joint end effector."""
         from ..kernels.passes.solve import solve_by_passes
 
         if self.mechanism.end_effector_is_joint:  # a point has no orientation; that of home is used
             targets[:, :3, :3] = np.eye(3)
-        seeds = positions_of(self.mechanism, self._compiled, begin)
+        seeds = positions_of(self.mechanism, self._compiled, coordinates)
         results = new_pass_results(self._compiled, len(targets))
 
         def run(block: slice) -> None:
@@ -193,23 +193,23 @@ class PassesEngine(InverseEngine):
 
 
 def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configurations | None:
-    """The starts of some rows; a single start for all rows is returned as it is."""
+    """Select the starts of some rows; a single start for all rows is returned as it is."""
     return start if start is None or len(start) == 1 else start.at(places)
 
 
 @derived
 def settings_of(model: Model, options: PassOptions, projection: ProjectionMode) -> P.Settings:
-    """Options as the kernel reads them; one pass a round, that ends sooner, if exact steps follow."""
+    """Convert options for the kernel; one pass a round and a looser tolerance if the loops are closed exactly after."""
     length, free = model.length, [weight != LOCKED and weight > 0.0 for weight in projection.weights]
     tolerance = float(options.tolerance or TOLERANCES.position * length)
     turning = max((weight for weight in projection.weights[3:] if weight != LOCKED), default=0.0)
     is_finished = options.method == "centroid"
     return P.Settings(
-        enough=max(tolerance, NEAR * length) if is_finished else tolerance,
+        tolerance=max(tolerance, NEAR * length) if is_finished else tolerance,
         max_iterations=1 if is_finished else int(options.max_iterations),
         max_rounds=int(options.max_rounds),
         free=P.TRANSLATES * any(free[:3]) + P.TURNS * any(free[3:]),
-        keep_sides=0,
+        keep_mode=0,
         lever=length * float(turning) ** 0.5,
         is_accelerated=int(options.method == "accelerated"),
     )

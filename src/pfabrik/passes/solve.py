@@ -25,32 +25,32 @@ from .passes_engine import PassesEngine
 def solve(
     mechanism: Mechanism, target: Target, options: PassOptions | None = None, *, start: Start | None = None
 ) -> Solution:
-    """Answers as of `solve_ik`, by passes; its own where joint positions do not express the mechanism (`decompose`).
+    """Solve for targets by passes; by `solve_ik` if joint positions do not express the mechanism (`decompose`).
 
     Parameters
     ----------
-    target, start : as of `solve_ik`.
+    target, start : see `solve_ik`.
     options : default `Options.paper()`.
     """
     options = options_or(PAPER, options)
-    return solve_by(lambda each: _engine(model_of(each), options), mechanism, target, start, options)
+    return solve_by(lambda machine: _engine(model_of(machine), options), mechanism, target, start, options)
 
 
 def track(
     mechanism: Mechanism, targets: Target, options: PassOptions | None = None, *, start: Start | None = None
 ) -> Track:
-    """A path as of `pfabrik.track`, by passes.
+    """Follow a path by passes; see `pfabrik.track`.
 
     Parameters
     ----------
-    targets, start : as of `pfabrik.track`.
+    targets, start : see `pfabrik.track`.
     options : default `Options.paper()`.
     """
     options = options_or(PAPER, options)
     poses = as_path(mechanism, targets, options)
     solutions, request = follow_by(_engine(model_of(mechanism), options), mechanism, poses, start, options, None)
-    again = partial(track, mechanism, options=options)
-    return Track(mechanism, solutions, request, again, pace_of(mechanism, len(poses), None, None, None))
+    follow = partial(track, mechanism, options=options)
+    return Track(mechanism, solutions, request, follow, pace_of(mechanism, len(poses), None, None, None))
 
 
 @derived

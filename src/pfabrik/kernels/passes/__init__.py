@@ -1,1 +1,1 @@
-"""P-FABRIK on joint positions: passes, restrictions, projection, and the exact step that finishes them."""
+"""Kernels of P-FABRIK on joint positions: passes, restrictions to limits, and projection of unreached targets."""

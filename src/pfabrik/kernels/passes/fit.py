@@ -1,4 +1,4 @@
-"""Least-squares fits: of a trunk to what its branches ask for, and of the platform's rotation to chains' ends."""
+"""Least-squares fits: of a trunk to the base nodes of its branches, and of the platform to the ends of chains."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from .plan import TRANSLATES, TURNS, Configuration, Plan, Settings
 
 @routine
 def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
-    """Fit the pose of the common body, within the ranges of its joints, to the wishes of the branches that ask.
+    """Fit a trunk, within its joint ranges, to the positions that the forward pass gave the branches' first nodes.
 
-    Gauss-Newton on the trunk's joint values; `config.wishes` holds where each branch wants its first node.
+    Gauss-Newton on the trunk's joint values. Branches whose first node is there already do not count.
     """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
-    n, wishes, system = last - first, config.wishes, config.system
+    n, base_targets, system = last - first, config.base_targets, config.system
     for _step in range(FIT_STEPS):
         for i in range(n):
             for j in range(n + 1):
                 system[i, j] = 0.0
         for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-            if config.is_unmet[b] == 0:
+            if config.is_displaced[b] == 0:
                 continue
             present = move(config.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
-            miss = sub(vec(wishes[b]), present)
+            miss = sub(vec(base_targets[b]), present)
             for i in range(n):
                 rate = scale(trunk_unit(plan, first + i), point_rate(plan, config, first + i, present))
                 system[i, n] += dot(rate, miss)
@@ -58,7 +58,7 @@ def point_rate(plan: Plan, config: Configuration, j: int, p: Vec) -> Vec:
 
 @routine
 def move_to_centroid(plan: Plan, config: Configuration) -> None:
-    """The paper's projection: move the target by the mean gap of the ends, with its orientation held."""
+    """Move the target by the mean gap of the ends, orientation held: the paper's projection."""
     n = plan.branches.shape[0]
     shift = (0.0, 0.0, 0.0)
     for b in range(n):
@@ -73,8 +73,8 @@ def move_to_centroid(plan: Plan, config: Configuration) -> None:
 def turn_to_fit(plan: Plan, config: Configuration, about_reference: bool) -> None:
     """Turn the platform by one Gauss-Newton step of the rigid best fit of its points to the ends of chains.
 
-    The rotation is about the centroid of the points, which `move_to_centroid` has moved to that of the ends, or about
-    the reference point if the position is held.
+    The centre is the centroid of the points, which `move_to_centroid` has moved to the centroid of the ends, or the
+    reference point if the position is held.
     """
     system = config.system
     for i in range(3):
@@ -111,7 +111,7 @@ def turn_to_fit(plan: Plan, config: Configuration, about_reference: bool) -> Non
 
 @routine
 def revise_target(plan: Plan, config: Configuration, settings: Settings) -> None:
-    """Move the target to where the ends of chains agree, as far as it may be moved."""
+    """Move the free components of the target towards the ends of the chains."""
     if settings.free & TRANSLATES:
         move_to_centroid(plan, config)
     if settings.free & TURNS:

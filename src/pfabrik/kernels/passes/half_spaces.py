@@ -1,7 +1,7 @@
-"""Half-spaces that limits of branches leave their trunk, or the target, to move into; and the least step into them all.
+"""Half-spaces of feasible motions of a trunk or of the target, from the limits of branches; the least step into them.
 
-A limit of a branch is exceeded by e [length]; e depends on where the carrier has the target: on the target's position t
-and the platform's rotation, both relative to the carrier. To first order
+A branch exceeds a limit by e [length]. e depends on the target's position t and the platform's rotation, both relative
+to the carrier. To first order
 
     e + g . dt + w . dphi <= 0,
 
@@ -31,12 +31,12 @@ PLATFORM = 6
 PROGRAMME = np.dtype(
     [
         ("n_rows", "i8"),
-        ("n_equations", "i8"),  # which are the first rows
+        ("n_equations", "i8"),  # the first rows
         ("n_unknowns", "i8"),
         ("trunk_column", "i8"),  # of trunk joint 0
         ("free", "i8"),  # motions of the platform: TRANSLATES, TURNS, or both
         ("margin", "f8"),  # how far within limits to aim [length]
-        ("window", "f8"),  # limits kept by more than this are left out [length]
+        ("window", "f8"),  # limits farther away than this are left out [length]
         ("trunk_scale", "f8"),  # motion of a trunk joint per unit of its unknown: more than 1 makes it cheaper
         ("lever", "f8"),  # how a turn counts beside a distance [length per rad]
     ]
@@ -52,15 +52,15 @@ class LeastStep(NamedTuple):
     problem: QP  # H is the identity, g zero; rows G, and h [L], the margin included
     x: Floats  # (n,): the step [L]
     programme: Records  # (1,): PROGRAMME
-    normals: Floats  # (n_branches, 3): which way each branch's end was missed last; zero if it was not
+    normals: Floats  # (n_branches, 3): direction of each branch's last end gap; zero if there was none
     pose: Floats  # (4, 4): the best pose so far
-    trunks: Floats  # (n_trunk_joints,): its trunks
-    start: Floats  # (n_trunk_joints,): where they began
+    trunks: Floats  # (n_trunk_joints,): trunk coordinates of the best pose
+    start: Floats  # (n_trunk_joints,): trunk coordinates at the start
 
 
 @allocator
 def new_half_spaces(plan: Plan) -> LeastStep:
-    """Allocate for all branches and trunk joints at once."""
+    """Allocate half-spaces for all branches and trunk joints."""
     joints, branches = plan.trunk_joints.shape[0], plan.branches.shape[0]
     n = PLATFORM + joints
     problem = new_qp(n + 1, 9 * branches + plan.cones.shape[0] + 2 * joints)
@@ -79,7 +79,7 @@ def new_half_spaces(plan: Plan) -> LeastStep:
 
 @routine
 def begin_programme(spaces: LeastStep, n: int, trunk_column: int, free: int) -> None:
-    """Begin with no half-space, for n unknowns."""
+    """Clear the half-spaces, for n unknowns."""
     programme = spaces.programme[0]
     programme["n_rows"] = programme["n_equations"] = 0
     programme["n_unknowns"] = n
@@ -91,9 +91,9 @@ def begin_programme(spaces: LeastStep, n: int, trunk_column: int, free: int) -> 
 def add_half_space(
     plan: Plan, b: int, config: Configuration, spaces: LeastStep, excess: float, g: Vec, w: Vec
 ) -> float:
-    """Add the half-space e + g . dt + w . dphi <= 0 of a branch; how far it is exceeded.
+    """Add the half-space e + g . dt + w . dphi <= 0 of a branch; return its excess.
 
-    Left out, with 0, are limits that are kept by more than the window, and what no motion answers.
+    Limits farther away than the window, and half-spaces that no unknown changes, are left out; their excess is 0.
     """
     programme = spaces.programme[0]
     if excess <= -programme["window"]:
@@ -104,7 +104,7 @@ def add_half_space(
 
 @routine
 def add_equation(plan: Plan, b: int, config: Configuration, spaces: LeastStep, error: float, g: Vec, w: Vec) -> float:
-    """Add the equation e + g . dt + w . dphi = 0 of a branch; how far it is off, or 0 if no motion answers."""
+    """Add the equation e + g . dt + w . dphi = 0 of a branch; return |e|, or 0 if no unknown changes it."""
     fill_row(plan, b, config, spaces, g, w)
     return abs(error) if keep_row(spaces, error / plan.length, True) else 0.0
 
@@ -120,8 +120,8 @@ def fill_row(plan: Plan, b: int, config: Configuration, spaces: LeastStep, g: Ve
     if programme["free"] & TRANSLATES:
         put(row, g)
     if programme["free"] & TURNS:
-        arm = sub(t, (config.pose[0, 3], config.pose[1, 3], config.pose[2, 3]))
-        put(row[3:], scale(1.0 / programme["lever"], add(cross(arm, g), w)))
+        lever_arm = sub(t, (config.pose[0, 3], config.pose[1, 3], config.pose[2, 3]))
+        put(row[3:], scale(1.0 / programme["lever"], add(cross(lever_arm, g), w)))
     trunk = branch["carrier"] - 1
     if trunk >= 0:
         for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
@@ -134,9 +134,9 @@ def fill_row(plan: Plan, b: int, config: Configuration, spaces: LeastStep, g: Ve
 
 @routine
 def keep_row(spaces: LeastStep, excess: float, is_equation: bool) -> bool:
-    """Count the row that has been filled, exceeded by so much [L]; False if no motion answers it.
+    """Keep the filled row with its excess [L]; False, and not kept, if no unknown changes it.
 
-    Equations come first: an equation changes places with the first half-space.
+    Equations come first: an equation is swapped with the first half-space.
     """
     programme, G, h = spaces.programme[0], spaces.problem.G, spaces.problem.h
     k, n, first = programme["n_rows"], programme["n_unknowns"], programme["n_equations"]
@@ -169,7 +169,7 @@ def add_ranges(plan: Plan, first: int, last: int, config: Configuration, spaces:
 
 @routine
 def add_branch(plan: Plan, b: int, config: Configuration, settings: Settings, spaces: LeastStep) -> float:
-    """Add the limits of a branch; the largest excess of what motions answer [length]."""
+    """Add the limits of a branch; return the largest excess [length]."""
     branch = plan.branches[b]
     parts, t = branch["last"] - branch["first"], move(config.pose, vec(branch["end"]))
     gap = add_planes(plan, b, config, spaces, parts)
@@ -185,26 +185,26 @@ def add_branch(plan: Plan, b: int, config: Configuration, settings: Settings, sp
 
 @routine
 def add_planes(plan: Plan, b: int, config: Configuration, spaces: LeastStep, parts: int) -> float:
-    """Add equations: the end in the plane of the hinges, and the platform's hinge parallel to them."""
+    """Add the equations of a planar branch: the end in the hinges' plane, the platform's hinge parallel to theirs."""
     branch, gap, zero = plan.branches[b], 0.0, (0.0, 0.0, 0.0)
     if branch["planar"] == 0:
         return gap
     normal = turn(config.carriers[branch["carrier"]], vec(branch["normal"]))
     if parts > 0 and branch["planar"] >= parts:
-        off = dot(normal, sub(move(config.pose, vec(branch["end"])), base_of(plan, branch, config)))
-        gap = max(gap, add_equation(plan, b, config, spaces, off, normal, zero))
+        error = dot(normal, sub(move(config.pose, vec(branch["end"])), base_of(plan, branch, config)))
+        gap = max(gap, add_equation(plan, b, config, spaces, error, normal, zero))
     hinge = vec(branch["end_normal"])
     if branch["end_plane"] == 0 and dot(hinge, hinge) > 0.0:
         hinge, e = turn(config.pose, hinge), any_normal(normal)
         for across in (e, cross(normal, e)):
-            off = plan.length * dot(hinge, across)
-            gap = max(gap, add_equation(plan, b, config, spaces, off, zero, scale(plan.length, cross(hinge, across))))
+            error = plan.length * dot(hinge, across)
+            gap = max(gap, add_equation(plan, b, config, spaces, error, zero, scale(plan.length, cross(hinge, across))))
     return gap
 
 
 @routine
 def add_strut(plan: Plan, b: int, config: Configuration, spaces: LeastStep) -> float:
-    """Add the limits of a strut: its stroke, its hinge's range, a plane of the platform, cones at both ends."""
+    """Add the limits of a strut: its stroke, its hinge's range, a plane fixed to the platform, cones at both ends."""
     branch, gap, zero = plan.branches[b], 0.0, (0.0, 0.0, 0.0)
     carrier, node = config.carriers[branch["carrier"]], plan.nodes[branch["last"]]
     d = sub(move(config.pose, vec(branch["end"])), base_of(plan, branch, config))
@@ -215,15 +215,15 @@ def add_strut(plan: Plan, b: int, config: Configuration, spaces: LeastStep) -> f
     else:
         gap = add_half_space(plan, b, config, spaces, length - node["hi"], u, zero)
         gap = max(gap, add_half_space(plan, b, config, spaces, node["lo"] - length, scale(-1.0, u), zero))
-    foot = plan.nodes[branch["first"]]
-    if foot["ranged"] == 1:
+    base_node = plan.nodes[branch["first"]]
+    if base_node["ranged"] == 1:
         normal = turn(carrier, vec(branch["normal"]))
         flat = flatten(d, normal)
         rho = max(norm(flat), NO_LENGTH)
         angle = hinge_angle(plan, branch, branch["first"], carrier, normal, config.nodes, flat)
         g = scale(1.0 / rho, cross(normal, flat))
-        gap = max(gap, add_half_space(plan, b, config, spaces, (angle - foot["angle_hi"]) * rho, g, zero))
-        below, g = (foot["angle_lo"] - angle) * rho, scale(-1.0, g)
+        gap = max(gap, add_half_space(plan, b, config, spaces, (angle - base_node["angle_hi"]) * rho, g, zero))
+        below, g = (base_node["angle_lo"] - angle) * rho, scale(-1.0, g)
         gap = max(gap, add_half_space(plan, b, config, spaces, below, g, zero))
     if branch["end_plane"] == 1:
         p = turn(config.pose, vec(branch["end_normal"]))
@@ -253,9 +253,10 @@ def cone_excess(axis: Vec, c: float, s: float, d: Vec) -> tuple[float, Vec]:
 
 @routine
 def add_end(plan: Plan, b: int, config: Configuration, settings: Settings, spaces: LeastStep) -> float:
-    """Add the half-space beyond the nearest end of a branch of several parts, square to what it misses its target by.
+    """Add the half-space tangent to the reach of a branch of several parts, normal to its end gap.
 
-    A branch that reaches is probed beyond its target, where it was missed last, if limits that are kept count.
+    The tangent point is the reachable end nearest to the target. If the branch reaches, and limits within the window
+    count, the tangent point is sought beyond the target in the direction of the last gap.
     """
     branch, zero = plan.branches[b], (0.0, 0.0, 0.0)
     t, base = move(config.pose, vec(branch["end"])), base_of(plan, branch, config)
@@ -263,7 +264,7 @@ def add_end(plan: Plan, b: int, config: Configuration, settings: Settings, space
         normal = turn(config.carriers[branch["carrier"]], vec(branch["normal"]))
         t = along(t, -dot(normal, sub(t, base)), normal)
     gap, _passes = reach_end(plan, b, config, t, settings)
-    if gap > settings.enough:
+    if gap > settings.tolerance:
         n = scale(1.0 / gap, sub(t, vec(config.nodes[branch["last"]])))
         put(spaces.normals[b], n)
         return add_half_space(plan, b, config, spaces, gap, n, zero)
@@ -272,7 +273,7 @@ def add_end(plan: Plan, b: int, config: Configuration, settings: Settings, space
         return 0.0
     beyond = along(t, PROBE * spaces.programme[0]["window"], n)
     gap, _passes = reach_end(plan, b, config, beyond, settings)
-    if gap > settings.enough:
+    if gap > settings.tolerance:
         end = vec(config.nodes[branch["last"]])
         n = scale(1.0 / gap, sub(beyond, end))
         put(spaces.normals[b], n)
@@ -293,7 +294,7 @@ def dot_of(a: Floats, b: Floats, n: int) -> float:
 def least_step(spaces: LeastStep) -> None:
     """Move x by the least step into all half-spaces: min |x - x_0|^2 / 2 + s^2 / 2 with G x + h <= s / STIFF.
 
-    The slack s misses all of them alike where they contradict; equations have none.
+    The slack s relaxes all half-spaces alike if they contradict each other; equations have no slack.
     """
     problem, x, programme = spaces.problem, spaces.x, spaces.programme[0]
     n = programme["n_unknowns"]

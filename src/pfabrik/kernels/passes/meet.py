@@ -1,4 +1,4 @@
-"""Closing a branch exactly: two parts meet where circle or rail meets a sphere, or as near as limits let them."""
+"""Closed-form solution of a branch of two parts: a circle or a line intersects a sphere, or comes nearest to it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .restrict import clamp_stroke
 
 @routine
 def is_two_part(plan: Plan, b: int) -> bool:
-    """True for a rigid crank or a rail that carries one rod."""
+    """True for a rod on a rigid crank or on a rail."""
     branch = plan.branches[b]
     first, parts = branch["first"], branch["last"] - branch["first"]
     if branch["rail"] == 1:
@@ -26,7 +26,7 @@ def is_two_part(plan: Plan, b: int) -> bool:
 
 @routine
 def base_of(plan: Plan, branch: Record, config: Configuration) -> Vec:
-    """Where the carrier has the first node of a branch; of a rail, its point at home."""
+    """Position of a branch's first node on its carrier; for a rail, of the rail's point at home."""
     return move(config.carriers[branch["carrier"]], vec(plan.nodes[branch["first"]]["home"]))
 
 
@@ -38,10 +38,11 @@ def crank_frame(branch: Record, carrier: Floats) -> tuple[Vec, Vec]:
 
 
 @routine
-def meeting(plan: Plan, b: int, config: Configuration, t: Vec) -> tuple[float, float]:
-    """Values c and s of the inner part with which the rod ends at `t`: c - s and c + s, angles of a crank or a slide.
+def intersection(plan: Plan, b: int, config: Configuration, t: Vec) -> tuple[float, float]:
+    """Intersect the circle of a crank, or a rail, with the rod's sphere about `t`.
 
-    Where circle or rail misses the sphere about `t`, s is 0 or pi: stretched or folded.
+    Returns c and s: the inner joint is at c - s or c + s. Without an intersection the branch is stretched (s = 0) or
+    folded (s = pi; 0 on a rail).
     """
     branch = plan.branches[b]
     rod, v = plan.nodes[branch["last"]], sub(t, base_of(plan, branch, config))
@@ -59,36 +60,36 @@ def meeting(plan: Plan, b: int, config: Configuration, t: Vec) -> tuple[float, f
 
 
 @routine
-def side_of(plan: Plan, b: int, config: Configuration) -> float:
-    """The side of the line to its end that the inner node of two parts is on: +1 or -1."""
+def elbow_sign(plan: Plan, b: int, config: Configuration) -> float:
+    """Inverse-kinematics branch of two parts, +1 or -1: the side of the line to the end that the inner node is on."""
     branch = plan.branches[b]
     base = base_of(plan, branch, config)
     inner = sub(vec(config.nodes[branch["last"] - 1]), base)
     end = sub(vec(config.nodes[branch["last"]]), base)
     if branch["rail"] == 1:
-        side = dot(vec(branch["rail_axis"]), sub(inner, end))
+        offset = dot(vec(branch["rail_axis"]), sub(inner, end))
     else:
-        side = dot(turn(config.carriers[branch["carrier"]], vec(branch["normal"])), cross(end, inner))
-    return 1.0 if side >= 0.0 else -1.0
+        offset = dot(turn(config.carriers[branch["carrier"]], vec(branch["normal"])), cross(end, inner))
+    return 1.0 if offset >= 0.0 else -1.0
 
 
 @routine
 def place_rod(plan: Plan, b: int, config: Configuration, t: Vec, value: float) -> float:
-    """Place two parts with the inner one at an angle or slide, and the rod towards `t`; the distance from there."""
+    """Place two parts: the inner joint at a value, the rod towards `t`; return the distance of its end from `t`."""
     branch, nodes = plan.branches[b], config.nodes
     base, inner = base_of(plan, branch, config), branch["last"] - 1
     if branch["rail"] == 1:
         put(nodes[inner], along(base, value, vec(branch["rail_axis"])))
     else:
         e, f = crank_frame(branch, config.carriers[branch["carrier"]])
-        arm = add(scale(math.cos(value), e), scale(math.sin(value), f))
-        put(nodes[inner], along(base, plan.nodes[inner]["lo"], arm))
+        direction = add(scale(math.cos(value), e), scale(math.sin(value), f))
+        put(nodes[inner], along(base, plan.nodes[inner]["lo"], direction))
     return place_towards(plan, b, config, t)
 
 
 @routine
 def place_towards(plan: Plan, b: int, config: Configuration, t: Vec) -> float:
-    """Pass outward with the end at `t`; the distance of the end from there."""
+    """Pass outward with the end aimed at `t`; return the distance of the end from `t`."""
     last = plan.branches[b]["last"]
     put(config.nodes[last], t)
     reach_backward(plan, b, config)
@@ -97,43 +98,43 @@ def place_towards(plan: Plan, b: int, config: Configuration, t: Vec) -> float:
 
 @routine
 def reach_end(plan: Plan, b: int, config: Configuration, t: Vec, settings: Settings) -> tuple[float, int]:
-    """Bring the end of a branch to `t`, or near it, within all limits; the distance left, and the passes.
+    """Bring the end of a branch to `t`, or near it, within all limits; return the remaining distance and the passes.
 
-    A strut is placed, two parts meet, a longer chain takes passes; t is the branch's target for such a chain.
+    A strut is placed, two parts are intersected, a longer branch takes passes; for these `t` is the branch's target.
     """
     branch = plan.branches[b]
     if not is_two_part(plan, b):
         if branch["last"] - branch["first"] + branch["rail"] < 2:
             return place_towards(plan, b, config, t), 1
         return reach_end_by_passes(plan, b, config, t, settings)
-    side = side_of(plan, b, config)
-    centre, spread = meeting(plan, b, config, t)
-    gap = place_rod(plan, b, config, t, centre + side * spread)
-    if gap <= settings.enough:
+    sign = elbow_sign(plan, b, config)
+    centre, spread = intersection(plan, b, config, t)
+    gap = place_rod(plan, b, config, t, centre + sign * spread)
+    if gap <= settings.tolerance:
         return gap, 1
-    if settings.keep_sides == 0:
-        gap = place_rod(plan, b, config, t, centre - side * spread)
-        if gap <= settings.enough:
+    if settings.keep_mode == 0:
+        gap = place_rod(plan, b, config, t, centre - sign * spread)
+        if gap <= settings.tolerance:
             return gap, 2
     return nearest_end(plan, b, config, t, centre), 1
 
 
 @routine
 def reach_end_by_passes(plan: Plan, b: int, config: Configuration, t: Vec, settings: Settings) -> tuple[float, int]:
-    """FABRIK's passes on one branch; the distance that they leave, and how many."""
+    """Run FABRIK's passes on one branch; return the remaining distance and their number."""
     gap = math.inf
     for n in range(settings.max_iterations):
         reach_forward(plan, b, config)
         reach_backward(plan, b, config)
         gap = norm(sub(vec(config.nodes[plan.branches[b]["last"]]), t))
-        if gap <= settings.enough:
+        if gap <= settings.tolerance:
             return gap, n + 1
     return gap, settings.max_iterations
 
 
 @routine
 def nearest_end(plan: Plan, b: int, config: Configuration, t: Vec, centre: float) -> float:
-    """Place two parts with their end as near to `t` as limits allow: the least over the range of the inner one."""
+    """Place two parts with their end nearest to `t` within limits: a search over the range of the inner joint."""
     branch = plan.branches[b]
     if branch["rail"] == 1:
         v = sub(t, base_of(plan, branch, config))

@@ -1,4 +1,4 @@
-"""Trunks moved, from where they are, by the least steps that let the branches on them reach."""
+"""Moves of trunks to where their branches reach a target, nearest to where they were."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .plan import Configuration, Plan, Settings
 
 
 @routine
-def stand_as_at_home(plan: Plan, config: Configuration) -> None:
-    """Place the nodes of all branches as their carriers have them at home: legs of two parts on the sides of home."""
+def place_at_home(plan: Plan, config: Configuration) -> None:
+    """Place the nodes of all branches relative to their carriers as at home, and so in home's working mode."""
     for b in range(plan.branches.shape[0]):
         branch = plan.branches[b]
         for k in range(branch["first"], branch["last"] + 1):
@@ -31,18 +31,18 @@ def move_trunk(
     config: Configuration,
     spaces: LeastStep,
 ) -> None:
-    """Move trunks (n_trunk_joints,), deviations from home, until their branches reach the target, if they can.
+    """Move trunks (n_trunk_joints,), deviations from home, to where their branches reach the target.
 
-    Every chain has a trunk. Where its branches reach already it stays; where it is caught, it is left there.
+    Every chain has a trunk. A trunk whose branches already reach stays. A search that fails ends where it stalled.
 
     Parameters
     ----------
-    margin : how far inside limits steps aim [length].
+    margin : distance inside the limits at which steps aim [length].
     """
     copy_table(target, config.pose)
     copy_row(trunks, config.trunks)
     move_carriers(plan, config)
-    stand_as_at_home(plan, config)
+    place_at_home(plan, config)
     for k in range(spaces.normals.shape[0]):
         for j in range(spaces.normals.shape[1]):
             spaces.normals[k, j] = 0.0

@@ -1,4 +1,4 @@
-"""Poses of the carriers, the bodies that branches are mounted on, and positions of the ends of branches."""
+"""Poses of the carriers (the base and the last bodies of trunks), and positions of the ends of branches."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def place_ends(plan: Plan, c: int, config: Configuration) -> None:
 
 @routine
 def load_seed(plan: Plan, seeds: Seeds, i: int, config: Configuration) -> None:
-    """Load seed `i`, or the only one; the ends of branches follow from the pose and the trunks."""
+    """Load seed `i`, or the only one, and place carriers and ends of branches."""
     row = i if seeds.poses.shape[0] > 1 else 0
     copy_table(seeds.poses[row], config.pose)
     copy_table(seeds.nodes[row], config.nodes)

@@ -1,4 +1,4 @@
-"""Reaching: FABRIK's forward and backward passes on one branch, and the chains made of branches."""
+"""FABRIK's forward and backward passes on one branch, and on the chains made of branches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .restrict import clamp_stroke, restrict_step, restrict_step_inward
 
 @routine
 def reach_forward(plan: Plan, b: int, config: Configuration) -> None:
-    """Pass from the target towards the base: each node at an allowed distance from its neighbour nearer the target."""
+    """Pass from the target to the base: place each node at an allowed distance from the node after it."""
     branch, nodes = plan.branches[b], config.nodes
     carrier = config.carriers[branch["carrier"]]
     first, last = branch["first"], branch["last"]
@@ -37,7 +37,7 @@ def reach_forward(plan: Plan, b: int, config: Configuration) -> None:
 
 @routine
 def reach_backward(plan: Plan, b: int, config: Configuration) -> None:
-    """Pass from the base to the end: each node at an allowed distance and direction from the one before it."""
+    """Pass from the base to the end: place each node at an allowed distance and direction from the node before it."""
     branch, nodes = plan.branches[b], config.nodes
     carrier = config.carriers[branch["carrier"]]
     first, last = branch["first"], branch["last"]
@@ -66,15 +66,15 @@ def end_gap(plan: Plan, b: int, config: Configuration) -> float:
 
 @routine
 def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
-    """One iteration, forward and backward, of all branches of a chain; the largest end gap it leaves."""
+    """Run one iteration, forward and backward, of a chain; return the largest end gap."""
     chain = plan.chains[c]
     for b in range(chain["first"], chain["last"]):
         first = plan.branches[b]["first"]
         present = move(config.carriers[plan.branches[b]["carrier"]], vec(plan.nodes[first]["home"]))
         reach_forward(plan, b, config)
-        wish = vec(config.nodes[first])
-        put(config.wishes[b], wish)
-        config.is_unmet[b] = 1 if norm(sub(wish, present)) > CONTENT * plan.length else 0
+        base_target = vec(config.nodes[first])
+        put(config.base_targets[b], base_target)
+        config.is_displaced[b] = 1 if norm(sub(base_target, present)) > CONTENT * plan.length else 0
     if chain["trunk"] >= 0:
         fit_trunk(plan, c, config)
     return pass_outward(plan, c, config)
@@ -82,7 +82,7 @@ def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
 
 @routine
 def pass_outward(plan: Plan, c: int, config: Configuration) -> float:
-    """Pass from the base to the ends of a chain, each joint within its limits; the largest end gap."""
+    """Pass from the base to the ends of a chain, each joint within its limits; return the largest end gap."""
     chain, gap = plan.chains[c], 0.0
     if chain["trunk"] >= 0:
         for j in range(plan.trunks[chain["trunk"]]["first"], plan.trunks[chain["trunk"]]["last"]):
@@ -96,15 +96,15 @@ def pass_outward(plan: Plan, c: int, config: Configuration) -> float:
 
 @routine
 def reach_by_passes(plan: Plan, c: int, config: Configuration, settings: Settings) -> tuple[float, int]:
-    """Forward and backward passes until the ends are within E, or K iterations are spent; the gap and the iterations.
+    """Run passes until the ends are within E, at most K iterations; return the gap and the iterations.
 
-    With K = 0 there is one pass outward only, after which all gaps are at the ends.
+    With K = 0 there is a single pass outward, after which all gaps are at the ends.
     """
     if settings.max_iterations == 0:
         return pass_outward(plan, c, config), 0
     gap = pass_over_chain(plan, c, config)
     for iteration in range(1, settings.max_iterations):
-        if gap <= settings.enough:
+        if gap <= settings.tolerance:
             return gap, iteration
         gap = pass_over_chain(plan, c, config)
     return gap, settings.max_iterations

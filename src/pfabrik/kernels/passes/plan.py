@@ -1,7 +1,7 @@
 """Inputs and results of the passes: the mechanism as flat records, and the configurations of a batch.
 
-Lengths are in the mechanism's own unit, angles in radians. Vectors named `home` are in base coordinates at home. The
-carrier of a branch is the body it is mounted on: the base, or the last body of a trunk. Vectors fixed to the platform
+Lengths are in the mechanism's unit, angles in radians. Vectors named `home` are in base coordinates at home. The
+carrier of a branch is its base body: the mechanism's base, or the last body of a trunk. Vectors fixed to the platform
 are relative to the reference point, at home orientation.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import Floats, Ints, Records
 from .._jit import allocator
 
-# The body that the axis of a cone is fixed to: the branch's carrier, the previous link, the platform.
+# Values of CONE.fixed_to, the body of the cone's axis: the branch's carrier, the previous link, the platform.
 CARRIER_CONE, LINK_CONE, PLATFORM_CONE = 0, 1, 2
 
 _vector = ("f8", (3,))
@@ -25,7 +25,7 @@ NODE = np.dtype(
         ("lo", "f8"),  # length of the segment from the previous node
         ("hi", "f8"),
         ("hinge", "i8"),  # 1: the next segment stays in the branch's plane
-        ("ranged", "i8"),  # 1: and its angle from home stays within [angle_lo, angle_hi]
+        ("ranged", "i8"),  # 1: the hinge's angle from home stays within [angle_lo, angle_hi]
         ("angle_home", "f8"),  # angle from the previous segment to the next, at home
         ("angle_lo", "f8"),
         ("angle_hi", "f8"),
@@ -36,7 +36,7 @@ BRANCH = np.dtype(
         ("first", "i8"),  # nodes first ... last
         ("last", "i8"),
         ("carrier", "i8"),  # 0: the base; k + 1: trunk k
-        ("planar", "i8"),  # how many leading hinges
+        ("planar", "i8"),  # number of leading hinges
         ("normal", *_vector),
         ("reference", *_vector),  # direction of the first segment at home, in the plane
         ("end", *_vector),
@@ -64,7 +64,7 @@ CONE = np.dtype(
 TRUNK_SPAN = np.dtype([("first", "i8"), ("last", "i8")])
 TRUNK_JOINT = np.dtype(
     [
-        ("turns", "i8"),  # 1: about its axis; 0: it slides along it
+        ("turns", "i8"),  # 1: turns about its axis; 0: slides along it
         ("unit", "f8"),  # 1 for angles, L for lengths
         ("point", *_vector),
         ("axis", *_vector),
@@ -90,15 +90,15 @@ class Plan(NamedTuple):
 
 
 class Configuration(NamedTuple):
-    """One configuration of the mechanism, worked on in place; carriers and screws follow from the trunk values."""
+    """One configuration of the mechanism, changed in place; carriers and screws follow from the trunk values."""
 
     pose: Floats  # (4, 4)
     nodes: Floats  # (n_nodes, 3)
     trunks: Floats  # (n_trunk_joints,): deviation from home
     carriers: Floats  # (n_trunks + 1, 3, 4); the first is the base
     screws: Floats  # (n_trunk_joints, 2, 3): present point and axis
-    wishes: Floats  # (n_branches, 3): where each branch wants its first node, after a forward pass
-    is_unmet: Ints  # (n_branches,): 1 if that is elsewhere than it is
+    base_targets: Floats  # (n_branches, 3): position of each branch's first node after a forward pass
+    is_displaced: Ints  # (n_branches,): 1 if that differs from its position on the carrier
     system: Floats  # (n, n + 1): the normal equations of a fit, right-hand side in the last column
 
 
@@ -119,7 +119,7 @@ def new_configuration(plan: Plan) -> Configuration:
 
 
 class Seeds(NamedTuple):
-    """Configurations that passes start from: one for all rows, or one per row."""
+    """Start configurations: one for all rows, or one per row."""
 
     poses: Floats
     nodes: Floats
@@ -127,19 +127,19 @@ class Seeds(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """Options, as numbers; lengths in the mechanism's unit."""
+    """Options as numbers; lengths in the mechanism's unit."""
 
-    enough: float  # E: passes end where the chains' ends are this close to their targets
-    max_iterations: int  # K; 0 for a pass outward alone
+    tolerance: float  # E: largest end gap with which a target is reached
+    max_iterations: int  # K; 0 for a single pass outward
     max_rounds: int
-    free: int  # motions of a target that is not reached: TRANSLATES, TURNS, or both
-    keep_sides: int  # 1: legs of two parts stay on their sides; with meetings only
-    lever: float  # how a turn counts beside a distance [length per rad]; with half-spaces only
-    is_accelerated: int  # 1: with meetings and half-spaces
+    free: int  # motions of an unreached target: TRANSLATES, TURNS, or both
+    keep_mode: int  # 1: branches of two parts keep their working mode; used if accelerated
+    lever: float  # weight of a turn beside a distance [length per rad]; used if accelerated
+    is_accelerated: int  # 1: with closed-form intersections and half-spaces
 
 
 class PassResults(NamedTuple):
-    """Results of the passes, row by row: configurations whose loops are closed up to the gap."""
+    """Results of the passes: configurations whose loops are closed up to the gap."""
 
     poses: Floats  # (n, 4, 4)
     nodes: Floats  # (n, n_nodes, 3)

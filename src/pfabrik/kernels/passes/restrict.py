@@ -1,4 +1,4 @@
-"""Clamps of a segment's direction and length to strokes, hinges and cones."""
+"""Clamps of segments to strokes, hinge ranges and cones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .plan import CARRIER_CONE, PLATFORM_CONE, Plan
 
 @routine
 def clamp_stroke(length: float, lo: float, hi: float) -> float:
-    """The length clamped to its limits."""
+    """Clamp a length to its limits."""
     return min(max(length, lo), hi)
 
 
@@ -56,7 +56,7 @@ def clamp_cone(axis: Vec, half_angle: float, d: Vec) -> Vec:
 
 @routine
 def keep_in_cone(cone: Record, axis: Vec, d: Vec) -> Vec:
-    """`clamp_cone` to a cone about its present axis; most vectors are well inside."""
+    """Clamp `d` to a cone about its present axis, with a quick exit for vectors well inside."""
     if dot(axis, d) > (cone["cosine"] + WELL_INSIDE) * norm(d):
         return d
     return clamp_cone(axis, cone["half_angle"], d)
@@ -64,7 +64,7 @@ def keep_in_cone(cone: Record, axis: Vec, d: Vec) -> Vec:
 
 @inlined
 def hinge_angle(plan: Plan, branch: Records, k: int, carrier: Floats, normal: Vec, nodes: Floats, d: Vec) -> float:
-    """Angle from home of the hinge at node `k` when the next segment is `d`."""
+    """Angle from home of the hinge at node `k`, with next segment `d`."""
     node = plan.nodes[k]
     if k == branch["first"]:
         angle = angle_about(normal, turn(carrier, vec(branch["reference"])), d)
@@ -89,7 +89,7 @@ def cone_axis(cone: Records, carrier: Floats, pose: Floats, normal: Vec, nodes: 
 
 @routine
 def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Floats, nodes: Floats, d: Vec) -> Vec:
-    """Turn the step `d` from node k-1 to node k until the hinges and cones at both ends allow it."""
+    """Clamp the step `d` from node k-1 to node k to the hinges and cones at both ends."""
     normal = turn(carrier, vec(branch["normal"]))
     before = plan.nodes[k - 1]
     at_end = k == branch["last"]
@@ -126,9 +126,9 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
 def restrict_step_inward(
     plan: Plan, branch: Records, k: int, carrier: Floats, pose: Floats, nodes: Floats, d: Vec
 ) -> Vec:
-    """Turn the step `d` from node k+1 to node k until the cones at both ends, and a plane of the platform, allow it.
+    """Clamp the step `d` from node k+1 to node k to the cones at both ends and to a plane fixed to the platform.
 
-    A cone at node k is fixed to what the pass has not come to, carrier or link: its present axis counts.
+    A cone at node k is fixed to a carrier or link that this pass has not moved yet: its present axis counts.
     """
     normal = turn(carrier, vec(branch["normal"]))
     at_end = k + 1 == branch["last"]

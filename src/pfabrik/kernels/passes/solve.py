@@ -1,4 +1,4 @@
-"""The kernel of the paper's method: passes bring chains to targets, and unreached targets move to the chains' ends."""
+"""The paper's method: passes bring chains to targets, and unreached targets move to the ends of the chains."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .plan import Configuration, PassResults, Plan, Seeds, Settings, new_configu
 
 
 @routine
-def reach_pose(plan: Plan, config: Configuration, settings: Settings) -> tuple[float, int]:
-    """Run the passes of every chain towards the present pose; the largest end gap, and the most iterations."""
+def pass_over_chains(plan: Plan, config: Configuration, settings: Settings) -> tuple[float, int]:
+    """Run the passes of every chain towards the present pose; return the largest end gap and the most iterations."""
     worst, iterations = 0.0, 0
     for c in range(plan.chains.shape[0]):
         gap, chain_iterations = reach_by_passes(plan, c, config, settings)
@@ -25,13 +25,13 @@ def reach_pose(plan: Plan, config: Configuration, settings: Settings) -> tuple[f
 
 @routine
 def project_by_centroid(plan: Plan, config: Configuration, settings: Settings) -> tuple[float, int, int]:
-    """Revise the target round by round until every chain reaches it; the largest gap, iterations and rounds."""
-    gap, iterations = reach_pose(plan, config, settings)
+    """Revise the target round by round until all chains reach it; return the largest gap, iterations and rounds."""
+    gap, iterations = pass_over_chains(plan, config, settings)
     rounds = 0
-    while gap > settings.enough and rounds < settings.max_rounds:
+    while gap > settings.tolerance and rounds < settings.max_rounds:
         revise_target(plan, config, settings)
         rounds += 1
-        gap, more = reach_pose(plan, config, settings)
+        gap, more = pass_over_chains(plan, config, settings)
         iterations += more
     return gap, iterations, rounds
 
@@ -46,7 +46,7 @@ def write_row(i: int, config: Configuration, results: PassResults) -> None:
 
 @search
 def solve_by_passes(plan: Plan, targets: Floats, seeds: Seeds, settings: Settings, results: PassResults) -> None:
-    """Run passes towards every target, plain or accelerated, and move targets that are not reached."""
+    """Solve for targets by plain or accelerated passes, and project unreached targets."""
     config, spaces = new_configuration(plan), new_half_spaces(plan)
     for i in range(targets.shape[0]):
         load_seed(plan, seeds, i, config)
