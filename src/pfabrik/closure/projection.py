@@ -1,4 +1,4 @@
-"""What the nearest feasible configuration to a target is: what counts of the distance, and what is held."""
+"""Projection modes: the weights of the distance to an unreachable target, and the part that is held."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ProjectionMode(NamedTuple):
     Attributes
     ----------
     weights : of the squares of position [L] and rotation [rad]; LOCKED for components that are held.
-    hold : the part of the target that is held: HOLD_NOTHING, HOLD_ORIENTATION or HOLD_POSITION.
+    hold : part of the target that is held: HOLD_NOTHING, HOLD_ORIENTATION or HOLD_POSITION.
     """
 
     weights: Weights
@@ -42,7 +42,7 @@ class ProjectionMode(NamedTuple):
 
 @derived
 def projection_modes(closure: Closure, hold: str | None, rotation_length: float | None) -> tuple[ProjectionMode, ...]:
-    """The projection modes in the order in which they are tried: first with the held part, then with nothing held."""
+    """Projection modes in the order of trial: first with the held part, then with nothing held."""
     task, mechanism = closure.task, closure.mechanism
     turning = ((rotation_length or mechanism.rotation_length) / mechanism.characteristic_length) ** 2
     free = ProjectionMode(task.weights(1.0, turning), HOLD_NOTHING)
@@ -56,15 +56,15 @@ def projection_modes(closure: Closure, hold: str | None, rotation_length: float 
 def projection_multipliers(
     closure: Closure, coordinates: Floats, targets: Floats, projection: ProjectionMode
 ) -> Floats:
-    """Multipliers of all limits, as of `limit_multipliers`, at projected configurations (n, columns) of targets."""
+    """Multipliers of all limits at projected configurations (n, columns) of targets; see `limit_multipliers`."""
     return limit_multipliers(closure, coordinates, targets, platform=projection.weights, frame=closure.task.frame)
 
 
 def held_parts(closure: Closure, holds: Ints, position: Floats, rotation: Floats) -> Ints:
-    """The parts of targets that poses really hold, (n,), from their errors [length], [rad]; else HOLD_NOTHING.
+    """Parts of targets that answers hold within tolerance, (n,), by their errors [length], [rad]; else HOLD_NOTHING.
 
-    An answer to a clipped target may miss the part that it was to hold.
+    An answer to a clipped target may miss the part to be held.
     """
-    is_turned = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
-    is_moved = (holds == HOLD_POSITION) & (position > TOLERANCES.held * closure.mechanism.characteristic_length)
-    return np.where(is_turned | is_moved, HOLD_NOTHING, holds)
+    misses_orientation = (holds == HOLD_ORIENTATION) & (rotation > TOLERANCES.held)
+    misses_position = (holds == HOLD_POSITION) & (position > TOLERANCES.held * closure.mechanism.characteristic_length)
+    return np.where(misses_orientation | misses_position, HOLD_NOTHING, holds)

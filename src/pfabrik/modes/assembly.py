@@ -25,7 +25,7 @@ from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes
 
 @dataclass(frozen=True)
 class AssemblyModes(Modes):
-    """The assembly modes that were found, nearest to home first, with how often; see `Modes` for the fields."""
+    """Assembly modes found by a search, nearest to home first; see `Modes` for the fields."""
 
     kind = "assembly"
 
@@ -39,7 +39,7 @@ class AssemblyModes(Modes):
 
 
 def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: int = 40_000) -> AssemblyModes:
-    """All poses in which the mechanism can be assembled with given actuator values, limits or not.
+    """All poses in which the mechanism can be assembled with given actuator values, regardless of limits.
 
     Newton's method, undamped, starts from random configurations of all joints until every mode has been found ten times
     and at least 4096 starts have been made, or `most_starts`. This is a search, not a proof: each mode listed exists,
@@ -60,8 +60,8 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
     """
     values, shape = as_values(mechanism, actuators)
     if shape != () or not np.isfinite(values).all():
-        found = f"batch shape {shape}" if shape else "a value that is not finite"
-        raise InvalidArgument("actuators", found, f"one set of {len(mechanism.actuator_names)} finite values")
+        actual = f"batch shape {shape}" if shape else "a value that is not finite"
+        raise InvalidArgument("actuators", actual, f"one set of {len(mechanism.actuator_names)} finite values")
     most_starts = require_count("most_starts", most_starts)
     search = _Search(model_of(mechanism).closure, values)
     while search.starts < most_starts and not search.is_done:
@@ -76,7 +76,7 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
 
 
 class _Search:
-    """A search for assembly modes, with the modes found so far as clusters."""
+    """A search for assembly modes, with a cluster for every mode found so far."""
 
     def __init__(self, closure: Closure, values: Floats) -> None:
         self.closure = closure
@@ -88,7 +88,7 @@ class _Search:
 
     @property
     def is_done(self) -> bool:
-        """True if there were enough starts and every mode was found often enough."""
+        """True after enough starts, if every mode was found often enough."""
         return self.starts >= LEAST_STARTS and self.clusters.are_well_known
 
     @property
@@ -110,7 +110,7 @@ class _Search:
         self._assign(close(self.closure, trial.coordinates, trial.poses, locked=self.locked, max_iterations=4))
 
     def _assign(self, closing: Closing) -> None:
-        """Assign the closed configurations to clusters, known or new."""
+        """Assign the closed configurations to existing or new clusters."""
         is_closed = closing.gap <= TOLERANCES.position
         coordinates, poses = closing.coordinates[is_closed], closing.poses[is_closed]
 
@@ -125,10 +125,10 @@ class _Search:
         self._refuse_continuum(range(n_known, len(self.clusters.hits)))
 
     def _refuse_continuum(self, new_places: range) -> None:
-        """Raise if a new mode is one of a continuum: steps along its free motion, closed again, do not return to it.
+        """Raise if a new mode is part of a continuum: steps along its free motion, closed again, do not return to it.
 
-        Steps of two lengths must also end apart: near two isolated modes that nearly meet, steps of any length lead to
-        the other one.
+        Steps of two lengths must also end apart: if two isolated modes nearly coincide, steps of any length end at the
+        other one.
         """
         for place in new_places:
             (whole, stays), (half, half_stays) = (self._step_freely(place, along) for along in (ALONG, 0.5 * ALONG))

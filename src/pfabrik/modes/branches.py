@@ -1,4 +1,4 @@
-"""The search for working modes: poses of the platform on a target, and below each the branches of every leg."""
+"""The search for working modes: platform poses on a target, and at each pose the branches of every leg."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .lists import LEAST_STARTS, STEPS, Clusters
 Ints = NDArray[np.intp]
 
 LEAST_STARTS_OF_LEGS = 1024
-"""Starts before a search may end where the target sets all of the platform: each is one of every leg, and a leg has a
-handful of branches. One that a start in 100 leads to is missed by all of them once in 30 000 searches."""
+"""Least number of starts if the target sets the whole pose: every start is one of every leg, and legs have few
+branches. A branch that one start in 100 finds is missed once in 30 000 searches."""
 
 FREEDOM = 2e-2
-"""Singular value of actuator moves from which a direction counts as a freedom: real motions are larger by far, and
-curvature of the moves is of the order of `ALONG`."""
+"""Least singular value of actuator moves that counts as a freedom: true motions are far larger, and the curvature of
+the moves is of the order of `ALONG`."""
 
 
 class Listed(NamedTuple):
@@ -34,8 +34,8 @@ class Listed(NamedTuple):
 
     Attributes
     ----------
-    coordinates, poses : (n, columns) [length or rad], and of the platform, (n, 4, 4) [length].
-    hits : number of starts that led to the rarest branch of a leg in each.
+    coordinates, poses : joint coordinates (n, columns) [length or rad]; platform poses (n, 4, 4) [length].
+    hits : number of starts that found the rarest leg branch of each mode.
     """
 
     coordinates: Floats
@@ -46,13 +46,13 @@ class Listed(NamedTuple):
 class BranchSearch:
     """A search for working modes.
 
-    With the platform fixed, legs are independent: a start that closes only some of them counts for these, and modes are
+    With the platform fixed, legs are independent: a start that closes only some legs counts for these, and modes are
     all combinations of the legs' branches.
 
     Attributes
     ----------
-    poses : clusters of the platform's poses; one if the task sets the whole pose.
-    legs : clusters of the branches of every leg, pose by pose.
+    poses : clusters of platform poses; a single one if the task sets the whole pose.
+    legs : for every pose, the clusters of the branches of every leg.
     """
 
     def __init__(self, closure: Closure, target: Floats) -> None:
@@ -64,24 +64,24 @@ class BranchSearch:
         self.poses = Clusters()
         self.legs: list[list[Clusters]] = []
         self._marks: Fingerprints | None = None
-        self._whole = np.zeros(len(closure.scale))
+        self._completing = np.zeros(len(closure.scale))
         self._lacking = np.ones(len(closure.loops.groups) - 1, bool)
         self._pending: list[tuple[Floats, Floats, Mask]] = []
 
     @property
     def is_done(self) -> bool:
-        """True if there were enough starts and every branch was found often enough."""
+        """True after enough starts, if every branch was found often enough."""
         all_clusters = [self.poses, *(leg for legs in self.legs for leg in legs)]
         least = LEAST_STARTS_OF_LEGS if self.task.is_whole_pose else LEAST_STARTS
         return self.starts >= least and all(clusters.are_well_known for clusters in all_clusters)
 
     def add_starts(self, n: int) -> None:
         """Search from n more random starts, the first of all from home."""
-        coordinates, begin = random_starts(self.closure, n, self.rng)
+        coordinates, poses = random_starts(self.closure, n, self.rng)
         if self.starts == 0:
-            coordinates[0], begin[0] = 0.0, self.closure.mechanism.home_pose
+            coordinates[0], poses[0] = 0.0, self.closure.mechanism.home_pose
         self.starts += n
-        completed = self.task.completed(np.repeat(self.target[None], n, axis=0), begin)
+        completed = self.task.completed(np.repeat(self.target[None], n, axis=0), poses)
         closing = close_on_target(self.closure, coordinates, completed, max_iterations=STEPS)
         is_closed = (closing.gaps <= TOLERANCES.position) & ~_has_negative_lengths(self.closure, closing.coordinates)
         if self.task.rotations == TASK_TURNS["yaw"]:
@@ -94,10 +94,10 @@ class BranchSearch:
             self._assign_pending()
 
     def _complete(self, coordinates: Floats, closed: Mask) -> None:
-        """Collect a closed solution of every leg into one configuration; it completes starts that close some legs."""
+        """Collect a closed solution of every leg in one configuration, to complete starts that close only some legs."""
         for group in np.flatnonzero(self._lacking & closed.any(axis=0)):
             in_group = self.closure.loops.group_of == group
-            self._whole[in_group] = coordinates[closed[:, group].argmax(), in_group]
+            self._completing[in_group] = coordinates[closed[:, group].argmax(), in_group]
             self._lacking[group] = False
 
     def _assign_pending(self) -> None:
@@ -106,7 +106,7 @@ class BranchSearch:
             rows = np.flatnonzero(closed.any(axis=1))
             if len(rows):
                 is_closed = closed[rows][:, self.closure.loops.group_of]
-                self._assign(np.where(is_closed, coordinates[rows], self._whole), poses[rows], closed[rows])
+                self._assign(np.where(is_closed, coordinates[rows], self._completing), poses[rows], closed[rows])
         self._pending.clear()
 
     def _assign(self, coordinates: Floats, poses: Floats, closed: Mask) -> None:
@@ -130,7 +130,7 @@ class BranchSearch:
                 self._assign_leg(leg, branches, coordinates[rows], poses[rows])
 
     def _assign_leg(self, leg: int, branches: Clusters, coordinates: Floats, poses: Floats) -> None:
-        """Assign configurations of one leg to clusters of its branches; of each branch, keep the best."""
+        """Assign configurations of one leg to clusters of its branches; keep the best of every branch."""
         marks = self._marks
         assert marks is not None
         of_leg = marks.leg_of_mark == leg
@@ -144,7 +144,7 @@ class BranchSearch:
             branches.prefer(int(places[row]), coordinates[row], tuple(rank))
 
     def _polish(self, coordinates: Floats, pose: Floats) -> tuple[Floats, Floats]:
-        """Iterate a configuration (columns,) and its pose (4, 4) to convergence; raise if it is one of a continuum."""
+        """Iterate a configuration (columns,) and its pose (4, 4) to convergence; raise if it is part of a continuum."""
         polished = close_on_target(self.closure, coordinates[None], pose[None], closeness=0.0)
         count_from_home(self.closure, polished.coordinates)
         self._refuse_continuum(polished.coordinates[0], polished.poses[0])
@@ -165,7 +165,7 @@ class BranchSearch:
             raise ContinuumOfWorkingModes(mechanism.name, max(freedoms, 1), names)
 
     def _ranks(self, coordinates: Floats, poses: Floats) -> Floats:
-        """Excess over limits, and distance of all coordinates from home, of the legs, (n, legs, 2); less is better."""
+        """Ranks (n, legs, 2), less is better: a leg's excess over its limits, distance of its coordinates from home."""
         marks = self._marks
         assert marks is not None
         measured = close(self.closure, coordinates, poses, max_iterations=0)
@@ -179,7 +179,7 @@ class BranchSearch:
         """The modes nearest to home, at most `most` of them."""
         marks = self._marks
         if marks is None:
-            return Listed(np.zeros((0, len(self._whole))), np.zeros((0, 4, 4)), ())
+            return Listed(np.zeros((0, len(self._completing))), np.zeros((0, 4, 4)), ())
         chosen: list[tuple[float, int, Ints]] = []
         for place, legs in enumerate(self.legs):
             squares = [marks.legs_from_home(leg, np.array(clusters.marks)) for leg, clusters in enumerate(legs)]
@@ -191,7 +191,7 @@ class BranchSearch:
             ]
         chosen = sorted(chosen, key=lambda mode: mode[0])[:most]
         bests = [self._best_branches(place) for place in range(len(self.legs))]
-        columns_of_all = np.arange(len(self._whole))
+        columns_of_all = np.arange(len(self._completing))
         coordinates = np.array(
             [bests[place][branches[marks.leg_of_column], columns_of_all] for _, place, branches in chosen]
         ).reshape(-1, len(columns_of_all))
@@ -206,13 +206,13 @@ class BranchSearch:
         return min(leg.hits[int(branch)] for leg, branch in zip(self.legs[place], branches, strict=True))
 
     def _best_branches(self, place: int) -> Floats:
-        """The branches of all legs below a pose, (most branches of a leg, columns), each leg's in its columns.
+        """Joint coordinates of all leg branches at a pose, (most branches of a leg, columns).
 
-        What a branch leaves open, such as a rod's spin, is nearest to home, or farther if limits require it.
+        Undetermined coordinates, such as a rod's spin, are nearest to home within the limits.
         """
         assert self._marks is not None
         marks, legs = self._marks, self.legs[place]
-        best = np.zeros((max(len(leg.hits) for leg in legs), len(self._whole)))
+        best = np.zeros((max(len(leg.hits) for leg in legs), len(self._completing)))
         for leg, branches in enumerate(legs):
             of_leg = marks.leg_of_column == leg
             for row in range(len(best)):
@@ -227,7 +227,7 @@ class BranchSearch:
         ):
             poses = self._poses_of(best)
             trial = close(self.closure, start, poses, locked=locked, platform=held, frame=self.task.frame, **options)
-            self._put_better(best, trial)
+            self._replace_worse(best, trial)
         return best
 
     def _poses_of(self, coordinates: Floats) -> Floats:
@@ -235,8 +235,8 @@ class BranchSearch:
         poses = platform_poses(self.closure.mechanism, coordinates)
         return self.task.completed(np.repeat(self.target[None], len(poses), axis=0), poses)
 
-    def _put_better(self, best: Floats, trial: Closing) -> None:
-        """Put legs of a trial that are on the same branch, closed, and less beyond limits or nearer to home."""
+    def _replace_worse(self, best: Floats, trial: Closing) -> None:
+        """Replace legs by those of a trial on the same branch that are closed and have a better rank."""
         assert self._marks is not None
         marks, coordinates = self._marks, trial.coordinates
         count_from_home(self.closure, coordinates)
@@ -254,7 +254,7 @@ class BranchSearch:
 
 
 def _has_negative_lengths(closure: Closure, coordinates: Floats) -> Mask:
-    """Mask of groups (n, groups) with a joint whose coordinate is a distance and negative."""
+    """Mask of groups (n, groups) with a negative joint coordinate that is a distance."""
     is_negative = np.zeros((len(coordinates), len(closure.loops.groups) - 1), bool)
     for joint in closure.mechanism.joints:
         if joint.along is not None:
@@ -265,12 +265,12 @@ def _has_negative_lengths(closure: Closure, coordinates: Floats) -> Mask:
 
 
 def _is_upside_down(poses: Floats) -> Mask:
-    """Mask of poses (n, 4, 4) that have no yaw, upside down, and so are on no target that sets one."""
+    """Mask of poses (n, 4, 4) that are upside down: they have no yaw, and meet no target that sets one."""
     return (poses[:, 2, 2] < 0.0) & (np.hypot(poses[:, 0, 2], poses[:, 1, 2]) <= TOLERANCES.same_mode)
 
 
 def _least_sums(terms: list[Floats], most: int) -> tuple[Floats, Ints]:
-    """The least sums of one term from each array, (m,), in growing order, and the indices of the terms, (m, arrays)."""
+    """The least sums of one term per array, (m,), in ascending order, and the indices of the terms, (m, arrays)."""
     sums, chosen = np.zeros(1), np.zeros((1, 0), np.intp)
     for array in terms:
         all_sums = (sums[:, None] + array).ravel()

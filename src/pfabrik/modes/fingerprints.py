@@ -1,4 +1,4 @@
-"""Fingerprints that distinguish working modes, and a test for motions that leave the end effector on its target."""
+"""Fingerprints that distinguish working modes, and a test for motions with the end effector on its target."""
 
 from __future__ import annotations
 
@@ -21,22 +21,21 @@ from .lists import ALONG
 Read = Callable[[Closing], Floats]
 
 SHAKES = 16
-"""Random directions in which a configuration is moved to test what is free; more than there are free motions."""
+"""Random moves of a configuration in the test for free motions; more than there are free motions."""
 
 SHIFT = 1e-3
-"""Least move of a free quantity, relative to the move of the configuration: errors at a double root are smaller."""
+"""Least move of a free quantity relative to that of the configuration: errors at a double root are smaller."""
 
 STRAIGHT = 0.2
-"""Largest relative difference of a move from twice the move of half the size. If one of them ended at another solution,
-or both at the same one, it is 1."""
+"""Largest relative difference between a move and twice the move of half the size; 1 if one of them ends at another
+solution, or both at the same."""
 
 
 class Fingerprints:
-    """Fingerprints of working modes: the platform's pose, and for each leg actuator values and joint centres.
+    """Fingerprints of working modes: the platform's pose, and the actuator values and joint centres of each leg.
 
     Centres that move while actuators and end effector rest, such as the elbow of a spinning rod, are left out. If the
-    platform itself moves then (a rod that ends in the target point), legs are not independent below it, and count as
-    one.
+    platform itself moves then (a rod that ends in the target point), legs depend on each other and count as one leg.
 
     Attributes
     ----------
@@ -45,7 +44,7 @@ class Fingerprints:
     """
 
     def __init__(self, closure: Closure, coordinates: Floats, pose: Floats) -> None:
-        """Choose the quantities that are determined at a closed configuration, (columns,) and (4, 4)."""
+        """Choose the quantities that are determined at a closed configuration (columns,) with pose (4, 4)."""
         mechanism = self.mechanism = closure.mechanism
         self._closure = closure
         locked = closure.driven
@@ -119,10 +118,10 @@ def pose_marks(mechanism: Mechanism, poses: Floats) -> Floats:
 def shifts(
     closure: Closure, coordinates: Floats, pose: Floats, read: Read, locked: frozenset[int] = frozenset()
 ) -> Floats:
-    """Moves of quantities of a configuration (columns,) that are free with the end effector on its target.
+    """Moves of the free quantities of a configuration (columns,) with the end effector on its target.
 
-    The configuration is moved by `ALONG` and by half of it, and closed again each time. A free quantity stays moved,
-    and by half for half the move; one that is determined returns, or goes to another solution.
+    The configuration is moved by `ALONG` and by half of it, and closed again after both moves. A free quantity stays
+    moved, by half after half the move; a determined one returns, or ends at another solution.
 
     Parameters
     ----------
@@ -139,8 +138,8 @@ def shifts(
     lengths = ALONG / np.sqrt((shakes**2).sum(axis=1, keepdims=True) + (twists**2).sum(axis=1, keepdims=True))
     moves = []
     for size in (0.0, 0.5 * lengths, lengths):
-        begin = _moved(pose, size * twists, closure.mechanism.characteristic_length)
-        completed = closure.task.completed(np.repeat(pose[None], SHAKES, axis=0), begin)
+        moved = _moved(pose, size * twists, closure.mechanism.characteristic_length)
+        completed = closure.task.completed(np.repeat(pose[None], SHAKES, axis=0), moved)
         closed = close_on_target(closure, coordinates + size * shakes / closure.scale, completed, locked=locked)
         moves.append(np.where((closed.gap <= TOLERANCES.position)[:, None, None], read(closed), np.nan))
     half, whole = moves[1] - moves[0], moves[2] - moves[0]
@@ -159,13 +158,13 @@ def _moved(pose: Floats, twists: Floats, length: float) -> Floats:
 
 
 def close_on_target(closure: Closure, coordinates: Floats, poses: Floats, **options: Any) -> Closing:
-    """Close legs below platforms (n, 4, 4) that are held in the components of the task; options as of `close`."""
+    """Close legs with platforms (n, 4, 4) held in the components of the task; options are those of `close`."""
     task = closure.task
     return close(closure, coordinates, poses, platform=task.held, frame=task.frame, **options)
 
 
 def count_from_home(closure: Closure, coordinates: Floats) -> None:
-    """Shift angles by full turns, in place: nearest to home, or into their ranges."""
+    """Shift angles in place by full turns: nearest to home, or into their ranges."""
     turns = closure.turning > 0.0
     for name, span in columns(closure.mechanism).items():
         if closure.mechanism.joint(name).type == "spherical":

@@ -18,30 +18,30 @@ from ..printed import Printed, ResultTable
 from ..tolerances import TOLERANCES
 
 BATCH = 512
-"""Starts between two checks whether a search is done."""
+"""Starts between two tests whether a search is done."""
 
 LEAST_STARTS = 4096
-"""Starts before a search may end: a mode that one start in 500 finds is missed by all of them once in 3600 searches."""
+"""Least number of starts: a mode that one start in 500 finds is missed once in 3600 searches."""
 
 HITS = 10
-"""Starts that must lead to every mode before a search ends: an unseen mode as rare as the rarest is then unlikely."""
+"""Starts that must find every mode before a search ends: an unseen mode as rare as the rarest is then unlikely."""
 
 STEPS = 80
-"""Newton steps a start may take; most need fewer than 20."""
+"""Most Newton steps of a start; fewer than 20 are usual."""
 
 ALONG = 1e-3
-"""Step that tests whether a solution is one of a continuum [L or rad]: large enough to distinguish it from a double
+"""Step that tests whether a solution is part of a continuum [L or rad]: large enough to distinguish it from a double
 root, too small to reach another solution."""
 
 
 @dataclass(frozen=True)
 class Modes(Printed, Sequence[Solution]):
-    """The modes that were found, nearest to home first.
+    """Modes found by a search, nearest to home first.
 
     Attributes
     ----------
-    modes : one Solution each: REACHED within all limits; EXCEEDED beyond some, which `active_limits` names.
-    hits : number of starts that led to each.
+    modes : a Solution per mode: REACHED within all limits; EXCEEDED beyond those in `active_limits`.
+    hits : number of starts that found each mode.
     starts : number of starts.
     """
 
@@ -53,7 +53,7 @@ class Modes(Printed, Sequence[Solution]):
 
     @property
     def total(self) -> int:
-        """Number of modes that were found."""
+        """Number of modes found."""
         return len(self.modes)
 
     @property
@@ -81,7 +81,7 @@ class Modes(Printed, Sequence[Solution]):
 
     @staticmethod
     def _columns(mechanism: Mechanism) -> list[str]:
-        """Names of the columns that tell modes apart."""
+        """Names of the table columns that distinguish modes."""
         raise NotImplementedError
 
     @staticmethod
@@ -90,7 +90,7 @@ class Modes(Printed, Sequence[Solution]):
         raise NotImplementedError
 
     def table(self) -> ResultTable:
-        """Every mode, the limits that it exceeds, and how likely it is that there are others."""
+        """Tabulate the modes with the limits that they exceed, and the probability of finding another."""
         chance = f"another one would find a new mode with a probability of about {self.unseen:.2%}"
         searched = f"{counted(self.starts, 'start')}; {chance}"
         if not self.modes:
@@ -113,11 +113,11 @@ class Modes(Printed, Sequence[Solution]):
 
 
 class Clusters:
-    """Clusters of configurations, one per mode, distinguished by marks: numbers that differ between modes.
+    """Clusters of configurations, one per mode; marks are numbers that differ between modes.
 
     Attributes
     ----------
-    marks, coordinates : of each cluster, (k,) [L or 1] and (columns,) [length or rad].
+    marks, coordinates : per cluster, marks (k,) [L or 1] and joint coordinates (columns,) [length or rad].
     hits : number of configurations in each.
     """
 
@@ -133,7 +133,7 @@ class Clusters:
         return min(self.hits, default=HITS) >= HITS
 
     def count(self, marks: Floats, polish: Callable[[int], tuple[Floats, Floats]]) -> NDArray[np.intp]:
-        """Count rows of marks (n, k) into their clusters, or into new ones; the cluster of each row, (n,).
+        """Assign rows of marks (n, k) to existing or new clusters; return the cluster of each row, (n,).
 
         Parameters
         ----------

@@ -25,12 +25,12 @@ from .lists import BATCH, Modes
 
 @dataclass(frozen=True)
 class WorkingModes(Modes):
-    """The working modes that were found, nearest to home first, with how often; see `Modes` for the other fields.
+    """Working modes found by a search, nearest to home first; see `Modes` for the other fields.
 
     Attributes
     ----------
-    hits : number of starts that led to the rarest branch of a leg in each.
-    branches : for every pose of the platform and each leg, the number of starts that led to each branch of the leg.
+    hits : number of starts that found the rarest leg branch of each mode.
+    branches : for every platform pose and every leg, the number of starts that found each branch of the leg.
         Modes are the combinations of one branch per leg; there may be more than are listed.
     """
 
@@ -58,32 +58,32 @@ class WorkingModes(Modes):
 
 
 def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40_000, most: int = 4096) -> WorkingModes:
-    """All configurations that have the end effector on a target in the components of the task, limits or not.
+    """All configurations with the end effector on a target in the components of the task, regardless of limits.
 
     Newton's method, undamped, starts from random configurations of all joints until every branch of every leg has been
     found ten times and at least 1024 starts have been made, or `most_starts`. With the platform fixed, legs are
-    independent, so modes are all combinations of their branches; if the task leaves part of the pose open, for every
-    pose that is found. This is a search, not a proof: each mode listed exists, its loops are closed to machine
+    independent, so modes are all combinations of their branches; if the task leaves part of the pose open, at every
+    pose found. This is a search, not a proof: each mode listed exists, its loops are closed to machine
     precision, and it is listed once. `unseen` of the result estimates the probability that another start finds a new
     branch. The same call gives the same answer.
 
     Modes differ in actuator values or joint centres. The spin of a rod, or half a turn of a strut about itself by the
-    universal joint at its end, makes no other mode: the configuration nearest to home within limits is listed.
+    universal joint at its end, makes no new mode: the configuration nearest to home within limits is listed.
 
     Parameters
     ----------
     target : one pose (4, 4) of the end effector in the base frame [length], or position (3,) at home orientation.
-    most : most modes that are listed, the nearest to home; `total` of the result counts all.
+    most : most modes to list, the nearest to home; `total` of the result counts all.
 
     Returns
     -------
-    WorkingModes : empty where no configuration has the end effector on the target.
+    WorkingModes : empty if no configuration has the end effector on the target.
 
     Raises
     ------
     ContinuumOfSolutions : actuators still move with the end effector on the target: a redundant machine, a task that
         asks for less than the actuators do, or a serial singularity (a stretched wrist). The message names them.
-    InvalidArgument : a batch of targets, or a target that is no pose.
+    InvalidArgument : a batch of targets, or a target that is not a pose.
     """
     pose = _as_pose(mechanism, target)
     most_starts, most = require_count("most_starts", most_starts), require_count("most", most, 0)
@@ -92,7 +92,7 @@ def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40
         search.add_starts(BATCH)
     listed = search.listed(most)
     branches = tuple(tuple(tuple(leg.hits) for leg in legs) for legs in search.legs)
-    return WorkingModes(tuple(_answered(mechanism, pose, listed)), listed.hits, search.starts, branches)
+    return WorkingModes(tuple(_as_solution(mechanism, pose, listed)), listed.hits, search.starts, branches)
 
 
 def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
@@ -106,8 +106,8 @@ def _as_pose(mechanism: Mechanism, target: Target) -> Floats:
     return exact
 
 
-def _answered(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
-    """A solution of listed configurations for one target: measured, not changed."""
+def _as_solution(mechanism: Mechanism, target: Floats, listed: Listed) -> Solution:
+    """Make a Solution of listed configurations for one target: measure them, without changes."""
     closing = close(model_of(mechanism).closure, listed.coordinates, listed.poses, max_iterations=0)
     configurations = engine_of(mechanism).as_configurations(closing)
     rows, n = configurations.rows, len(configurations)

@@ -1,4 +1,4 @@
-"""Walks from a configuration along motions that the loops allow, or hardly resist."""
+"""Walks from a configuration along motions that the loops allow or hardly resist."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .displacements import gaps
 from .joint_rates import actuated_columns, first_order, loop_errors_here, loop_slopes, moved, right_singular
 
 SAMPLES, STEPS, STEP = 8, 3, 0.1
-"""Number of walks from home to generic configurations, steps of each, and largest joint motion of a step [rad or L]."""
+"""Number of walks from home to generic configurations, steps of a walk, largest joint motion of a step [rad or L]."""
 NEWTON_STEPS = 20
 """Most steps to close the loops after a step of a walk; a walk that needs more is left out."""
 
 
 @derived
 def around_home(mechanism: Mechanism) -> Floats:
-    """Home, and closed configurations some steps from it, (n, c): the same in every call."""
+    """Home and closed configurations some steps away from it, (n, c), the same in every call."""
     random = np.random.default_rng(0)
     q = np.zeros((SAMPLES, len(column_joints(mechanism))))
     for _ in range(STEPS):
@@ -39,20 +39,20 @@ def _closed(mechanism: Mechanism, q: Floats) -> Floats:
     Directions in which the loops hardly resist are not corrected, so that a walk may start in a singularity.
     """
     for _ in range(NEWTON_STEPS):
-        open_by = gaps(mechanism, q) / mechanism.characteristic_length
+        open_gaps = gaps(mechanism, q) / mechanism.characteristic_length
         inverses = np.linalg.pinv(loop_slopes(mechanism, q), TOLERANCES.alignment)
         step = np.einsum("nij,nj->ni", inverses, -loop_errors_here(mechanism, q))
         q = moved(mechanism, q, step)
-        if (open_by <= TOLERANCES.position).all():
+        if (open_gaps <= TOLERANCES.position).all():
             break
     return q
 
 
 def stepped_freely(mechanism: Mechanism, q: Floats, step: float) -> Floats:
-    """Coordinates (k, c), moved from one configuration q (c,) by a step along each free motion.
+    """Coordinates (k, c) after a step from q (c,) along each free motion.
 
-    Free motions are those of the end effector with locked actuators that the loops resist, to first order, by less than
-    `TOLERANCES.singular`. The caller tests whether they are finite motions.
+    A free motion moves the end effector with locked actuators; the loops resist it, to first order, by less than
+    `TOLERANCES.singular`. The caller tests whether it is a finite motion.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Folds: configurations in which both solutions of a leg coincide, and which so belong to both of its working modes."""
+"""Folds: configurations in which both solutions of a leg coincide; they belong to two working modes."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from .coordinates import read_coordinates
 
 
 def subsets(legs: list[int]) -> Iterator[list[int]]:
-    """The subsets of some legs but the empty one, the smallest first, up to `MOST_CHANGED`."""
-    every = chain.from_iterable(combinations(legs, n) for n in range(1, len(legs) + 1))
-    return (list(subset) for subset in islice(every, MOST_CHANGED))
+    """Iterate over the non-empty subsets of some legs, the smallest first, at most `MOST_CHANGED`."""
+    all_subsets = chain.from_iterable(combinations(legs, n) for n in range(1, len(legs) + 1))
+    return (list(subset) for subset in islice(all_subsets, MOST_CHANGED))
 
 
 def starts_beside(model: Model, start: Configurations | None) -> list[tuple[Mask, LegAnswers]]:
-    """A start, or home, on the other sides that legs may take there, and which of its rows are on such a fold."""
+    """The start, or home, in the other working modes that meet there, each with a mask of the rows on that fold."""
     return _beside(home_answer(model) if start is None else start, model)
 
 
 @derived
 def _beside(start: Configurations, model: Model) -> list[tuple[Mask, LegAnswers]]:
-    """As `starts_beside`; kept with the start, from which many targets may be asked for."""
-    sides, found = sides_at(model, start), []
-    folded = _folded(model, start.rows.poses, sides)
+    """Compute `starts_beside`; cached with the start, which may serve many targets."""
+    branch, starts = sides_at(model, start), []
+    folded = _folded(model, start.rows.poses, branch)
     for changed in subsets(np.flatnonzero(folded.any(axis=0)).tolist()):
-        others = sides.copy()
-        others[:, changed] *= -1.0
+        other_branch = branch.copy()
+        other_branch[:, changed] *= -1.0
         is_folded = np.asarray(folded[:, changed].all(axis=1))
-        found.append((is_folded, LegAnswers(start.rows, start.coordinates, others)))
-    return found
+        starts.append((is_folded, LegAnswers(start.rows, start.coordinates, other_branch)))
+    return starts
 
 
 @derived
@@ -50,14 +50,14 @@ def home_answer(model: Model) -> LegAnswers:
     return LegAnswers(rows, coordinates, model.legs.home_sides)
 
 
-def _folded(model: Model, poses: Floats, sides: Floats) -> Mask:
+def _folded(model: Model, poses: Floats, branch: Floats) -> Mask:
     """True for legs whose two solutions coincide at poses (n, 4, 4) [length], (n, legs)."""
-    table, folded = model.legs, np.zeros(sides.shape, bool)
+    table, folded = model.legs, np.zeros(branch.shape, bool)
     two_sided, columns, groups = columns_of_sides(model)
     for group in groups:
-        q = np.zeros((2, len(sides), len(model.path_closure.scale)))
+        q = np.zeros((2, len(branch), len(model.path_closure.scale)))
         for factor, values in zip((1.0, -1.0), q, strict=True):
-            candidate = sides.copy()
+            candidate = branch.copy()
             candidate[:, two_sided[group]] *= factor
             read_coordinates(table, poses, candidate, values)
         apart = np.subtract(*q)[:, columns]

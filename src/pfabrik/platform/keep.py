@@ -1,4 +1,4 @@
-"""Answers that have left the sides of their start, where the mode is to be kept: led there in small steps instead."""
+"""Continuation to targets whose answers left the working mode of their start, if this mode is to be kept."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ from .answers import sides_at
 from .branch import same_branch
 
 Answer = Callable[[Floats, Configurations], Configurations]
-"""Answers one target (1, 4, 4) around a start, in its working mode."""
+"""Solver for one target (1, 4, 4) around a start, in its working mode."""
 
 
 def kept(
     model: Model, answers: Configurations, targets: Floats, start: Configurations, answer: Answer
 ) -> Configurations:
-    """The answers, with those on other sides than their start replaced by what small steps reach."""
-    sides = sides_at(model, start)
-    has_left = (answers.rows.status <= PROJECTED) & ~_same_sides(model, answers, sides)
+    """Replace answers in another working mode than their start by the result of continuation from the start."""
+    branch = sides_at(model, start)
+    has_left = (answers.rows.status <= PROJECTED) & ~_is_in_mode(model, answers, branch)
     for row in np.flatnonzero(has_left):
         place = np.array([row])
-        begin, begin_sides = (start, sides) if len(start) == 1 else (start.at(place), sides[place])
-        answers = answers.with_rows(place, _led(model, targets[place], begin, begin_sides, answer))
+        row_start, row_branch = (start, branch) if len(start) == 1 else (start.at(place), branch[place])
+        answers = answers.with_rows(place, _continue_to(model, targets[place], row_start, row_branch, answer))
     return answers
 
 
-def _same_sides(model: Model, answers: Configurations, sides: Floats) -> Mask:
-    """True where no leg with two solutions is on another side than in `sides`, (n,)."""
-    return same_branch(sides_at(model, answers), sides * (model.legs.home_sides != 0.0))
+def _is_in_mode(model: Model, answers: Configurations, branch: Floats) -> Mask:
+    """True where no leg with two solutions is on another branch than in `branch`, (n,)."""
+    return same_branch(sides_at(model, answers), branch * (model.legs.home_sides != 0.0))
 
 
-def _led(model: Model, target: Floats, start: Configurations, sides: Floats, answer: Answer) -> Configurations:
-    """The answer to one target as far as steps from the start lead to it, PROJECTED where they end before it."""
-    begin, last = start.rows.poses, answer(start.rows.poses, start)
+def _continue_to(model: Model, target: Floats, start: Configurations, branch: Floats, answer: Answer) -> Configurations:
+    """Answer one target by continuation from the start; PROJECTED if the last feasible step ends before it."""
+    start_pose, last = start.rows.poses, answer(start.rows.poses, start)
 
     def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
         nonlocal last
-        trial = answer(between(begin, target, shares), last)
-        is_kept = (trial.rows.status == REACHED) & _same_sides(model, trial, sides)
+        trial = answer(between(start_pose, target, shares), last)
+        is_kept = (trial.rows.status == REACHED) & _is_in_mode(model, trial, branch)
         last = trial if is_kept[0] else last
         return np.asarray(is_kept)
 

@@ -1,4 +1,4 @@
-"""Reaching targets by the legs' closed forms, in the working mode of the start, on all cores."""
+"""Solution of targets by the legs' closed forms, in the working mode of the start, on all cores."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .rows_one_by_one import Answers, answer_phases, request_from, step_redundan
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
-"""Rows of one call of the kernels that solve targets one by one, and in blocks."""
+"""Rows of one kernel call: of the kernel that solves targets one by one, and of the kernel for blocks."""
 
 
 def reach(
@@ -36,15 +36,16 @@ def reach(
     *,
     is_tried: bool = False,
 ) -> tuple[int, Floats]:
-    """Solve the rows that legs reach.
+    """Solve for targets (n, 4, 4) by the legs' closed forms.
 
     Parameters
     ----------
-    is_tried : the only row was tried already, without success; its status is set.
+    sides : branches of the start with the coordinates of redundant joints, (n or 1, legs).
+    is_tried : True if the only row has failed before; its status is set.
 
     Returns
     -------
-    The number of unsolved rows, and the sides of the answers with the coordinates of redundant joints.
+    The number of unsolved rows, and the answers' `sides`.
     """
     start_poses = model.mechanism.home_pose[None] if start is None else start.rows.poses
     legs = local_table(model.legs) if keep_mode else table_handle(model.legs)
@@ -52,7 +53,7 @@ def reach(
         sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
     n_unsolved = 1 if is_tried else _reach_at_start(model, start is None, legs, targets, start_poses, sides, rows)
     if n_unsolved and keep_mode and model.legs.has_implicit_joints:
-        n_unsolved -= _lead(model, legs, targets, start_poses, sides, rows)
+        n_unsolved -= _continue_to(model, legs, targets, start_poses, sides, rows)
     if n_unsolved and model.legs.is_for_blocks and model.legs.task["unset"][0]:
         n_unsolved -= _complete(model, legs, targets, start_poses, sides, rows)
     if n_unsolved and model.legs.has_free_redundant:
@@ -66,43 +67,46 @@ def reach(
 def _reach_at_start(
     model: Model, from_home: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
 ) -> int:
-    """Solve the rows that legs reach while free redundant joints stay; return the number of unsolved rows."""
+    """Solve rows with free redundant joints at their start; return the number of unsolved rows."""
     resting = legs_at_rest(model.legs) if from_home else None
     if resting is None:
-        return _run(model.legs.is_for_blocks, legs, targets, start_poses, sides, rows)
+        return _answer(model.legs.is_for_blocks, legs, targets, start_poses, sides, rows)
     rows.actuators[:] = resting.actuators
-    return _run(True, table_handle(resting.table), targets, start_poses, resting.table.home_sides, rows)
+    return _answer(True, table_handle(resting.table), targets, start_poses, resting.table.home_sides, rows)
 
 
-def _lead(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
-    """Lead the platform from its start to the targets that are not reached; return the number of rows solved.
+def _continue_to(
+    model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows
+) -> int:
+    """Solve the remaining rows by continuation from their starts; return the number of solved rows.
 
-    Each step completes near the configuration before, and halves where that fails: implicit joints keep their branch.
+    Every step completes the pose near the configuration before, and is halved if that fails, so that implicit joints
+    keep their branch.
     """
     unsolved = np.flatnonzero(rows.status != REACHED)
-    begin = np.broadcast_to(start_poses, targets.shape)[unsolved]
-    present, led_sides, led = begin.copy(), sides[unsolved], take(rows, unsolved)
+    first_poses = np.broadcast_to(start_poses, targets.shape)[unsolved]
+    present, last_sides, last = first_poses.copy(), sides[unsolved], take(rows, unsolved)
 
     def advance(active: NDArray[np.intp], shares: Floats) -> Mask:
-        wanted = between(begin[active], targets[unsolved[active]], shares[:, None, None])
-        block, block_sides = take(led, active), led_sides[active]
-        reach_on_sides(legs, wanted, present[active], block_sides, block)
+        step_targets = between(first_poses[active], targets[unsolved[active]], shares[:, None, None])
+        block, block_sides = take(last, active), last_sides[active]
+        reach_on_sides(legs, step_targets, present[active], block_sides, block)
         is_reached = np.asarray(block.status == REACHED)
         reached = active[is_reached]
-        put(led, reached, block, is_reached)
-        present[reached], led_sides[reached] = block.poses[is_reached], block_sides[is_reached]
+        put(last, reached, block, is_reached)
+        present[reached], last_sides[reached] = block.poses[is_reached], block_sides[is_reached]
         return is_reached
 
     solved = np.flatnonzero(continued(len(unsolved), advance) == 1.0)
-    put(rows, unsolved[solved], led, solved)
-    sides[unsolved[solved]] = led_sides[solved]
+    put(rows, unsolved[solved], last, solved)
+    sides[unsolved[solved]] = last_sides[solved]
     return len(solved)
 
 
 def _move_redundant(
     model: Model, targets: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
 ) -> int:
-    """Solve rows by moving free redundant joints, and write their coordinates; return the number of unsolved rows."""
+    """Solve the remaining rows by moving free redundant joints; return the number of unsolved rows."""
     unsolved = np.flatnonzero(rows.status != REACHED)
     request = request_from(model, Options(), start, sides.copy(), keep_mode, nearby=False)
     answer_phases(request, targets, Answers(rows, np.empty_like(sides), sides), unsolved, BY_LEGS, BY_LEGS)
@@ -111,9 +115,9 @@ def _move_redundant(
 
 
 def rest_redundant(model: Model, start: Configurations | None, start_sides: Floats, sides: Floats, rows: Rows) -> Mask:
-    """Move the redundant joints of answers, (n, legs), to where they are nearest to those of starts at the same poses.
+    """Move redundant joints of answers nearer to those of their starts, poses kept; return a mask of changed rows.
 
-    Each independent set alone: limits that end a projection may hold one where it is. Return the mask of rows changed.
+    Independent sets are moved one by one, because a limit that ends a projection may block one of them.
     """
     start_sides = np.broadcast_to(start_sides, sides.shape)
     table, rested, is_changed = model.legs, start_sides.copy(), np.zeros(len(sides), bool)
@@ -122,7 +126,7 @@ def rest_redundant(model: Model, start: Configurations | None, start_sides: Floa
         columns = np.intersect1d(table.implicit_joints["leg"], np.arange(len(table.legs))[legs])
         candidate, block = sides.copy(), take(rows, np.arange(len(sides)))
         candidate[:, columns] = rested[:, columns]
-        far, before = (np.linalg.norm((each - start_sides)[:, columns], axis=1) for each in (candidate, sides))
+        far, before = (np.linalg.norm((array - start_sides)[:, columns], axis=1) for array in (candidate, sides))
         reach_on_sides(local_table(table), rows.poses, rows.poses, candidate, block)
         is_nearer = (block.status == REACHED) & (far < before)
         sides[is_nearer], rows.actuators[is_nearer] = candidate[is_nearer], block.actuators[is_nearer]
@@ -135,12 +139,12 @@ def rest_redundant(model: Model, start: Configurations | None, start_sides: Floa
 
 
 def reach_on_sides(legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
-    """Solve targets one by one by legs on given sides (n, legs), as `legs.answer`; return the number not reached."""
-    return _run(False, legs, targets, start_poses, sides, rows)
+    """Solve targets one by one from given `sides` (n, legs); return the number of unsolved rows."""
+    return _answer(False, legs, targets, start_poses, sides, rows)
 
 
-def _run(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
-    """Solve targets on all cores, in blocks of poses or one by one; return the number not reached."""
+def _answer(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
+    """Solve targets on all cores, in blocks of poses or one by one; return the number of unsolved rows."""
     if by_blocks:
         from ..kernels.legs.blocks import answer_blocks as answer
     else:
@@ -150,8 +154,8 @@ def _run(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Float
         return answer(
             legs.address,
             targets[block],
-            _part(start_poses, block),
-            _part(sides, block),
+            _block_of(start_poses, block),
+            _block_of(sides, block),
             rows.status[block],
             rows.poses[block],
             rows.actuators[block],
@@ -162,7 +166,7 @@ def _run(by_blocks: bool, legs: TableHandle, targets: Floats, start_poses: Float
 
 
 def _complete(model: Model, legs: TableHandle, targets: Floats, start_poses: Floats, sides: Floats, rows: Rows) -> int:
-    """Solve the rows that blocks left OPEN, whose poses are to be completed; return the number reached."""
+    """Complete the poses of rows that the kernel for blocks left OPEN; return the number of solved rows."""
     is_open = (rows.status == OPEN).nonzero()[0]
     if not len(is_open):
         return 0
@@ -174,7 +178,7 @@ def _complete(model: Model, legs: TableHandle, targets: Floats, start_poses: Flo
 
 
 def count_turns(model: Model, start_values: Floats, rows: Rows) -> None:
-    """Add whole turns to actuators that may turn more than once: nearest to the start's values (n or 1, n_a)."""
+    """Add whole turns to actuators with more than one turn: nearest to the start's values (n or 1, n_a)."""
     for driven in _turning(model.legs):
         is_solved = rows.status != PENDING
         values, previous = rows.actuators[is_solved, driven["column"]], start_values[:, driven["column"]]
@@ -190,12 +194,12 @@ def turns_repeatedly(table: LegTable) -> bool:
 
 @derived
 def _turning(table: LegTable) -> Records:
-    """The actuators that may turn more than once."""
+    """Actuators that may turn more than once."""
     driven = table.driven
     return np.asarray(driven[(driven["turns"] == 1) & (driven["hi"] - driven["lo"] > 2.0 * np.pi)])
 
 
-def _part(array: Floats, block: slice) -> Floats:
-    """The rows of a block, or the single row for all; writable, as kernels are compiled for."""
+def _block_of(array: Floats, block: slice) -> Floats:
+    """Select the rows of a block, or the single row for all; contiguous and writable, as kernels require."""
     part = array if len(array) == 1 else array[block]
     return np.require(part, requirements=["C", "W"])

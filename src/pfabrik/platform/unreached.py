@@ -1,4 +1,4 @@
-"""Targets that legs do not reach on the sides of the start: other modes, then the nearest feasible poses."""
+"""Targets that legs do not reach in the working mode of the start: other modes, then the nearest feasible poses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .tables import has_seeds
 def answer_unreached(request: Request, targets: Floats, answers: Answers, places: NDArray[np.intp]) -> None:
     """Answer targets (n, 4, 4) at some places in other working modes, or by the nearest feasible poses.
 
-    Rows may stay PENDING or UNSURE. Seeds are not looked for where other modes answer all rows.
+    Rows may stay PENDING or UNSURE. Seeds are not computed if other modes answer all rows.
     """
     first, model = IN_OTHER_MODES, request.model
     if not (request.keep_mode or has_seeds(model)) and model.legs.has_sides:

@@ -1,15 +1,15 @@
-"""How configurations of closed loops move to first order: joint rates, Jacobians, and how near singularities are.
+"""Joint rates, Jacobians and singularity measures of closed loops, to first order.
 
-With C the conditions of the loops by joint rates, N an orthonormal basis of the motions that they allow, T the twist
-of the end effector and A the rates of the actuators: the left singular vectors of [T N; A N] are pairs (twist, rates)
-that the mechanism can do. Rows of columns that belong together, a pair with its joint rates, or a condition with the
-joint rates that resist it, are turned by orthogonal rotations until they are orthogonal in some of their columns: the
-map from these to others is then a sum over the rows. From rates to twists it is the forward Jacobian, to joint rates J;
-from twists to rates the inverse one; from conditions to joint rates G = C+, the least that open the loops so.
+Let C be the conditions of the loops by joint rates, N an orthonormal basis of the null space of C, T the twist of the
+end effector and A the rates of the actuators. The left singular vectors of [T N; A N] are feasible pairs (twist,
+actuator rates). A table row holds a pair with its joint rates, or a condition with the joint rates that resist it.
+Orthogonal rotations make the rows orthogonal in some columns; the linear map from these columns to others is then a sum
+over the rows. From actuator rates to twists it is the forward Jacobian, to joint rates J; from twists to actuator rates
+the inverse Jacobian; from conditions to joint rates G = C+, the least joint rates.
 
-    Actuators e, of loops that stay closed    joint rates J e
-    Geometry that opens the loops by b        joint rates -(1 - J A) G b at actuators that rest
-    Wrenches that do work h with joint rates  actuators t = -J' h, and loops transmit -G' (h + A' t)
+    Actuator rates e, loops closed            joint rates J e
+    Geometry that opens the loops by b        joint rates -(1 - J A) G b, actuators locked
+    Wrenches that do work h with joint rates  actuator forces t = -J' h, loop wrenches -G' (h + A' t)
 """
 
 from __future__ import annotations
@@ -26,38 +26,38 @@ from .loops import BALL, CONSTRAINT, JOINTS, MEASURES, PARALLEL, PASSIVE, SERIAL
 from .path_kinematics import LAYOUT, LOOPS, Equations, State, end_path, new_equations, new_state, open_loops, walk_path
 
 SWEEPS = 40
-"""Most sweeps of rotations: they take four to eight."""
+"""Most sweeps of rotations; four to eight are usual."""
 
 ORTHOGONAL, NEARLY = 1e-14, 1e-8
-"""Cosine of two rows that count as orthogonal, and cosines that one sweep brings there: it squares them."""
+"""Largest cosine of two orthogonal rows, and largest cosine before a last sweep: a sweep squares cosines."""
 
 REGULAR, ENOUGH = 1e-3, 0.5
-"""What has to be left of a row beside others for one pass to make them orthogonal [L or rad], and share from which one
-subtraction is enough."""
+"""Least remainder of a regular row after projections are subtracted [L or rad]; share of a row that must remain for one
+subtraction to be enough."""
 
 SHOWS = 1e-6
-"""Twist from which a motion that the loops hold back least is said to be gained [L or rad]."""
+"""Least twist of a motion that counts as gained [L or rad]."""
 
 
 class FirstOrderScratch(NamedTuple):
-    """Scratch memory of one thread; a width for the twist, the actuators and, where asked for, all joints."""
+    """Scratch memory of one thread; the width is that of the twist, the actuators and, if requested, all joints."""
 
     state: State
     eq: Equations
     screws: Floats  # (columns, 6)
-    table: Floats  # (conditions + width, columns): what the loops ask, and below it what every column does
-    motions: Floats  # (motions, width): what the motions do that the loops allow
+    table: Floats  # (conditions + width, columns): conditions of the loops, below them the rates of every column
+    motions: Floats  # (motions, width): rates of the motions that the loops allow
     pairs: Floats  # (shown, width)
     conditions: Floats  # (rank, conditions)
     resisted: Floats  # (rank, conditions + width)
     across: Floats  # (directions, motions + twists)
-    sizes: Floats  # (columns,), or of the directions where these are more
+    sizes: Floats  # (columns,), or (directions,) if these are more
 
 
 def new_first_order_scratch(loops: Loops, plan: FirstOrderPlan) -> FirstOrderScratch:
     """Scratch memory of one thread."""
     n, m, (twists, directions) = len(loops.lo), 6 * plan.loops.shape[0], plan.directions.shape
-    width = twists + len(plan.actuated) + (n if plan.asks == JOINTS else 0)
+    width = twists + len(plan.actuated) + (n if plan.outputs == JOINTS else 0)
     shapes = (
         (n, 6),
         (m + width, n),
@@ -73,14 +73,14 @@ def new_first_order_scratch(loops: Loops, plan: FirstOrderPlan) -> FirstOrderScr
 
 NONE = np.zeros((0, 0))
 PLAN = FirstOrderPlan(NONE, np.zeros(0), NONE, np.zeros(0, np.int64), NONE, 0, 0, 0, 0.0, 0.0, 0)
-"""A plan of the types that kernels are compiled for."""
+"""Plan whose types the kernels are compiled for."""
 
 open_scratch = opener(new_first_order_scratch(LOOPS, PLAN))
 
 
 @search
-def rates(machine: int, scratch_address: int, plan: FirstOrderPlan, coordinates: Floats, found: FirstOrder) -> None:
-    """Fill what is asked of dimensionless joint coordinates (n, columns); rows that are no numbers stay as they are.
+def rates(machine: int, scratch_address: int, plan: FirstOrderPlan, coordinates: Floats, results: FirstOrder) -> None:
+    """Fill the requested outputs at dimensionless joint coordinates (n, columns); rows with NaN are skipped.
 
     Parameters
     ----------
@@ -89,87 +89,89 @@ def rates(machine: int, scratch_address: int, plan: FirstOrderPlan, coordinates:
     loops, scratch = open_loops(machine), open_scratch(scratch_address)
     table, motions, pairs, sizes = scratch.table, scratch.motions, scratch.pairs, scratch.sizes
     m, twists = 6 * plan.loops.shape[0], plan.directions.shape[0]
-    seen = twists + plan.actuated.shape[0]
+    pair_width = twists + plan.actuated.shape[0]
     for row in range(coordinates.shape[0]):
         if not load_coordinates(loops, coordinates[row], scratch.state):
             continue
-        put_screws(loops, plan, scratch.state, scratch.eq, scratch.screws)
-        lay_out_motions(plan, scratch.screws, table)
+        fill_screws(loops, plan, scratch.state, scratch.eq, scratch.screws)
+        fill_table(plan, scratch.screws, table)
         triangularise(table, m, plan.rank)
-        put_columns(table, m, plan.rank, motions)
-        rotate_apart(motions, 0, seen, sizes)
+        copy_columns(table, m, plan.rank, motions)
+        orthogonalise_rows(motions, 0, pair_width, sizes)
         for k in range(pairs.shape[0]):
             for i in range(pairs.shape[1]):
                 pairs[k, i] = motions[k, i] / sizes[k] if sizes[k] > plan.least else 0.0
-        if plan.asks == JOINTS:
-            put_joint_rates(plan, scratch, seen, row, found)
+        if plan.outputs == JOINTS:
+            fill_joint_rates(plan, scratch, pair_width, row, results)
             continue
-        measures, shown = found.measures[row], pairs.shape[0]
+        measures, shown = results.measures[row], pairs.shape[0]
         measures[CONSTRAINT], measures[PASSIVE] = math.inf, sizes[shown - 1] if shown > 0 else math.inf
-        rotate_apart(pairs, twists, seen, sizes)
-        put_map(pairs, twists, 0, shown, plan.least, sizes, found.forward[row])
-        k = least_ratio(pairs, 0, twists, shown, plan.least, sizes)
-        copy_twist(pairs, k, 0, found.gained[row])
-        measures[PARALLEL] = sizes[k] / size_of(pairs, k, 0, twists) if k >= 0 else math.inf
-        rotate_apart(pairs, 0, twists, sizes)
-        put_map(pairs, 0, twists, plan.freedoms, plan.least, sizes, found.inverse[row])
-        k = least_ratio(pairs, twists, seen, plan.freedoms, plan.least, sizes)
-        copy_twist(pairs, k, 0, found.lost[row])
-        measures[SERIAL] = sizes[k] / size_of(pairs, k, twists, seen) if k >= 0 else math.inf
-        if plan.asks == MEASURES:
+        orthogonalise_rows(pairs, twists, pair_width, sizes)
+        fill_map(pairs, twists, 0, shown, plan.least, sizes, results.forward[row])
+        k = index_of_least_ratio(pairs, 0, twists, shown, plan.least, sizes)
+        copy_twist(pairs, k, 0, results.gained[row])
+        measures[PARALLEL] = sizes[k] / row_norm(pairs, k, 0, twists) if k >= 0 else math.inf
+        orthogonalise_rows(pairs, 0, twists, sizes)
+        fill_map(pairs, 0, twists, plan.freedoms, plan.least, sizes, results.inverse[row])
+        k = index_of_least_ratio(pairs, twists, pair_width, plan.freedoms, plan.least, sizes)
+        copy_twist(pairs, k, 0, results.lost[row])
+        measures[SERIAL] = sizes[k] / row_norm(pairs, k, twists, pair_width) if k >= 0 else math.inf
+        if plan.outputs == MEASURES:
             if plan.rank > 0:
-                put_columns(table, 0, 0, scratch.conditions)
-                rotate_apart(scratch.conditions, 0, m, sizes)
+                copy_columns(table, 0, 0, scratch.conditions)
+                orthogonalise_rows(scratch.conditions, 0, m, sizes)
                 measures[CONSTRAINT] = sizes[plan.rank - 1]
             if min(measures[SERIAL], measures[PASSIVE]) < plan.singular and plan.freedoms > 0:
-                put_lost(plan, scratch, k, measures, found.lost[row])
+                fill_lost(plan, scratch, k, measures, results.lost[row])
             if measures[CONSTRAINT] < min(measures[PARALLEL], plan.singular):
-                put_gained(scratch, m, found.forward[row], found.gained[row])
+                fill_gained(scratch, m, results.forward[row], results.gained[row])
 
 
 @routine
-def put_joint_rates(plan: FirstOrderPlan, scratch: FirstOrderScratch, seen: int, row: int, found: FirstOrder) -> None:
-    """Fill joint rates from motions that are turned so that those that show most are first."""
+def fill_joint_rates(
+    plan: FirstOrderPlan, scratch: FirstOrderScratch, pair_width: int, row: int, results: FirstOrder
+) -> None:
+    """Fill joint rates; the motions are orthogonal, those with the largest twists and actuator rates first."""
     motions, pairs, resisted, sizes = scratch.motions, scratch.pairs, scratch.resisted, scratch.sizes
     n, m, largest = scratch.screws.shape[0], 6 * plan.loops.shape[0], 0.0
     for j in range(n):
         for i in range(6):
-            found.screws[row, j, i] = scratch.screws[j, i]
+            results.screws[row, j, i] = scratch.screws[j, i]
         for k in range(motions.shape[0]):
-            found.motions[row, j, k], found.sizes[row, k] = motions[k, seen + j], sizes[k]
-    rotate_apart(pairs, plan.directions.shape[0], seen, sizes)
-    put_map(pairs, plan.directions.shape[0], seen, pairs.shape[0], plan.least, sizes, found.joints[row])
-    found.measures[row, CONSTRAINT] = math.inf
-    put_resisted(plan, scratch, seen)
-    is_regular = orthogonalise(resisted, 0, m)
+            results.motions[row, j, k], results.sizes[row, k] = motions[k, pair_width + j], sizes[k]
+    orthogonalise_rows(pairs, plan.directions.shape[0], pair_width, sizes)
+    fill_map(pairs, plan.directions.shape[0], pair_width, pairs.shape[0], plan.least, sizes, results.joints[row])
+    results.measures[row, CONSTRAINT] = math.inf
+    fill_resisted(plan, scratch, pair_width)
+    is_regular = orthonormalise_rows(resisted, 0, m)
     for k in range(plan.rank):
         sizes[k] = 1.0
-        largest += size_of(resisted, k, m + seen, m + seen + n) ** 2
+        largest += row_norm(resisted, k, m + pair_width, m + pair_width + n) ** 2
     if not (is_regular and largest * plan.singular**2 < 1.0):
-        put_resisted(plan, scratch, seen)
-        rotate_apart(resisted, 0, m, sizes)
-        found.measures[row, CONSTRAINT] = sizes[plan.rank - 1]
-    put_map(resisted, 0, m + seen, plan.rank, plan.least, sizes, found.closing[row])
+        fill_resisted(plan, scratch, pair_width)
+        orthogonalise_rows(resisted, 0, m, sizes)
+        results.measures[row, CONSTRAINT] = sizes[plan.rank - 1]
+    fill_map(resisted, 0, m + pair_width, plan.rank, plan.least, sizes, results.closing[row])
 
 
 @routine
-def put_resisted(plan: FirstOrderPlan, scratch: FirstOrderScratch, seen: int) -> None:
-    """Fill orthonormal motions that loops resist, by how much; the conditions in the order of the loops."""
+def fill_resisted(plan: FirstOrderPlan, scratch: FirstOrderScratch, pair_width: int) -> None:
+    """Fill the orthonormal motions that the loops resist, with their conditions in the order of the loops."""
     table, resisted, m = scratch.table, scratch.resisted, 6 * plan.loops.shape[0]
-    put_columns(table, 0, 0, resisted)
+    copy_columns(table, 0, 0, resisted)
     for k in range(plan.rank):
         for i in range(m):
             resisted[k, i] = 0.0
         for loop in range(plan.loops.shape[0]):
             for j in range(scratch.screws.shape[0]):
-                share = plan.loops[loop, j] * table[m + seen + j, k]
+                share = plan.loops[loop, j] * table[m + pair_width + j, k]
                 for i in range(6 if share != 0.0 else 0):
                     resisted[k, 6 * loop + i] += share * scratch.screws[j, i]
 
 
 @routine
-def put_lost(plan: FirstOrderPlan, scratch: FirstOrderScratch, place: int, measures: Floats, lost: Floats) -> None:
-    """Fill the twist that is lost: of pairs that at a place, of all motions the one that they show least of."""
+def fill_lost(plan: FirstOrderPlan, scratch: FirstOrderScratch, place: int, measures: Floats, lost: Floats) -> None:
+    """Fill the lost twist: of pair number `place`, or, at a passive singularity, of the motion with the least rates."""
     is_passive, across = measures[PASSIVE] < min(measures[SERIAL], plan.singular), scratch.across
     rows = scratch.motions if is_passive else scratch.pairs
     n = rows.shape[0]
@@ -180,17 +182,17 @@ def put_lost(plan: FirstOrderPlan, scratch: FirstOrderScratch, place: int, measu
             across[k, across.shape[1] - len(lost) + i] = plan.directions[i, k]
             for j in range(n):
                 across[k, j] += plan.directions[i, k] * rows[j, i]
-    rotate_apart(across, 0, n, scratch.sizes)
+    orthogonalise_rows(across, 0, n, scratch.sizes)
     copy_twist(across, plan.freedoms - 1 if is_passive else place, across.shape[1] - len(lost), lost)
 
 
 @routine
-def put_gained(scratch: FirstOrderScratch, m: int, forward: Floats, gained: Floats) -> None:
-    """Fill the twist of the motion that the loops hold back least, at locked actuators, where it shows."""
+def fill_gained(scratch: FirstOrderScratch, m: int, forward: Floats, gained: Floats) -> None:
+    """Fill the gained twist: of the motion that the loops resist least at locked actuators, if it has one."""
     resisted, twists = scratch.resisted, len(gained)
     rank, size = resisted.shape[0], 0.0
-    put_columns(scratch.table, 0, 0, resisted)
-    rotate_apart(resisted, 0, m, scratch.sizes)
+    copy_columns(scratch.table, 0, 0, resisted)
+    orthogonalise_rows(resisted, 0, m, scratch.sizes)
     for i in range(twists):
         for j in range(forward.shape[1]):
             resisted[rank - 1, m + i] -= forward[i, j] * resisted[rank - 1, m + twists + j]
@@ -201,14 +203,14 @@ def put_gained(scratch: FirstOrderScratch, m: int, forward: Floats, gained: Floa
 
 @routine
 def copy_twist(rows: Floats, k: int, first: int, twist: Floats) -> None:
-    """Copy a twist from columns of a row; NaN for none."""
+    """Copy a twist from columns of row `k`; NaN if k is -1."""
     for i in range(len(twist)):
         twist[i] = rows[k, first + i] if k >= 0 else math.nan
 
 
 @routine
-def put_columns(table: Floats, first: int, column: int, rows: Floats) -> None:
-    """Fill rows with columns of a table, from a column and a row on."""
+def copy_columns(table: Floats, first: int, column: int, rows: Floats) -> None:
+    """Copy columns of a table to rows, from row `first` and column `column` on."""
     for k in range(rows.shape[0]):
         for i in range(rows.shape[1]):
             rows[k, i] = table[first + i, column + k]
@@ -216,7 +218,7 @@ def put_columns(table: Floats, first: int, column: int, rows: Floats) -> None:
 
 @routine
 def load_coordinates(loops: Loops, coordinates: Floats, state: State) -> bool:
-    """A configuration from its coordinates; False where they are no numbers."""
+    """Load joint coordinates; False if one is NaN."""
     for j in range(len(state.q)):
         state.q[j] = coordinates[j]
         if coordinates[j] != coordinates[j]:
@@ -231,11 +233,11 @@ def load_coordinates(loops: Loops, coordinates: Floats, state: State) -> bool:
 
 
 @routine
-def put_screws(loops: Loops, plan: FirstOrderPlan, state: State, eq: Equations, screws: Floats) -> None:
-    """Present screws of orthonormal joint rates: velocity of the reference point, angular velocity."""
+def fill_screws(loops: Loops, plan: FirstOrderPlan, state: State, eq: Equations, screws: Floats) -> None:
+    """Fill the present screws of orthonormal joint rates: velocity of the reference point, angular velocity."""
     for j in range(screws.shape[0]):
         for i in range(6):
-            screws[j, i] = 0.0  # what is on no path moves neither a loop nor the end effector
+            screws[j, i] = 0.0  # a joint on no path moves neither a loop nor the end effector
     for path in range(len(loops.paths) - 1):
         last = loops.paths[path + 1]
         walk_path(loops, path, last, state, eq)
@@ -258,27 +260,27 @@ def put_screws(loops: Loops, plan: FirstOrderPlan, state: State, eq: Equations, 
 
 
 @routine
-def lay_out_motions(plan: FirstOrderPlan, screws: Floats, table: Floats) -> None:
-    """By joint rates: the loops' conditions, the end effector's twist, rates of the actuators, rates of all joints."""
+def fill_table(plan: FirstOrderPlan, screws: Floats, table: Floats) -> None:
+    """Fill the table by joint rates: conditions of loops, twist, actuator rates and, if requested, all joint rates."""
     m, twists = 6 * plan.loops.shape[0], plan.directions.shape[0]
-    seen = m + twists + plan.actuated.shape[0]
+    joint_rows = m + twists + plan.actuated.shape[0]
     for j in range(screws.shape[0]):
         for k in range(plan.loops.shape[0]):
             for i in range(6):
                 table[6 * k + i, j] = plan.loops[k, j] * screws[j, i]
         for i in range(twists):
-            table[m + i, j] = plan.way[j] * screws[j, i]
+            table[m + i, j] = plan.path[j] * screws[j, i]
         for i in range(plan.actuated.shape[0]):
             table[m + twists + i, j] = 1.0 if plan.actuated[i] == j else 0.0
-        for i in range(seen, table.shape[0]):
-            table[i, j] = 1.0 if i - seen == j else 0.0
+        for i in range(joint_rows, table.shape[0]):
+            table[i, j] = 1.0 if i - joint_rows == j else 0.0
 
 
 @routine
 def triangularise(table: Floats, m: int, rank: int) -> None:
-    """Reflect the columns so that the first m rows, the largest first, become triangular; `rank` columns of them.
+    """Make the first m rows lower triangular by Householder reflections of columns, the largest row first.
 
-    In the columns behind, which are motions that these rows allow, stand the others.
+    The first `rank` columns then span the motions that these rows resist, the others the motions that they allow.
     """
     rows, n = table.shape
     for k in range(rank):
@@ -309,10 +311,10 @@ def triangularise(table: Floats, m: int, rank: int) -> None:
 
 
 @routine
-def rotate_apart(table: Floats, first: int, last: int, sizes: Floats) -> None:
-    """Rotate rows until they are orthogonal in the columns from `first` to `last`, the largest first; their sizes.
+def orthogonalise_rows(table: Floats, first: int, last: int, sizes: Floats) -> None:
+    """Rotate rows until they are orthogonal in the columns from `first` to `last`, the largest first; fill their norms.
 
-    One-sided Jacobi: the other columns go along.
+    One-sided Jacobi rotations, applied to all columns.
     """
     n, width = table.shape
     for _ in range(SWEEPS):
@@ -331,7 +333,7 @@ def rotate_apart(table: Floats, first: int, last: int, sizes: Floats) -> None:
                     for i in range(width):
                         x, y = table[a, i], table[b, i]
                         table[a, i], table[b, i] = c * x + s * y, c * y - s * x
-                    # two that change places miss some of the other pairs of this sweep
+                    # rows that are swapped miss some other pairs of this sweep
                     worst = max(worst, 1.0 if aa < bb else cosine)
         if worst <= NEARLY:
             break
@@ -344,7 +346,7 @@ def rotate_apart(table: Floats, first: int, last: int, sizes: Floats) -> None:
 
 @routine
 def rotation_between(aa: float, bb: float, ab: float, cosine: float) -> tuple[float, float]:
-    """Cosine and sine of the rotation that makes two rows orthogonal, the larger first."""
+    """Cosine and sine of the rotation that makes two rows orthogonal, with the larger first."""
     if cosine <= ORTHOGONAL:
         return 0.0, 1.0
     angle = 0.5 * math.atan2(2.0 * ab, aa - bb)
@@ -352,21 +354,21 @@ def rotation_between(aa: float, bb: float, ab: float, cosine: float) -> tuple[fl
 
 
 @routine
-def put_map(pairs: Floats, first: int, to: int, most: int, least: float, sizes: Floats, found: Floats) -> None:
-    """Fill the map (to, from) from columns of rows, from `first` on and orthogonal there, to others from `to` on."""
-    for i in range(found.shape[0]):
-        for j in range(found.shape[1]):
-            found[i, j] = 0.0
+def fill_map(pairs: Floats, first: int, to: int, most: int, least: float, sizes: Floats, out: Floats) -> None:
+    """Fill the linear map from the columns at `first`, in which rows are orthogonal, to those at `to`: (to, from)."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 0.0
     for k in range(min(most, pairs.shape[0])):
-        for i in range(found.shape[0] if sizes[k] > least else 0):
+        for i in range(out.shape[0] if sizes[k] > least else 0):
             share = pairs[k, to + i] / (sizes[k] * sizes[k])
-            for j in range(found.shape[1]):
-                found[i, j] += share * pairs[k, first + j]
+            for j in range(out.shape[1]):
+                out[i, j] += share * pairs[k, first + j]
 
 
 @routine
-def size_of(pairs: Floats, k: int, first: int, last: int) -> float:
-    """Size of a row in the columns from `first` to `last`."""
+def row_norm(pairs: Floats, k: int, first: int, last: int) -> float:
+    """Norm of row `k` in the columns from `first` to `last`."""
     size = 0.0
     for i in range(first, last):
         size += pairs[k, i] * pairs[k, i]
@@ -374,24 +376,24 @@ def size_of(pairs: Floats, k: int, first: int, last: int) -> float:
 
 
 @routine
-def least_ratio(pairs: Floats, first: int, last: int, most: int, least: float, sizes: Floats) -> int:
-    """Which of the first pairs has the least ratio; -1 where none has one."""
-    best, found = math.inf, -1
+def index_of_least_ratio(pairs: Floats, first: int, last: int, most: int, least: float, sizes: Floats) -> int:
+    """Index of the pair with the least ratio of `sizes` to its norm in other columns; -1 if there is none."""
+    best, index = math.inf, -1
     for k in range(min(most, pairs.shape[0])):
-        other = size_of(pairs, k, first, last)
+        other = row_norm(pairs, k, first, last)
         if other > least and sizes[k] / other < best:
-            best, found = sizes[k] / other, k
-    return found
+            best, index = sizes[k] / other, k
+    return index
 
 
 @routine
-def orthogonalise(rows: Floats, first: int, last: int) -> bool:
-    """Make the columns of all rows from `first` to `last` orthonormal, by Gram and Schmidt; the others go along.
+def orthonormalise_rows(rows: Floats, first: int, last: int) -> bool:
+    """Make rows orthonormal in the columns from `first` to `last` by Gram-Schmidt steps, applied to all columns.
 
-    False where next to nothing is left of one.
+    False if a row nearly depends on those before it.
     """
     for k in range(rows.shape[0]):
-        size = set_apart(rows, k, first, last)
+        size = subtract_projections(rows, k, first, last)
         if not size > REGULAR:
             return False
         for i in range(rows.shape[1]):
@@ -400,10 +402,10 @@ def orthogonalise(rows: Floats, first: int, last: int) -> bool:
 
 
 @routine
-def set_apart(rows: Floats, k: int, first: int, last: int) -> float:
-    """Take from a row what it has of those before, orthonormal from `first` to `last`; the size of what is left."""
-    size = size_of(rows, k, first, last)
-    for _ in range(2):  # what is left of a row after much of it was taken is not orthogonal yet
+def subtract_projections(rows: Floats, k: int, first: int, last: int) -> float:
+    """Subtract the projections of row `k` on the rows before it, orthonormal there; return the remaining norm."""
+    size = row_norm(rows, k, first, last)
+    for _ in range(2):  # a small remainder is not orthogonal yet
         before = size
         for j in range(k):
             share = 0.0
@@ -411,7 +413,7 @@ def set_apart(rows: Floats, k: int, first: int, last: int) -> float:
                 share += rows[j, i] * rows[k, i]
             for i in range(rows.shape[1]):
                 rows[k, i] -= share * rows[j, i]
-        size = size_of(rows, k, first, last)
+        size = row_norm(rows, k, first, last)
         if size > ENOUGH * before:
             break
     return size

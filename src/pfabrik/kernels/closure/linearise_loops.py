@@ -1,4 +1,4 @@
-"""Linearisation of a configuration: the motions that the loops leave free, and objective and limits on them."""
+"""Linearisation at a configuration: the free motions of the loops, and the objective and limits along them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class DescentScratch(NamedTuple):
     gradient: PoseGradient
     hessian: Hessian
     control: Records  # (1,): CONTROL
-    gaps: Floats  # (paths, 6): between the ends of each path and of the first
+    gaps: Floats  # (paths, 6): gap between the end of each path and that of the first
     elimination: Elimination  # `used` counts paths per coordinate, the first path twice: it is in all equations
     row: Floats  # (columns,)
     force: Floats  # (paths, 6): force and moment at the end of each path
@@ -61,7 +61,7 @@ class DescentScratch(NamedTuple):
     here: Floats  # (columns,)
     there: Floats  # (columns,)
     links: LinkLimits
-    ways: Loops  # a path from the base to each body that a link moves with
+    ways: Loops  # a path from the base to the body of each link
     way_eq: Equations
 
 
@@ -71,7 +71,7 @@ def new_descent_scratch(loops: Loops, links: LinkLimits, ways: Loops) -> Descent
     limits = 2 * n + len(loops.cone_angles) + len(links.pairs)
     elimination = new_elimination(n, rows)
     for r in range(len(loops.row_columns)):
-        is_first = r < loops.visit_rows[loops.paths[1]]  # which is in all equations
+        is_first = r < loops.visit_rows[loops.paths[1]]  # the first path is in all equations
         elimination.used[loops.row_columns[r]] += 2 if is_first else 1
     return DescentScratch(
         new_state(loops),
@@ -102,7 +102,7 @@ open_scratch = opener(new_descent_scratch(LOOPS, NO_LINKS, LOOPS))
 
 @routine
 def walk_all(loops: Loops, state: State, scratch: DescentScratch) -> float:
-    """Pose the end effector by the first path, and compare the ends of the other paths with it; the largest gap."""
+    """Pose the end effector by the first path, and fill the gaps of the other paths; return the largest."""
     eq, gap = scratch.eq, 0.0
     for path in range(len(loops.paths) - 1):
         last = loops.paths[path + 1]
@@ -131,7 +131,7 @@ def add_force(loops: Loops, path: int, force: Floats, scratch: DescentScratch, o
 
 @routine
 def add_anchors(row: int, objective: Objective, state: State, unit: float, out: Floats) -> float:
-    """Half the weighted sum of squared distances of coordinates from their anchors; the gradient is added to `out`."""
+    """Add the gradient of half the weighted sum of squared distances from anchors to `out`; return the value."""
     value = 0.0
     for j in range(objective.weights.shape[0]):
         if objective.weights[j] > 0.0:
@@ -164,7 +164,7 @@ def linearise(
 
 @routine
 def lay_out(loops: Loops, held: int, scratch: DescentScratch) -> int:
-    """Write the equations of the loops and of the held components, with an identity beside them; their number."""
+    """Write the equations of the loops and held components, an identity beside them; return their number."""
     paths, n, A, eq = len(loops.paths) - 1, len(loops.lo), scratch.elimination.A, scratch.eq
     first = 6 * (paths - 1)
     rows, holds = eq.rows, scratch.gradient.holds
@@ -189,18 +189,18 @@ def lay_out(loops: Loops, held: int, scratch: DescentScratch) -> int:
 
 @routine
 def linearise_limits(loops: Loops, margin: float, state: State, scratch: DescentScratch, reduced: FreeMotions) -> None:
-    """Excess and reduced gradient of every limit that a step may reach."""
+    """Fill excess and reduced gradient of every limit that a step may reach."""
     linear = reduced.linear
     basis, shift, G, row = reduced.basis, reduced.shift, linear.G, scratch.row
     n, k, excess = len(loops.lo), 0, -math.inf
     for j in range(n):
-        for side in range(2):
-            h = loops.lo[j] + margin - state.q[j] if side == 0 else state.q[j] - loops.hi[j] + margin
+        for is_upper in range(2):
+            h = loops.lo[j] + margin - state.q[j] if is_upper == 0 else state.q[j] - loops.hi[j] + margin
             if h > -REACH and scratch.elimination.used[j] > 0:
                 for a in range(linear.totals[0]["motions"]):
-                    G[k, a] = -basis[j, a] if side == 0 else basis[j, a]
-                linear.drift[k] = -shift[j] if side == 0 else shift[j]
-                linear.h[k], linear.which[k] = h, 2 * j + side
+                    G[k, a] = -basis[j, a] if is_upper == 0 else basis[j, a]
+                linear.drift[k] = -shift[j] if is_upper == 0 else shift[j]
+                linear.h[k], linear.which[k] = h, 2 * j + is_upper
                 excess = max(excess, h)
                 k += 1
     for cone in range(len(loops.cone_angles)):
@@ -228,7 +228,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
 
 @routine
 def cone_excess(loops: Loops, cone: int, margin: float, state: State, scratch: DescentScratch) -> float:
-    """Excess over a cone [rad]; poses its joint for `add_cone`."""
+    """Excess over a cone [rad]; also poses its joint, for `add_cone`."""
     pose_cone(loops, cone, state, scratch.eq)
     moved, stayed = scratch.eq.twist[:3], scratch.eq.twist[3:]
     x = moved[1] * stayed[2] - moved[2] * stayed[1]
@@ -240,7 +240,7 @@ def cone_excess(loops: Loops, cone: int, margin: float, state: State, scratch: D
 
 @routine
 def add_cone(loops: Loops, cone: int, factor: float, scratch: DescentScratch, out: Floats) -> None:
-    """The gradient of a cone's excess, times a factor, added to `out`."""
+    """Add the gradient of a cone's excess, times a factor, to `out`."""
     eq = scratch.eq
     a, b = eq.twist[:3], eq.twist[3:]
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -87,28 +87,28 @@ class Closed(NamedTuple):
 # Columns of FirstOrder.measures.
 SERIAL, PARALLEL, CONSTRAINT, PASSIVE = 0, 1, 2, 3
 
-# What is asked for: Jacobians alone, with all measures, or joint rates.
+# Values of FirstOrderPlan.outputs: Jacobians alone, Jacobians with all measures, joint rates.
 JACOBIANS, MEASURES, JOINTS = 0, 1, 2
 
 
 class FirstOrderPlan(NamedTuple):
-    """What is asked of a mechanism, and what holds of it in general."""
+    """Requested outputs, and the generic properties of a mechanism."""
 
     loops: Floats  # (loops, columns): orthonormal combinations of the loops
-    way: Floats  # (columns,): how the way to the end effector passes each joint
+    path: Floats  # (columns,): sign of each joint on the path to the end effector; 0 off the path
     rates: Floats  # (columns, columns): orthonormal rates of every joint
     actuated: Ints  # (n_a,): columns of the actuators
     directions: Floats  # (twists, k): orthonormal twists that the end effector ever has
     rank: int  # of the loops' conditions
-    shown: int  # motions that show at the end effector or the actuators
+    shown: int  # number of motions that move the end effector or the actuators
     freedoms: int  # of the end effector
     least: float  # singular value up to which a direction counts as lost
     singular: float  # measure below which a configuration is singular
-    asks: int  # JACOBIANS, MEASURES or JOINTS
+    outputs: int  # JACOBIANS, MEASURES or JOINTS
 
 
 class FirstOrder(NamedTuple):
-    """What holds at n configurations, by orthonormal joint rates; lengths in L. No rows of what is not asked for."""
+    """First-order results at n configurations, by orthonormal joint rates; lengths in L. No rows without a request."""
 
     forward: Floats  # (n, twists, n_a)
     inverse: Floats  # (n, n_a, twists)
@@ -117,7 +117,7 @@ class FirstOrder(NamedTuple):
     gained: Floats
     screws: Floats  # (n, columns, 6): velocity of the reference point, angular velocity
     motions: Floats  # (n, columns, motions): orthonormal, those that show most first
-    sizes: Floats  # (n, motions): how much each shows at end effector and actuators
+    sizes: Floats  # (n, motions): norm of each motion's twist and actuator rates
     joints: Floats  # (n, columns, n_a): rates per actuator rate
     closing: Floats  # (n, columns, conditions): the least rates that open loops
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ...arrays import Floats, Ints
 from .._jit import routine
-from ..closure.first_order import set_apart
+from ..closure.first_order import subtract_projections
 from ..legs.answer import put_slopes
 from ..legs.frames import redundant_slope
 from ..legs.leg_constants import LEAST_MARGIN
@@ -142,7 +142,7 @@ def take_off(row: Floats, pivot: Floats, k: int) -> None:
 def bars(own: Rating, count: int, row: Floats) -> bool:
     """Add a row to an orthonormal basis of `count` rows; False where rounding is all that is left of it."""
     copy_row(row[:6], own.basis[count])
-    size = set_apart(own.basis, count, 0, 6)
+    size = subtract_projections(own.basis, count, 0, 6)
     for j in range(6 if size > RANK else 0):
         own.basis[count, j] /= size
     return size > RANK
