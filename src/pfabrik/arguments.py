@@ -1,4 +1,4 @@
-"""Arrays that callers pass: one check of what they are, their shape and their values, and one sentence that says it."""
+"""Checks of array arguments: their type, shape and values, and the sentence of a refusal."""
 
 from __future__ import annotations
 
@@ -117,10 +117,10 @@ def is_not_negative(values: Floats) -> Mask:
 
 
 def any_values(values: Floats) -> Mask:
-    """All values: what they are is seen later, row by row."""
+    """Accept all values; they are checked later, row by row."""
     return np.ones(values.shape, bool)
 
 
 def is_not_infinite(values: Floats) -> Mask:
-    """True where values are finite, or NaN for what is not known."""
+    """True where values are finite, or NaN for unknown values."""
     return np.asarray(~np.isinf(values))

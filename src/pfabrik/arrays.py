@@ -1,4 +1,4 @@
-"""The kinds of arrays that go from function to function, and the shape in which they are told."""
+"""Types of arrays, and the conversion of rows to the shape of a batch."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ Record: TypeAlias = Any  # one of them: its fields are numbers and arrays
 
 
 def shaped(array: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """What was found row by row, (n, ...), in the shape of what was asked; a number where that is one."""
+    """Results row by row, (n, ...), in the batch shape of the question; a number if that shape is ()."""
     found = array.reshape(shape + array.shape[1:])
     return found if found.ndim else found.item()

@@ -86,7 +86,7 @@ def require_ending(path: Any, known: Sequence[str]) -> str:
 
 
 def require_names(name: str, value: Any) -> tuple[str, ...]:
-    """Names, as a tuple; InvalidArgument for a single text and for what is no list of texts."""
+    """Names, as a tuple; InvalidArgument for a single text and for any value but a list of texts."""
     names = tuple(value) if isinstance(value, Iterable) and not _is_single(value) else None
     if names is None or not all(isinstance(each, str) for each in names):
         raise InvalidArgument(name, reprlib.repr(value), "a list of names")
@@ -114,7 +114,7 @@ def names_of(name: str, value: Any) -> tuple[str, ...]:
 
 
 def require_choice(name: str, value: Any, choices: Iterable[str | None]) -> None:
-    """InvalidArgument for what is none of some texts, or None where that is one of them; of any type."""
+    """Refuse a value of any type that is none of some choices; None may be one of them."""
     known = tuple(choices)
     if not (value is None or isinstance(value, str)) or value not in known:
         raise InvalidArgument(name, reprlib.repr(value), " or ".join(map(repr, known)))
@@ -126,14 +126,14 @@ def _is_single(value: Any) -> bool:
 
 
 def require_mapping(name: str, value: Any, expected: str) -> Mapping[Any, Any]:
-    """Values by name, none for None; InvalidArgument for what is no mapping."""
+    """Values by name, none for None; InvalidArgument for any value but a mapping."""
     if value is not None and not isinstance(value, Mapping):
         raise InvalidArgument(name, reprlib.repr(value), expected)
     return value or {}
 
 
 def require_callable(name: str, value: Any) -> None:
-    """InvalidArgument for what is neither None nor can be called."""
+    """Refuse a value that is neither None nor callable."""
     if value is not None and not callable(value):
         raise InvalidArgument(name, reprlib.repr(value), "a function to call, or None")
 

@@ -57,7 +57,7 @@ def _as_it_was(kind: type[PfabrikError], args: tuple[Any, ...]) -> PfabrikError:
 
 
 class MobilityWarning(UserWarning):
-    """A sound description that may not be what is meant, by how the mechanism can move at home.
+    """A valid description that may not be the intended one, by its mobility at home.
 
     Its actuators, locked, leave the end effector freedoms; or its loops hold the end effector, or all but lock.
     """

@@ -20,7 +20,7 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
 
 @dataclass(frozen=True)
 class Options:
-    """How `solve_ik` and `track` work, and `solve_fk`, for which only `working_mode` and the last two count.
+    """Options of `solve_ik` and `track`, and of `solve_fk`, which uses only `working_mode` and the last two.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ class Printed:
     """A result that prints its table."""
 
     def table(self) -> ResultTable:
-        """What is printed."""
+        """The table to print."""
         raise NotImplementedError
 
     def __str__(self) -> str:

@@ -120,7 +120,7 @@ class Solver:
         return self._store(solve_fk(self.mechanism, copied, start=self._start, options=self.options), "actuators")
 
     def jacobian(self) -> Floats:
-        """The forward Jacobian at the last answer, as of `forward_jacobian`, (6 or 3, n_a): twist per actuator rate.
+        """The forward Jacobian at the last answer, (6 or 3, n_a): twist per actuator rate; see `forward_jacobian`.
 
         Raises
         ------

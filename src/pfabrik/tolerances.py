@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How exact things are. Lengths are relative to the mechanism's characteristic length L; angles are in radians.
+    """All tolerances. Lengths are relative to the mechanism's characteristic length L; angles are in radians.
 
     Attributes
     ----------

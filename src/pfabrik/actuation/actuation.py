@@ -121,7 +121,7 @@ class Actuation:
         return Mapped(values, shaped(placed.status, shape), lambda: self._placer.solution_of(placed.asked, shape))
 
     def to_joints(self, x: ArrayLike, *, start: Start | None = None) -> Mapped:
-        """Coordinates (..., k) at actuator values x (..., n_a): as of `solve_fk`.
+        """Coordinates (..., k) at actuator values x (..., n_a), by `solve_fk`.
 
         Parameters
         ----------

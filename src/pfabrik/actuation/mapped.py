@@ -1,4 +1,4 @@
-"""What a map gives: values, and whether they are what was asked for."""
+"""Results of a map: values, and whether they are the requested ones."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Mapped:
 
     @property
     def active_limits(self) -> tuple[ActiveLimit, ...] | list[tuple[ActiveLimit, ...]]:
-        """The limits that hold rows back, as of `Solution.active_limits`."""
+        """The limits that block rows; see `Solution.active_limits`."""
         return self.solution.active_limits
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Floats:

@@ -80,7 +80,7 @@ class Placer:
         return placed
 
     def _put(self, placed: Placed, rows: Ints) -> None:
-        """Put the answers of the machine to what is asked in some rows."""
+        """Write the answers of the machine to some rows."""
         if len(rows):
             asked = placed.asked[rows]
             solution = self.solution(asked)
@@ -94,7 +94,7 @@ class Placer:
         return self.solution_of(q, (len(q),))
 
     def solution_of(self, q: Floats, shape: tuple[int, ...]) -> Solution:
-        """The same, as a batch of some shape."""
+        """The answers of the machine to the poses at coordinates q (n, k), as a batch of a given shape."""
         return solve_ik(self.mechanism, self.coordinates.poses(q).reshape(*shape, 4, 4), options=IN_MODE)
 
     def values(self, solution: Solution) -> Floats:
@@ -142,7 +142,7 @@ class Placer:
         return maps
 
     def jacobian_of(self, solution: Solution) -> Floats:
-        """The same at the configurations of a solution, (n, n_a, k).
+        """Actuator rates by the rates of the named coordinates at a solution, (n, n_a, k).
 
         Of a task with rates r = R T: dr/dx = R dT/dx, whose Moore-Penrose inverse is dx/dr.
         """

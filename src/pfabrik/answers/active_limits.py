@@ -141,7 +141,7 @@ def stretched_joint(model: Model, q: Floats) -> tuple[ActiveLimit, ...]:
 
 
 def has_passive_limits(mechanism: Mechanism, multipliers: Floats) -> bool:
-    """True if a limit of a passive joint, or a clearance, is active; multipliers as of `holding_limits`."""
+    """True if a limit of a passive joint, or a clearance, is active; for multipliers see `holding_limits`."""
     columns = [drive.column for drive in mechanism.drives]
     columns += [coordinate.column for coordinate in mechanism.coordinates if coordinate.joint.is_rigid]  # never listed
     is_passive = np.ones(multipliers.shape[1], bool)

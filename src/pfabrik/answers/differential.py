@@ -62,7 +62,7 @@ def inverse_jacobian(solution: Solution) -> Floats:
 
 
 def singularity(solution: Solution) -> Singularity:
-    """How near every configuration of a solution is to a singularity of each kind; INVALID rows are NaN."""
+    """Distances of a solution's configurations from singularities of every kind; NaN for INVALID rows."""
     model, configurations = _of(solution)
     found = singularities(model, configurations.coordinates)
     numbers = {name: shaped(np.asarray(getattr(found, name)), solution.shape) for name in NUMBERS}

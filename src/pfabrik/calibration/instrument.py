@@ -40,7 +40,7 @@ def seen(poses: Floats, twists: Floats | None, places: Floats, moves: Floats) ->
 
 
 def aligned(poses: Floats, given: Measurements, is_free: Mask, length: float) -> Floats:
-    """The frame and the target, (2, 6), that take poses (n, 4, 4) nearest to what was measured, in closed form.
+    """The frame and the target, (2, 6), that take poses (n, 4, 4) nearest to measured ones, in closed form.
 
     Turns follow from covariances (Arun; of positions, and of orientations), then both places from linear equations;
     round by round where frame and target are open.

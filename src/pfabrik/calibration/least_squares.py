@@ -1,4 +1,4 @@
-"""Calibration: the parameters of a machine from what was measured of it, by least squares."""
+"""Calibration: the parameters of a machine from measurements, by least squares."""
 
 from __future__ import annotations
 

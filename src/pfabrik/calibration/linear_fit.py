@@ -1,4 +1,4 @@
-"""A least-squares problem at its solution: what it determines, how well, and which measurement does not fit."""
+"""A least-squares problem at its solution: determined directions, deviations, and measurements that do not fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a machine with other parameters would have measured, less what was: residuals and their derivatives."""
+"""Residuals of a calibration, predicted less measured values, and their derivatives by the parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measurements of a real machine: what its actuators read, and what was measured of its end effector then."""
+"""Measurements of a real machine: readings of its actuators, and measured quantities of its end effector."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ QUANTITIES = ("position", "orientation", "height", "distances", "joints")
 
 
 class Measurements:
-    """What a machine's actuators read in some configurations, and what was measured there.
+    """Readings of a machine's actuators in some configurations, and the quantities measured there.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Measurements:
         return f"<Measurements: {self.rows} rows, {self.count} values: {', '.join(given)}>"
 
     def without(self, rows: Sequence[int]) -> Measurements:
-        """The same without what was measured in some rows, and distances to them."""
+        """Measurements without those of some rows and the distances to them."""
         kept = np.setdiff1d(np.arange(self.rows), rows)
         place = np.full(self.rows, -1)
         place[kept] = np.arange(len(kept))

@@ -1,4 +1,4 @@
-"""What may be a parameter of a machine: centres, axes, zeros of actuators and lengths of rods."""
+"""Kinds of parameters of a machine: centres, axes, zeros of actuators and lengths of rods."""
 
 from __future__ import annotations
 

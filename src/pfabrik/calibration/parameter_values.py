@@ -1,4 +1,4 @@
-"""What a calibration says of a parameter, and of a measurement; as text, as HTML and as plain numbers."""
+"""Results of a calibration for a parameter and for a measurement: as text, as HTML and as plain numbers."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def table_of(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: 
 
 
 def as_numbers(parameters: Sequence[ParameterValue]) -> list[dict[str, Any]]:
-    """Parameters as plain numbers, ready for JSON; None for what is not finite."""
+    """Parameters as plain numbers, ready for JSON; None for infinite values and NaN."""
     return [{name: plain(value) for name, value in each._asdict().items()} for each in parameters]
 
 

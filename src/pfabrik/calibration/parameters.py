@@ -115,7 +115,7 @@ class Parameters:
 
     @cached_property
     def unlimited(self) -> Mechanism:
-        """The same without limits: what a real machine read, it did reach."""
+        """The machine without limits: a real machine has reached every configuration that was read."""
         return self.like.without_limits()
 
     def geometry(self, values: Floats) -> Geometry:

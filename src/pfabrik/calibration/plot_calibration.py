@@ -1,4 +1,4 @@
-"""A calibration as a picture: what is left of the residuals, and how far parameters moved."""
+"""A calibration as a picture: the residuals after it, and the changes of the parameters."""
 
 from __future__ import annotations
 

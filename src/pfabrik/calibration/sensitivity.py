@@ -1,4 +1,4 @@
-"""How the pose and the actuators of configurations change with the parameters of their machine, to first order."""
+"""Derivatives of the pose and the actuators of configurations by the parameters of their machine."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ NEWTON_STEPS = 12
 
 @dataclass(frozen=True)
 class Shift:
-    """What a unit of one parameter changes.
+    """Changes per unit of one parameter.
 
     Attributes
     ----------

@@ -126,7 +126,7 @@ def _exchanged(information: Floats, base: Floats, n: int, criterion: str, rng: n
 
 
 def _losses(information: Floats, criterion: str) -> Floats:
-    """How bad information matrices (k, p, p) are."""
+    """Losses of information matrices (k, p, p)."""
     if criterion == "determinant":
         signs, logarithms = np.linalg.slogdet(information)
         return np.asarray(np.exp(np.where(signs > 0.0, -logarithms / information.shape[1], 700.0)))

@@ -100,7 +100,7 @@ class Certificate(Printed):
 
     @cached_property
     def open_boxes(self) -> Floats:
-        """The boxes that are neither proved nor refuted, as of `boxes`."""
+        """The boxes that are neither proved nor refuted; see `boxes`."""
         return self._ends(self._left)
 
     def replay(self) -> bool:
@@ -144,7 +144,7 @@ class Certificate(Printed):
         return plain
 
     def table(self) -> ResultTable:
-        """The verdict, and what it rests on."""
+        """The verdict and its evidence."""
         lines = [f"{self.verdict}  {counted(self.n_cells, 'cell')}"]
         unit, refutation = self.mechanism.length_unit, self.refutation
         if self:

@@ -76,7 +76,7 @@ class PoseRegion:
         tilt: float | None = None,
         yaw: ArrayLike = 0.0,
     ) -> PoseRegion:
-        """Positions in a cylinder along z, about its centre (3,) [length]; the orientations are as of `box`."""
+        """Positions in a cylinder along z, about its centre (3,) [length]; orientations as in `box`."""
         radius, height = require_positive("radius", radius), require_positive("height", height)
         half = np.array([radius, radius, 0.5 * height])
         middle = array("centre", centre, "3")
@@ -91,7 +91,7 @@ class PoseRegion:
         tilt: float | None = None,
         yaw: ArrayLike = 0.0,
     ) -> PoseRegion:
-        """Positions in a ball about its centre (3,) [length]; the orientations are as of `box`."""
+        """Positions in a ball about its centre (3,) [length]; orientations as in `box`."""
         middle, half = array("centre", centre, "3"), np.full(3, require_positive("radius", radius))
         return _region(np.stack([middle - half, middle + half]), "ball", rotation, tilt, yaw)
 

@@ -1,4 +1,4 @@
-"""How the least distance between links changes with the actuators."""
+"""Derivatives of the least distance between links by the actuators."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from ..rotations import from_quaternion, random_quaternions, rotvec_from_quatern
 
 
 def random_starts(closure: Closure, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Coordinates (n, columns), as of `random_coordinates`, and poses (n, 4, 4) around home with any rotation."""
+    """Coordinates (n, columns) by `random_coordinates`, and poses (n, 4, 4) around home with any rotation."""
     mechanism = closure.mechanism
     poses = np.repeat(mechanism.home_pose[None], n, axis=0)
     poses[:, :3, :3] = from_quaternion(random_quaternions(n, rng))

@@ -1,4 +1,4 @@
-"""How far paths reach: a bound from lengths alone, which tells without a search that a pose is out of reach."""
+"""Bounds on the reach of paths from lengths alone, to find poses out of reach without a search."""
 
 from __future__ import annotations
 
@@ -63,6 +63,6 @@ def _reach(loops: Loops, units: Ints) -> tuple[Floats, Floats, float]:
 
 
 def _from_axis(axis: Floats, way: Floats) -> tuple[float, float]:
-    """How far along an axis a point is, and how far from it."""
+    """Coordinate of a point along an axis, and its distance from the axis."""
     along = float(axis @ way)
     return along, float(np.linalg.norm(way - along * axis))

@@ -1,1 +1,1 @@
-"""What a machine is: bodies, joints and limits in the assembled home configuration, checked when it is made."""
+"""The description of a machine: bodies, joints and limits in the assembled home configuration, checked when made."""

@@ -86,7 +86,7 @@ def _faults(place: str, value: Any, at: Vector | None) -> Iterator[Fault]:
 
 
 def _radius(at: Vector) -> float:
-    """Distance from the z axis; 0 within the accuracy of what is typed."""
+    """Distance from the z axis; 0 within the accuracy of typed numbers."""
     radius = math.hypot(at[0], at[1])
     return radius if radius > TOLERANCES.alignment * abs(at[2]) else 0.0
 

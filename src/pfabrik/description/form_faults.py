@@ -121,7 +121,7 @@ def name_faults(place: str, value: object) -> Iterator[Fault]:
 
 
 def choice_faults(place: str, value: object, choices: Sequence[str]) -> Iterator[Fault]:
-    """The fault of what is none of some words."""
+    """The fault of a value that is none of some words."""
     if not isinstance(value, str) or value not in choices:
         hint = near_miss(value, choices) if isinstance(value, str) else ""
         yield Fault(place, f"{shown(value)}{hint}", f"one of {', '.join(choices)}")

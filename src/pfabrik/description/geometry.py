@@ -1,4 +1,4 @@
-"""The numbers of a mechanism's description, apart from what they belong to: where its joints are at home."""
+"""The geometry of a mechanism as arrays: the numbers of its description, without names and types."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def numbers_with(mechanism: Mechanism, geometry: Geometry) -> Floats:
 
 
 def with_geometry(mechanism: Mechanism, geometry: Geometry) -> Mechanism:
-    """The same description with other numbers, unchecked: no fault of theirs is found, nor a lack of freedom."""
+    """The description with other numbers, unchecked for faults and for mobility."""
     return with_numbers(mechanism, numbers_with(mechanism, geometry))
 
 

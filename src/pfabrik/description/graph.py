@@ -58,7 +58,7 @@ class Step:
 
     @property
     def back(self) -> Step:
-        """The same joint, passed the other way."""
+        """The joint, passed in the other direction."""
         return Step(self.joint, not self.forward, self.ends)
 
     @property

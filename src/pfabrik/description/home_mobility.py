@@ -1,4 +1,4 @@
-"""How a mechanism can move at home, to first order: freedoms of the whole and of its end effector.
+"""Mobility at home, to first order: freedoms of the mechanism and of its end effector.
 
 Unknown are the rates of all joint coordinates. A tree of joints from the base gives the twist (angular velocity, and
 velocity at the origin) of every body as a sum of screws times rates; every other joint closes a loop, and asks that
@@ -35,7 +35,7 @@ def body_twist(path: Floats, screws: Floats) -> Floats:
 
 
 def loop_conditions(loops: Floats, screws: Floats) -> Floats:
-    """What the loops ask to vanish, per rate, shape (..., 6 loops, c).
+    """Conditions of the loops by joint rates, shape (..., 6 loops, c); they vanish in every motion.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def _home_motion(mechanism: Structure, locked: frozenset[int]) -> tuple[Floats, 
 
 
 def _null_space(matrix: Floats) -> Floats:
-    """Orthonormal basis, one vector per column, of what the rows of the matrix are blind to."""
+    """Orthonormal basis of the null space of a matrix, one vector per column."""
     if matrix.size == 0:
         return np.eye(matrix.shape[1])
     _, values, rows = np.linalg.svd(matrix)
@@ -280,5 +280,5 @@ def _rank(matrix: Floats) -> int:
 
 
 def _count(values: NDArray[Any]) -> int:
-    """How many singular values are not zero. All matrices here have entries of order 1, so the scale is absolute."""
+    """Number of nonzero singular values. All matrices here have entries of order 1, so the scale is absolute."""
     return int(np.count_nonzero(values > TOLERANCES.alignment))

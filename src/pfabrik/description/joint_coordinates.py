@@ -1,4 +1,4 @@
-"""The coordinates of a mechanism's joints, one by one: what they are called, measure, and may be."""
+"""The coordinates of a mechanism's joints, one by one: their names, kinds and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The joint types, and for each what describes it, what its coordinates are and what may limit it."""
+"""The joint types, with the fields that describe each, its coordinates and its limits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Coordinate: TypeAlias = Literal["angle", "length"]
 
 @dataclass(frozen=True)
 class JointKind:
-    """What a description of one joint type contains.
+    """The contents of the description of one joint type.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ KINDS: dict[JointType, JointKind] = {
 
 
 def driven_places(joint_type: Any, actuated: Any) -> tuple[int, ...]:
-    """Which coordinates of a joint of some type are driven, as far as what is said of it makes sense.
+    """Indices of the driven coordinates of a joint of some type, as far as its description is valid.
 
     Parameters
     ----------

@@ -283,7 +283,7 @@ def placed_joints(
 
 
 def count_joints(leg: Leg) -> int:
-    """How many joints legs stand for, as far as they can be read."""
+    """Number of joints that legs stand for, as far as they can be read."""
     copies = leg.copies.get("count") if isinstance(leg.copies, Mapping) else 1.0
     turns = int(copies) if isinstance(copies, float) and 1.0 <= copies <= MOST_COPIES else 1
     return count_legs(leg.base, leg.platform) * len(read_chain(leg.chain)) * turns

@@ -48,13 +48,13 @@ def _only_end(leg: Leg, place: str, count: int, faults: list[Fault]) -> dict[str
 
 
 def count_legs(*ends: Any) -> int:
-    """How many legs there are: as many as points of the first list that can be read."""
+    """Number of legs: that of the points in the first list that can be read."""
     lists = [value for value in ends if isinstance(value, tuple) and value]
     return next((1 if _depth(value) < 2 else len(value) for value in lists), 1)
 
 
 def _depth(value: Any) -> int:
-    """How deep lists are nested, by their first items."""
+    """Depth of nested lists, by their first items."""
     return 1 + _depth(value[0] if value else None) if isinstance(value, tuple) else 0
 
 

@@ -124,7 +124,7 @@ def read_chain(chain: Any) -> tuple[ChainJoint, ...]:
 
 
 def chain_faults(place: str, chain: Any) -> Iterator[Fault]:
-    """The fault of what is no chain."""
+    """The fault of a value that is not a chain."""
     if read_chain(chain):
         return
     hint = ""

@@ -298,7 +298,7 @@ class Mechanism(Structure):
 
 
 def checked_mechanism(mechanism: Any) -> Mechanism:
-    """What was passed as a mechanism; InvalidArgument where it is none."""
+    """The argument, if it is a Mechanism; raises InvalidArgument otherwise."""
     return require_type("mechanism", mechanism, Mechanism, "a Mechanism, as `load` returns")
 
 

@@ -1,4 +1,4 @@
-"""How actuators are shown to people: angles in degrees, lengths in the mechanism's unit, with their limits."""
+"""Display of actuators: angles in degrees, lengths in the mechanism's unit, with their limits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .structure import Structure
 
 @dataclass(frozen=True)
 class Readout:
-    """How the coordinate of an actuator is shown.
+    """Display of the coordinate of an actuator.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ def readouts(mechanism: Structure) -> tuple[Readout, ...]:
 
 
 def readout(coordinate: JointCoordinate, length_unit: str) -> Readout:
-    """How one coordinate is shown."""
+    """The display of one coordinate."""
     is_angle, (low, high) = coordinate.kind == "angle", coordinate.limits
     limits = (math.degrees(low), math.degrees(high)) if is_angle else (low, high)
     return Readout(coordinate.name, is_angle, "deg" if is_angle else length_unit, limits)

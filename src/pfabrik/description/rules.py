@@ -1,4 +1,4 @@
-"""What a description may not be, as tables of rules: where, what is found if it is so, and what is expected instead."""
+"""Rules for descriptions, as tables: the place, the fault that is found there, and what is expected instead."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def is_same_place(one: str, other: str) -> bool:
 
 
 def kind_of(joint: Joint) -> JointKind | None:
-    """What the joint's type is described by; None when there is no such type."""
+    """The kind that describes the joint's type; None if there is no such type."""
     return KINDS.get(joint.type) if isinstance(joint.type, str) else None
 
 

@@ -1,4 +1,4 @@
-"""What shapes may not be: single ones, and the bodies and joints that they name."""
+"""Faults of shapes: of single ones, and of the bodies and joints that they name."""
 
 from __future__ import annotations
 

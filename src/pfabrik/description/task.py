@@ -1,4 +1,4 @@
-"""What a target sets of a pose, and what follows from the mechanism."""
+"""Tasks: the components of a pose that a target sets; the others follow from the mechanism."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Task:
         return self.rotations > 1, self.rotations > 1, self.rotations % 2 == 1
 
     def turning_axes(self, pose: Floats) -> Floats:
-        """What they are about at a pose (4, 4): unit vectors (k, 3) in the base frame."""
+        """Axes of the rotations at a pose (4, 4): unit vectors (k, 3) in the base frame."""
         axes = pose[:3, :3].T if self.rotations == 2 else np.eye(3)
         return np.asarray(axes[list(self.turns)])
 

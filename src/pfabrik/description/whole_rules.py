@@ -1,4 +1,4 @@
-"""What a mechanism as a whole may not be: its head, its names and its graph, and where its joints are at home."""
+"""Rules for a mechanism as a whole: its head, its names, its graph, and its joints at home."""
 
 from __future__ import annotations
 

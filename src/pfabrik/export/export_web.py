@@ -138,7 +138,7 @@ class _Weights(NamedTuple):
 
 
 class _Reading(NamedTuple):
-    """What `evaluate_poses` fills."""
+    """Outputs of `evaluate_poses`."""
 
     coordinates: Floats  # (1, columns)
     no_rows: Floats  # (0, 0)

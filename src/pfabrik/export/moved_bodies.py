@@ -1,4 +1,4 @@
-"""How bodies follow from the pose and from coordinates of legs, as an exported file places them."""
+"""Poses of bodies by the platform's pose and the coordinates of legs, in exported files."""
 
 from __future__ import annotations
 

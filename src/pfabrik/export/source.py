@@ -103,7 +103,7 @@ def _machine_h(machine: Machine, tables: ControllerTables, parts: Sequence[str],
 def _tables(
     machine: Machine, precision: Precision, parts: Sequence[str], path: JointPath | None, n_ways: int
 ) -> Iterator[str]:
-    """What the routines around the kernels read."""
+    """Tables for the routines around the kernels."""
     size, turning = machine.mechanism.characteristic_length, not machine.mechanism.end_effector_is_joint
     yield "/* L, the radius of the smallest sphere around the joints; units are L of lengths, 1 of angles. */"
     yield f"#define PFK_SIZE {literal(size)}"

@@ -1,4 +1,4 @@
-"""How many Newton steps a file of tensors needs."""
+"""Number of Newton steps that a file of tensors needs."""
 
 from __future__ import annotations
 

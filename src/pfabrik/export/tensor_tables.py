@@ -175,7 +175,7 @@ def place_of(coordinate: Coordinate, machine: Machine, groups: list[LegGroup]) -
 
 
 def counting_of(coordinate: Coordinate) -> tuple[bool, float, float]:
-    """How whole turns are counted into the range of a coordinate, and that range, from home."""
+    """True if a coordinate is counted into its range by whole turns, and that range, from home."""
     low, high = np.clip([coordinate.lo, coordinate.hi], -FAR, FAR).tolist()
     return coordinate.turns, low, high
 

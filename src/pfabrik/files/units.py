@@ -49,7 +49,7 @@ def measured(field: str, joint_type: Any, actuated: Any) -> tuple[Coordinate, ..
 
 
 def angle_in_radians(value: Any, unit: str) -> Any:
-    """An angle of a file in radians; what is no number stays as it is."""
+    """An angle of a file in radians; any value but a number stays as it is."""
     read = numbers(value)
     return math.radians(read) if unit == "deg" and isinstance(read, float) else value
 

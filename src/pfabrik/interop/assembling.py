@@ -133,7 +133,7 @@ def _outside(loops: OpenLoops, q: Floats) -> list[str]:
 
 
 def _rounding(opened: OpenMechanism, loops: OpenLoops) -> float:
-    """How far the digits of a file let its loops be open [L or rad], where these are known."""
+    """Gaps of loops that the digits of a file explain [L or rad], where these are known."""
     digits = worst(opened.roundings.values())
     most = np.inf if opened.is_asked else TOLERANCES.file_digits
     return float(min(digits.length / loops.length + digits.angle, most))

@@ -46,7 +46,7 @@ class Coupling:
 
     @property
     def ratio(self) -> float | None:
-        """How far the follower goes when its leader goes by one; None where that depends on where it is, or is 0."""
+        """Motion of the follower per unit of its leader; None if it depends on the position, or is 0."""
         is_plain = len(self.factors) > 1 and self.factors[1] != 0.0 and not any(self.factors[2:])
         return self.factors[1] if is_plain else None
 

@@ -44,7 +44,7 @@ def on_export(mechanism: Mechanism, solutions: Iterable[Solution], rng: np.rando
 
 
 def distances(solution: Solution, position: Floats, turn: Floats, metres: float) -> tuple[float, float]:
-    """How far an answer's pose is from a position (3,) [m] and an orientation (3, 3), [m] and [rad]."""
+    """Distances of an answer's pose from a position (3,) [m] and an orientation (3, 3), [m] and [rad]."""
     apart = float(np.linalg.norm(position - solution.pose[:3, 3] * metres))
     is_point = solution.mechanism.end_effector_is_joint
     return apart, 0.0 if is_point else float(angles_between(turn, solution.pose[:3, :3]))

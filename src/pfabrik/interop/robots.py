@@ -71,7 +71,7 @@ class Robot:
 
 
 class ImportOptions(NamedTuple):
-    """What an import makes of a robot, besides its ends; as of `from_mjcf`."""
+    """Options of an import, besides base and end effector; see `from_mjcf`."""
 
     actuated: Sequence[str] | None = None
     length_unit: str = "m"
@@ -88,7 +88,7 @@ def mechanism_of(
     fixed: Iterable[str] = (),
     leave_out: Iterable[str] = (),
 ) -> Imported:
-    """The mechanism between the base and the end effector of a robot, its loops closed; arguments as of `from_mjcf`."""
+    """The mechanism between the base and the end effector of a robot, its loops closed; arguments as in `from_mjcf`."""
     metres_of(asked.length_unit)
     robot = _with_drives(_with_held(_without(robot, leave_out, notes), fixed), asked.actuated)
     base = _base(robot, base)

@@ -101,7 +101,7 @@ def _moving(structure: Structure, allowed: Sequence[Rounding], kept: Kept) -> St
 
 
 def _severity(unclear: Sequence[float]) -> tuple[int, float]:
-    """How nearly loops lock: fewer conditions are better, then smaller ones."""
+    """Severity with which loops lock: fewer conditions are better, then smaller ones."""
     return len(unclear), max(unclear, default=0.0)
 
 

@@ -1,4 +1,4 @@
-"""Loops that elements of a file tell, beside its tree of links, in the dialects of several programs.
+"""Loops in elements of a file beside its tree of links, in the dialects of several programs.
 
 <loop_joint type="spherical"><link1 link="a" xyz="…" rpy="…"/><link2 …/></loop_joint>       Isaac Sim, an older Drake
 <loop_joint type="revolute"><parent link="a"/><child link="b"/><parent_origin …/>…          exporters of Fusion
@@ -42,7 +42,7 @@ SPRING = "linear_spring_damper"
 
 
 def told_joint(element: ET.Element, frames: Mapping[str, Floats], number: int) -> tuple[UrdfJoint, Floats]:
-    """The joint that an element tells, and its place (4, 4) [m] in its second link's frame.
+    """The joint that an element describes, and its place (4, 4) [m] in its second link's frame.
 
     Parameters
     ----------

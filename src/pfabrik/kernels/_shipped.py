@@ -24,7 +24,7 @@ def name_of(function: Callable[..., Any]) -> str:
 
 
 def is_stale(file: str | None) -> bool:
-    """Whether kernels of a checkout were edited after the module was compiled; what is installed nobody edits."""
+    """True if kernels of a checkout were edited after the module was compiled; installed ones never are."""
     if file is None or not (HERE.parents[2] / "building" / "compile_kernels.py").exists():
         return False
     made = os.stat(file).st_mtime

@@ -34,7 +34,7 @@ def walk_path(motions: Floats, end: Floats, deviations: Floats, poses: Floats, t
 
 @routine
 def walk_row(motions: Floats, end: Floats, deviations: Floats, T: Floats, columns: Floats) -> None:
-    """Fill the displacement (4, 4) and the twists (6, k) of one row, as of `walk_path`."""
+    """Fill the displacement (4, 4) and the twists (6, k) of one row; see `walk_path`."""
     for i in range(4):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0

@@ -193,7 +193,7 @@ def geometry_screws(mechanism: Structure, q: Floats, points: Floats, axes: Float
 
 
 class _AxisValues(NamedTuple):
-    """How far joints are turned about, and slid along, their axes; zero where a joint does not.
+    """Turns of joints about their axes, and slides along them; zero for a joint without.
 
     Attributes
     ----------

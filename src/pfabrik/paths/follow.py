@@ -36,7 +36,7 @@ def follow_parts(
     speed_limits: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
 ) -> Iterator[TrackPart]:
-    """Answers along a path as of `track`, a part at a time.
+    """Answers along a path a part at a time; see `track`.
 
     Each part overlaps the one before it: by two steps, for accelerations, or back to the last target that was reached,
     because answers with stretched links depend on the steps before them.

@@ -22,7 +22,7 @@ ROWS_A_BLOCK = 1024
 def forward_kinematics(
     request: Request, values: Floats, starts: Starts, given: tuple[Rows, AssemblyOutputs] | None
 ) -> Answers:
-    """Configurations within all limits at actuated values (n, n_a), as of `assemble_row`; rows may be PENDING.
+    """Configurations within all limits at actuated values (n, n_a), by `assemble_row`; rows may be PENDING.
 
     Readings of more actuators than freedoms, which fit nowhere else, are looked for in every assembly mode.
 

@@ -31,7 +31,7 @@ class Answers(NamedTuple):
 
 
 class Request(NamedTuple):
-    """A machine, and what is asked of all rows."""
+    """A machine, with the options common to all rows."""
 
     model: Model
     options: Options

@@ -1,4 +1,4 @@
-"""How far off a pose is by errors of actuators and play in joints, to first order."""
+"""Pose errors by actuator errors and play in joints, to first order."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LOOSE = "a constraint singularity: what joints with play move is not determined"
 
 @dataclass(frozen=True, eq=False)
 class PoseAccuracy:
-    """How far off a pose is, as `accuracy` returns it; r is 6, or 3 for a joint end effector.
+    """Pose errors, as `accuracy` returns them; r is 6, or 3 for a joint end effector.
 
     Attributes
     ----------

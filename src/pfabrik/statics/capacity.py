@@ -1,4 +1,4 @@
-"""What a machine can hold: polytopes of wrenches by the limits of its actuators."""
+"""Wrench polytopes of a machine by the limits of its actuators."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ OPEN = "equilibrium does not determine all reactions, for joints work against ea
 
 
 class _Question(NamedTuple):
-    """What forces are asked for."""
+    """Arguments of `forces`."""
 
     solution: Solution
     asked: Asked

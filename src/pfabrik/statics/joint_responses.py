@@ -1,4 +1,4 @@
-"""How the end effector responds to displacements at joints, such as play, or the end of a rod that stretches."""
+"""Responses of the end effector to displacements at joints, such as play or a stretched rod."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What acts on a machine from outside: a wrench on its end effector, weights and wrenches on its bodies."""
+"""Loads on a machine: a wrench on its end effector, weights and wrenches on its bodies."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoa
 
 
 def checked_loads(mechanism: Mechanism, loads: Any) -> BodyLoads:
-    """Loads by body; the errors of `forces` for what is none."""
+    """Loads by body; raises the errors of `forces` for invalid ones."""
     given = require_mapping("loads", loads, OF_LOADS)
     known = tuple(body for body in mechanism.bodies if body != mechanism.base)
     require_known("body that moves", given, known)

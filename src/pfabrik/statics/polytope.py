@@ -82,7 +82,7 @@ def vertices_of(normals: Floats, offsets: Floats) -> Floats:
 
 
 def _cut(corners: Floats, active: np.ndarray, planes: Floats, ends: Floats, place: int) -> tuple[Floats, np.ndarray]:
-    """What a half-space leaves of vertices (v, d), and of the half-spaces that each is on, (v, h)."""
+    """Cut a polytope by a half-space: its vertices (v, d), and the half-spaces that each is on, (v, h)."""
     d = planes.shape[1]
     beyond = corners @ planes[place] - ends[place]
     near = TOLERANCES.rank * np.maximum(1.0, np.abs(corners).max(axis=1, initial=0.0))

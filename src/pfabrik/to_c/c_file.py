@@ -93,7 +93,7 @@ class File:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two constants are equal, and of one type."""
+    """True if two constants are equal, and of one type."""
     return type(a) is type(b) and bool(a == b)
 
 

@@ -42,7 +42,7 @@ def constant_of(node: ast.expr, constants: dict[str, Any]) -> int | None:
 
 
 def turns_at_least_once(loop: ast.For, constants: dict[str, Any]) -> bool:
-    """Whether a loop's body runs whatever the arguments are."""
+    """True if a loop's body runs whatever the arguments are."""
     if not isinstance(loop.iter, ast.Call) or not is_range(loop.iter):
         return True  # over a tuple
     limits = [constant_of(a, constants) for a in loop.iter.args]
@@ -51,7 +51,7 @@ def turns_at_least_once(loop: ast.For, constants: dict[str, Any]) -> bool:
 
 
 class Flow:
-    """What can be said of a function's variables before any type is known."""
+    """Facts about a function's variables before any type is known."""
 
     def __init__(self, function: ast.FunctionDef, constants: dict[str, Any]) -> None:
         self.arguments = {a.arg for a in function.args.args}
@@ -165,7 +165,7 @@ class Flow:
 
 
 def meet(states: list[State]) -> State:
-    """What holds where several ways meet."""
+    """The common state where several paths of control join."""
     known = [s for s in states if s is not None]
     if not known:
         return None

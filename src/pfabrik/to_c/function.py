@@ -34,7 +34,7 @@ MOST_PASSES = 8
 
 
 class Function(Statements):
-    """A function: its text, its name, what it takes, gives, reads and writes, and whether it takes memory."""
+    """A function: its text, name, arguments, result, reads and writes, and whether it allocates."""
 
     def __init__(self, program: File, source: Any, arguments: tuple[Any, ...]) -> None:
         super().__init__()

@@ -46,5 +46,5 @@ def number(value: float, is_single: bool) -> str:
 
 
 def is_simple(text: str) -> bool:
-    """Whether C text is a path of names: it may be repeated."""
+    """True if C text is a path of names: it may be repeated."""
     return re.fullmatch(r"[A-Za-z_][\w.]*(->[\w.]+)*", text) is not None

@@ -140,7 +140,7 @@ class Operators(Expressions):
         return Value(" && ".join(p.at(AND) for p in parts), BOOL, AND, **effects(parts))
 
     def member(self, node: ast.Compare) -> Value:
-        """Whether a value is one of a tuple's."""
+        """True if a value is one of a tuple's."""
         is_in, among = isinstance(node.ops[0], ast.In), node.comparators[0]
         if len(node.ops) > 1 or not isinstance(among, ast.Tuple) or not among.elts:
             raise self.fault(node, "`in` of what is not a tuple")
@@ -253,11 +253,11 @@ class Operators(Expressions):
         return Value(f"pow{self.program.suffix}({a.text}, {b.text})", REAL, **more)
 
     def is_never_negative(self, node: ast.AST) -> bool:
-        """Whether what is divided counts a loop from a constant on."""
+        """True if what is divided counts a loop from a constant on."""
         left = node.left if isinstance(node, ast.BinOp) else node
         return isinstance(left, ast.Name) and left.id in self.flow.rising
 
 
 def is_number(v: Value, t: Any) -> bool:
-    """Whether a value can become one of a type of numbers."""
+    """True if a value can become one of a type of numbers."""
     return v.type in NUMBERS and t in NUMBERS

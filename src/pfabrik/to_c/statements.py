@@ -155,7 +155,7 @@ class Statements(Calls):
             self.assign(target, v, s)
 
     def _matters(self, targets: list[ast.expr], values: list[ast.expr]) -> bool:
-        """Whether what is stored first could be read by a value after it."""
+        """True if what is stored first could be read by a value after it."""
         for k, target in enumerate(targets):
             places = [n for t in targets[k + 1 :] for n in ast.walk(t) if isinstance(n, ast.Subscript)]
             later: list[ast.expr] = [*values[k + 1 :], *places]
@@ -359,7 +359,7 @@ class Statements(Calls):
         self.emit("}")
 
     def _stays(self, node: ast.expr, stop: Value, assigned: frozenset[str]) -> bool:
-        """Whether the end of a range is the same at each turn, and costs nothing."""
+        """True if the end of a range is the same at each turn, and costs nothing."""
         if stop.is_constant:
             return True
         if re.fullmatch(r"t\d+", stop.text):
@@ -400,7 +400,7 @@ class Statements(Calls):
 
 
 def is_choice(node: ast.expr, n: int) -> bool:
-    """Whether a value is one of two tuples of a length."""
+    """True if a value is one of two tuples of a length."""
     return isinstance(node, ast.IfExp) and all(
         isinstance(each, ast.Tuple) and len(each.elts) == n for each in (node.body, node.orelse)
     )

@@ -16,7 +16,7 @@ WIDE = 32
 
 
 class Unsupported(Exception):
-    """What the subset lacks, with its place in the source."""
+    """An unsupported construct, with its place in the source."""
 
 
 @dataclass(frozen=True)

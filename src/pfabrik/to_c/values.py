@@ -1,4 +1,4 @@
-"""Values in C: the text of an expression, and what is known of it."""
+"""Values in C: the text of an expression, with its known properties."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Value:
 
 
 def effects(values: list[Value]) -> dict[str, Any]:
-    """What several expressions read and write together."""
+    """Reads and writes of several expressions together."""
     return {
         "reads": NONE.union(*(v.reads for v in values)),
         "writes": NONE.union(*(v.writes for v in values)),
@@ -50,5 +50,5 @@ def effects(values: list[Value]) -> dict[str, Any]:
 
 
 def conflict(values: list[Value]) -> bool:
-    """Whether the order of evaluation could matter: one writes what another reads or writes."""
+    """True if the order of evaluation could matter: one writes what another reads or writes."""
     return any(a.writes & (b.reads | b.writes) for a in values for b in values if a is not b)

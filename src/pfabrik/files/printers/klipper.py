@@ -39,7 +39,7 @@ class KlipperSettings:
                 raise fault("file", f"no settings of Klipper: {' '.join(str(error).split())}", "sections") from None
 
     def text(self, section: str, key: str) -> str | None:
-        """What is said of a key, or None."""
+        """The value of a key, or None."""
         return self._sections.get(section, key, fallback=None)
 
     def number(self, section: str, key: str, default: float | None = None, above: float = -math.inf) -> float:

@@ -17,7 +17,7 @@ from .solids import CAPSULE, KIND
 
 @allocator
 def new_link_limits(limits: LinkLimits) -> LinkLimits:
-    """The same links, with memory of its own for their places."""
+    """Copy the links, with new memory for their places."""
     has_solids = False
     for i in range(limits.sizes.shape[0]):
         has_solids = has_solids or limits.sizes[i, KIND] != CAPSULE
@@ -71,7 +71,7 @@ def put_pulls(links: LinkLimits, pair: int, excess: float, factor: float) -> Non
 
 @routine
 def share_of_end(links: LinkLimits, link: int, x: Vec) -> float:
-    """How far along the axis of a capsule a point beside it is, from 0 to 1; 0 for links that move with one body."""
+    """Coordinate of a point along the axis of a capsule, from 0 to 1; 0 for links that move with one body."""
     if links.bodies[link, 0] == links.bodies[link, 1] or links.sizes[link, KIND] != CAPSULE:
         return 0.0
     start = vec(links.places[link, 0])

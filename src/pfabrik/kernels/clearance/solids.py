@@ -67,7 +67,7 @@ def middle_of(solid: Solid) -> Vec:
 
 @routine
 def reach_of(solid: Solid) -> float:
-    """How far a solid reaches from its middle."""
+    """Largest distance of a solid's points from its middle."""
     sizes, place = solid
     if sizes[KIND] == CAPSULE:
         return 0.5 * norm(sub(vec(place[1]), vec(place[0]))) + sizes[ROUND]

@@ -208,7 +208,7 @@ def choose_start(tables: JointTables, scratch: JointScratch, n_starts: int) -> N
 
 @routine
 def project(tables: JointTables, scratch: JointScratch, question: Record, n_starts: int, first: int) -> int:
-    """The nearest feasible configuration, into `scratch.answer`; what it holds.
+    """Fill `scratch.answer` with the nearest feasible configuration; return the part that it holds.
 
     Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
     target than a start that was given, nothing is held. The fallback is the start, which is feasible, or nearly.

@@ -183,7 +183,7 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
 def nearest_of(
     loops: Loops, row: int, objective: Objective, scratch: DescentScratch, closed: Closed, weights: Floats
 ) -> None:
-    """Minimise the objective of a row, as of `nearest_configuration`."""
+    """Minimise the objective of a row; see `nearest_configuration`."""
     best, first = scratch.best, scratch.first
     load_row(loops, row, closed, best)
     closed.iterations[row] = 0

@@ -59,7 +59,7 @@ MACHINE = np.dtype(
 
 
 class JointQuestion(NamedTuple):
-    """What is asked of targets."""
+    """Options of the question, common to all targets."""
 
     asked: Records  # (1,): ASKED
 

@@ -1,1 +1,1 @@
-"""What a controller asks of a machine, one call at a time, with memory that is there before; exported as C."""
+"""Kernels for controllers, one call at a time, in memory that is allocated before; exported as C."""

@@ -343,7 +343,7 @@ def search_for(
     targets: Floats,
     answer: PoseSolutions,
 ) -> float:
-    """Fill the nearest feasible pose by one objective, as of `nearest_of_row`; its distance [L]."""
+    """Fill the nearest feasible pose by one objective; return its distance [L]. See `nearest_of_row`."""
     begin = scratch.begin
     load_own(start.poses[0], tables.legs.task[0]["length"], begin[0])
     return nearest_of_row(

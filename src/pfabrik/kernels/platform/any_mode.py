@@ -70,7 +70,7 @@ def note_choices(table: Table, sides: Floats, choices: Ints) -> int:
 
 @routine
 def count_changes(choice: int) -> int:
-    """How many legs a choice changes: the bits that are set."""
+    """Number of legs that a choice changes: the bits that are set."""
     n = 0
     while choice > 0:
         n += choice & 1

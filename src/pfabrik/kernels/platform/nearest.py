@@ -191,7 +191,7 @@ def search_from(
     stays: int,
     scratch: NearestScratch,
 ) -> bool:
-    """Descend from `search.best` and count the end, as of `keep_ending`; True if no feasible configuration was found.
+    """Descend from `search.best` and count the end by `keep_ending`; True if no feasible configuration was found.
 
     Parameters
     ----------
@@ -336,7 +336,7 @@ def set_status(setting: Record, row: int, solutions: PoseSolutions) -> None:
 def put_limit_multipliers(
     table: Table, row: int, objective: PlatformObjective, starts: Starts, scratch: NearestScratch, weights: Floats
 ) -> None:
-    """Fill the multipliers of all limits where a row starts, as of `nearest_pose`."""
+    """Fill the multipliers of all limits where a row starts; see `nearest_pose`."""
     search, linear = scratch.search, scratch.search.first.linear
     load_start(table, starts, row, search)
     fix_held(objective.pose, True, search)

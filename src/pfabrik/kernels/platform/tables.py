@@ -63,7 +63,7 @@ QUESTION = np.dtype(
 
 
 class Question(NamedTuple):
-    """What is asked of targets."""
+    """Options of the question, common to all targets."""
 
     asked: Records  # (1,): QUESTION
 
