@@ -65,7 +65,7 @@ def add_chain(plan: Plan, c: int, config: Configuration, settings: Settings, spa
 
 
 @routine
-def move_trunk(plan: Plan, trunk: int, config: Configuration, spaces: LeastStep, share: float) -> None:
+def step_trunk(plan: Plan, trunk: int, config: Configuration, spaces: LeastStep, share: float) -> None:
     """Move the joints of a trunk by a share of the step, within their ranges; leave the carriers where they are."""
     programme = spaces.programme[0]
     for j in range(plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]):
@@ -122,7 +122,7 @@ def reach_from_start(
         size = math.sqrt(dot_of(spaces.x, spaces.x, last - first))
         if reaches and size <= CAME_BACK * distance:
             break
-        move_trunk(plan, trunk, config, spaces, min(1.0, LONGEST / max(size, 1e-300)))
+        step_trunk(plan, trunk, config, spaces, min(1.0, LONGEST / max(size, 1e-300)))
         move_carriers(plan, config)
         margin *= SHRINK
     if least_distance < math.inf:
@@ -213,7 +213,7 @@ def pull_back(
 
 
 @routine
-def move_all(plan: Plan, config: Configuration, settings: Settings, spaces: LeastStep, share: float) -> None:
+def step_all(plan: Plan, config: Configuration, settings: Settings, spaces: LeastStep, share: float) -> None:
     """Move the target and all trunks by a share of the step."""
     if settings.free & TURNS:
         turn_pose(config.pose, scale(share * plan.length / settings.lever, vec(spaces.x[3:6])))
@@ -222,7 +222,7 @@ def move_all(plan: Plan, config: Configuration, settings: Settings, spaces: Leas
         for i in range(3):
             config.pose[i, 3] += share * plan.length * spaces.x[i]
     for trunk in range(plan.trunks.shape[0]):
-        move_trunk(plan, trunk, config, spaces, share)
+        step_trunk(plan, trunk, config, spaces, share)
     move_carriers(plan, config)
 
 
@@ -259,7 +259,7 @@ def project_target(
         if dot(step, last_step) < -0.25 * dot(last_step, last_step):
             pull *= WEAKER
         last_step = step
-        move_all(plan, config, settings, spaces, min(1.0, LONGEST_OF_ALL / max(size, 1e-300)))
+        step_all(plan, config, settings, spaces, min(1.0, LONGEST_OF_ALL / max(size, 1e-300)))
         if closing > 0 or size <= SETTLED * distance or rounds >= PULLED:
             closing += 1
     gap, _passes = reach_ends(plan, config, settings)
