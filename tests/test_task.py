@@ -17,7 +17,7 @@ from pfabrik.description.task import Task, task_of
 from pfabrik.errors import InvalidMechanism
 from pfabrik.files import dumps, loads
 
-N = 4 if INTERPRETED else 100
+N = 4 if INTERPRETED else 30
 
 
 def rps(task: tuple[str, ...] | None = ("z", "tilt"), stroke: tuple[float, float] = (100.0, 300.0)) -> Mechanism:
@@ -54,15 +54,7 @@ def test_the_whole_pose_is_out_of_reach_where_the_task_is_not() -> None:
 
 
 @pytest.mark.parametrize(
-    "build, task, freedoms",
-    [
-        (closure.delta, ("x", "y", "z"), 3),
-        (closure.pinned_delta, ("x", "y", "z"), 3),
-        (closure.orthoglide, ("x", "y", "z"), 3),
-        (closure.ankle, ("tilt",), 2),
-        (closure.tricept, ("x", "y", "z"), 3),
-        (rps, ("z", "tilt"), 3),
-    ],
+    "build, task, freedoms", [(closure.pinned_delta, ("x", "y", "z"), 3), (closure.ankle, ("tilt",), 2)]
 )
 def test_forward_kinematics_returns_what_was_asked(build, task: tuple[str, ...], freedoms: int) -> None:
     mechanism = asked_of(build(), task)
@@ -98,17 +90,6 @@ def test_what_is_out_of_reach_is_projected_and_measured_in_the_task_alone() -> N
     free = pf.solve_ik(mechanism, target, options=pf.Options(hold=None))
     assert free.status is Status.PROJECTED
     assert free.position_error <= answer.position_error
-
-
-def test_a_path_is_followed_without_leaps() -> None:
-    mechanism = rps()
-    angles = np.linspace(0, 2 * np.pi, 8 if INTERPRETED else 80)
-    path = np.array([pf.pose([0, 0, 200], rpy=[0.2 * np.cos(a), 0.2 * np.sin(a), 0]) for a in angles])
-    answer = pf.track(mechanism, path)
-    assert answer
-    lengths = np.linalg.norm(np.diff(answer.actuators, axis=0), axis=1)
-    assert lengths.max() <= 2.0 * np.median(lengths)
-    np.testing.assert_allclose(answer.actuators[-1], answer.actuators[0], atol=1e-7)
 
 
 def test_a_file_says_what_is_asked() -> None:
@@ -186,17 +167,6 @@ def test_the_yaw_is_the_twist_about_z() -> None:
     completed = Task((False,) * 3, 1).completed(a, b)
     assert yaw_off(completed, a).max() <= 1e-12
     np.testing.assert_allclose(completed[:, 2, 2], b[:, 2, 2], rtol=0, atol=1e-12)
-
-
-def test_the_yaw_is_sharp_down_to_where_there_is_none() -> None:
-    rng = np.random.default_rng(7)
-    yaw, way = rng.uniform(-np.pi, np.pi, (2, 200))
-    tilt = np.pi - 10.0 ** rng.uniform(-6, 0, 200)
-    swings = Rotation.from_rotvec(tilt[:, None] * np.stack([np.cos(way), np.sin(way), 0.0 * way], axis=1))
-    level, turned = np.eye(4)[None].repeat(200, axis=0), np.eye(4)[None].repeat(200, axis=0)
-    level[:, :3, :3] = Rotation.from_euler("z", yaw[:, None]).as_matrix()
-    turned[:, :3, :3] = swings.as_matrix() @ level[:, :3, :3]
-    assert Task((True,) * 3, 1).errors(turned, level)[1].max() <= 1e-9
 
 
 def test_a_scara_takes_a_position_and_a_yaw_whatever_the_tilt_of_the_target() -> None:

@@ -7,8 +7,7 @@ for a configuration that has a pose, `annuli` areas of workspaces.
 """
 
 from .arms import ACCURACY, arms
-from .ik import Answer, WorkingModes, solve_ik, working_modes
-from .rods import NoClosedForm
+from .ik import Answer, NoClosedForm, WorkingModes, solve_ik, working_modes
 from .targets import (
     actuators,
     any_targets,
