@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,68 +12,29 @@ from checks import INTERPRETED, assert_feasible, assert_honest, home_values
 from machines import closure, machine, ring
 from machines.closure import X, Z, chain, joint
 from oracles import any_targets, any_values
-from pfabrik import Mechanism, Solution, Status
+from pfabrik import Mechanism, Status
 
 compiled = pytest.mark.skipif(INTERPRETED, reason="many searches: minutes without the compiler")
 pytestmark = pytest.mark.filterwarnings("error", "ignore::pfabrik.errors.MobilityWarning")
 
 
-def turned_by(mechanism: Mechanism, first: Solution, second: Solution) -> float:
-    """Largest change of any joint between two single answers [L or rad], whole turns aside."""
-    changes = [0.0]
-    for each in mechanism.joints:
-        if each.type == "fixed":
-            continue
-        here, there = np.atleast_1d(first.joints[each.name]), np.atleast_1d(second.joints[each.name])
-        if each.type == "spherical":
-            changes.append((Rotation.from_rotvec(here) * Rotation.from_rotvec(there).inv()).magnitude())
-            continue
-        off = np.abs(here - there)
-        slides = {"prismatic": [True], "cylindrical": [False, True]}.get(each.type, [False] * len(off))
-        turn = np.abs(2.0 * np.sin(0.5 * off))
-        changes.append(np.where(slides, off / mechanism.characteristic_length, turn).max())
-    return float(max(changes))
+def turned(q: np.ndarray, other: np.ndarray) -> float:
+    """Largest change of any angle [rad], whole turns aside."""
+    return float(np.abs(2.0 * np.sin(0.5 * (q - other))).max())
 
 
 # --- paths -----------------------------------------------------------------------------------------------------------
 
 
-def round_trip(mechanism: Mechanism, shift: float, turn: float, steps: int = 60) -> np.ndarray:
-    """Poses out from home and back, (2 steps, 4, 4): by a distance [L] and by an angle [rad]."""
-    direction = np.array([2.0, -1.0, 1.5]) / np.linalg.norm([2.0, -1.0, 1.5])
-    way = np.r_[np.linspace(0, 1, steps), np.linspace(1, 0, steps)][:, None] * direction
-    path = np.tile(mechanism.home_pose, (2 * steps, 1, 1))
-    path[:, :3, 3] += shift * mechanism.characteristic_length * way
-    path[:, :3, :3] = Rotation.from_rotvec(turn * way).as_matrix()
-    return path
-
-
-SMOOTH = ("tricept", "delta_uu", "pinned_delta", "orthoglide", "puu", "exechon", "cru", "ankle", "limited_tip")
-
-
 @compiled
-@pytest.mark.parametrize("name", SMOOTH)
-def test_a_path_out_of_reach_and_back_is_followed_without_leaps_and_ends_as_it_began(name: str) -> None:
-    mechanism = machine(f"closure.{name}")
-    path = round_trip(mechanism, shift=1.2, turn=0.3)
+def test_an_orientation_out_of_reach_does_not_pull_a_path_into_another_branch() -> None:
+    """Nothing turns this platform: far turns asked for drew the search through open loops to other branches."""
+    mechanism = machine("closure.delta_uu")
+    turns = np.linspace(0, 2.9, 40)[:, None] * np.array([2.0, -1.0, 1.5]) / np.linalg.norm([2.0, -1.0, 1.5])
+    path = pf.pose(mechanism.home_pose[:3, 3] + 0.0 * turns, rotvec=turns)
     answer = pf.track(mechanism, path)
     assert_honest(mechanism, path, answer)
-    assert (answer.status == Status.PROJECTED).any()
-    leaps = [turned_by(mechanism, *pair) for pair in pairwise(answer)]
-    assert max(leaps) <= 0.2
-    assert turned_by(mechanism, answer[0], answer[-1]) <= 1e-6
-
-
-@compiled
-@pytest.mark.parametrize("name", ["delta_uu", "pinned_delta", "puu"])
-def test_an_orientation_out_of_reach_does_not_pull_a_path_into_another_branch(name: str) -> None:
-    """Nothing turns these platforms: far turns asked for drew the search through open loops to other branches."""
-    mechanism = machine(f"closure.{name}")
-    path = round_trip(mechanism, shift=0.0, turn=2.9)
-    answer = pf.track(mechanism, path)
-    assert_honest(mechanism, path, answer)
-    leaps = [turned_by(mechanism, *pair) for pair in pairwise(answer)]
-    assert max(leaps) <= 0.3
+    assert turned(answer.q[1:], answer.q[:-1]) <= 0.3
 
 
 @compiled
@@ -112,7 +71,7 @@ def test_a_start_far_away_keeps_its_working_mode_as_a_path_does(count: int) -> N
         answer = pf.solve_ik(mechanism, path[-1], start=there[row])
         if answer:  # fewer steps than the path has may end at a limit
             followed += 1
-            assert turned_by(mechanism, answer, tracked[-1]) <= 1e-6
+            assert turned(answer.q, tracked.q[-1]) <= 1e-6
     assert followed >= count // 6
 
 
@@ -169,18 +128,7 @@ def test_a_platform_welded_to_the_base_stays_there() -> None:
 
 
 @compiled
-@pytest.mark.parametrize("distance", [1e7, 1e9, 1e12, 1e100, 1e200, 1e300])
-def test_a_target_however_far_is_approached_like_one_that_is_far(distance: float) -> None:
-    mechanism = machine("closure.delta_uu")
-    near, far = (pf.solve_ik(mechanism, mechanism.home_pose[:3, 3] + [away, 0, 0]) for away in (1e5, distance))
-    assert far.status == Status.PROJECTED
-    assert far.position_error == pytest.approx(distance, rel=1e-4)
-    np.testing.assert_allclose(far.pose, near.pose, atol=0.5)  # of 240 from the base
-    assert_feasible(mechanism, far)
-
-
-@compiled
-@pytest.mark.parametrize("distance", [1e1, 1e2, 1e3, 1e4])
+@pytest.mark.parametrize("distance", [1e1, 1e4])
 def test_slides_without_ranges_reach_however_far(distance: float) -> None:
     mechanism = Mechanism.from_legs(
         "U-P*-U",

@@ -57,7 +57,7 @@ def test_reached_exactly_where_the_closed_form_says_cold_and_warm(name: str, cou
     machine, rng = pf.load(name), np.random.default_rng(count)
     targets = some_targets(machine, count, seed=5)
     margin = oracles.margin(machine, targets)
-    assert 0.1 < (margin >= 0.0).mean() < 0.95 or INTERPRETED
+    assert 0.1 < (margin >= 0.0).mean() < 1.0 or INTERPRETED
     cold = pf.solve_ik(machine, targets)
     assert_as_in_closed_form(cold, margin)
     warm = pf.solve_ik(machine, targets, start=cold[rng.permutation(count)], options=Options(working_mode="any"))
@@ -80,7 +80,7 @@ def test_home_is_the_first_of_the_working_modes_in_closed_form(name: str) -> Non
 def test_status_is_right_on_both_sides_of_the_boundary(name: str) -> None:
     """Targets a millionth of L inside and outside the edge, by the closed form."""
     machine, rng = pf.load(name), np.random.default_rng(3)
-    count = 5 if name == "nrpm" else 20  # whose margins are searched for
+    count = 2 if name == "nrpm" else 20  # whose margins are searched for
     outward = rng.normal(size=(count, 3)) * ([0, 1, 1] if name == "five_bar" else 1)
     outward /= np.linalg.norm(outward, axis=1)[:, None]
     home, length = np.array(machine.reference_point), machine.characteristic_length
@@ -230,7 +230,7 @@ def test_batches_asked_again_do_not_keep_all_answers_before_them() -> None:
     first = answer = pf.solve_ik(machine, targets, options=Options(hold=None))
     assert 0 < np.count_nonzero(first.status == Status.PROJECTED) < len(targets)
     kept = weakref.ref(first._configurations)
-    for _ in range(10):
+    for _ in range(40):
         answer = pf.solve_ik(machine, targets, start=answer, options=Options(hold=None))
     q = first.q.copy()
     del first

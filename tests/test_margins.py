@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -42,17 +40,6 @@ def test_margins_of_a_hexapod_are_shares_of_half_its_stroke_and_of_its_cones() -
             assert found[joint.name, "cone"] == pytest.approx(1.0 - angle / joint.cone.half_angle, abs=1e-7)
 
 
-def test_margins_are_0_on_the_limits_that_hold_an_answer_back() -> None:
-    for name in ("five_bar", "stewart", "nrpm"):
-        machine = pf.load(name)
-        answer = pf.solve_ik(machine, np.add(machine.reference_point, (0.0, 10.0, 300.0)))
-        assert answer.active_limits
-        found = pf.margins(answer)
-        for limit in answer.active_limits:
-            assert abs(found[limit.joint, limit.bound]) <= 1e-6
-        assert min(found.values()) >= -1e-8
-
-
 def test_margins_are_negative_beyond_a_limit() -> None:
     machine = pf.load("five_bar")
     (exceeded, *_) = [mode for mode in pf.working_modes(machine, (0, 10, 180)) if mode.status == Status.EXCEEDED]
@@ -71,17 +58,12 @@ def slide(low: float, high: float, home: float = 0.0) -> Mechanism:
     return Mechanism("slide", joints, "tip")
 
 
-def test_margins_count_from_where_the_joint_does() -> None:
-    machine = slide(4.0, 12.0, home=6.0)
-    home = pf.solve_ik(machine, machine.reference_point)
-    found = pf.margins(home)
-    assert (found["X", "min"], found["X", "max"]) == (pytest.approx(0.5), pytest.approx(1.5))
-
-
-def test_a_range_without_room_has_a_margin_on_it_and_none_off_it() -> None:
-    machine = slide(6.0, 6.0, home=6.0)
+@pytest.mark.parametrize(("low", "high", "margins"), [(4.0, 12.0, (0.5, 1.5)), (6.0, 6.0, (0.0, 0.0))])
+def test_margins_count_from_where_the_joint_does(low: float, high: float, margins: tuple[float, float]) -> None:
+    """On a range without room they are 0."""
+    machine = slide(low, high, home=6.0)
     found = pf.margins(pf.solve_ik(machine, machine.reference_point))
-    assert (found["X", "min"], found["X", "max"]) == (0.0, 0.0)
+    assert (found["X", "min"], found["X", "max"]) == pytest.approx(margins)
 
 
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -108,13 +90,6 @@ def test_margins_have_the_shape_of_the_answers() -> None:
     assert all(isinstance(margin, float) for margin in pf.margins(answers[0, 0]).values())
 
 
-def test_margins_cannot_be_written_to() -> None:
-    machine = pf.load("five_bar")
-    found = pf.margins(pf.solve_ik(machine, machine.reference_point))
-    with pytest.raises(TypeError):
-        found["p1", "min"] = 0.0  # type: ignore[index]
-
-
 def test_margins_are_of_a_solution_and_of_its_own_mechanism() -> None:
     """To measure against other limits: the same joint vector as a configuration of a machine that has them."""
     machine = pf.load("five_bar")
@@ -126,13 +101,3 @@ def test_margins_are_of_a_solution_and_of_its_own_mechanism() -> None:
     wider = machine.with_limits(p1=(off - 0.3 - 1.5, off + 1.5))
     found = pf.margins(pf.configuration(wider, home.q))
     assert (found["p1", "min"], found["p1", "max"]) == (pytest.approx(1.5 / 1.65), pytest.approx(1.8 / 1.65))
-
-
-def test_a_limit_at_home_has_no_margin() -> None:
-    machine = pf.load("stewart")
-    joint = machine.joint("AL1")
-    line = np.subtract(machine.joint("CL1").at, joint.at)
-    angle = np.arccos(line[2] / np.linalg.norm(line))
-    tight = machine.with_limits(AL1=replace(joint.cone, half_angle=angle + 1e-12))
-    home = pf.solve_ik(tight, tight.home_pose)
-    assert pf.margins(home)["AL1", "cone"] == pytest.approx(0.0, abs=1e-8)

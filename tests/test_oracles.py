@@ -9,16 +9,8 @@ from scipy.spatial.transform import Rotation
 import oracles
 import pfabrik as pf
 from machines.published import PUBLISHED
-from oracles.arms import redundant_margin
+from oracles import Array
 from pfabrik import Mechanism
-
-NAMES = ("five_bar", "stewart", "nrpm")
-
-
-def sample(name: str, n: int) -> tuple[Mechanism, oracles.Array]:
-    mechanism = pf.load(name)
-    return mechanism, oracles.random_targets(mechanism, np.random.default_rng(20), n)
-
 
 # --- legs in closed form ---------------------------------------------------------------------------------------------
 
@@ -62,9 +54,7 @@ def test_leg_lengths_agree_with_a_published_hexapod(p: list[float], rpy: list[fl
 # --- the redundant mechanism against brute force ---------------------------------------------------------------------
 
 
-def arm_slack(
-    mechanism: Mechanism, leg: str, targets: oracles.Array, phi: oracles.Array, d: oracles.Array
-) -> oracles.Array:
+def arm_slack(mechanism: Mechanism, leg: str, targets: Array, phi: Array, d: Array) -> Array:
     """Smallest slack of an NRPM arm, ``(n, *phi.shape)``, from the positions of its joints step by step."""
     hinge, slide = mechanism.joint("A" + leg), mechanism.joint("B" + leg)
     pivot = np.array(hinge.at)
@@ -86,55 +76,38 @@ def arm_slack(
     return np.min(np.broadcast_arrays(*slacks), axis=0)
 
 
-def arm_grid(mechanism: Mechanism, leg: str, n: int) -> tuple[oracles.Array, oracles.Array]:
+def arm_grid(mechanism: Mechanism, leg: str, n: int) -> tuple[Array, Array]:
     """Angles and extensions, ``(n, n)`` each, over the arm's ranges."""
     ranges = (mechanism.joint("A" + leg).range, mechanism.joint("B" + leg).range)
     phi, d = np.meshgrid(*(np.linspace(*limits, n) for limits in ranges), indexing="ij")
     return phi, d
 
 
-def share_of_range(value: oracles.Array, limits: tuple[float, float]) -> oracles.Array:
+def share_of_range(value: Array, limits: tuple[float, float]) -> Array:
     return np.minimum(value - limits[0], limits[1] - value) / (limits[1] - limits[0])
 
 
-def angle(first: oracles.Array, second: oracles.Array) -> oracles.Array:
+def angle(first: Array, second: Array) -> Array:
     return np.arctan2(np.linalg.norm(np.cross(first, second), axis=-1), (first * second).sum(axis=-1))
 
 
 def test_nrpm_margin_is_never_below_what_brute_force_finds() -> None:
-    mechanism, targets = sample("nrpm", 300)
+    mechanism = pf.load("nrpm")
+    targets = oracles.random_targets(mechanism, np.random.default_rng(20), 100)
     grids = [arm_slack(mechanism, leg, targets, *arm_grid(mechanism, leg, 41)).max(axis=(1, 2)) for leg in "123"]
     found, margins = np.min(grids, axis=0), oracles.margin(mechanism, targets)
     assert (margins >= found - oracles.ACCURACY).all()
     near = np.abs(margins) < 0.3
-    assert near.sum() > 100
+    assert near.sum() > 30
     assert (margins - found)[near].max() < 0.1
-
-
-def test_nrpm_margin_does_not_depend_on_how_finely_it_is_searched() -> None:
-    mechanism, targets = sample("nrpm", 100)
-    finer = redundant_margin(mechanism, targets, cells=240, peaks=6, steps=55)
-    assert oracles.margin(mechanism, targets) == pytest.approx(finer, abs=oracles.ACCURACY)
 
 
 def test_nrpm_actuators_attain_the_margin() -> None:
     mechanism = pf.load("nrpm")
-    targets = oracles.inside_targets(mechanism, np.random.default_rng(5), 30)
+    targets = oracles.inside_targets(mechanism, np.random.default_rng(5), 10)
     values = dict(zip(mechanism.actuator_names, oracles.actuators(mechanism, targets).T, strict=True))
     attained = [
         [arm_slack(mechanism, leg, targets[k : k + 1], values["A" + leg][k], values["B" + leg][k])[0] for leg in "123"]
         for k in range(len(targets))
     ]
     assert np.min(attained, axis=1) == pytest.approx(oracles.margin(mechanism, targets), abs=1e-7)
-
-
-# --- targets ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_random_targets_are_on_both_sides_of_the_boundary(name: str) -> None:
-    mechanism, targets = sample(name, 400)
-    margins = oracles.margin(mechanism, targets)
-    assert np.isfinite(margins).all()
-    assert 0.2 < (margins > 0).mean() < 0.8
-    assert np.abs(targets[:, :3, 3]).max() > 1000.0

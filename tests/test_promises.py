@@ -13,12 +13,9 @@ import pytest
 
 import machines
 import pfabrik as pf
-from checks import excess_of_joints, gap_of_joints
+from checks import assert_feasible
 from machines import closure
 from pfabrik import Cone, Joint, Mechanism, Options, Status
-from pfabrik.kernels.legs.records import CARRIAGE
-from pfabrik.model import model_of
-from pfabrik.platform.carriages import carriages_along
 
 Z = (0.0, 0.0, 1.0)
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -39,7 +36,7 @@ def arm_on_a_rail(travel: float | None = None) -> Mechanism:
     return Mechanism("arm on a rail", joints, "tip")
 
 
-@pytest.mark.parametrize("angle", np.linspace(0, 2 * np.pi, 7))
+@pytest.mark.parametrize("angle", [0.5, 2.0, 4.5])
 def test_a_path_that_leaves_the_workspace_and_returns_ends_as_it_began(angle: float) -> None:
     """The arms stretch out at the boundary, where their two bends meet; they come back in their own."""
     machine = five_bar()
@@ -115,17 +112,6 @@ def test_a_revolute_along_an_axis_of_its_universal_neighbour_makes_no_ball_joint
         assert (pf.decompose(Mechanism("leg", joints, "platform", (0, 0, 100)))[0].reason is None) == is_positions
 
 
-@pytest.mark.parametrize("distance", [1e8, 1e12, 1e150, 1.7e308])
-def test_targets_at_any_distance_are_told_from_where_the_machine_goes(distance: float) -> None:
-    """Struts without limits follow far, but not to where numbers end; the error is measured against the target."""
-    machine = pf.load("stewart").without_limits()
-    for target in ([distance, distance, 180], [[distance, distance, 180]] * 2):
-        answer = pf.solve_ik(machine, target)
-        assert np.isfinite(answer.position_error).all()
-        gone = np.abs(np.subtract(answer.pose[..., 0, 3], distance)) / distance
-        assert (np.equal(answer.status, Status.REACHED) == (gone < 1e-12)).all()
-
-
 def test_a_range_of_more_than_a_turn_counts_from_home() -> None:
     joints = [
         Joint("j1", "revolute", ("base", "l1"), at=(0, 0, 0), axis=Z, actuated=True, range=(0, 10)),
@@ -171,19 +157,16 @@ def wrist(legs: int, lean: float, offset: float, half: float, elbow: float | Non
 
 @pytest.mark.parametrize("machine", [wrist(4, 1.047, 0.42, 1.22, 1.745), wrist(3, 1.309, 0.4125, 1.047, None)])
 def test_hinges_that_cannot_point_their_rod_anywhere_are_not_told_to(machine: Mechanism) -> None:
-    """Out of reach, on a path and by actuator values alike; from a feasible start there is always an answer."""
+    """Out of reach and by actuator values alike; from a feasible start there is always an answer."""
     rng = np.random.default_rng(0)
-    axes = rng.normal(size=(60, 3)) * (1.0, 1.0, 0.1)
-    tilts = rng.uniform(0.0, 3.1, (60, 1)) * axes / np.linalg.norm(axes, axis=1)[:, None]
-    targets = np.stack([pf.pose((0, 0, 1), rotvec=tilt) for tilt in tilts])
+    axes = rng.normal(size=(40, 3)) * (1.0, 1.0, 0.1)
+    tilts = rng.uniform(0.0, 3.1, (40, 1)) * axes / np.linalg.norm(axes, axis=1)[:, None]
+    targets = pf.pose((0, 0, 1) + np.zeros((40, 3)), rotvec=tilts)
     home = pf.solve_ik(machine, machine.home_pose)
     for answer in (pf.solve_ik(machine, targets), pf.solve_ik(machine, targets, start=home)):
-        assert (answer.status <= Status.PROJECTED).all() and (answer.status == Status.PROJECTED).any()
-        assert gap_of_joints(machine, answer).max() <= 1e-9
-        assert excess_of_joints(machine, answer).max() <= 1e-9
-    found = pf.solve_fk(machine, rng.uniform(-1.0, 1.0, (60, 2)))
-    assert gap_of_joints(machine, found).max() <= 1e-9
-    assert excess_of_joints(machine, found).max() <= 1e-9
+        assert (answer.status == Status.PROJECTED).any()
+        assert_feasible(machine, answer)
+    assert_feasible(machine, pf.solve_fk(machine, rng.uniform(-1.0, 1.0, (40, 2))))
 
 
 def wide_five_bar() -> Mechanism:
@@ -196,7 +179,7 @@ def wide_five_bar() -> Mechanism:
 def test_more_freedom_leads_no_farther_from_the_target() -> None:
     """Answers that may be in any working mode are no farther than those that may not, nor than what others reach."""
     machine, rng = wide_five_bar(), np.random.default_rng(3)
-    targets = machine.home_pose[:3, 3] + rng.uniform(-500, 500, (300, 3)) * (1, 1, 0)
+    targets = machine.home_pose[:3, 3] + rng.uniform(-500, 500, (150, 3)) * (1, 1, 0)
     answer = pf.solve_ik(machine, targets)
     kept = pf.solve_ik(machine, targets, options=Options(working_mode="keep"))
     assert (answer.position_error <= kept.position_error + 1e-6 * machine.characteristic_length).all()
@@ -216,16 +199,8 @@ def test_a_position_that_another_way_of_assembly_has_is_reached() -> None:
     """A tool on a forearm of a 5-bar: where it points is left open, and has two solutions at each elbow."""
     machine = closure.five_bar_with_tool()
     rng = np.random.default_rng(0)
-    found = pf.solve_fk(machine, rng.uniform((-np.pi, -1.4), (np.pi, 1.1), (600, 2)))
+    found = pf.solve_fk(machine, rng.uniform((-np.pi, -1.4), (np.pi, 1.1), (300, 2)))
     assert pf.solve_ik(machine, found.pose[found.status == Status.REACHED])
-
-
-def test_answers_survive_pickling_and_copying_after_they_were_read() -> None:
-    answer = pf.solve_ik(pf.load("stewart"), [[0, 0, 200], [0, 0, 900]])
-    points, limits = dict(answer.points), answer.active_limits
-    for twin in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
-        assert twin.active_limits == limits
-        np.testing.assert_equal(dict(twin.points), points)
 
 
 def test_every_mapping_of_an_answer_and_legs_survive_pickling_and_copying() -> None:
@@ -252,15 +227,3 @@ def test_a_forked_child_solves_batches_too() -> None:
     child.start()
     child.join(60)
     assert child.exitcode == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "along"), [("hexaglide", [0, 1, 0]), ("prs", [0, 0, 1]), ("orthoglide", [0, 0, 0]), ("delta", [0, 0, 0])]
-)
-def test_parallel_rails_alone_take_a_whole_machine_along(name: str, along: list[float]) -> None:
-    table = model_of(pf.load(name)).legs
-    found = carriages_along(table)
-    np.testing.assert_allclose(found.part, np.outer(along, along), atol=1e-9)
-    rails = table.legs["proximal"] == CARRIAGE
-    expected = rails[:, None] * (table.legs["proximal_axis"] @ found.part)
-    np.testing.assert_allclose(found.rates, expected, atol=1e-9)

@@ -75,13 +75,9 @@ def test_what_of_a_tilt_is_off_the_only_freedom_does_not_count(
     assert (pf.feasibility(machine, targets).margin >= 0.0).all()
     assert solver.ik(np.ascontiguousarray(targets[5])) == pf.Status.REACHED
     assert solver.actuators == pytest.approx(known.actuators[5], abs=1e-6)
-    leant = [reach for reach in pf.travel(start).reaches if reach.kind == "about"]
-    level = [
-        reach
-        for reach in pf.travel(pf.solve_ik(build(np.eye(3)), build(np.eye(3)).home_pose)).reaches
-        if reach.kind == "about"
-    ]
-    assert sorted(each.distance for each in leant) == pytest.approx(sorted(each.distance for each in level), rel=1e-3)
+    level = pf.solve_ik(build(np.eye(3)), build(np.eye(3)).home_pose)
+    leant, about = (sorted(r.distance for r in pf.travel(each) if r.kind == "about") for each in (start, level))
+    assert leant == pytest.approx(about, rel=1e-3)
 
 
 class Pose(ctypes.Structure):
@@ -107,7 +103,7 @@ def test_exported_c_measures_a_tilt_along_the_only_freedom(tmp_path: Path) -> No
         assert np.array(actuators) == pytest.approx(known.actuators, abs=1e-9)
 
 
-@pytest.mark.parametrize("turn", [np.eye(3), *TURNS], ids=["base", "upright", "leaning", "further"])
+@pytest.mark.parametrize("turn", [np.eye(3), TURNS[2]], ids=["base", "leaning"])
 @pytest.mark.parametrize("digits", [6, 7])
 def test_a_model_of_a_few_digits_answers_typed_angles_as_the_exact_one(turn: np.ndarray, digits: int) -> None:
     linkage = Linkage(hinges(turn), ["hip", "knee", "ankle"], "foot", 3)

@@ -49,21 +49,21 @@ def around(mechanism: Mechanism, n: int, seed: int) -> np.ndarray:
 def test_poses_near_a_constraint_singularity_are_reached_with_an_orientation_held_or_not() -> None:
     """They are poses of configurations whose loops are closed; all but a few of a hundred are found."""
     mechanism = h4_on_rails()
-    count = 3 if INTERPRETED else 200
+    count = 3 if INTERPRETED else 100
     found = pf.solve_ik(mechanism, around(mechanism, count, 5), options=Options(hold=None))
     own = pf.configuration(mechanism, found.q)
     assert (own.status == Status.REACHED).all()
     assert max(gap_of_joints(mechanism, own)) <= 1e-6
     for hold in ("orientation", None):
         again = pf.solve_ik(mechanism, own.pose, options=Options(hold=hold))
-        assert (again.status != Status.REACHED).sum() <= 0.015 * count
+        assert (again.status != Status.REACHED).sum() <= 0.02 * count
 
 
 def test_an_answer_that_holds_something_is_not_dragged_away_from_its_start() -> None:
     """With an orientation held it is farther than the start by no more than L for each radian by which that is turned;
     with nothing held not at all, in the distance that is least then."""
     mechanism = h4_on_rails()
-    count = 2 if INTERPRETED else 150
+    count = 2 if INTERPRETED else 60
     length, turning = mechanism.characteristic_length, mechanism.rotation_length
     starts = pf.solve_ik(mechanism, around(mechanism, count, 5), options=Options(hold=None))
     targets = around(mechanism, count, 6)
@@ -91,7 +91,7 @@ def eight_struts() -> Mechanism:
 def test_lengths_that_agree_are_reached_from_a_start_too() -> None:
     """The lengths are those of a pose, by Pythagoras; where the way from the start strays, other starts follow."""
     mechanism, rng = eight_struts(), np.random.default_rng(1)
-    count = 10 if INTERPRETED else 1000
+    count = 10 if INTERPRETED else 200
     length, feet, heads = mechanism.characteristic_length, [], []
     for name in mechanism.actuator_names:
         along = mechanism.joint(name).along

@@ -320,7 +320,7 @@ def working_modes(mechanism: Mechanism, target: Any) -> WorkingModes:
     modes = sorted(product(*branches), key=lambda mode: sum(branch[0] for branch in mode))
     order = [mechanism.actuator_names.index(leg.actuated.name) for leg in plan.legs]
     actuators = np.zeros((len(modes), len(order)))
-    actuators[:, order] = np.array([[value for _, value, _ in mode] for mode in modes]).reshape(len(modes), -1)
+    actuators[:, order] = np.array([[value for _, value, _ in mode] for mode in modes]).reshape(len(modes), len(order))
     return WorkingModes(actuators, np.array([min(margin for *_, margin in mode) for mode in modes]))
 
 
