@@ -183,10 +183,10 @@ VARIANTS = {
 def test_arms_of_any_dimensions_reach_what_a_search_of_their_own_says_they_can(name: str) -> None:
     """From home and from far away; the search knows crossbars that do not turn, and these lead to a part of it all."""
     mechanism, known = arms(**VARIANTS[name]), arms(**VARIANTS[name] | {"elbows": False})
-    wanted = targets(mechanism, 80, 0.35, 0.35)
+    wanted = targets(mechanism, 40, 0.35, 0.35)
     margin = redundant_margin(known, wanted)
     reachable = wanted[margin > 1e-3]
-    assert len(reachable) >= 20 and pf.solve_ik(known, wanted[margin < -1e-3]).status.min(initial=1) != 0
+    assert len(reachable) >= 8 and pf.solve_ik(known, wanted[margin < -1e-3]).status.min(initial=1) != 0
     for start in (None, pf.solve_ik(mechanism, reachable[::-1].copy())):
         answers = pf.solve_ik(mechanism, reachable, start=start, options=Options(working_mode="any"))
         np.testing.assert_array_equal(answers.status, Status.REACHED)
@@ -239,7 +239,7 @@ LOOSE = (
 @pytest.mark.parametrize(("name", "task", "about"), LOOSE, ids=[f"{name}, {task}" for name, task, _ in LOOSE])
 def test_what_neither_task_nor_legs_tell_stays_where_it_was(name: str, task: str, about: tuple[int, ...]) -> None:
     mechanism = dataclasses.replace(machine(name), task=tuple(task.split()))
-    wanted = targets(mechanism, 30, 0.1, 0.2, about)
+    wanted = targets(mechanism, 10, 0.1, 0.2, about)
     answers = pf.solve_ik(mechanism, wanted)
     rows = ClosureEngine(model_of(mechanism)).answer(wanted, None, Options(), keep_mode=False).rows
     np.testing.assert_array_equal(answers.status, rows.status)
@@ -248,7 +248,7 @@ def test_what_neither_task_nor_legs_tell_stays_where_it_was(name: str, task: str
     np.testing.assert_allclose(again.pose, answers[0].pose, atol=1e-9 * mechanism.characteristic_length)
 
 
-@pytest.mark.parametrize("name", ["H4", "R + 3-RPS + RR", "3-CRU"])
+@pytest.mark.parametrize("name", ["SCARA", "R + 3-RPS + RR", "3-CRU"])
 def test_a_start_may_be_a_joint_vector(name: str) -> None:
     mechanism = machine(f"closure.{name}")
     target = pf.pose(0.03 * mechanism.characteristic_length * np.ones(3)) @ mechanism.home_pose
