@@ -262,11 +262,11 @@ def test_no_small_motion_leads_nearer_to_a_yaw_out_of_reach(hold: str | None) ->
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 def test_an_h4_takes_positions_and_yaws_from_its_singular_home() -> None:
     mechanism = closure.h4()
-    assembled = pf.solve_fk(mechanism, np.random.default_rng(6).uniform(-0.5, 0.5, (N, 4)))
+    assembled = pf.solve_fk(mechanism, np.random.default_rng(6).uniform(-0.5, 0.5, (12, 4)))
     level = assembled.pose[:, 2, 2] > 1.0 - 1e-9  # else it has folded, or tilts as its singular home lets it
     same = np.abs(assembled.joints["Q1"] - assembled.joints["Q2"]) < 1e-6
     poses = assembled.pose[(assembled.status == Status.REACHED) & level & same]
-    assert len(poses) >= N // 3
+    assert len(poses) >= 4
     assert np.ptp(twist_about_z(poses[:, :3, :3])) > (0.5 if not INTERPRETED else 0.0)
     answer = pf.solve_ik(mechanism, poses)
     assert answer

@@ -49,7 +49,7 @@ def around(mechanism: Mechanism, n: int, seed: int) -> np.ndarray:
 def test_poses_near_a_constraint_singularity_are_reached_with_an_orientation_held_or_not() -> None:
     """They are poses of configurations whose loops are closed; all but a few of a hundred are found."""
     mechanism = h4_on_rails()
-    count = 3 if INTERPRETED else 100
+    count = 3 if INTERPRETED else 50
     found = pf.solve_ik(mechanism, around(mechanism, count, 5), options=Options(hold=None))
     own = pf.configuration(mechanism, found.q)
     assert (own.status == Status.REACHED).all()
@@ -63,7 +63,7 @@ def test_an_answer_that_holds_something_is_not_dragged_away_from_its_start() -> 
     """With an orientation held it is farther than the start by no more than L for each radian by which that is turned;
     with nothing held not at all, in the distance that is least then."""
     mechanism = h4_on_rails()
-    count = 2 if INTERPRETED else 60
+    count = 2 if INTERPRETED else 30
     length, turning = mechanism.characteristic_length, mechanism.rotation_length
     starts = pf.solve_ik(mechanism, around(mechanism, count, 5), options=Options(hold=None))
     targets = around(mechanism, count, 6)
