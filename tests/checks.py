@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from pfabrik import Joint, Mechanism, Solution, Status
 from pfabrik.description.home_mobility import universal_axes
-from pfabrik.description.task import task_of
 from pfabrik.kernels._shipped import IS_INTERPRETED
 
 Array = NDArray[np.float64]
@@ -49,11 +48,28 @@ def assert_feasible(mechanism: Mechanism, answer: Solution) -> None:
     assert np.max(excess_of_joints(mechanism, answer)) <= 1.0001e-9
 
 
-def task_errors(mechanism: Mechanism, poses: np.ndarray, targets: np.ndarray) -> np.ndarray:
+def task_offsets(mechanism: Mechanism, poses: Array, targets: Array) -> tuple[Array, Array]:
+    """Offsets [L] and turns [rad] of poses (n, 4, 4) from targets in what the task sets, (n, k) each."""
+    axes = ["xyz".index(name) for name in mechanism.task if name in "xyz"]
+    offset, turn = (poses - targets)[:, :3, 3][:, axes] / mechanism.characteristic_length, np.zeros((len(poses), 1))
+    here, there = poses[:, :3, :3], np.broadcast_to(targets, poses.shape)[:, :3, :3]
+    if "rotation" in mechanism.task and not mechanism.end_effector_is_joint:
+        turn = Rotation.from_matrix(here @ np.swapaxes(there, 1, 2)).as_rotvec()
+    elif "tilt" in mechanism.task:
+        across = np.cross(here[:, :, 2], there[:, :, 2])
+        sine, cosine = np.linalg.norm(across, axis=1), (here[:, :, 2] * there[:, :, 2]).sum(axis=1)
+        turn = across * (np.arctan2(sine, cosine) / np.maximum(sine, 1e-300))[:, None]
+    elif "yaw" in mechanism.task:  # the twist about z that is left when the z axis is turned back the shortest way
+        quaternions = (Rotation.from_matrix(each).as_quat() for each in (here, there))
+        yaw, other = (2.0 * np.arctan2(each[:, 2], each[:, 3]) for each in quaternions)
+        turn = np.remainder(yaw - other + np.pi, 2.0 * np.pi)[:, None] - np.pi
+    return offset, turn
+
+
+def task_errors(mechanism: Mechanism, poses: Array, targets: Array) -> Array:
     """How far poses are from targets in what the task sets, (n,) [L and rad]."""
-    position, rotation = task_of(mechanism).errors(poses, targets)
-    turning = 0.0 if mechanism.end_effector_is_joint else 1.0
-    return np.hypot(position / mechanism.characteristic_length, turning * rotation)
+    offset, turn = task_offsets(mechanism, poses, targets)
+    return np.hypot(np.hypot.reduce(offset, axis=1), np.linalg.norm(turn, axis=1))
 
 
 def assert_honest(mechanism: Mechanism, targets: np.ndarray, answer: Solution) -> None:

@@ -128,21 +128,6 @@ def test_a_joint_end_effector_has_no_rotation_to_ask_for() -> None:
     assert pf.solve_ik(dataclasses.replace(pf.load("five_bar"), task=("y", "z")), (5.0, 10.0, 180.0))
 
 
-def test_tilts_are_told_by_the_z_axis_and_turned_the_shortest_way() -> None:
-    task = Task((False, False, True), 2)
-    rng = np.random.default_rng(1)
-    begin, targets = (np.tile(np.eye(4), (50, 1, 1)) for _ in range(2))
-    begin[:, :3, :3] = Rotation.random(50, random_state=rng).as_matrix()
-    targets[:, :3, :3] = Rotation.random(50, random_state=rng).as_matrix()
-    targets[0, :3, :3] = begin[0, :3, :3] @ np.diag([1.0, -1.0, -1.0])  # upside down: half a turn about any normal
-    wanted = task.completed(targets, begin)
-    np.testing.assert_allclose(wanted[:, :3, 2], targets[:, :3, 2], atol=1e-9)
-    turned = Rotation.from_matrix(wanted[:, :3, :3] @ begin[:, :3, :3].swapaxes(1, 2)).magnitude()
-    between = np.arccos(np.clip((begin[:, :3, 2] * targets[:, :3, 2]).sum(axis=1), -1, 1))
-    np.testing.assert_allclose(turned, between, atol=1e-7)
-    assert task.errors(wanted, targets)[1].max() <= 1e-9
-
-
 def twist_about_z(turn: np.ndarray) -> np.ndarray:
     """What SciPy makes of it: the quaternion's part about z, as an angle (n,)."""
     quaternions = Rotation.from_matrix(turn).as_quat()

@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from checks import cone_angle, deviations, placed_bodies, with_axes
+from checks import cone_angle, deviations, placed_bodies, task_offsets, with_axes
 from pfabrik import Mechanism, Solution
 from pfabrik.description.joint_types import KINDS
 
@@ -49,7 +48,9 @@ def conditions(mechanism: Mechanism, target: Array, answer: Solution, rotation_l
         """Derivatives (len(x), k) of values (2 len(x), k)."""
         return (values[: len(x)] - values[len(x) :]) / (2.0 * STEP)
 
-    offset, turn = errors(explicit, target, placed)
+    body = explicit.end_effector
+    body = explicit.joint(body).connects[0] if explicit.end_effector_is_joint else body
+    offset, turn = task_offsets(explicit, placed[body] @ explicit.home_pose, target[None])
     away = np.hypot(np.linalg.norm(offset, axis=1), rotation_length / length * np.linalg.norm(turn, axis=1))
     held = {"orientation": [turn], "position": [offset]}.get(answer.held or "", [])
     rigid = [
@@ -71,23 +72,3 @@ def conditions(mechanism: Mechanism, target: Array, answer: Solution, rotation_l
             column = first[joint.name] + limit.coordinate
             rest[column] += (1.0 if limit.bound == "max" else -1.0) * limit.multiplier * scale[column]
     return Conditions(free.shape[1], slope @ free, rest @ free)
-
-
-def errors(mechanism: Mechanism, target: Array, placed: dict[str, Array]) -> tuple[Array, Array]:
-    """Offsets [L] and turns [rad] of placed end effectors from a target, in what the task counts, (n, k) each."""
-    body = mechanism.end_effector
-    body = mechanism.joint(body).connects[0] if mechanism.end_effector_is_joint else body
-    at = (placed[body] @ np.append(mechanism.reference_point, 1.0))[:, :3]
-    offset = (at - target[:3, 3])[:, ["xyz".index(name) for name in mechanism.task if name in "xyz"]]
-    turn = np.zeros((len(at), 1))
-    if "rotation" in mechanism.task and not mechanism.end_effector_is_joint:
-        turn = Rotation.from_matrix(placed[body][:, :3, :3] @ target[:3, :3].T).as_rotvec()
-    elif "tilt" in mechanism.task:
-        across = np.cross(placed[body][:, :3, 2], target[:3, 2])
-        sine = np.linalg.norm(across, axis=1)
-        turn = across * (np.arctan2(sine, placed[body][:, :3, 2] @ target[:3, 2]) / np.maximum(sine, 1e-300))[:, None]
-    elif "yaw" in mechanism.task:
-        here, there = (Rotation.from_matrix(each).as_quat() for each in (placed[body][:, :3, :3], target[:3, :3]))
-        off = 2.0 * (np.arctan2(here[:, 2], here[:, 3]) - np.arctan2(there[2], there[3]))
-        turn = np.remainder(off + np.pi, 2.0 * np.pi)[:, None] - np.pi
-    return offset / mechanism.characteristic_length, turn
