@@ -68,6 +68,13 @@ def test_reached_exactly_where_the_closed_form_says_cold_and_warm(name: str, cou
         np.testing.assert_allclose(cold.actuators[reached], expected, rtol=0, atol=1e-9 * max(length, 1.0))
 
 
+def test_every_machine_of_the_catalogue_with_a_closed_form_is_in_the_table() -> None:
+    for name in pf.catalog():
+        if name not in MODES:
+            with pytest.raises(oracles.NoClosedForm):
+                plan_of(pf.load(name))
+
+
 @pytest.mark.parametrize("name", MODES)
 def test_home_is_the_first_of_the_working_modes_in_closed_form(name: str) -> None:
     machine = pf.load(name)
