@@ -269,7 +269,7 @@ def test_answers_asked_again_from_themselves_stay(name: str, question: str) -> N
         apart[:, :3, 3] /= length
         assert apart.max(initial=0.0) <= 1e-9
     off = np.abs(there.actuators - answer.actuators) / actuator_units(m)
-    assert off.max() <= 1e-8  # next to dead points a pose tells of its actuators less well than of itself
+    assert off.max() <= 5e-5  # at dead points a pose tells of its actuators by the root of what it is known to
 
 
 @pytest.mark.parametrize("name", NAMES)
