@@ -118,7 +118,9 @@ def test_a_configuration_is_closed_within_its_limits_and_is_what_the_answer_says
     m, (_, answer) = machine(name), asked(name, question)
     assert_feasible(m, answer)
     again, length = pf.configuration(m, answer.q), m.characteristic_length
-    assert (again.status < Status.FAILED).all() and again.limit_excess.max() <= 1.0001e-9
+    assert (
+        again.status < Status.FAILED
+    ).all() and again.limit_excess.max() <= 2e-8  # by loops open as far as they may be
     np.testing.assert_allclose(again.pose[..., :3, 3], answer.pose[..., :3, 3], rtol=0, atol=1e-8 * length)
     np.testing.assert_allclose(again.pose[..., :3, :3], answer.pose[..., :3, :3], rtol=0, atol=2e-8)
     off = (again.actuators - answer.actuators) / actuator_units(m)
