@@ -239,7 +239,7 @@ LOOSE = (
 @pytest.mark.parametrize(("name", "task", "about"), LOOSE, ids=[f"{name}, {task}" for name, task, _ in LOOSE])
 def test_what_neither_task_nor_legs_tell_stays_where_it_was(name: str, task: str, about: tuple[int, ...]) -> None:
     mechanism = dataclasses.replace(machine(name), task=tuple(task.split()))
-    wanted = targets(mechanism, 10, 0.1, 0.2, about)
+    wanted = targets(mechanism, 5, 0.1, 0.2, about)
     answers = pf.solve_ik(mechanism, wanted)
     rows = ClosureEngine(model_of(mechanism)).answer(wanted, None, Options(), keep_mode=False).rows
     np.testing.assert_array_equal(answers.status, rows.status)

@@ -91,7 +91,7 @@ def eight_struts() -> Mechanism:
 def test_lengths_that_agree_are_reached_from_a_start_too() -> None:
     """The lengths are those of a pose, by Pythagoras; where the way from the start strays, other starts follow."""
     mechanism, rng = eight_struts(), np.random.default_rng(1)
-    count = 10 if INTERPRETED else 200
+    count = 10 if INTERPRETED else 100
     length, feet, heads = mechanism.characteristic_length, [], []
     for name in mechanism.actuator_names:
         along = mechanism.joint(name).along
