@@ -28,7 +28,10 @@ def test_the_check_of_joints_accepts_home_and_notices_one_wrong_joint(name: str)
     mechanism = machine(name)
     joints = [joint.name for joint in mechanism.joints if joint.type != "fixed"]
     home = {name: np.array(mechanism.home_coordinate(name), dtype=float) for name in joints}
-    answer = SimpleNamespace(shape=(), pose=mechanism.home_pose, actuators=home_values(mechanism), joints=home)
+    points = {joint.name: np.array(joint.at) for joint in mechanism.joints if joint.at is not None}
+    answer = SimpleNamespace(
+        shape=(), pose=mechanism.home_pose, actuators=home_values(mechanism), joints=home, points=points
+    )
     assert checks.gap_of_joints(mechanism, answer).max() <= 1e-12
     for joint in home.keys() - {mechanism.end_effector}:
         answer.joints = home | {joint: home[joint] + 0.01}

@@ -231,7 +231,7 @@ def test_what_no_arm_is_long_enough_for_has_no_modes(name: str, position: tuple[
 @pytest.mark.parametrize(("name", "away"), [("stewart", 9e3), ("stewart", 1e7), ("rps", 1e5)])
 def test_a_strut_has_a_mode_however_far_and_exceeds_its_stroke(name: str, away: float) -> None:
     modes = pf.working_modes(pf.load(name), (0, 0, away))
-    assert len(modes) == len(oracles.working_modes(pf.load(name), (0, 0, away)).actuators) > 0
+    assert len(modes) == {"stewart": 1, "rps": 2}[name]
     assert all(mode.status == Status.EXCEEDED for mode in modes)
 
 

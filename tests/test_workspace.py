@@ -308,6 +308,8 @@ def leaning_five_bar() -> pf.Mechanism:
         ("x, y, z change in 2 directions", leaning_five_bar, {}),
         ("whose task has a tilt", closure.ruu, {"tilt": 0.1}),
         ("at most 2 coordinates", partial(pf.load, "ankle_ups"), {"over": ("tilt_x", "tilt_y", "yaw")}),
+        ("can change, x, y, yaw", partial(pf.load, "rrr"), {"over": ("tilt_x", "tilt_y")}),
+        ("can change, y, z", partial(pf.load, "five_bar"), {"over": ("x", "y")}),
         ("'z'.*nothing ends the workspace", lambda: pf.load("linear_delta").without_limits(), {"resolution": 15.0}),
     ],
 )

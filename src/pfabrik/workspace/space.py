@@ -134,15 +134,18 @@ def space_of(
         expected = f"at most {most} coordinates: the end effector has no more freedoms, and more have no size"
         raise InvalidArgument("over", ", ".join(names), expected)
     _require_task(mechanism, "over", names)
+    moving = _moving(mechanism)
+    for name in names:
+        if name not in moving:
+            raise InvalidArgument("over", name, f"coordinates that the end effector can change, {', '.join(moving)}")
     _require_task(mechanism, "fixed", [name for name in fixed if name not in names])
     return Space(mechanism, names, np.array([held[name] for name in names]), held, rotation)
 
 
 def free_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
     """Coordinates of the task that the end effector can change."""
-    task, directions = task_of(mechanism), generic_of(mechanism).directions
-    moves = np.linalg.norm(directions, axis=1) > TOLERANCES.alignment
-    places = [name for name, counts, free in zip(POSITIONS, task.axes, moves, strict=False) if counts and free]
+    names, directions = _moving(mechanism), generic_of(mechanism).directions
+    places = [name for name in names if name in POSITIONS]
     rows = [POSITIONS.index(name) for name in places]
     rank = int((np.linalg.svd(directions[rows], compute_uv=False) > TOLERANCES.alignment).sum())
     if rank < len(places):
@@ -151,11 +154,19 @@ def free_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
             f"an end effector of which {', '.join(places)} change in {rank} directions, across the axes of the base",
             "a base frame turned so that it moves along its axes",
         )
+    return names
+
+
+def _moving(mechanism: Mechanism) -> tuple[str, ...]:
+    """Coordinates of the task that the end effector can change, be it together with others only."""
+    task, directions = task_of(mechanism), generic_of(mechanism).directions
+    moves = np.linalg.norm(directions, axis=1) > TOLERANCES.alignment
     axis = tilt_axis(mechanism)
     turned = moves[3:] if len(moves) > 3 else np.zeros(3, bool)
     if axis is not None:
         turned = np.arange(3) == np.abs(axis[:2]).argmax()
-    return (*places, *compress(TURNS, np.logical_and(task.turns, turned)))
+    counted = np.logical_and((*task.axes, *task.turns), (*moves[:3], *turned))
+    return tuple(compress((*POSITIONS, *TURNS), counted))
 
 
 def _require_task(mechanism: Mechanism, argument: str, names: Sequence[str]) -> None:
