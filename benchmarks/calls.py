@@ -14,8 +14,8 @@ from pfabrik.closure.closure_engine import ClosureEngine
 from pfabrik.description.geometry import geometry_of
 from pfabrik.model import Model, model_of
 from pfabrik.motion.displacements import rate_units
-from pfabrik.motion.joint_rates import actuated_columns, right_singular
-from pfabrik.motion.joint_rates import first_order as conditions_and_twist
+from pfabrik.motion.loops import actuated_columns, right_singular
+from pfabrik.motion.loops import first_order as conditions_and_twist
 from pfabrik.motion.mobility import generic_of
 from table import Row, cells, machine, table
 from timing import best_times, draw

@@ -24,7 +24,7 @@ import numpy as np
 
 import pfabrik as pf
 from pfabrik.export.export_c import c_source
-from pfabrik.export.wording import Precision
+from pfabrik.export.static_data import Precision
 from timing import Array, draw
 
 SIZE, TILT, BEYOND = 0.35, 0.4, 1.6

@@ -16,9 +16,9 @@ import machines
 import pfabrik as pf
 from checks import actuator_units
 from machines import published
-from pfabrik.description.joint_types import KINDS
+from pfabrik.description.joints import KINDS
 from pfabrik.export.export_c import c_source
-from pfabrik.export.self_test import targets_around_home
+from pfabrik.export.source import targets_around_home
 from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns
 from pfabrik.motion.limited_coordinates import coned

@@ -25,7 +25,7 @@ from pfabrik.cli import main
 from pfabrik.kernels.certify.affine_forms import ABOVE, BELOW, CENTRE
 from pfabrik.kernels.certify.limit_rows import put_limits
 from pfabrik.kernels.certify.pose_cells import put_cell
-from pfabrik.kernels.certify.subdivision import new_rows
+from pfabrik.kernels.certify.prove import new_rows
 from pfabrik.model import model_of
 from pfabrik.platform.table import kernel_table
 

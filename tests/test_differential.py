@@ -21,7 +21,7 @@ from pfabrik.closure.first_order import forward_map, inverse_map, units_of
 from pfabrik.errors import InvalidArgument
 from pfabrik.model import model_of
 from pfabrik.motion.displacements import columns
-from pfabrik.motion.joint_rates import actuated_columns, first_order
+from pfabrik.motion.loops import actuated_columns, first_order
 from pfabrik.motion.mobility import generic_of
 from pfabrik.motion.singularities import KINDS
 from pfabrik.tolerances import TOLERANCES

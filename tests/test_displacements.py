@@ -23,8 +23,8 @@ from pfabrik.motion.displacements import (
     screws,
     stepped,
 )
+from pfabrik.motion.mobility import around_home
 from pfabrik.motion.outward import centres_at
-from pfabrik.motion.walks import around_home
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -37,9 +37,9 @@ from machines import closure
 from pfabrik.cli import main
 from pfabrik.description.task import task_of
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
-from pfabrik.export import self_test
+from pfabrik.export import source
 from pfabrik.export.export_c import PARTS, c_source
-from pfabrik.export.wording import in_words
+from pfabrik.export.static_data import in_words
 from pfabrik.files import dumps, loads
 
 ROUNDED = 1e-6
@@ -230,7 +230,7 @@ def slide(name: str = "J", **more: Any) -> pf.Mechanism:
 
 @needs_compiler
 def test_a_self_test_says_so_where_nothing_can_be_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(self_test, "N_POSES", 0)
+    monkeypatch.setattr(source, "N_POSES", 0)
     words = "nothing is checked: no pose near home has one answer alone\n"
     assert checks_itself(compiled(c_source(slide()), driver=None)) == (2, words)
 

@@ -34,7 +34,7 @@ from pfabrik.errors import UnsupportedMechanism
 from pfabrik.export.export_c import c_source
 from pfabrik.export.firmware_settings import klipper
 from pfabrik.export.linuxcnc import linuxcnc
-from pfabrik.export.self_test import targets_around_home
+from pfabrik.export.source import targets_around_home
 from pfabrik.export.tensors import tensor_source
 
 Array = np.ndarray

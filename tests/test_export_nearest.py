@@ -10,7 +10,7 @@ import pytest
 
 import pfabrik as pf
 from exported import KEEP, asked, flat, home_of, limit_units, machine, matrices, needs_compiler, program_of, slack_of
-from pfabrik.export.self_test import targets_around_home
+from pfabrik.export.source import targets_around_home
 from pfabrik.model import model_of
 
 Array = np.ndarray

@@ -20,8 +20,8 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument
+from pfabrik.export.controller_tables import packed
 from pfabrik.export.export_web import FOLDER, SCRIPTS, machine_data, web_page
-from pfabrik.export.memory_image import packed
 from pfabrik.model import model_of
 from pfabrik.rotations import from_rotvec
 

@@ -23,7 +23,7 @@ from pfabrik.description.geometry import (
     with_geometry,
     with_numbers,
 )
-from pfabrik.description.joint_types import JOINT_TYPES
+from pfabrik.description.joints import JOINT_TYPES
 from pfabrik.description.structure import Structure
 from pfabrik.files import dumps, loads
 from pfabrik.kernels.replay import replay

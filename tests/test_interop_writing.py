@@ -19,7 +19,7 @@ from pfabrik.description.links import links_of
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.files.units import metres_of
 from pfabrik.interop import from_mjcf, to_mjcf, verify
-from pfabrik.interop.referee_configurations import reached_at_random
+from pfabrik.interop.referee import reached_at_random
 
 LIKE_OTHERS = ("ankle_ups", "hexaglide", "linear_delta", "nrpm", "panda", "prr", "psu", "reachy_mini", "rps", "rrr")
 """Machines whose joints and loops others of the catalogue have too."""

@@ -13,8 +13,7 @@ from machines import machine
 from pfabrik import Joint, Mechanism
 from pfabrik.errors import InvalidArgument, MobilityWarning, UnknownName
 from pfabrik.motion.displacements import end_effector_pose, home_coordinates
-from pfabrik.motion.joint_path import JointPath, joint_path
-from pfabrik.motion.joint_series import passive_series
+from pfabrik.motion.joint_path import JointPath, joint_path, passive_series
 
 
 @cache

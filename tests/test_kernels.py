@@ -21,8 +21,8 @@ from pfabrik.kernels import quaternions
 from pfabrik.kernels.legs.complete_poses import ROUNDED, orthonormalise, turn_pose
 from pfabrik.kernels.passes import half_spaces
 from pfabrik.kernels.passes import plan as P
-from pfabrik.kernels.passes.moving_frames import move_carriers, place_ends
 from pfabrik.kernels.passes.passes import reach_backward
+from pfabrik.kernels.passes.plan import move_carriers, place_ends
 from pfabrik.kernels.passes.restrict import clamp_cone
 from pfabrik.kernels.vectors import angle_between, wrap
 

@@ -18,11 +18,11 @@ import pytest
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
 from pfabrik.common_centre import common_centre
-from pfabrik.description.places import joint_places, joints_on, slider_place
+from pfabrik.description.sketch import joint_places, joints_on, slider_place
+from pfabrik.drawing import viewpoint
 from pfabrik.drawn_parts import home_rail, order_around
 from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName
 from pfabrik.skeleton import skeleton_of
-from pfabrik.viewpoint import viewpoint
 
 pytest.importorskip("matplotlib")
 from matplotlib.colors import to_hex

@@ -8,18 +8,18 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import machine, published
-from pfabrik.closure.links_on_paths import links_on_paths
+from pfabrik.closure.placed_links import links_on_paths
 from pfabrik.decomposition.leg_table import LegTable
 from pfabrik.kernels.clearance.link_limits import new_link_limits, pair_excess
 from pfabrik.kernels.clearance.link_records import NO_LINKS, LinkLimits
-from pfabrik.kernels.closure import path_links
+from pfabrik.kernels.closure import path_kinematics
 from pfabrik.kernels.closure.descend import move
 from pfabrik.kernels.closure.loops import BALL, BASE_AXES, PoseObjective
 from pfabrik.kernels.closure.path_kinematics import LAYOUT, new_equations, new_state
 from pfabrik.kernels.holding import limit_multipliers
 from pfabrik.kernels.platform import equations as E
-from pfabrik.kernels.platform import leg_links
-from pfabrik.kernels.platform.lagrangian import lagrangian_gradient, note_involved
+from pfabrik.kernels.platform import limits
+from pfabrik.kernels.platform.linearise import lagrangian_gradient, note_involved
 from pfabrik.kernels.platform.nearest import NO_STARTS, new_nearest_scratch
 from pfabrik.kernels.platform.search import new_search_scratch
 from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
@@ -116,14 +116,14 @@ def test_slopes_of_distances_of_links_are_their_differences(name: str) -> None:
 
     def at_poses(state: E.PlatformState) -> np.ndarray:
         E.evaluate_legs(table, state, leg_eval)
-        leg_links.place_links(table, links, leg_eval.frames, leg_eval.values)
+        limits.place_links(table, links, leg_eval.frames, leg_eval.values)
         return excesses_of(links)
 
     state = random_configuration(mechanism, legs, rng)
     slopes = np.zeros((len(links.pairs), E.count_unknowns(table)))
     for pair, excess in enumerate(at_poses(state)):
         pair_excess(links, pair, np.inf)
-        leg_links.add_pair_slope(table, links, pair, excess, 1.0, leg_eval, slopes[pair])
+        limits.add_pair_slope(table, links, pair, excess, 1.0, leg_eval, slopes[pair])
     for unknown in range(slopes.shape[1]):
         ends = [at_poses(moved(state, unknown, sign * STEP, table.columns)) for sign in (1.0, -1.0)]
         np.testing.assert_allclose(slopes[:, unknown], (ends[0] - ends[1]) / (2.0 * STEP), atol=1e-6)
@@ -136,13 +136,13 @@ def test_slopes_of_distances_of_links_are_their_differences(name: str) -> None:
         joints.balls[ways.kinds == BALL, 0] = 1.0
         move(ways, random, 1.0, joints)
         move(ways, step, 1.0, joints)
-        path_links.place_links(ways, joints, eq, links)
+        path_kinematics.place_links(ways, joints, eq, links)
         return excesses_of(links)
 
     random, slopes = 0.1 * rng.normal(size=n), np.zeros((len(links.pairs), n))
     for pair, excess in enumerate(at_joints(np.zeros(n))):
         pair_excess(links, pair, np.inf)
-        path_links.add_pair_slope(ways, links, pair, excess, 1.0, eq, slopes[pair])
+        path_kinematics.add_pair_slope(ways, links, pair, excess, 1.0, eq, slopes[pair])
     for column in range(n):
         ends = [at_joints(sign * STEP * np.eye(n)[column]) for sign in (1.0, -1.0)]
         np.testing.assert_allclose(slopes[:, column], (ends[0] - ends[1]) / (2.0 * STEP), atol=1e-6)

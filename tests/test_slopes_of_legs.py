@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from duals import dual, duals, on_duals
 from machines import EVERY, FILES, machine
-from pfabrik.decomposition.elementary_joints import NoLeg
+from pfabrik.decomposition.leg_forms import NoLeg
 from pfabrik.kernels import vectors
 from pfabrik.kernels.legs import answer, endings, frames, kinds, pivots, rods
 from pfabrik.kernels.legs import records as K

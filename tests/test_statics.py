@@ -19,7 +19,7 @@ from machines import closure, ring
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
 from pfabrik.files.units import metres_of
 from pfabrik.interop import to_mjcf
-from pfabrik.interop.referee_configurations import reached_at_random
+from pfabrik.interop.referee import reached_at_random
 
 Array = NDArray[np.float64]
 QUICK = ("stewart", "five_bar", "orthoglide", "tricept", "rps")

@@ -17,7 +17,7 @@ from pfabrik.arrays import Floats
 from pfabrik.description.task import task_of
 from pfabrik.errors import InvalidArgument, UnknownName
 from pfabrik.motion.displacements import actuator_units
-from pfabrik.motion.joint_rates import first_order
+from pfabrik.motion.loops import first_order
 from pfabrik.motion.mobility import generic_of
 from pfabrik.timing.curve import curve_of
 from pfabrik.timing.time_path import limits_of

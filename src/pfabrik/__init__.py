@@ -49,8 +49,7 @@ _NAMES = {
         "singularity",
     ),
     "answers.active_limits": ("ActiveLimit",),
-    "answers.margins": ("margins",),
-    "answers.residual": ("closure_residual",),
+    "answers.margins": ("closure_residual", "margins"),
     "answers.solution": ("Solution",),
     "answers.status": ("Status",),
     "answers.tracked": ("Track",),
@@ -128,7 +127,7 @@ if TYPE_CHECKING:
     )
     from .answers.active_limits import ActiveLimit as ActiveLimit
     from .answers.margins import margins as margins
-    from .answers.residual import closure_residual as closure_residual
+    from .answers.margins import closure_residual as closure_residual
     from .answers.solution import Solution as Solution
     from .answers.status import Status as Status
     from .answers.tracked import Track as Track

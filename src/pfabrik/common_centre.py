@@ -10,7 +10,7 @@ from .arrays import Floats
 from .derived import derived
 from .description.joints import Joint
 from .description.mechanism import Mechanism
-from .description.places import joints_on
+from .description.sketch import joints_on
 from .tolerances import TOLERANCES
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from .arrays import Floats
 from .common_centre import common_centre, is_around
 from .description.mechanism import Joint, Mechanism
-from .description.places import Places, joint_places, joints_on, middle
+from .description.sketch import Places, joint_places, joints_on, middle
 
 Role: TypeAlias = Literal["base", "platform", "link"]
 Kind: TypeAlias = Literal["bar", "arc", "barrel", "plate", "rail", "carriage", "ball"]

@@ -19,7 +19,7 @@ from .errors import UnsupportedMechanism, counted
 from .kernels.threads import in_blocks
 from .model import Model, model_of
 from .platform.answers import sides_at
-from .platform.folds import starts_beside
+from .platform.branch import starts_beside
 from .platform.links_at_poses import links_at_poses
 from .platform.table import table_handle
 from .platform.tip_engine import measured, start_at_tip

@@ -32,11 +32,10 @@ from .motion.displacements import (
     joint_centres,
     rate_units,
 )
-from .motion.joint_path import JointPath, joint_path
-from .motion.joint_rates import cycle_basis
-from .motion.joint_series import passive_series
+from .motion.fitting_task import tilt_axis
+from .motion.joint_path import JointPath, joint_path, passive_series
+from .motion.loops import cycle_basis
 from .motion.mobility import generic_of, internal_rates
-from .motion.tilt_axis import tilt_axis
 
 __all__ = [
     "Configurations",

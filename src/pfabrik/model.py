@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import cached_property, lru_cache
 
 from .arrays import Floats
-from .decomposition.elementary_joints import NoLeg
+from .decomposition.leg_forms import NoLeg
 from .decomposition.leg_table import LegTable, leg_table
 from .decomposition.rewritten import rewritten
 from .description.geometry import Geometry, geometry_of, home_numbers, numbers_with, with_numbers
 from .description.mechanism import Mechanism
 from .description.task import Task, task_of
-from .motion.closure import Closure, closure_of
+from .motion.loops import Closure, closure_of
 
 
 class Model:

@@ -14,7 +14,7 @@ from .answers.differential import Mobility, NearlyFree, mobility
 from .clearance.clearance import clearance
 from .decomposition.decompose import decompose
 from .description.home_mobility import universal_axes
-from .description.joint_types import KINDS
+from .description.joints import KINDS
 from .description.links import has_pairs
 from .description.mechanism import MOST_JOINTS_FOR_FREEDOM, Joint, Mechanism, Shape
 from .description.readouts import readout

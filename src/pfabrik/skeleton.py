@@ -12,7 +12,7 @@ from .checks import require_type
 from .clearance.solid_meshes import SolidMesh, solids_of
 from .common_centre import arc, common_centre
 from .description.mechanism import Joint, Mechanism
-from .description.places import Places, joint_places, middle
+from .description.sketch import Places, joint_places, middle
 from .drawn_parts import Part, Place, home_rail, parts_of
 from .errors import InvalidArgument
 

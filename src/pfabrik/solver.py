@@ -22,7 +22,7 @@ from .first_answers import prepare
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
 from .model import model_of
-from .motion.tilt_axis import along_tilt, tilt_axis
+from .motion.fitting_task import along_tilt, tilt_axis
 from .options import Options, checked_options
 from .targets import Target
 

@@ -15,8 +15,8 @@ from .description.task import task_of
 from .errors import InvalidArgument
 from .kernels.rows import INVALID
 from .motion.displacements import columns
+from .motion.fitting_task import along_tilt
 from .motion.joint_path import path_of
-from .motion.tilt_axis import along_tilt
 from .options import Options
 from .poses import SupportsMatrix, as_poses, what_is_wrong
 

@@ -17,7 +17,7 @@ from .arrays import Floats, Mask
 from .batch import put
 from .closure.close import measure_configurations
 from .closure.configurations import Configurations
-from .closure.continuation import continued
+from .closure.effort import continued
 from .closure.engine_contract import InverseEngine, OnProgress
 from .description.mechanism import Mechanism
 from .description.task import task_of

@@ -22,9 +22,8 @@ from .engine import engine_of
 from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
 from .model import model_of
-from .motion.fitting_task import has_dependent_coordinates, task_remark
+from .motion.fitting_task import has_dependent_coordinates, task_remark, tilt_axis
 from .motion.singularities import assembly_signs
-from .motion.tilt_axis import tilt_axis
 from .printed import Printed, ResultTable, plain
 from .rotations import from_rotvec
 from .tolerances import TOLERANCES

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from checks import cone_angle, placed_bodies
 from pfabrik import Mechanism
-from pfabrik.description.joint_types import KINDS
+from pfabrik.description.joints import KINDS
 
 Array = NDArray[np.float64]
 INSIDE = (

@@ -18,9 +18,7 @@ from ..fk import solve_fk
 from ..kinematics import JointPath, actuator_units, joint_path, require_determined
 from .drive_limits import HalfSpaces, image_of_box, preimage_of_box
 from .hull import Hull, feasible_hull
-from .inverses import inverses
-from .mapped import Mapped
-from .named_values import per_actuator, rows_of, speeds_of, vectors_of
+from .named_values import Mapped, inverses, per_actuator, rows_of, speeds_of, vectors_of
 from .placed import Placer
 from .sample import Sample, sample_feasible
 from .task_path import Coordinates, TaskPath

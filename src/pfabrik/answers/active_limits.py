@@ -15,8 +15,8 @@ from ..closure.link_distances import pair_distances_at, pair_names
 from ..description.mechanism import Mechanism
 from ..model import Model
 from ..motion.displacements import rate_units
-from ..motion.joint_rates import cycle_basis, first_order, right_singular
 from ..motion.limited_coordinates import coned, ranges_of
+from ..motion.loops import cycle_basis, first_order, right_singular
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..decomposition.elementary_joints import ElementaryJoint
-from ..decomposition.leg_forms import Rod
+from ..decomposition.leg_forms import ElementaryJoint, Rod
 from ..description.mechanism import Mechanism
 from ..model import model_of
 from ..motion.displacements import displacements, home_coordinates

@@ -13,9 +13,8 @@ from ..checks import require_type
 from ..kernels.rows import REACHED
 from ..printed import ResultTable
 from .answer_fields import Answer
-from .solution_table import answer_table
 from .status import Status
-from .words import as_sentence, what_blocks
+from .words import answer_table, as_sentence, what_blocks
 
 _AlongAxis: TypeAlias = int | slice | EllipsisType | Sequence[int] | NDArray[np.integer] | NDArray[np.bool_]
 Index: TypeAlias = _AlongAxis | tuple[_AlongAxis, ...]

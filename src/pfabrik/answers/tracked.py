@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
 from ..closure.configurations import Configurations
-from ..closure.on_the_way import least_on_the_way
+from ..closure.link_distances import least_on_the_way
 from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
 from ..description.task import task_of

@@ -18,8 +18,7 @@ from ..ik import solve_ik
 from ..kinematics import Configurations, engine_of, home_coordinates, model_of
 from ..options import Options
 from ..rotations import to_rotvec
-from .instrument import aligned, seen
-from .measurements import Measurements
+from .measurements import Measurements, aligned, seen
 from .parameters import Parameters
 from .sensitivity import GeometrySlopes, require_closed
 

@@ -13,7 +13,7 @@ from ..description.geometry import Geometry, geometry_of
 from ..description.mechanism import Joint, Mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..tolerances import TOLERANCES
-from .instrument import INSTRUMENT
+from .measurements import INSTRUMENT
 from .shifts import DrivenRods, Shift
 
 KINDS = ("points", "axes", "offsets", "lengths", "frame", "tool", "scale")

@@ -16,8 +16,7 @@ from ..description.mechanism import Mechanism
 from ..errors import counted
 from ..ik import solve_ik
 from ..kernels.certify.pose_cells import STEPS, CellParameters, is_beside
-from ..kernels.certify.prove import DONE
-from ..kernels.certify.subdivision import HALF, PROVED_LEGS
+from ..kernels.certify.prove import DONE, HALF, PROVED_LEGS
 from ..kinematics import model_of
 from ..printed import Printed, ResultTable
 from ..rotations import to_rpy

@@ -13,13 +13,12 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..kernels.certify.pose_cells import BOX, ROTATION_VECTOR, TILT, CellParameters
-from ..kernels.certify.prove import ENCLOSE
-from ..kernels.certify.subdivision import HALF, N_COLUMNS
+from ..kernels.certify.prove import ENCLOSE, HALF, N_COLUMNS
 from ..kinematics import Model
 from ..rotations import to_rotvec
 from ..telling import OnProgress
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
-from .reach_box import reach_box
+from .pose_region import reach_box
 from .subdividing import Enclosing
 
 COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "yaw")

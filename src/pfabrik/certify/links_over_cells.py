@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Ints
 from ..closure.link_distances import pair_names
-from ..closure.links_on_paths import link_limits
+from ..closure.placed_links import link_limits
 from ..derived import derived
 from ..description.links import NOWHERE
 from ..kernels.certify.link_rows import CellLinks, new_cell_links

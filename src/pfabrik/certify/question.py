@@ -18,8 +18,19 @@ from ..feasibility import feasibility
 from ..ik import solve_ik
 from ..kernels.certify.link_rows import ROWS_A_PAIR
 from ..kernels.certify.pose_cells import CellParameters
-from ..kernels.certify.prove import BREAKS, BROKEN, DONE, SPENT, TOO_SMALL
-from ..kernels.certify.subdivision import FOUND_MARGIN, LIMIT, N_OPEN, N_PROVED, N_STACK, PROVED_MARGIN
+from ..kernels.certify.prove import (
+    BREAKS,
+    BROKEN,
+    DONE,
+    FOUND_MARGIN,
+    LIMIT,
+    N_OPEN,
+    N_PROVED,
+    N_STACK,
+    PROVED_MARGIN,
+    SPENT,
+    TOO_SMALL,
+)
 from ..kinematics import Model, model_of, task_of
 from ..poses import are_poses
 from ..rotations import to_rotvec
@@ -30,6 +41,14 @@ from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of
 from .links_over_cells import bounded_pairs, links_without_bounds
 from .pose_region import PoseRegion
 from .subdividing import Subdividing, first_cells, region_parameters, step_poses, track_parameters
+
+
+def require_no_clearance(mechanism: Mechanism, doing: str) -> None:
+    """Raise UnsupportedMechanism if a mechanism has a clearance: there are no bounds of distances over regions."""
+    if mechanism.clearance is not None:
+        reason = "its clearance is no part of a proof: ask for `mechanism.with_clearance(None)`"
+        raise UnsupportedMechanism(mechanism.name, [reason], doing)
+
 
 BUDGET = 200_000
 """Cells that are looked at by default: about a tenth of a second for six struts."""

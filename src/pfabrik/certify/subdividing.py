@@ -9,16 +9,18 @@ import numpy as np
 from ..arrays import Floats
 from ..kernels.certify.link_rows import new_cell_links
 from ..kernels.certify.pose_cells import BALL, BOX, CYLINDER, ROTATION_VECTOR, STEPS, TILT, CellParameters
-from ..kernels.certify.prove import ENCLOSE, SPENT, prove
-from ..kernels.certify.subdivision import (
+from ..kernels.certify.prove import (
     BUDGET,
+    ENCLOSE,
     GAP,
     HALF,
     N_CELLS,
     N_STACK,
     PROVED_LEGS,
+    SPENT,
     Subdivision,
     new_subdivision,
+    prove,
 )
 from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.handle import Handle

@@ -28,11 +28,10 @@ from ..model import Model
 from ..options import USUAL, Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
-from .chain_tables import question_of, tables_of
-from .run_chains import ROWS_A_BLOCK, new_scratch, scratch_of_chain, walk
+from .chain_tables import ROWS_A_BLOCK, new_scratch, question_of, scratch_of_chain, tables_of, walk
 
 if TYPE_CHECKING:
-    from ..kernels.chains.chain_state import ChainScratch
+    from ..kernels.chains.chain_records import ChainScratch
 
 ROWS_AHEAD = 256
 """Targets of a path that one call of the kernel follows."""

@@ -9,7 +9,7 @@ from ..derived import derived
 from ..kernels.closure.loops import BALL
 from ..model import Model
 from ..tolerances import TOLERANCES
-from .run_chains import posed
+from .chain_tables import posed
 from .serial_chain import chain_of, is_chain
 
 

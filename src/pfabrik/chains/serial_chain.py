@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..derived import derived
-from ..description.paths import independent_paths
+from ..description.graph import independent_paths
 from ..kernels.chains.chain_records import SerialChain
 from ..kernels.closure.loops import BALL, SLIDE, Loops
 from ..kernels.handle import Handle

@@ -123,7 +123,7 @@ def joint_target(mechanism: pf.Mechanism, options: tuple[str, ...]) -> dict[str,
 
 def joint_coordinates(mechanism: pf.Mechanism, words: str) -> tuple[str, float | list[float]]:
     """A joint's name and coordinates [rad or length], from words such as ``pivot=5,10``."""
-    from ..description.joint_types import KINDS
+    from ..description.joints import KINDS
 
     name, equals, listed = words.partition("=")
     values = listed.split(",")

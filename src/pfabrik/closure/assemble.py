@@ -14,15 +14,14 @@ from ..derived import derived
 from ..kernels.closure.joint_constants import ASSEMBLY_STARTS, LONGEST_SEARCH, NEAR_VALUES, NOISE, PROJECTIONS, SAME_GAP
 from ..kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
 from ..kernels.search_constants import MOST_STEPS
-from ..motion.closure import Closure
+from ..motion.loops import Closure
 from ..motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 from .close import CLOSED, Closing, close, platform_poses
 from .configurations import Configurations
-from .continuation import continued
 from .descend import nearest_actuators
-from .effort import descents_within
-from .random_starts import same_random_starts
+from .effort import continued, descents_within
+from .multistart import same_random_starts
 
 
 def assemble(

@@ -22,8 +22,8 @@ from ..kernels.closure import loops as K
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
-from ..motion.closure import Closure
 from ..motion.displacements import displacements
+from ..motion.loops import Closure
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from ..arrays import Floats, Mask
 from ..batch import put, take
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from ..model import Model
-from ..motion.closure import Closure
+from ..motion.loops import Closure
 from ..tolerances import TOLERANCES
 from .close import Closing
 

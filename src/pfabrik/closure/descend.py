@@ -14,11 +14,11 @@ from ..kernels.closure.loops import BASE_AXES, Closed, Objective, PoseObjective
 from ..kernels.handle import Scratch
 from ..kernels.search_constants import MOST_STEPS, SIGHT
 from ..kernels.threads import in_blocks
-from ..motion.closure import Closure
+from ..motion.loops import Closure
 from ..tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, close, closing_of, new_closed
 from .effort import steps_within
-from .links_on_paths import links_on_paths
+from .placed_links import links_on_paths
 
 if TYPE_CHECKING:
     from ..description.mechanism import Mechanism

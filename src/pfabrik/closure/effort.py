@@ -1,4 +1,4 @@
-"""Bounds on the operations of a search, whose cost grows with the cube of the number of coordinates.
+"""Bounds on the operations of a search, and continuation: steps that double while they succeed, else halve.
 
 Machines with a dozen coordinates per chain never reach these bounds. For chains of hundreds they limit starts and
 steps, so that an answer takes seconds.
@@ -6,8 +6,12 @@ steps, so that an answer takes seconds.
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Mask
 from ..kernels.closure.joint_constants import (
     A_DESCENT,
     CLOSING,
@@ -17,7 +21,8 @@ from ..kernels.closure.joint_constants import (
     FEWEST_CLOSING,
     LIMIT_COST,
 )
-from ..motion.closure import Closure
+from ..kernels.search_constants import SHORTEST_SHARE
+from ..motion.loops import Closure
 
 
 def steps_within(closure: Closure, most: int) -> int:
@@ -54,3 +59,19 @@ def descending_steps(closure: Closure, n_limits: int = 0) -> int:
     """Most steps of all descents of one answer."""
     moving = max(1, int(np.count_nonzero(~closure.idle)))
     return int(DESCENDING / (moving**2 * (moving + LIMIT_COST * n_limits)))
+
+
+def continued(n: int, advance: Callable[[NDArray[np.intp], Floats], Mask], shortest: float = SHORTEST_SHARE) -> Floats:
+    """The shares (n,) of n ways to which steps lead; 1 where they lead to the end.
+
+    Parameters
+    ----------
+    advance : called with some ways, and the share of each to move to from where the last step that succeeded has
+        ended; moves those for which that succeeds, and tells which.
+    """
+    way, step = np.zeros(n), np.full(n, 0.5)
+    while len(rows := np.flatnonzero((way < 1.0) & (step >= shortest))):
+        has_succeeded = advance(rows, way[rows] + step[rows])
+        way[rows] += np.where(has_succeeded, step[rows], 0.0)
+        step[rows] = np.where(has_succeeded, np.minimum(2.0 * step[rows], 1.0 - way[rows]), 0.5 * step[rows])
+    return way

@@ -16,7 +16,7 @@ from ..kernels.handle import Scratch
 from ..kernels.threads import in_blocks
 from ..model import Model
 from ..motion.displacements import rate_units
-from ..motion.joint_rates import actuated_columns, cycle_basis, present_screws
+from ..motion.loops import actuated_columns, cycle_basis, present_screws
 from ..motion.mobility import generic_of
 from ..motion.singularities import Singularity, loop_basis, singularity_of
 from ..tolerances import TOLERANCES

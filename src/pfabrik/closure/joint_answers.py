@@ -25,11 +25,10 @@ from ..tolerances import TOLERANCES
 from .close import CLOSED, in_lengths, locking
 from .configurations import new_rows
 from .effort import descending_steps, starts_within, steps_per_continuation_step, steps_within
-from .links_on_paths import links_on_paths
-from .multistart import random_feasible, seeds_of
+from .multistart import random_coordinates, random_feasible, seeds_of
 from .parasitic import asks_too_much, follows_task, has_parasitic_motion
+from .placed_links import links_on_paths
 from .projection import projection_modes
-from .random_starts import random_coordinates
 from .reaches import reaches_of
 
 if TYPE_CHECKING:

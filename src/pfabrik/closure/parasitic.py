@@ -6,9 +6,8 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..derived import derived
-from ..motion.closure import Closure
-from ..motion.mobility import generic_of
-from ..motion.walks import STEP, around_home
+from ..motion.loops import Closure
+from ..motion.mobility import STEP, around_home, generic_of
 from ..tolerances import TOLERANCES
 from .close import platform_poses
 

@@ -11,7 +11,7 @@ from ..derived import derived
 from ..description.task import Weights
 from ..kernels.closure.loops import LOCKED
 from ..kernels.rows import HOLD_NOTHING, HOLD_ORIENTATION, HOLD_POSITION
-from ..motion.closure import Closure
+from ..motion.loops import Closure
 from ..tolerances import TOLERANCES
 from .descend import limit_multipliers
 

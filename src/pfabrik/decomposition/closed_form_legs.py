@@ -24,19 +24,23 @@ from itertools import pairwise, product
 from ..description.graph import Step
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
-from .elementary_joints import HAS_LOOP, ElementaryJoint, NoLeg, are_parallel, elementary_joints
 from .leg_forms import (
+    HAS_LOOP,
+    ElementaryJoint,
     Ending,
     EndingKind,
     KeptAxis,
     LegForm,
+    NoLeg,
     Pivot,
     RedundantJoint,
     Rod,
+    are_parallel,
     closed_form_coordinates,
+    elementary_joints,
     keeps_from_spinning,
 )
-from .recorded_home import RecordedHome
+from .recording import RecordedHome
 from .tape import Vector, area, cross, largest, norm, spread
 
 MOST_HINGES, MOST_REDUNDANT = 3, 3

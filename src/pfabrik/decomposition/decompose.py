@@ -12,9 +12,8 @@ from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
 from .graph_blocks import TIP, Block, blocks_between, graph_of, is_connected, is_tree
 from .joint_nodes import NotExpressible
-from .parallelograms import Parallelogram, parallelogram_of
-from .positions import BranchForm, express_branch, express_trunk
-from .recorded_home import RecordedHome
+from .positions import BranchForm, Parallelogram, express_branch, express_trunk, parallelogram_of
+from .recording import RecordedHome
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,9 @@ from dataclasses import replace
 from ..description.graph import Edge, Step, components
 from .closed_form_legs import legs_of_chain, placed_on, rigid_rod
 from .decompose import SubChain, parts_between
-from .elementary_joints import HAS_LOOP, ElementaryJoint, NoLeg, elementary_joints
 from .graph_blocks import graph_of
-from .leg_forms import LegForm, RedundantJoint
-from .recorded_home import RecordedHome
+from .leg_forms import HAS_LOOP, ElementaryJoint, LegForm, NoLeg, RedundantJoint, elementary_joints
+from .recording import RecordedHome
 
 MEETING, MOST_REDUNDANT = 3, 4
 """Least joints of an intermediate platform, and most redundant joints of a sub-chain: searches fail on linkages with

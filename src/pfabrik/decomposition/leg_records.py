@@ -10,10 +10,8 @@ import numpy as np
 from ..arrays import Records
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .elementary_joints import ElementaryJoint
-from .leg_forms import Ending, KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
-from .recorded_home import RecordedHome
-from .recording import Fields, RecordedRecords
+from .leg_forms import ElementaryJoint, Ending, KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
+from .recording import Fields, RecordedHome, RecordedRecords
 from .tape import Scalar, Vector, angle_of, area, cross, largest, norm, sign, square_to
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}

@@ -20,12 +20,10 @@ from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
 from .decompose import sub_chains
-from .elementary_joints import ElementaryJoint, NoLeg
 from .intermediate_platforms import legs_of_sub_chain
-from .leg_forms import LegForm, RedundantJoint, Rod, closed_form_coordinates
+from .leg_forms import ElementaryJoint, LegForm, NoLeg, RedundantJoint, Rod, closed_form_coordinates
 from .leg_records import leg_records
-from .recorded_home import RecordedHome
-from .recording import Fields, RecordedRecords, Recording
+from .recording import Fields, RecordedHome, RecordedRecords, Recording
 from .tape import area, largest, sign
 
 NO_PATH = "does not lead to the end effector"

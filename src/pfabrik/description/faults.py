@@ -15,9 +15,8 @@ from .joints import Joint
 from .legs import LEG_KEYS
 from .links import collisions_at_home
 from .rules import is_same_place, joint_faults
-from .shape_faults import form_of_clearance, form_of_shapes, shape_faults
 from .structure import Structure
-from .whole_rules import graph_faults, head_faults, home_faults
+from .whole_rules import form_of_clearance, form_of_shapes, graph_faults, head_faults, home_faults, shape_faults
 
 _FIELDS: dict[str, tuple[str, ...]] = {
     "joint": tuple(field.name for field in dataclasses.fields(Joint)),

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..errors import Fault, near_miss
-from .joint_types import Coordinate
+from .joints import Coordinate
 
 LARGEST_NUMBER = 1e12
 """Largest length or angle accepted: beyond it, squares and differences of lengths lose every digit that matters."""

@@ -11,8 +11,7 @@ import numpy as np
 from ..arrays import Floats
 from .coercion import unit_vector
 from .home_mobility import universal_axes
-from .joint_types import KINDS
-from .joints import Joint, set_fields
+from .joints import KINDS, Joint, set_fields
 from .mechanism import Mechanism
 from .structure import Structure
 

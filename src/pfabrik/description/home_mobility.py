@@ -18,8 +18,7 @@ from ..derived import derived
 from ..kernels.tape import LENGTH, SQUARE, V_SUBTRACT, result
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
-from .joint_types import KINDS
-from .joints import Joint
+from .joints import KINDS, Joint
 from .structure import Structure
 
 

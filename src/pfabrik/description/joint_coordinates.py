@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..tolerances import TOLERANCES
-from .joint_types import KINDS, Coordinate
-from .joints import Joint, Range
+from .joints import KINDS, Coordinate, Joint, Range
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,9 @@ from typing import Any
 from ..errors import Fault, near_miss
 from .body_shapes import Shape
 from .copies import MOST_COPIES, read_copies, turned
-from .directions import EXPECTED, PLACEHOLDER, axis_pairs, directions
 from .form_faults import is_pair_of_names, shown, table_faults
 from .joints import Cone, Joint, Vector
-from .leg_points import Point, count_legs, leg_points
+from .leg_points import EXPECTED, PLACEHOLDER, Point, axis_pairs, count_legs, directions, leg_points
 from .legs import CONE_KEYS, JOINT_KEYS, Leg, chain_faults, read_chain
 from .rules import faults_by, form, wrong
 

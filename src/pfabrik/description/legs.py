@@ -13,8 +13,7 @@ from ..errors import Fault, InvalidArgument
 from ..frozen import FrozenMapping
 from .coercion import numbers, text, texts
 from .form_faults import shown
-from .joint_types import KINDS, JointType
-from .joints import Cone, Range, set_fields
+from .joints import KINDS, Cone, JointType, Range, set_fields
 
 LEG_KEYS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "thickness", "copies")
 """What can be said of legs, in the order in which it is told, beside what is said of single joints."""

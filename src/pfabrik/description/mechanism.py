@@ -21,8 +21,7 @@ from .expanded import expanded
 from .faults import find_faults, joint_index
 from .form_faults import shown
 from .home_mobility import end_effector_freedom, is_held, unclear_conditions
-from .joint_types import JOINT_TYPES, JointType
-from .joints import Cone, Joint, Range, Vector, set_fields
+from .joints import JOINT_TYPES, Cone, Joint, JointType, Range, Vector, set_fields
 from .leg_joints import legs_name
 from .legs import Leg, as_legs
 from .mechanism_table import mechanism_table

@@ -20,8 +20,7 @@ from .form_faults import (
     range_text,
     shown,
 )
-from .joint_types import JOINT_TYPES, KINDS, Coordinate, JointKind
-from .joints import Joint
+from .joints import JOINT_TYPES, KINDS, Coordinate, Joint, JointKind
 
 
 class Rule:

@@ -17,8 +17,7 @@ from .body_shapes import Shape
 from .coercion import items, numbers, text, texts
 from .enclosing import enclosing_radius
 from .joint_coordinates import JointCoordinate
-from .joint_types import KINDS, TASK_COORDINATES, WHOLE_TASK
-from .joints import Joint, Range, Vector, set_fields
+from .joints import KINDS, TASK_COORDINATES, WHOLE_TASK, Joint, Range, Vector, set_fields
 
 _TEXT_FIELDS = ("name", "end_effector", "base", "length_unit", "angle_unit")
 

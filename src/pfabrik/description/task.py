@@ -10,7 +10,7 @@ from ..arrays import Floats
 from ..derived import derived
 from ..kernels.closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES
 from ..rotations import angles_between, from_rotvec, nearest_turn, shortest_turns, yaws
-from .joint_types import TASK_TURNS
+from .joints import TASK_TURNS
 from .mechanism import Mechanism
 
 Weights = tuple[float, ...]

@@ -14,10 +14,9 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..motion.fitting_task import leaves_a_choice
 from ..whole_files import whole_path
-from .machine_data import Machine
-from .named_joints import fitting_path
+from .machine_data import Machine, fitting_path
 from .source import source
-from .wording import Precision
+from .static_data import Precision
 
 Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest"]
 PARTS: tuple[Part, ...] = get_args(Part)

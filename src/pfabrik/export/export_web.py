@@ -26,7 +26,7 @@ from ..platform.table import reading_table
 from ..platform.tables import limit_names, tables_of
 from ..tolerances import TOLERANCES
 from ..whole_files import whole_path
-from .memory_image import image_of, packed
+from .controller_tables import image_of, packed
 from .posed_drawing import drawing_of
 
 FOLDER = Path(__file__).parent

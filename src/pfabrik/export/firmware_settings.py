@@ -17,7 +17,7 @@ from ..tolerances import TOLERANCES
 from .fits import Thigh, Tower, angle_of, thighs_of, towers_of
 from .machine_data import Machine
 from .rod_lengths import uneven_rods, with_lengths
-from .wording import comment
+from .static_data import comment
 
 
 def klipper(mechanism: Mechanism) -> str:

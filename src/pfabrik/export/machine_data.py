@@ -9,16 +9,36 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Record
+from ..checks import require_names
 from ..closure.parasitic import has_other_assemblies
 from ..decomposition.leg_forms import RedundantJoint, Rod
 from ..decomposition.leg_table import LegTable
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.legs import records as K
-from ..kinematics import generic_of, model_of
+from ..kinematics import JointPath, generic_of, joint_path, model_of, require_determined
 from ..platform.links_of_legs import keeps_links
 from ..rotations import nearest_turn, square_to
-from .exported_links import ExportedLinks, exported_links
+from .moved_bodies import ExportedLinks, exported_links
+
+PURPOSE = "exported"
+
+
+def fitting_path(mechanism: Mechanism, joints: str | Sequence[str]) -> JointPath:
+    """The path of named joints, which determine the actuators as these determine them.
+
+    Raises
+    ------
+    UnsupportedMechanism : they do not, or one of them is a ball, which has no coordinates in files.
+    UnknownName, InvalidArgument : no such joints, or not in series.
+    """
+    path = joint_path(mechanism, require_names("joints", [joints] if isinstance(joints, str) else joints))
+    if any(motion.kind == "ball" for motion in path.motions):
+        reason = f"joints {', '.join(path.names)}: a ball has no coordinates here, name hinges"
+        raise UnsupportedMechanism(mechanism.name, [reason], PURPOSE)
+    require_determined(mechanism, path.names, path.rates_of, PURPOSE)
+    return path
+
 
 Number = float | Floats
 

@@ -1,18 +1,22 @@
-"""Poses of bodies by the platform's pose and the coordinates of legs, in exported files."""
+"""Bodies and links as an exported file places them, from the pose and from coordinates of legs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats
+from ..closure.placed_links import link_limits
 from ..decomposition.leg_forms import LegForm, Rod
 from ..description.home_mobility import universal_axes
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from ..kernels.clearance.solids import CAPSULE, DISC, KIND
+from ..errors import UnsupportedMechanism
+from ..kernels.clearance.link_records import LinkLimits
+from ..kernels.clearance.solids import BOX, CAPSULE, DISC, KIND
 from ..kernels.legs import records as K
 from ..kinematics import links_of, model_of
 from ..tolerances import TOLERANCES
@@ -172,3 +176,81 @@ def _end_with(form: LegForm, body: str) -> int | None:
     if body == (slide.outward if slide is not None else form.platform_ending.elements[0].inward):
         return WITH_PLATFORM_END
     return None
+
+
+class ExportedLinks(NamedTuple):
+    """The links of a machine, and the pairs that stay apart.
+
+    Attributes
+    ----------
+    limits : in L; `bodies` are those of the motions, as `MovedBodies` numbers them.
+    names : of the bodies of each pair.
+    """
+
+    motions: list[Motion]
+    limits: LinkLimits
+    names: list[tuple[str, str]]
+
+
+def exported_links(mechanism: Mechanism) -> ExportedLinks | None:
+    """The links of a mechanism with a clearance; None without one.
+
+    Raises
+    ------
+    UnsupportedMechanism : the place of some link follows from no coordinates of legs, or its shape has no code here.
+    """
+    if mechanism.clearance is None:
+        return None
+    links, bodies = links_of(mechanism), MovedBodies(mechanism)
+    used = np.unique(links.pairs).tolist()
+    reasons = [reason for solid in used for reason in _faults(mechanism, solid, bodies)]
+    if reasons:
+        raise UnsupportedMechanism(mechanism.name, reasons, "exported with its clearance")
+    ends = np.full((len(links.sizes), 2), BASE)
+    for solid in used:
+        ends[solid] = _bodies_of(mechanism, solid, bodies)
+    names = [(mechanism.shapes[i].body, mechanism.shapes[j].body) for i, j in links.pairs.tolist()]
+    return ExportedLinks(bodies.motions, link_limits(mechanism, ends, 0.0), names)
+
+
+WHAT_TO_DO = "or name its pairs in `ignore`, or export without the part 'limits'"
+
+
+def _faults(mechanism: Mechanism, solid: int, bodies: MovedBodies) -> Iterator[str]:
+    """The reason why a solid cannot be exported, if there is one."""
+    links, shape = links_of(mechanism), mechanism.shapes[solid]
+    if int(links.sizes[solid, KIND]) not in (CAPSULE, BOX, DISC):
+        yield f"body '{shape.body}' is a {shape.kind}, which has no code here: give it another shape, {WHAT_TO_DO}"
+        return
+    for name in links.joints[solid]:
+        if bodies.of_centre(mechanism.joint(name)) is None:
+            yield (
+                f"body '{shape.body}' ends at joint '{name}', whose place follows from no leg: name other joints in "
+                f"`between`, {WHAT_TO_DO}"
+            )
+    if not links.joints[solid] and not bodies.is_placed(shape.body) and bodies.along_rod(solid) is None:
+        yield (
+            f"body '{shape.body}' turns in ways that no leg has in closed form: name two joints in `between`, or put "
+            f"its shape on the line of its rod, {WHAT_TO_DO}"
+        )
+
+
+def _bodies_of(mechanism: Mechanism, solid: int, bodies: MovedBodies) -> tuple[int, int]:
+    joints = links_of(mechanism).joints[solid]
+    if not joints:
+        body = mechanism.shapes[solid].body
+        number = bodies.number(body) if bodies.is_placed(body) else bodies.along_rod(solid)
+        assert number is not None
+        return number, number
+    first, second = (bodies.of_centre(mechanism.joint(name)) for name in joints)
+    assert first is not None
+    assert second is not None
+    return first, second
+
+
+def angles_needed(links: ExportedLinks | None, leg: int, start: int) -> bool:
+    """True if angles of an end of a rod place links; `start` is the first place of that end's angles."""
+    return links is not None and any(
+        motion.leg == leg and start <= motion.place < start + 3 and start in (K.BASE_END, K.PLATFORM_END)
+        for motion in links.motions
+    )

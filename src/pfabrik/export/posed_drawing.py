@@ -11,7 +11,7 @@ from ..clearance.solid_meshes import solids_of
 from ..common_centre import common_centre
 from ..description.home_mobility import joint_screws
 from ..description.mechanism import Joint, Mechanism
-from ..description.places import joint_places, joints_on
+from ..description.sketch import joint_places, joints_on
 from ..drawn_parts import Part, Place, hangs, home_rail, parts_of, role_of, size_of
 from ..kinematics import Model, columns, links_of, plane_of
 

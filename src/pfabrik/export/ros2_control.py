@@ -13,9 +13,8 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..kinematics import JointPath
 from ..whole_files import whole_path
 from .export_c import c_source, require_identifier
-from .machine_data import Machine
-from .named_joints import fitting_path
-from .wording import comment, literal
+from .machine_data import Machine, fitting_path
+from .static_data import comment, literal
 
 FILES = {
     "CMakeLists.txt": "CMakeLists.txt",

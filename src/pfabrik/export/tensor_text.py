@@ -11,9 +11,8 @@ import numpy as np
 
 from ..description.mechanism import Mechanism
 from .source import NOTICE, selected
-from .tensor_machine import TensorMachine
-from .tensor_tables import Rows, cones_of, counting_of, dimensions_of, nested, place_of
-from .wording import comment
+from .static_data import comment
+from .tensor_tables import Rows, TensorMachine, cones_of, counting_of, dimensions_of, nested, place_of
 
 ACCURACY = {"float64": 1e-13, "float32": 1e-6}
 """Share of a pivot below which equations do not determine an unknown: what rounding leaves of it."""

@@ -21,8 +21,7 @@ from ..kernels.platform.search_records import SETTINGS
 from ..kernels.platform.tables import MACHINE
 from ..to_c import Program
 from .controller_tables import ASKED, ControllerTables
-from .static_data import StaticData, fields_read
-from .wording import Precision
+from .static_data import Precision, StaticData, fields_read
 
 SINGLE = {
     ("kernels.legs.leg_constants", "DAMPING"): 1e-7,

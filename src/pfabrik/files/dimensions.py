@@ -11,7 +11,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..description.directions import WORDS
+from ..description.leg_points import WORDS
 from ..errors import Fault, counted, near_miss
 
 TEXTS = (

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..description.coercion import numbers, truths
 from ..description.form_faults import is_numbers
-from ..description.joint_types import KINDS, Coordinate, driven_places
+from ..description.joints import KINDS, Coordinate, driven_places
 from ..errors import InvalidArgument, near_miss
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "µm": 1e-6}

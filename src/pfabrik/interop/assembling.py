@@ -12,15 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
+from ..description.joints import KINDS, Joint
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
 from ..files.units import metres_of
 from ..kinematics import column_joints, columns, displacements
 from ..motion.displacements import centres, screws
-from ..motion.joint_rates import loop_slopes
+from ..motion.loops import loop_slopes
 from ..tolerances import TOLERANCES
 from .closing import CLOSED, ClosedHome, OpenLoops, close_home
 from .collision import Collision

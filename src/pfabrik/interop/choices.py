@@ -10,13 +10,12 @@ import numpy as np
 from ..arrays import Floats
 from ..description.graph import Edge, spanning_tree
 from ..description.home_mobility import body_twist
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
+from ..description.joints import KINDS, Joint
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, PfabrikError, counted
 from ..kinematics import column_joints, tree_of
-from ..motion.joint_rates import actuated_columns, first_order, present_screws, right_singular
-from ..motion.walks import around_home
+from ..motion.loops import actuated_columns, first_order, present_screws, right_singular
+from ..motion.mobility import around_home
 from ..tolerances import TOLERANCES
 from .opened import Loop
 from .simplify import edges_between, loop_blocks

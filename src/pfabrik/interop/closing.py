@@ -14,13 +14,12 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..closure.close import close, platform_poses
-from ..description.joint_types import JointType
-from ..description.joints import Joint
+from ..description.joints import Joint, JointType
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from ..kinematics import column_joints, columns, displacements, home_coordinates, rate_units, tree_of
-from ..motion.closure import Closure, closure_of
 from ..motion.displacements import screws
+from ..motion.loops import Closure, closure_of
 from ..rotations import shortest_turns, to_rotvec
 from ..tolerances import TOLERANCES
 from .opened import Loop, OpenMechanism

@@ -9,11 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
+from ..description.joints import KINDS, Joint
 from ..errors import Fault, InvalidMechanism
 from ..kinematics import columns, cycle_basis, rate_units
-from ..motion.joint_rates import loop_slopes, right_singular
+from ..motion.loops import loop_slopes, right_singular
 from ..tolerances import TOLERANCES
 from .assembling import closed_structure
 from .closing import OpenLoops, close_home

@@ -6,8 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
+from ..description.joints import KINDS, Joint
 from ..description.mechanism import Mechanism
 from ..errors import Fault, InvalidMechanism
 from .opened import OpenMechanism

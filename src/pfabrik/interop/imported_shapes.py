@@ -9,8 +9,8 @@ from typing import Any
 
 from ..description.links import MOST_PAIRS, bodies_of_shapes, overlaps_at_home
 from ..description.mechanism import Mechanism, Shape
-from ..description.shape_faults import MOST_SHAPES, form_of_shapes, shape_faults
 from ..description.structure import Structure
+from ..description.whole_rules import MOST_SHAPES, form_of_shapes, shape_faults
 from ..kinematics import links_of
 from .collision import Collision, Solid
 from .notes import Note, note_names

@@ -1,26 +1,207 @@
-"""The bodies of a MuJoCo model, with their joints, masses, sites and what is drawn of them."""
+"""The bodies of a MuJoCo model: joints, masses, servos, sites, struts, and what is drawn of them."""
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_mapping, require_positive
+from ..description.form_faults import shown
+from ..description.graph import sliding_along
 from ..description.home_mobility import universal_axes
 from ..description.joint_coordinates import JointCoordinate
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
-from ..description.mechanism import Mechanism
+from ..description.joints import KINDS, Joint
+from ..description.mechanism import Mechanism, Shape
+from ..errors import UnknownName
 from ..kinematics import columns, links_of
+from ..tolerances import TOLERANCES
+from .collision import Solid
 from .cuts import Branch, CutTree
-from .mjcf_struts import Half, halves_of, struts_of
 from .names import unique
-from .physics import Physics
-from .xml_reading import number_text
+from .xml_reading import fault, number_text
+
+DENSITY = 100.0
+"""Mass of the end effector over the cube of the characteristic length [kg/m³]: 0.8 kg for a hexapod of 200 mm."""
+
+LINK = 0.1
+"""Mass of any other body over that of the end effector."""
+
+THINNEST = 0.1
+"""Least radius of gyration of a body [L]: a light body that turns easily would need shorter steps."""
+
+SERVO_RATE = 120.0
+"""Natural frequency of the servos [1/s] where they carry all of the machine: an eighth of what one step of the
+simulation can follow. A platform that its legs hold by short levers settles tens of times more slowly."""
+
+STEP = 0.001
+"""Time step of the simulation [s]."""
+
+
+@dataclass(frozen=True)
+class Physics:
+    """The masses of a simulation model, and what follows from them, in SI units.
+
+    Attributes
+    ----------
+    masses : body -> its mass [kg].
+    given : bodies whose masses the caller gave.
+    length : the characteristic length [m].
+    heaviest : the largest of the masses, which any servo can carry [kg].
+    """
+
+    masses: Mapping[str, float]
+    given: frozenset[str]
+    length: float
+    heaviest: float
+
+    def inertia(self, body: str, points: Floats) -> tuple[float, Floats, float]:
+        """Mass [kg], centre of mass (3,) [m] and moment of inertia about any axis [kg m²] of a body with these points.
+
+        As if its mass were in a ball around them.
+        """
+        centre = points.mean(axis=0)
+        spread = float(np.sqrt(points.var(axis=0).sum()))
+        mass = self.masses.get(body, LINK**2 * self.heaviest)  # of a doubled body, hardly any
+        return mass, centre, mass * max(spread, THINNEST * self.length) ** 2
+
+    def carried(self, turning: bool) -> float:
+        """The load of a servo: a moment of inertia [kg m²] if it turns, else a mass [kg]."""
+        return self.heaviest * self.length**2 if turning else self.heaviest
+
+    def servo(self, turning: bool) -> dict[str, float]:
+        """Gains of a critically damped position servo, per radian or metre."""
+        carried = self.carried(turning)
+        return {"kp": carried * SERVO_RATE**2, "kv": 2.0 * carried * SERVO_RATE}
+
+    def joint(self, turning: bool, actuated: bool) -> dict[str, float]:
+        """Armature and damping: stiff servos on light bodies without an armature blow up."""
+        carried = self.carried(turning)
+        return {"armature": (0.2 if actuated else 0.01) * carried, "damping": 0.02 * carried}
+
+
+def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | None) -> Physics:
+    """Masses as given, the others plausible.
+
+    Parameters
+    ----------
+    metres : length of the mechanism's unit [m].
+    masses : body -> mass [kg], of some of the bodies.
+
+    Raises
+    ------
+    UnknownName : a mass of no body of the mechanism.
+    InvalidArgument : a mass that is not positive.
+    """
+    given = {}
+    for body, mass in require_mapping("masses", masses, "masses in kg by the names of bodies").items():
+        if body not in mechanism.bodies:
+            raise UnknownName("body", body, mechanism.bodies)
+        given[body] = require_positive(f"masses['{body}']", mass)
+    length = mechanism.characteristic_length * metres
+    whole = DENSITY * length**3
+    plausible = {body: whole if body == mechanism.end_effector_body else LINK * whole for body in mechanism.bodies}
+    every = plausible | given
+    moving = [mass for body, mass in every.items() if body != mechanism.base]
+    return Physics(every, frozenset(given), length, max(moving))
+
+
+SLIDING = ("prismatic", "cylindrical")
+"""Joints whose centre rests on one of their bodies only."""
+
+STRUT = "strut"
+"""What notes and geoms of struts are called: the note `strut.3` has the geoms `strut_3_1` and `strut_3_2`."""
+
+
+class Half(NamedTuple):
+    """The part of a strut that moves with one of its two bodies: its ends at home (2, 3), and its radius [length]."""
+
+    name: str
+    body: str
+    ends: Floats
+    radius: float
+
+
+def struts_of(mechanism: Mechanism) -> dict[int, tuple[Joint, Joint]]:
+    """Index of a shape -> the two joints that it is between, of capsules whose two ends do not move with one body."""
+    links = links_of(mechanism) if mechanism.shapes else None
+    struts = {}
+    for k, names in enumerate(() if links is None else links.joints):
+        joints = [mechanism.joint(name) for name in names]
+        body = mechanism.shapes[k].body
+        if any(body not in joint.connects or joint.type in SLIDING for joint in joints):
+            struts[k] = (joints[0], joints[1])
+    return struts
+
+
+def halves_of(mechanism: Mechanism) -> Iterator[Half]:
+    """Yield the halves of the struts that two capsules are exactly, at any length within the range.
+
+    Each is as long as half the longest strut. Together they are the strut unless it is shorter than one of them: so the
+    longest is at most twice the shortest.
+    """
+    for k, joints in struts_of(mechanism).items():
+        length, bodies = _half_length(mechanism, mechanism.shapes[k], joints)
+        if length == 0.0:
+            continue
+        ends = np.array([joint.at for joint in joints])
+        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        for side, (body, sign) in enumerate(zip(bodies, (1.0, -1.0), strict=True)):
+            half = np.array([ends[side], ends[side] + sign * length * along])
+            yield Half(f"{STRUT}_{k}_{side + 1}", body, half, 0.5 * mechanism.shapes[k].thickness)
+
+
+def _half_length(mechanism: Mechanism, shape: Shape, joints: tuple[Joint, Joint]) -> tuple[float, tuple[str, ...]]:
+    """Half of a strut's greatest length, and its two bodies; 0 where two halves would not be it."""
+    nothing: tuple[float, tuple[str, ...]] = (0.0, ())
+    parts = sliding_along(mechanism, shape.body)
+    bodies = tuple(next((body for body in joint.connects if body in parts), "") for joint in joints)
+    slides = [each for each in mechanism.joints if each.type == "prismatic" and set(each.connects) == set(bodies)]
+    if any(joint.type in SLIDING for joint in joints) or len(set(bodies)) < 2 or len(slides) != 1:
+        return nothing
+    span = np.subtract(*(np.array(joint.at) for joint in reversed(joints)))
+    length, axis = float(np.linalg.norm(span)), np.array(mechanism.home_axis(slides[0].name))
+    if np.linalg.norm(np.cross(span, axis)) > TOLERANCES.alignment * length or slides[0].range is None:
+        return nothing
+    sign = np.sign(span @ axis) * (1.0 if slides[0].connects[1] == bodies[1] else -1.0)
+    change = sign * (np.array(slides[0].range) - mechanism.home_coordinate(slides[0].name))
+    shortest, longest = length + change.min(), length + change.max()
+    return (0.5 * float(longest), bodies) if 0.5 * longest <= shortest else nothing
+
+
+def strut_notes(mechanism: Mechanism, metres: float) -> Iterator[tuple[str, str]]:
+    """Yield names and texts of the custom elements that tell of struts."""
+    for k, joints in struts_of(mechanism).items():
+        shape = mechanism.shapes[k]
+        data = [shape.body, shape.thickness * metres, *(joint.name for joint in joints)]
+        yield f"{STRUT}.{k}", json.dumps(data)
+
+
+def read_struts(notes: dict[str, str]) -> Iterator[tuple[str, Solid]]:
+    """Yield the number of each strut of a model's notes, and the strut as a solid [m]."""
+    for name, text in notes.items():
+        prefix, _, number = name.partition(".")
+        if prefix == STRUT:
+            try:
+                body, thickness, first, second = json.loads(text)
+                strut = Shape(str(body), thickness=float(thickness), between=(str(first), str(second)))
+            except (ValueError, TypeError):
+                expected = '["body", thickness in metres, "joint", "joint"]'
+                raise fault(f"custom text '{name}'", shown(text), expected) from None
+            yield number, Solid(strut, strut.body)
+
+
+def is_half(name: str, struts: Container[str]) -> bool:
+    """True if a geom is called as half of one of some struts, by their numbers."""
+    prefix, _, rest = name.partition("_")
+    return prefix == STRUT and rest.rpartition("_")[0] in struts
+
 
 REFERENCE_POINT = "reference_point"
 """Name of the site that targets place."""

@@ -16,10 +16,10 @@ from ..extras import require
 from .assembling import Imported
 from .collision import Collision
 from .driving import Rates
+from .mjcf_bodies import is_half, read_struts
 from .mjcf_geoms import read_collision
 from .mjcf_model import MjcfModel
 from .mjcf_plain import plain_model, transmission_text
-from .mjcf_struts import is_half, read_struts
 from .mjcf_writing import NOTE
 from .notes import Note, noting
 from .opened import loops_by_name

@@ -15,9 +15,7 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..files.units import metres_of
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import Names, as_attributes, bodies, names_of, si_unit
-from .mjcf_struts import strut_notes
-from .physics import STEP, Physics, physics
+from .mjcf_bodies import STEP, Names, Physics, as_attributes, bodies, names_of, physics, si_unit, strut_notes
 from .xml_reading import number_text
 
 NOTE = "pfabrik."

@@ -19,7 +19,7 @@ from ..description.home_mobility import loop_conditions
 from ..description.structure import Structure
 from ..kinematics import columns, cycle_basis, displacements, tree_of
 from ..motion.displacements import joint_displacements
-from ..motion.joint_rates import at_reference, loop_errors_here, loop_slopes, moved
+from ..motion.loops import at_reference, loop_errors_here, loop_slopes, moved
 from ..rotations import from_rotvec
 from .digits import NOTHING, Rounding
 from .relations import Axis, Relation, axes_of, equations

@@ -17,12 +17,11 @@ from ..errors import InvalidArgument, PfabrikError, UnknownName
 from ..fk import solve_fk
 from ..tolerances import TOLERANCES
 from .loops_file import read_loops
-from .mjcf_plain import plain_model
+from .mjcf_plain import plain_model, plain_robot
 from .mjcf_reading import from_mjcf
 from .opened import CLOSING
 from .referee import distances
 from .robot_in_mujoco import RobotInMujoco
-from .urdf_plain import plain_robot
 from .urdf_reading import from_urdf, read_description
 from .xml_reading import kind_of, read_xml
 

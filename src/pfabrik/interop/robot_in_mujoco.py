@@ -18,8 +18,8 @@ from ..files.units import metres_of
 from ..kinematics import columns
 from ..rotations import to_quaternion
 from ..tolerances import TOLERANCES
-from .compiled_model import CompiledModel
 from .mjcf_bodies import si_unit
+from .mjcf_model import CompiledModel
 
 NEWTON_STEPS = 30
 """Most steps to close the loops; one or two are usual, from where the joints' values put them."""

@@ -12,8 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_names, require_positive
-from ..description.joint_types import KINDS
-from ..description.joints import Cone, Joint
+from ..description.joints import KINDS, Cone, Joint
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, PfabrikError, UnknownName, counted
 from ..files.units import metres_of
@@ -26,10 +25,9 @@ from .digits import Rounding, worst
 from .driving import Rates, require_drives, with_actuators
 from .imported_shapes import with_collision
 from .names import unique
-from .notes import Note, note_names
+from .notes import Note, note_names, with_task
 from .opened import Loop, OpenMechanism
 from .simplify import merged_bodies, merged_pair, prune
-from .tasks import with_task
 
 PROPOSED = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 """Values of `within` [m and rad] that are tried, where loops all but move, to propose the least that lets them."""

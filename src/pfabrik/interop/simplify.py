@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..description.graph import Edge, Tree, spanning_tree, welded
-from ..description.joint_types import JointType
-from ..description.joints import Cone, Joint
+from ..description.joints import Cone, Joint, JointType
 from ..tolerances import TOLERANCES
 from .notes import Note, note_names
 from .opened import Loop, OpenMechanism

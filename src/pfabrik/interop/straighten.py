@@ -17,7 +17,7 @@ from ..arrays import Floats
 from ..description.home_mobility import unclear_conditions, unclear_joints
 from ..description.joints import Joint, Vector
 from ..description.structure import Structure
-from ..motion.joint_rates import loop_errors_here
+from ..motion.loops import loop_errors_here
 from ..tolerances import TOLERANCES
 from .digits import NOTHING, Rounding, worst
 from .nearest_geometry import Kept, Moving, nearest_geometry, walked

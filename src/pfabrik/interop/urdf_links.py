@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..arrays import Floats
-from ..description.joint_types import JointType
+from ..description.joints import JointType
 from ..errors import Fault, InvalidMechanism, near_miss
 from ..rotations import from_rpy, square_to
 from .couplings import Coupling

@@ -14,8 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_names
-from ..description.joint_types import KINDS
-from ..description.joints import Joint
+from ..description.joints import KINDS, Joint
 from ..errors import Fault, InvalidMechanism
 from .assembling import Imported
 from .driving import Rates

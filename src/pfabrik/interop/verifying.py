@@ -19,8 +19,7 @@ from ..files.units import metres_of
 from ..printed import Printed, ResultTable, error_text
 from ..tolerances import TOLERANCES
 from .original import Original, OriginalFile
-from .referee import on_export
-from .referee_configurations import Travelled, reached_at_random, travelled
+from .referee import Travelled, on_export, reached_at_random, travelled
 
 FAR = 0.25
 """Share of its range, or of what was tried, that some actuator must have gone through: poses nearer to home than that

@@ -25,10 +25,9 @@ from .legs.margin_blocks import margins_in_blocks
 from .passes import plan as P
 from .passes.solve import solve_by_passes
 from .platform.answer_rows import answer_rows, mark_near, step_rows
-from .platform.evaluate import evaluate_poses
+from .platform.evaluate import evaluate_poses, jacobians
 from .platform.forward import assemble
 from .platform.forward_blocks import assemble_in_blocks
-from .platform.jacobians import jacobians
 from .platform.nearest import nearest_pose
 from .replay import replay
 from .rows import Rows

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..answers.solution import Solution
-from ..answers.solution_table import pose_cells, pose_columns
+from ..answers.words import pose_cells, pose_columns
 from ..arrays import Floats, Mask
 from ..checks import require_count
 from ..closure.close import Closing, close, platform_poses
-from ..closure.random_starts import random_starts
+from ..closure.multistart import random_starts
 from ..description.mechanism import Mechanism
 from ..errors import ContinuumOfSolutions, InvalidArgument
 from ..fk import Actuators, as_values, solution_at
 from ..kinematics import model_of
-from ..motion.closure import Closure
-from ..motion.walks import stepped_freely
+from ..motion.loops import Closure
+from ..motion.mobility import stepped_freely
 from ..tolerances import TOLERANCES
 from .fingerprints import pose_marks
 from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..closure.close import HELD, Closing, close, platform_poses
-from ..closure.random_starts import random_starts
-from ..description.joint_types import TASK_TURNS
+from ..closure.multistart import random_starts
+from ..description.joints import TASK_TURNS
 from ..errors import ContinuumOfWorkingModes
 from ..kinematics import columns
-from ..motion.closure import Closure
+from ..motion.loops import Closure
 from ..tolerances import TOLERANCES
 from .fingerprints import Fingerprints, close_on_target, count_from_home, shifts
 from .lists import LEAST_STARTS, STEPS, Clusters

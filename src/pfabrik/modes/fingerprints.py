@@ -11,9 +11,9 @@ from ..arrays import Floats, Mask
 from ..closure.close import Closing, close
 from ..description.mechanism import Mechanism
 from ..kinematics import columns
-from ..motion.closure import Closure
 from ..motion.displacements import centres
 from ..motion.limited_coordinates import within_turns
+from ..motion.loops import Closure
 from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .lists import ALONG

@@ -8,8 +8,8 @@ from math import prod
 import numpy as np
 
 from ..answers.solution import Solution
-from ..answers.solution_table import actuator_columns, in_units, pose_cells, pose_columns
 from ..answers.status import Status
+from ..answers.words import actuator_columns, in_units, pose_cells, pose_columns
 from ..arrays import Floats
 from ..checks import require_count
 from ..closure.close import CLOSED, close

@@ -10,9 +10,8 @@ from ..arrays import Floats, Mask
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism, counted
 from ..tolerances import TOLERANCES
-from .joint_rates import actuated_columns, first_order, right_singular
-from .mobility import generic_of
-from .walks import around_home
+from .loops import actuated_columns, first_order, right_singular
+from .mobility import around_home, generic_of
 
 MOST_NAMED = 6
 """Most coordinates that are named."""

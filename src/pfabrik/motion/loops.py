@@ -1,21 +1,47 @@
-"""A mechanism as closed loops: unit motions, and the paths from the base to the end effector that visit them."""
+"""A mechanism as closed loops of unit motions, as kernels take them, and its joint rates to first order.
+
+Here lengths are in units of L and twists are [velocity of the reference point; angular velocity], in the base frame, so
+nothing depends on the mechanism's unit, on where it stands, or on the order of its joints.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..description.graph import PASSED_THROUGH, Step, cone_line, edges_of, opposite, spanning_tree, tree_of
-from ..description.home_mobility import universal_axes
+from ..arrays import Floats, Ints, Mask
+from ..derived import derived
+from ..description.graph import (
+    PASSED_THROUGH,
+    Path,
+    Step,
+    cone_line,
+    edges_of,
+    independent_paths,
+    opposite,
+    spanning_tree,
+    tree_of,
+)
+from ..description.home_mobility import (
+    body_twist,
+    column_joints,
+    column_moves,
+    loop_conditions,
+    orthonormal_rates,
+    universal_axes,
+)
 from ..description.mechanism import Joint, Mechanism
-from ..description.paths import Path, independent_paths
+from ..description.structure import Structure
+from ..description.task import Task, task_of
 from ..kernels.closure import loops as K
+from ..kernels.handle import Handle
 from ..tolerances import TOLERANCES
-from .displacements import columns, rate_units
+from .displacements import columns, end_effector_pose, loop_errors, rate_units, screws, stepped
 
 
 def loops_of(mechanism: Mechanism, *, whole: bool = True) -> K.Loops:
@@ -213,3 +239,155 @@ def _pairs(values: Iterable[tuple[int, int]]) -> Ints:
 
 def _vectors(values: Iterable[Any]) -> Floats:
     return np.array(list(values), dtype=float).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """A mechanism compiled for the closure kernel.
+
+    Attributes
+    ----------
+    loops : the table of loops that kernels read.
+    scale : factor that makes a coordinate dimensionless: 1 / L for lengths, 1 for angles, (columns,).
+    turning : 1 for angles, 0 for lengths, (columns,).
+    last_balls : columns of ball joints at the platform, each at the end of a path that shares no joint.
+    actuated, home : columns of the actuators, and their values at home, (n_a,).
+    driven : columns of actuators and locked joints, which stay fixed in forward kinematics.
+    """
+
+    mechanism: Mechanism
+    task: Task
+    loops: K.Loops
+    scale: Floats
+    turning: Floats
+    actuated: Ints
+    driven: frozenset[int]
+    last_balls: frozenset[int]
+    home: Floats
+
+    @property
+    def idle(self) -> Mask:
+        """Mask of coordinates on no path, such as a tool's hinge: they do not move, and only their limits matter."""
+        idle = np.ones(len(self.scale), bool)
+        idle[self.loops.row_columns] = False
+        return idle
+
+    @cached_property
+    def cubes(self) -> float:
+        """Sum over groups of the cubed number of coordinates, at least 1: the cost of one closing step."""
+        on_paths = self.loops.group_of[~self.idle]
+        return float(max(1.0, (np.bincount(on_paths).astype(float) ** 3).sum()))
+
+    def actuators(self, coordinates: Floats) -> Floats:
+        """The actuated values (n, n_a) in coordinates (n, columns) [length or rad]."""
+        return np.asarray(coordinates[:, self.actuated] + self.home)
+
+    def put_actuators(self, coordinates: Floats, values: Floats) -> None:
+        """Write actuated values (n, n_a), and zero for locked joints, into coordinates (n, columns)."""
+        coordinates[:, list(self.driven)] = 0.0
+        coordinates[:, self.actuated] = values - self.home
+
+    @cached_property
+    def machine(self) -> Handle[K.Loops]:
+        """The handle by which kernels open the loops."""
+        return Handle(self.loops)
+
+
+def closure_of(mechanism: Mechanism, *, whole: bool) -> Closure:
+    """Compile a mechanism for the closure kernel.
+
+    Parameters
+    ----------
+    whole : with all loops; else with those on paths to the end effector only, the joints of other loops (a gripper's)
+        being idle.
+    """
+    loops = loops_of(mechanism, whole=whole)
+    turning = np.array([float(coordinate.kind == "angle") for coordinate in mechanism.coordinates])
+    scale = np.where(turning, 1.0, 1.0 / mechanism.characteristic_length)
+    actuated = np.array([drive.column for drive in mechanism.drives], np.int64)
+    home = np.array([drive.home for drive in mechanism.drives])
+    ending = loops.columns[loops.visits[loops.paths[1:][loops.last_balls == 1] - 1, 0]]
+    balls = frozenset((ending[:, None] + np.arange(3)).ravel().tolist())
+    locked = [coordinate.column for coordinate in mechanism.coordinates if coordinate.joint.is_rigid]
+    driven = frozenset([*actuated.tolist(), *locked])
+    return Closure(mechanism, task_of(mechanism), loops, scale, turning, actuated, driven, balls, home)
+
+
+def actuated_columns(mechanism: Mechanism) -> list[int]:
+    """The columns of the actuators."""
+    return [drive.column for drive in mechanism.drives]
+
+
+@dataclass(frozen=True)
+class CycleBasis:
+    """Sums of screws that make up twists and loop conditions, per column of q; locked joints have no part in them.
+
+    Attributes
+    ----------
+    path : of the end effector's body, (c,).
+    fundamental, orthonormal : the loops of the tree, and orthonormal combinations that depend on no tree, (loops, c).
+    of_joints : these combinations by joint, (loops, joints).
+    rates : orthonormal rates of every joint, (c, c).
+    """
+
+    path: Floats
+    fundamental: Floats
+    orthonormal: Floats
+    of_joints: Floats
+    rates: Floats
+
+
+@derived
+def cycle_basis(mechanism: Structure) -> CycleBasis:
+    """The paths and loops along which screws of joint rates add up."""
+    tree, owners = tree_of(mechanism), column_joints(mechanism)
+    path = tree.paths[mechanism.end_effector_body][owners]
+    orthonormal = np.linalg.qr(tree.loops.T)[0].T
+    moves = column_moves(mechanism)
+    loops, rates = tree.loops[:, owners] * moves, moves[:, None] * orthonormal_rates(mechanism)
+    return CycleBasis(path * moves, loops, orthonormal[:, owners] * moves, orthonormal, rates)
+
+
+def first_order(mechanism: Structure, q: Floats) -> tuple[Floats, Floats]:
+    """Loop conditions (n, 6 loops, c) and twist of the end effector (n, r, c), per orthonormal joint rate."""
+    graph, present = cycle_basis(mechanism), present_screws(mechanism, q)
+    twist = body_twist(graph.path, present)
+    velocity, angular = twist[:, 3:], twist[:, :3]
+    rows = [velocity] if mechanism.end_effector_is_joint else [velocity, angular]
+    return loop_conditions(graph.orthonormal, present), np.concatenate(rows, axis=1)
+
+
+def present_screws(mechanism: Structure, q: Floats) -> Floats:
+    """Screws of orthonormal joint rates, (n, c, 6): angular velocity, velocity of the present reference point."""
+    return np.asarray(cycle_basis(mechanism).rates @ at_reference(mechanism, q, screws(mechanism, q)))
+
+
+def loop_slopes(mechanism: Structure, q: Floats) -> Floats:
+    """Slopes of the loops' errors by orthonormal joint rates, (n, 6 loops, c)."""
+    return loop_conditions(cycle_basis(mechanism).fundamental, present_screws(mechanism, q))
+
+
+def loop_errors_here(mechanism: Structure, q: Floats) -> Floats:
+    """The loops' errors at the present reference point, (n, 6 loops) [rad, L]."""
+    return at_reference(mechanism, q, loop_errors(mechanism, q)).reshape(len(q), -1)
+
+
+def at_reference(mechanism: Structure, q: Floats, origin_screws: Floats) -> Floats:
+    """Screws (n, k, 6) with the velocity of the present reference point in place of that at the base origin."""
+    points = end_effector_pose(mechanism, q)[:, None, :3, 3] / mechanism.characteristic_length
+    moved = origin_screws.copy()
+    moved[..., 3:] += np.cross(moved[..., :3], points)
+    return moved
+
+
+def moved(mechanism: Structure, q: Floats, rates: Floats) -> Floats:
+    return stepped(mechanism, q, rates @ cycle_basis(mechanism).rates)
+
+
+def right_singular(matrices: Floats) -> tuple[Floats, Floats]:
+    """Singular values, and all right singular vectors as rows, of (n, a, b): (n, min(a, b)) and (n, b, b)."""
+    if 0 in matrices.shape[1:]:
+        n, _, b = matrices.shape
+        return np.zeros((n, 0)), np.broadcast_to(np.eye(b), (n, b, b))
+    _, values, right = np.linalg.svd(matrices)
+    return values, right

@@ -23,9 +23,8 @@ from ..description.task import task_of
 from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
 from .displacements import displacements
-from .joint_rates import actuated_columns, first_order
-from .mobility import generic_of
-from .walks import around_home
+from .loops import actuated_columns, first_order
+from .mobility import around_home, generic_of
 
 KINDS = ("serial", "parallel", "constraint", "passive")
 NUMBERS = (*KINDS, "lost", "gained")

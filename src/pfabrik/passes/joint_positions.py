@@ -12,8 +12,8 @@ from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..description.task import Weights
 from ..kernels.passes import plan as P
-from ..motion.closure import Closure
 from ..motion.displacements import columns, displacements
+from ..motion.loops import Closure
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
 

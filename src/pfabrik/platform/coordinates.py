@@ -10,8 +10,8 @@ from ..closure.close import HELD, close
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..model import Model
-from ..motion.closure import Closure
 from ..motion.limited_coordinates import within_turns
+from ..motion.loops import Closure
 from ..rotations import nearest_turn
 from ..tolerances import TOLERANCES
 from .table import reading_scratch, reading_table

@@ -13,8 +13,7 @@ from ..kernels.platform.tables import EXACTLY, IN_OTHER_MODES
 from ..kernels.rows import Rows
 from ..kernels.threads import in_blocks
 from ..model import Model
-from .rows_one_by_one import Answers, Request, answer_phases, mark_near
-from .single import AssemblyOutputs, assembly_of
+from .single import Answers, AssemblyOutputs, Request, answer_phases, assembly_of, mark_near
 
 ROWS_A_BLOCK = 1024
 

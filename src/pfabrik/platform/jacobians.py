@@ -22,8 +22,7 @@ from .coordinates import NO_ROWS
 from .table import TableHandle, reading_scratch, reading_table
 
 if TYPE_CHECKING:
-    from ..kernels.platform.evaluate import EvaluationScratch
-    from ..kernels.platform.jacobians import JacobianTables
+    from ..kernels.platform.evaluate import EvaluationScratch, JacobianTables
 
 ROWS_A_BLOCK = 512
 """Rows of one call of the kernel."""
@@ -123,8 +122,7 @@ def _fill_maps(by_legs: ByLegs, poses: Floats, sides: Floats, q_proximal: Floats
     ----------
     sides, q_proximal : see `LegAnswers`; `q_proximal` has no rows if closed forms solve all.
     """
-    from ..kernels.platform.evaluate import evaluate_poses
-    from ..kernels.platform.jacobians import jacobians
+    from ..kernels.platform.evaluate import evaluate_poses, jacobians
 
     n, actuators = len(poses), len(by_legs.units[0])
     rows, slopes = np.empty((n, by_legs.rows)), np.empty((n, by_legs.rows + actuators, 6))
@@ -140,7 +138,7 @@ def _by_legs(model: Model) -> ByLegs | None:
 
     They follow if the pose determines all coordinates of the legs and all actuator motions move the end effector.
     """
-    from ..kernels.platform.jacobians import new_jacobian_tables
+    from ..kernels.platform.evaluate import new_jacobian_tables
 
     counts = generic_of(model.mechanism).mobility
     if not model.has_legs or len(model.legs.redundant) or counts.internal or counts.uncontrolled:

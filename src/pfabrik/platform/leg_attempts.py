@@ -16,8 +16,8 @@ from ..options import Options
 from .nearest import endings
 from .nearest_pose import starts_at
 from .reach import reach
-from .rows_one_by_one import Answers, Request, answer_phases
 from .seeds import seeds_of
+from .single import Answers, Request, answer_phases
 from .tables import home_of
 
 

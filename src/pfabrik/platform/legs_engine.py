@@ -38,18 +38,15 @@ from ..options import Options
 from ..poses import are_poses
 from ..tolerances import TOLERANCES
 from .answers import LegAnswers, leg_answers, sides_at
+from .branch import answer_unreached, home_answer, kept, starts_beside
 from .coordinates import joint_coordinates
-from .folds import home_answer, starts_beside
 from .forward import forward_kinematics
-from .keep import kept
 from .leg_attempts import attempts
 from .links_of_legs import keeps_links, links_of_legs
 from .nearest import limit_multipliers, nearest_positions
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, rest_redundant, turns_repeatedly
-from .rows_one_by_one import Answers, mark_near, request_from
-from .single import LegsAssembly, SingleTarget, assembly_of, new_scratch
-from .unreached import answer_unreached
+from .single import Answers, LegsAssembly, SingleTarget, assembly_of, mark_near, new_scratch, request_from
 
 
 class LegsEngine(Engine):

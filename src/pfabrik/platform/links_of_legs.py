@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..arrays import Ints
-from ..closure.links_on_paths import link_limits
+from ..closure.placed_links import link_limits
 from ..decomposition.leg_forms import Rod
 from ..derived import derived
 from ..description.graph import welded

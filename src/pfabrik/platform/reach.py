@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Mask, Records
 from ..batch import put, take
 from ..closure.configurations import Configurations
-from ..closure.continuation import continued
+from ..closure.effort import continued
 from ..decomposition.leg_table import LegTable
 from ..derived import derived
 from ..kernels.platform.tables import BY_LEGS
@@ -19,7 +19,7 @@ from ..options import Options
 from ..poses import between
 from ..rotations import nearest_turn
 from .redundant_joints import split_by_redundant
-from .rows_one_by_one import Answers, answer_phases, request_from, step_redundant_joints
+from .single import Answers, answer_phases, request_from, step_redundant_joints
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096

@@ -12,7 +12,7 @@ from ..derived import derived
 from ..kernels.handle import Handle
 from ..kernels.legs import records as K
 from ..model import Model
-from ..motion.walks import around_home
+from ..motion.mobility import around_home
 from ..tolerances import TOLERANCES
 from .table import TableHandle, kernel_table, reading_scratch, search_table, table_handle, with_pointing_cones
 

@@ -15,9 +15,9 @@ from ..checks import require_choice, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
 from ..tolerances import TOLERANCES
-from .first_order_maps import Maps, maps_of
-from .joint_responses import responses_of
-from .reasons import Reasons, add_reason, has_reason, in_shape
+from .joint_balance import responses_of
+from .loads import Reasons, add_reason, has_reason, in_shape
+from .transmission import Maps, maps_of
 
 ROWS_A_BLOCK = 256
 MOST_PATTERNS = 2**14

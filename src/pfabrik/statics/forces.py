@@ -1,4 +1,4 @@
-"""Actuator forces and joint reactions in static equilibrium."""
+"""Actuator forces, joint reactions, and forces along rods that only pull or push, in static equilibrium."""
 
 from __future__ import annotations
 
@@ -11,17 +11,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..answers.solution import Solution, as_plain, checked_solution
-from ..arrays import Floats, Mask, shaped
+from ..arrays import Floats, Ints, Mask, shaped
+from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..frozen import FrozenMapping
 from ..kinematics import actuator_units, end_effector_pose, joint_centres
 from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
-from .first_order_maps import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 from .joint_balance import Balance, about_centres, balance
-from .loads import Asked, BodyLoads, asked_of, carried_of, checked_gravity, checked_loads
-from .reasons import Reasons, add_reason, has_reason, in_shape, no_reasons
-from .rod_forces import rods_of, tensions
+from .loads import (
+    Asked,
+    BodyLoads,
+    Reasons,
+    add_reason,
+    asked_of,
+    carried_of,
+    checked_gravity,
+    checked_loads,
+    has_reason,
+    in_shape,
+    no_reasons,
+)
+from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
 GRAVITY = (0.0, 0.0, -9.81)
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -216,3 +227,53 @@ def _balanced(question: _Question, q: Floats, rows: slice | NDArray[np.intp]) ->
     mechanism = question.solution.mechanism
     wrenches = question.asked.wrenches[rows]
     return balance(mechanism, q, carried_of(mechanism, q, wrenches, question.loads, question.gravity)[..., None])
+
+
+class Rods(NamedTuple):
+    """The rods of a machine.
+
+    Attributes
+    ----------
+    names : of their bodies.
+    starts, ends : indices of their joints, (rods,).
+    signs : 1 where the rod is the second body of its end joint, else -1, (rods,).
+    """
+
+    names: tuple[str, ...]
+    starts: Ints
+    ends: Ints
+    signs: Floats
+
+
+@derived
+def rods_of(mechanism: Mechanism) -> Rods:
+    """Bodies with two joints whose centres are apart and neither of which is driven, except base and end effector."""
+    fixed = (mechanism.base, mechanism.end_effector)
+    found = []
+    for body in mechanism.bodies:
+        places = [place for place, joint in enumerate(mechanism.joints) if body in joint.connects]
+        places.sort(key=lambda place: mechanism.joints[place].name != mechanism.end_effector)  # its load is at that end
+        joints = [mechanism.joints[place] for place in places]
+        is_passive = all(joint.at is not None and not joint.driven for joint in joints)
+        if len(joints) == 2 and is_passive and body not in fixed and joints[0].at != joints[1].at:
+            sign = 1.0 if joints[1].connects[1] == body else -1.0
+            found.append((body, *places, sign))
+    names, starts, ends, signs = zip(*found, strict=True) if found else ((), (), (), ())
+    return Rods(names, np.array(starts, np.int64), np.array(ends, np.int64), np.array(signs, float))
+
+
+def tensions(rods: Rods, wrenches: Floats, centres: Floats) -> Floats:
+    """Forces along rods, positive if they are pulled, (n, rods, k).
+
+    Parameters
+    ----------
+    wrenches : what joints transmit from their first body to their second, [force; moment], (n, joints, 6, k).
+    centres : of joints, (n, joints, 3) [length].
+    """
+    return np.asarray(np.einsum("nri,nrik->nrk", along(rods, centres), wrenches[:, rods.ends, :3]))
+
+
+def along(rods: Rods, centres: Floats) -> Floats:
+    """Displacements of the end joints' second bodies that make rods longer, (n, rods, 3)."""
+    lines = centres[:, rods.ends] - centres[:, rods.starts]
+    return np.asarray(lines * (rods.signs / np.linalg.norm(lines, axis=-1))[..., None])

@@ -1,4 +1,4 @@
-"""Static equilibrium of every body of a machine: what joints transmit and actuators exert.
+"""Static equilibrium of every body: what joints transmit and actuators exert, and how displacements at joints act.
 
 By the way of the tree from the base, joint j carries K_j = sum of the loads w_b on the bodies b beyond it; the closing
 joint of loop l transmits a wrench that is not known, x_l. So joint j transmits, from its first body to its second,
@@ -19,10 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..answers.solution import Solution
+from ..arrays import Floats, Ints, Mask
 from ..description.mechanism import Mechanism
-from ..kinematics import JointRates, column_joints, cycle_basis, model_of
+from ..errors import UnsupportedMechanism
+from ..kinematics import JointRates, column_joints, cycle_basis, model_of, tree_of
 from ..tolerances import TOLERANCES
+from .transmission import Maps, is_redundantly_actuated
 
 ROWS_A_BLOCK = 512
 """Rows whose matrices are in memory at once."""
@@ -117,3 +120,43 @@ def about_centres(mechanism: Mechanism, wrenches: Floats, centres: Floats, refer
     forces = wrenches[:, :, :3] / mechanism.characteristic_length
     arms = (points - reference[:, None])[..., None]
     return np.concatenate([forces, wrenches[:, :, 3:] - np.cross(arms, forces, axis=2)], axis=2)
+
+
+class Responses(NamedTuple):
+    """Twists by displacements of each joint's second body from its first, at some rows of a solution.
+
+    By virtual work these are also the forces that joints transmit, per wrench on the end effector.
+
+    Attributes
+    ----------
+    places : indices of the rows, (n,).
+    twists : at held actuators, per length, (n, joints, r, 3); r is 6, or 3 for a joint end effector.
+    open : what loops resist of displacements, (n, joints, 3, z); 0 where they give way.
+    is_singular : rows in a constraint singularity, in which the others mean nothing, (n,).
+    """
+
+    places: Ints
+    twists: Floats
+    open: Floats
+    is_singular: Mask
+
+
+def responses_of(solution: Solution, maps: Maps, purpose: str) -> Responses:
+    """The responses at all valid rows.
+
+    Raises
+    ------
+    UnsupportedMechanism : actuators work against each other, so that they hold no displacement.
+    """
+    mechanism, places = solution.mechanism, np.flatnonzero(maps.is_valid)
+    if is_redundantly_actuated(mechanism):
+        reason = "there are more actuators than motions, and forces do not follow from equilibrium alone"
+        raise UnsupportedMechanism(mechanism.name, [reason], purpose)
+    first, r = JointRates(model_of(mechanism), solution._configurations.coordinates_at(places)), maps.forward.shape[1]
+    path, shift = tree_of(mechanism).paths[mechanism.end_effector_body], np.eye(6, 3)
+    openings = np.einsum("lj,ik->lijk", cycle_basis(mechanism).of_joints, shift).reshape(-1, 3 * len(path))
+    rates = first.geometry(openings, np.zeros((len(first.actuated), openings.shape[1])))
+    twists = np.swapaxes((first.twists @ rates)[:, :r].reshape(-1, r, len(path), 3), 1, 2)
+    twists = twists + np.multiply.outer(path, shift[:r])
+    twists[:, :, 3:] /= mechanism.characteristic_length
+    return Responses(places, twists, of_joints(mechanism, first.open)[:, :, :3], first.is_singular)

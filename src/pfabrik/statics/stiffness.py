@@ -16,13 +16,10 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..kinematics import actuator_units, generic_of, joint_centres
 from ..tolerances import TOLERANCES
-from .actuator_values import positive_values
-from .first_order_maps import Maps, is_redundantly_actuated, maps_of, twist_units
-from .forces import Forces
-from .joint_balance import pairs_of
-from .joint_responses import responses_of
-from .reasons import Reasons, add_reason, has_reason, in_shape
-from .rod_forces import along, rods_of
+from .forces import Forces, along, rods_of
+from .joint_balance import pairs_of, responses_of
+from .loads import Reasons, add_reason, has_reason, in_shape, positive_values
+from .transmission import Maps, is_redundantly_actuated, maps_of, twist_units
 
 SLACK = "slack cables leave a direction without stiffness"
 UNKNOWN_FORCES = "the forces that say which cables are slack are not known"

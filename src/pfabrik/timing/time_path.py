@@ -15,8 +15,7 @@ from ..errors import InvalidArgument
 from ..kernels.timing import fastest
 from ..kinematics import actuator_units, readouts
 from ..tolerances import TOLERANCES
-from .crossings import refuse_crossings
-from .curve import Curve, curve_of, largest_between
+from .curve import Curve, curve_of, largest_between, refuse_crossings
 from .timed import Timed, What
 
 MOST_SAMPLES = 10_000_000

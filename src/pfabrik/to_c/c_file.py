@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..kernels._jit import SOURCES
-from .naming import RESERVED, number
 from .types import INTEGER, REAL, Array, Spelling, Struct, Unsupported, type_of
-from .values import Value
+from .values import RESERVED, Value, number
 
 PRELUDE = Path(__file__).with_name("prelude.h")
 SMALL = 2**31

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from .expressions import ANNOTATED
-from .naming import is_simple
-from .sources import opened_by, source_of, tree_of
 from .subscripts import Subscripts
 from .types import BOOL, INTEGER, NUMBERS, REAL, WIDE, Array, Struct, Tuple, element_of, join
-from .values import UNARY, Value, effects
+from .values import UNARY, Value, effects, is_simple, opened_by, source_of, tree_of
 
 MATH = frozenset(
     ["sqrt", "sin", "cos", "tan", "atan2", "acos", "asin", "atan", "hypot", "fabs", "copysign", "exp", "log"]

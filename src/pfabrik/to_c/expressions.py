@@ -11,9 +11,8 @@ from typing import Any
 
 from .c_file import File
 from .flow import Flow
-from .naming import c_name, is_simple
 from .types import BOOL, INTEGER, NUMBERS, REAL, Array, Struct, Tuple, Unsupported, join
-from .values import EQUAL, NONE, POSTFIX, UNARY, UNKNOWN, Value, conflict, effects
+from .values import EQUAL, NONE, POSTFIX, UNARY, UNKNOWN, Value, c_name, conflict, effects, is_simple
 
 ANNOTATED = {"float": REAL, "int": INTEGER, "bool": BOOL}
 

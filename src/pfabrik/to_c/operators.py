@@ -8,7 +8,6 @@ from typing import Any
 
 from .c_file import SMALL
 from .expressions import Expressions
-from .naming import is_simple
 from .types import BOOL, INTEGER, NUMBERS, REAL, Struct, Tuple, join
 from .values import (
     AND,
@@ -28,6 +27,7 @@ from .values import (
     Value,
     conflict,
     effects,
+    is_simple,
 )
 
 OPERATORS: dict[type[ast.operator], tuple[str, int, Any]] = {

@@ -2,14 +2,102 @@
 
 from __future__ import annotations
 
+import ast
 import re
+import textwrap
 from typing import Any
 
 from .c_file import File
-from .function import Function
-from .naming import RESERVED, c_name
-from .sources import source_of
-from .types import Unsupported
+from .expressions import ANNOTATED
+from .flow import Flow
+from .statements import Statements
+from .types import NOTHING, Unsupported
+from .values import RESERVED, c_name, comment, comments_of, short_path, source_of, tree_of
+
+STRANGE = (
+    ast.ListComp,
+    ast.SetComp,
+    ast.DictComp,
+    ast.GeneratorExp,
+    ast.Lambda,
+    ast.FunctionDef,
+    ast.NamedExpr,
+    ast.Starred,
+)
+"""What brings variables of its own, or sets them within an expression."""
+
+INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}
+
+MOST_PASSES = 8
+"""A function is translated until its types, its result and its effects are settled; two or three times are usual."""
+
+
+class Function(Statements):
+    """A function: its text, name, arguments, result, reads and writes, and whether it allocates."""
+
+    def __init__(self, program: File, source: Any, arguments: tuple[Any, ...]) -> None:
+        super().__init__()
+        self.program, self.source, self.arguments = program, source, arguments
+        function = source.function
+        self.globals, self.file = function.__globals__, function.__code__.co_filename
+        self.node, self.path, self.comments = tree_of(function), short_path(self.file), comments_of(self.file)
+        self.flow = Flow(self.node, self.globals)
+        self.name = ""
+        self.gives: Any = None
+        self.types: dict[str, Any] = {}
+        self.by_value: set[str] = set()
+
+    def translate(self) -> None:
+        """Fill the lines of the body."""
+        node, takes = self.node, self.node.args
+        if len(takes.args) != len(self.arguments) or takes.defaults or takes.kwonlyargs or takes.vararg or takes.kwarg:
+            raise self.refused(node.lineno, f"{node.name}: another number of arguments, or arguments with defaults")
+        for part in ast.walk(ast.Module(node.body, [])):
+            if isinstance(part, STRANGE):
+                raise self.fault(part, f"{type(part).__name__} is not in the subset")
+        for name in self.flow.unset:
+            raise self.fault(name, "read before it is assigned")
+        if self.flow.perhaps_unset:
+            names = ", ".join(sorted(self.flow.perhaps_unset))
+            raise self.refused(node.lineno, f"{node.name}: perhaps read before it is assigned: {names}")
+        self.parameters = [a.arg for a in takes.args]
+        self.types = dict(zip(self.parameters, self.arguments, strict=True))
+        declared = ast.unparse(node.returns) if node.returns else ""
+        self.gives = {"None": NOTHING, **ANNOTATED}.get(declared)
+        for _ in range(MOST_PASSES):
+            before = self._settled()
+            self.lines, self.indent, self.n_temporaries, self._last = [], 1, 0, node.body[0].lineno - 1
+            self._declared = set(self.parameters)
+            self.block(node.body[1:] if isinstance(node.body[0], ast.Expr) and ast.get_docstring(node) else node.body)
+            self.gives = self.gives or NOTHING
+            if before == self._settled():
+                return
+        raise self.refused(node.lineno, f"{node.name}: its types do not settle")
+
+    def _settled(self) -> Any:
+        return dict(self.types), self.gives, self.reads, self.writes, self.allocates, set(self.by_value)
+
+    def refused(self, line: int, what: str) -> Unsupported:
+        return Unsupported(f"{self.path}:{line}: {what}")
+
+    def text(self) -> str:
+        """The function as C text."""
+        spell = self.program.spell
+        takes = [f"{spell.variable(self.types[name])}{c_name(name)}" for name in self.parameters]
+        if self.allocates:
+            takes.insert(0, "arena *memory")
+        gives = spell.stored(self.gives)
+        kind = {"inlined": "INLINED ", "flattened": "FLATTENED static "}.get(self.source.kind, "static ")
+        head = f"{kind}{gives}{self.name}({', '.join(takes) or 'void'})"
+        if len(head) > 118:
+            head = f"{kind}{gives}{self.name}(\n" + textwrap.fill(f"{', '.join(takes)})", 116, **INDENTED)
+        described = comment(f"{ast.get_docstring(self.node) or ''}\n[{self.path}:{self.node.lineno}]")
+        unused = [f"    (void){c_name(name)};" for name in self.parameters if not self._mentions(c_name(name))]
+        return f"{described}{head} {{\n" + "\n".join([*unused, *self.lines]) + "\n}\n"
+
+    def _mentions(self, name: str) -> bool:
+        pattern = re.compile(rf"(?<![.>])\b{name}\b")
+        return any(pattern.search(re.sub(r"/\*.*?\*/", "", line)) for line in self.lines)
 
 
 class Program(File):

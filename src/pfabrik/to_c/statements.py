@@ -9,10 +9,9 @@ from typing import Any
 from .calls import Calls
 from .expressions import ANNOTATED
 from .flow import is_range, names_in
-from .naming import c_name, comment, is_simple
 from .operators import OPERATORS
 from .types import BOOL, INTEGER, NOTHING, NUMBERS, REAL, Struct, Tuple, join
-from .values import CONDITION, ORDER, POSTFIX, UNARY, Value, conflict
+from .values import CONDITION, ORDER, POSTFIX, UNARY, Value, c_name, comment, conflict, is_simple
 
 WITH_BLOCKS = (ast.For, ast.While, ast.If)
 

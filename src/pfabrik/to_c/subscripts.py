@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from functools import reduce
 from typing import Any
 
-from .naming import c_name, is_simple
 from .operators import Operators
 from .types import BOOL, INTEGER, Array, Record, Tuple, element_of
-from .values import POSTFIX, SUM, UNARY, Value, conflict, effects
+from .values import POSTFIX, SUM, UNARY, Value, c_name, conflict, effects, is_simple
 
 
 class Subscripts(Operators):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .naming import c_name, comment
+from .values import c_name, comment
 
 NOTHING, BOOL, INTEGER, REAL = "nbif"
 NUMBERS = (BOOL, INTEGER, REAL)

@@ -19,8 +19,8 @@ from ..drawing import (
     numbers_at,
     part_ticks,
     require_spatial,
+    viewpoint,
 )
-from ..viewpoint import viewpoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..description.joint_types import JointType
+from ..description.joints import JointType
 
 BASE, PLATFORM, LINK, EDGE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a"
 ACTUATED, PASSIVE = "#1a1a1a", "#ffffff"

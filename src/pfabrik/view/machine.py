@@ -9,7 +9,7 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..checks import require_names
-from ..description.joint_types import JointType
+from ..description.joints import JointType
 from ..description.mechanism import Mechanism
 from ..drawing import SMALL
 from ..kinematics import plane_of

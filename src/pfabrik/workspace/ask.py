@@ -14,7 +14,7 @@ from ..answers.start_configuration import Start, joint_vectors, start_of
 from ..arguments import any_values, array
 from ..arrays import Floats
 from ..certify.enclosure import Enclosure, enclose
-from ..certify.provable import require_no_clearance
+from ..certify.question import require_no_clearance
 from ..checks import require_angle, require_known, require_mapping, require_positive
 from ..configuration import configuration
 from ..description.mechanism import Mechanism, checked_mechanism

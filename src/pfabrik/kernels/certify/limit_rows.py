@@ -43,9 +43,8 @@ from .affine_forms import (
     put_turned,
     put_unknown,
 )
-from .leg_bounds import LegBounds, put_end, put_reach_of_crank, put_rod, put_span
+from .leg_bounds import LegBounds, put_base_line, put_end, put_platform_line, put_reach_of_crank, put_rod, put_span
 from .pose_cells import ROUNDING, PoseCell
-from .rod_lines import put_base_line, put_platform_line
 
 # Reach [L] by which a rod must be away from a dead point: beyond it, the closed form keeps its digits.
 LEAST_REACH = 1e-9

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...arrays import Floats
 from .._jit import routine
+from ..clearance.capsules import between_segments
 from ..clearance.link_records import BASE, PLATFORM, LinkLimits
-from ..clearance.segments import between_segments
 from ..clearance.solids import ROUND
 from ..legs.records import Table
 from ..vectors import Vec, along, dot, norm, scale, sub, vec

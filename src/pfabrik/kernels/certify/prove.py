@@ -8,35 +8,299 @@ measured, and the search descends from there to where the limit is broken most.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from ...arrays import Floats
-from .._jit import routine, search
-from ..legs.open_table import open_table
-from ..legs.records import Table
+import numpy as np
+
+from ...arrays import Floats, Ints
+from .._jit import opener, routine, search
+from ..clearance.link_records import NO_LINKS
+from ..legs.records import SAMPLE, SHARED, Table, open_table
 from ..vectors import copy_row
-from .affine_forms import CENTRE
-from .cell_verdicts import centre_less_slopes, enclose_cell, put_row, unproved_row
-from .limit_rows import first_link_row, margin_of
+from .affine_forms import ABOVE, BELOW, CENTRE, least, most
+from .leg_bounds import new_bounds
+from .limit_rows import LimitRows, first_link_row, margin_of, put_limits
+from .link_rows import ROWS_A_PAIR, CellLinks, least_row_of_pair, new_cell_links, put_link_ends, put_pair
 from .pose_cells import (
+    BALL,
+    BOX,
     N_PARAMETERS,
+    ROUNDING,
     STEPS,
+    TILT,
+    CellParameters,
     fit_into,
     is_beside,
+    new_cell,
+    put_cell,
 )
-from .subdivision import (
-    BUDGET,
-    FOUND_MARGIN,
-    GAP,
-    HALF,
-    LIMIT,
-    N_CELLS,
-    N_OPEN,
-    N_PROVED,
-    N_STACK,
-    PROVED_LEGS,
-    Subdivision,
-    open_subdivision,
-)
+
+# Slope, as a share of the largest, below which one counts as part of the remainder: the volume divides by all of them.
+FLAT = 1e-4
+# Error of a volume by rounding, as a share of its cell's.
+ROUNDED = 1e-9
+
+
+@routine
+def share_above(row: Floats, n: int, bound: int) -> float:
+    """Share of a cell where the linear part of a row, plus one of its bounds, is positive; rounded to that side.
+
+    Of the unit cube, {sum w_i u_i <= t} has the volume sum (-1)^|S| max(t - w(S), 0)^m / (m! prod w), over all sets S
+    of axes.
+    """
+    side = -1.0 if bound == BELOW else 1.0
+    total, largest = row[CENTRE] + row[bound], 0.0
+    if not abs(total) < math.inf:
+        return 1.0 if total > 0.0 else 0.0
+    for i in range(n):
+        largest = max(largest, abs(row[i]))
+    first, second, third = 0.0, 0.0, 0.0  # the widths of up to three slopes; 0 if there are fewer
+    for i in range(n):
+        width = abs(row[i])
+        if width <= FLAT * largest or third > 0.0:
+            total += side * width
+        elif first == 0.0:
+            first = width
+        elif second == 0.0:
+            second = width
+        else:
+            third = width
+    span = first + second + third
+    if total >= span:
+        return 1.0
+    if total <= -span:
+        return 0.0
+    t = 0.5 * (total + span)
+    if second == 0.0:
+        volume = t / first
+    elif third == 0.0:
+        volume = (square(t) - square(t - first) - square(t - second) + square(t - span)) / (2.0 * first * second)
+    else:
+        volume = cube(t) - cube(t - first) - cube(t - second) - cube(t - third) - cube(t - span)
+        volume += cube(t - first - second) + cube(t - first - third) + cube(t - second - third)
+        volume /= 6.0 * first * second * third
+    return min(max(volume + side * ROUNDED, 0.0), 1.0)
+
+
+@routine
+def square(t: float) -> float:
+    """t^2 if t is positive, else 0."""
+    return t * t if t > 0.0 else 0.0
+
+
+@routine
+def cube(t: float) -> float:
+    """t^3 if t is positive, else 0."""
+    return t * t * t if t > 0.0 else 0.0
+
+
+# Counters: cells on the stack, proved, left open, looked at; the limit that a pose breaks; cells to look at, at most.
+N_STACK, N_PROVED, N_OPEN, N_CELLS, LIMIT, BUDGET, N_COUNTERS = 0, 1, 2, 3, 4, 5, 6
+# Measures: a proved lower bound of the margin; the least margin of the poses measured; a cell is proved where its
+# margin is at least that less this gap, or, if it is infinite, where the margin is positive.
+PROVED_MARGIN, FOUND_MARGIN, GAP, N_MEASURES = 0, 1, 2, 3
+# Columns of a cell: middle, half sizes, the set of legs, then pairs of links, that are proved on it, as bits.
+HALF, PROVED_LEGS, N_COLUMNS = 6, 12, 13
+
+
+class Subdivision(NamedTuple):
+    """A region, its cells, and scratch memory."""
+
+    parameters: CellParameters
+    sides: Floats  # (legs,): the branch of each leg
+    stack: Floats  # (n, N_COLUMNS): cells still to be looked at
+    proved: Floats  # (n, N_COLUMNS): proved cells, as many as there is memory for
+    left: Floats  # (n, N_COLUMNS): cells left open
+    shares: Floats  # (n, 2): of each cell of the stack, what is within all limits at least and at most
+    counters: Ints  # (N_COUNTERS,)
+    measures: Floats  # (N_MEASURES,)
+    pose: Floats  # (6,): parameters of the pose that breaks a limit
+    cells: Floats  # (3, N_COLUMNS): scratch
+    rows: LimitRows
+    links: CellLinks
+
+
+def new_rows(table: Table, n_pairs: int = 0) -> LimitRows:
+    """Allocate the rows of a machine, with as many pairs of links."""
+    n_legs = len(table.legs)
+    leaders = np.arange(n_legs)
+    for k in range(1, n_legs):
+        leaders[k] = leaders[k - 1] if table.legs["proximal"][k] == SHARED else k
+    owners = np.concatenate(
+        [
+            np.repeat(leaders[table.limited["leg"]], 2),
+            leaders[table.cones["leg"]],
+            np.repeat(leaders, 2),
+            np.repeat(n_legs + np.arange(n_pairs), ROWS_A_PAIR),
+        ]
+    )
+    rows, spreads = np.zeros((len(owners), 9)), np.zeros((n_legs + n_pairs, N_PARAMETERS))
+    return LimitRows(rows, owners.astype(np.int64), spreads, new_cell(), new_bounds())
+
+
+def new_subdivision(
+    table: Table,
+    parameters: CellParameters,
+    sides: Floats,
+    links: CellLinks,
+    sizes: tuple[int, int, int],
+    n_shares: int = 0,
+) -> Subdivision:
+    """Allocate a subdivision; `sizes` are the numbers of cells of the stack, proved and left open."""
+    return Subdivision(
+        parameters,
+        sides,
+        np.empty((sizes[0], N_COLUMNS)),
+        np.empty((sizes[1], N_COLUMNS)),
+        np.empty((sizes[2], N_COLUMNS)),
+        np.empty((n_shares, 2)),
+        np.zeros(N_COUNTERS, np.int64),
+        np.full(N_MEASURES, np.inf),
+        np.zeros(N_PARAMETERS),
+        np.zeros((3, N_COLUMNS)),
+        new_rows(table, len(links.limits.pairs)),
+        links,
+    )
+
+
+def no_parameters() -> CellParameters:
+    """Parameters of a region without poses."""
+    return CellParameters(
+        np.zeros(4, np.int64), np.zeros(6), np.zeros(6), np.zeros((1, 12)), np.zeros((1, 6)), np.zeros(1)
+    )
+
+
+open_subdivision = opener(new_subdivision(SAMPLE, no_parameters(), np.zeros(1), new_cell_links(NO_LINKS), (1, 1, 1), 1))
+"""The subdivision at the address of a `Handle`."""
+
+
+# Legs and pairs of links of which a cell remembers that they are proved.
+MOST_BITS = 50
+
+
+@routine
+def enclose_cell(table: Table, work: Subdivision, cell: Floats, shares: Floats) -> None:
+    """Fill the shares of a cell that are within all limits at least and at most.
+
+    Over a cell each limit is between two affine functions. What limits cut off is at most the sum of what each cuts
+    off, and at least the most that one does.
+    """
+    rows, n, proved, inner, outer = work.rows, work.parameters.kinds[2], int(cell[PROVED_LEGS]), 1.0, 1.0
+    put_cell(work.parameters, cell, rows.cell)
+    for k in range(table.legs.shape[0]):
+        bit = 1 << min(k, MOST_BITS)
+        if table.legs[k]["proximal"] == SHARED or (k < MOST_BITS and proved & bit != 0) or outer <= 0.0:
+            continue
+        put_limits(table, work.sides, work.parameters.uncertain[0], k, n, rows)
+        is_proved = True
+        for row in range(rows.rows.shape[0]):
+            if rows.owners[row] != k or least(rows.rows[row], n) >= 0.0:
+                continue
+            is_proved = False
+            if most(rows.rows[row], n) < 0.0:
+                outer = 0.0
+            inner -= 1.0 - share_above(rows.rows[row], n, BELOW)
+            outer = min(outer, share_above(rows.rows[row], n, ABOVE))
+        if is_proved and k < MOST_BITS:
+            proved |= bit
+    cell[PROVED_LEGS] = float(proved)
+    shares[0], shares[1] = min(max(inner, 0.0), outer), outer
+
+
+@routine
+def unproved_row(table: Table, work: Subdivision, cell: Floats) -> int:
+    """The row with the least margin of those that are not proved on a cell; -1 if all are, and noted in the cell."""
+    rows, measures, n = work.rows, work.measures, work.parameters.kinds[2]
+    margin = max(measures[FOUND_MARGIN] - measures[GAP], 0.0) if measures[GAP] < math.inf else 0.0
+    put_cell(work.parameters, cell, rows.cell)
+    proved, worst, least_margin, proved_margin = int(cell[PROVED_LEGS]), -1, math.inf, measures[PROVED_MARGIN]
+    is_round = work.parameters.kinds[0] == TILT or work.parameters.kinds[1] != BOX
+    n_legs, n_leg_rows, has_ends = table.legs.shape[0], first_link_row(table), False
+    for k in range(n_legs + work.links.limits.pairs.shape[0]):
+        bit = 1 << min(k, MOST_BITS)
+        if (k < n_legs and table.legs[k]["proximal"] == SHARED) or (k < MOST_BITS and proved & bit != 0):
+            continue
+        first, end = 0, n_leg_rows
+        if k < n_legs:
+            put_limits(table, work.sides, work.parameters.uncertain[0], k, n, rows)
+        else:
+            if not has_ends:
+                put_link_ends(table, work.sides, work.parameters.uncertain[0], n, rows, work.links)
+                has_ends = True
+            put_pair(table, k - n_legs, margin, work.parameters.uncertain[0], n, rows, work.links)
+            first = n_leg_rows + ROWS_A_PAIR * (k - n_legs)
+            end = first + ROWS_A_PAIR
+        is_proved, leg_margin = True, math.inf
+        for row in range(first, end):
+            if rows.owners[row] != k:
+                continue
+            value = least(rows.rows[row], n)
+            at_least = margin_of(table, row, value)
+            if is_round and not at_least >= margin:
+                at_least = margin_of(table, row, value + gain_of_shape(work.parameters, cell, rows.rows[row]))
+            leg_margin = min(leg_margin, at_least)
+            if not at_least >= margin:
+                is_proved = False
+                if worst < 0 or at_least < least_margin:
+                    worst, least_margin = row, at_least
+        if is_proved:
+            proved_margin = min(proved_margin, leg_margin)
+            if k < MOST_BITS:
+                proved |= bit
+    cell[PROVED_LEGS] = float(proved)
+    measures[PROVED_MARGIN] = proved_margin
+    return worst
+
+
+@routine
+def put_row(table: Table, work: Subdivision, box: Floats, row: int) -> int:
+    """Fill the rows of the leg, or the pair of links, of a row over a box; the row, of a pair the lowest one."""
+    rows, n, owner, n_legs = work.rows, work.parameters.kinds[2], work.rows.owners[row], table.legs.shape[0]
+    put_cell(work.parameters, box, rows.cell)
+    if owner < n_legs:
+        put_limits(table, work.sides, work.parameters.uncertain[0], owner, n, rows)
+        return row
+    put_link_ends(table, work.sides, work.parameters.uncertain[0], n, rows, work.links)
+    put_pair(table, owner - n_legs, 0.0, work.parameters.uncertain[0], n, rows, work.links)
+    return least_row_of_pair(table, owner - n_legs, n, rows)
+
+
+@routine
+def gain_of_shape(region: CellParameters, cell: Floats, row: Floats) -> float:
+    """By how much the least value of a row in the region's shape is above that in the cell, at least.
+
+    Of the slopes g by the parameters of a ball about b of radius r, the least is g . (b - middle) - |g| r.
+    """
+    gain = 0.0
+    if region.kinds[1] != BOX:
+        gain += gain_in_ball(cell, row, region.middle, 0, 3 if region.kinds[1] == BALL else 2, region.half[0])
+    if region.kinds[0] == TILT:
+        gain += gain_in_ball(cell, row, region.middle, 3, 5, region.half[3])
+    return gain * (1.0 - ROUNDING) - ROUNDING
+
+
+@routine
+def gain_in_ball(cell: Floats, row: Floats, centre: Floats, first: int, end: int, radius: float) -> float:
+    """What the ball of some parameters, rather than their box, adds to the least value of a row."""
+    in_box, in_ball, square = 0.0, 0.0, 0.0
+    for i in range(first, end):
+        if not cell[HALF + i] > 0.0:
+            return 0.0
+        slope = row[i] / cell[HALF + i]
+        in_box -= abs(row[i])
+        in_ball += slope * (centre[i] - cell[i])
+        square += slope * slope
+    return max(in_ball - radius * math.sqrt(square) - in_box, 0.0)
+
+
+@routine
+def centre_less_slopes(row: Floats, n: int) -> float:
+    """The least value of the linear part of a row."""
+    total: float = row[CENTRE]
+    for i in range(n):
+        total -= abs(row[i])
+    return total
+
 
 # Questions, in kinds[3]: prove the region, or enclose the part of each cell that is within all limits.
 PROVE, ENCLOSE = 0, 1

@@ -27,8 +27,7 @@ from ..rows import (
 )
 from ..search_constants import SIGHT
 from ..vectors import copy_row, copy_table
-from .chain_records import ChainTables
-from .chain_state import ChainScratch, open_chain, open_chain_scratch, open_question, open_tables
+from .chain_records import ChainScratch, ChainTables, open_chain, open_chain_scratch, open_question, open_tables
 from .search_chain import project, reach
 from .walk_chain import copy_chain_state, excess_of, load_chain, store_chain, walk_chain
 

@@ -1,7 +1,10 @@
-"""A serial chain of unit motions from the base to the end effector, and what kernels are asked of it.
+"""A serial chain of unit motions, its configuration, and what its kernels are asked.
 
 Lengths are in units of L; coordinates are deviations from home. A degree of freedom is one turn or one slide; a ball
 joint has three.
+
+A ball joint's three freedoms are turns about axes chosen anew at every configuration. The screw of a freedom is the
+twist of the end effector per unit rate: velocity of its point, then angular velocity.
 """
 
 from __future__ import annotations
@@ -11,6 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Ints, Records
+from .._jit import opener
+from ..closure.linearise_loops import PoseGradient
+from ..closure.loops import BALL
+from ..platform.tables import QUESTION, Question
+from ..projecting import ATTEMPT, EFFORT, TALLY
 
 SEEDS = 512
 """Most feasible configurations that are kept as starts: the nearest of them is near enough for most targets."""
@@ -84,3 +92,115 @@ class ChainTables(NamedTuple):
     holds: Ints  # (1 + projections,): what these hold; the last one holds nothing
     seeds: Floats  # (seeds, columns): feasible configurations, dimensionless
     seed_poses: Floats  # (seeds, 4, 4) [L]
+
+
+class ChainState(NamedTuple):
+    """One configuration, changed in place."""
+
+    q: Floats  # (n,): turns and slides; nothing for the freedoms of balls
+    balls: Floats  # (m, 4): quaternions of ball joints; no rows if there is none, nor a cone
+
+
+class ChainScratch(NamedTuple):
+    """Scratch memory of one thread."""
+
+    state: ChainState
+    best: ChainState
+    saved: ChainState
+    unpulled: ChainState
+    nearest: ChainState
+    start: ChainState
+    own: ChainState  # where the searches for the nearest start first
+    held: ChainState  # the nearest that holds a part of the target
+    X: Floats  # (3, 4): pose of the end effector
+    start_X: Floats  # (3, 4)
+    nearest_X: Floats  # (3, 4)
+    held_X: Floats  # (3, 4)
+    target: Floats  # (4, 4) [L]: no farther away than SIGHT
+    between: Floats  # (4, 4): a target on the way there
+    pulled: Floats  # (4, 4): a target farther out
+    pose: Floats  # (4, 4) [length]: the target as it is asked for, exactly orthonormal
+    coordinates: Floats  # (columns,), dimensionless: of the start, then of the answer
+    bent: Floats  # (columns,), dimensionless: a start moved a little
+    screws: Floats  # (n, 6)
+    couplings: Floats  # (n, 6)
+    rests: Floats  # (n, 7): right-hand sides: of the gradient, then of the held components
+    responses: Floats  # (n, 7): step, or slope of a fixed freedom; then its changes per unit of each multiplier
+    centres: Floats  # (n, 3): a point on the axis of each freedom
+    least: Floats  # (n,): bounds of the step of each freedom
+    most: Floats  # (n,)
+    bend: Floats  # (n,): second derivative of an active cone, times its multiplier
+    step: Floats  # (n,)
+    force: Floats  # (n,): gradient of the objective in the freedoms
+    pivots: Floats  # (n,)
+    fixed: Ints  # (n,): 1 where the step of a freedom is given, as of a bound, 2 where only this step's, else 0
+    cones: Floats  # (cones, 5): how the freedoms of a joint near its cone are turned, as of `frame_cone`
+    gradient: PoseGradient
+    sums: Floats  # (6, 6): of products of screws
+    P: Floats  # (6, 6): second derivatives of the objective, as of `fill_curvature`
+    M: Floats  # (6, 6): those of the cost of the freedoms further out
+    A: Floats  # (6, 7): system of the held components, or of the rows to reach
+    sides: Floats  # (7, 6): sums of right-hand sides
+    shifts: Floats  # (7, 6): twists of the freedoms further in
+    total: Floats  # (6,): force and moment at the end, of objective and multipliers
+    wanted: Floats  # (6,): by what the held components are to change
+    multipliers: Floats  # (6,): of the held components
+    distances: Floats  # (SEEDS,): of the seeds from a target; infinite for those that were tried
+    effort: Records  # (1,): EFFORT
+    tally: Records  # (1,): TALLY
+    log: Records  # (attempts,): ATTEMPT; most have no rows
+
+
+def new_chain_state(chain: SerialChain) -> ChainState:
+    """Allocate a configuration."""
+    has_balls = (chain.kinds == BALL).any() or len(chain.cone_angles) > 0
+    return ChainState(np.zeros(len(chain.lo)), np.zeros((len(chain.kinds) if has_balls else 0, 4)))
+
+
+def new_chain_scratch(chain: SerialChain, columns: int, attempts: int) -> ChainScratch:
+    """Allocate the memory of one thread, with room to note so many attempts."""
+    n, zeros = len(chain.lo), np.zeros
+    return ChainScratch._make(
+        (
+            *(new_chain_state(chain) for _ in range(8)),
+            *zeros((4, 3, 4)),
+            *zeros((4, 4, 4)),
+            *zeros((2, columns)),
+            *zeros((2, n, 6)),
+            *zeros((2, n, 7)),
+            zeros((n, 3)),
+            *zeros((6, n)),
+            zeros(n, np.int64),
+            zeros((len(chain.cone_angles), 5)),
+            PoseGradient(zeros(6), zeros((6, 6)), zeros(6), np.ones(1), zeros(6)),
+            *zeros((3, 6, 6)),
+            zeros((6, 7)),
+            *zeros((2, 7, 6)),
+            *zeros((3, 6)),
+            zeros(SEEDS),
+            *(zeros(1, record) for record in (EFFORT, TALLY)),
+            zeros(attempts, ATTEMPT),
+        )
+    )
+
+
+_TYPES = "i1 f2 f2 i1 i1 f1 f1 f1 f1 f1 i1 f2 f2 f1"
+
+CHAIN = SerialChain._make(np.zeros((2,) * int(each[1]), f"{each[0]}8") for each in _TYPES.split())
+"""A chain of the types that kernels are compiled for."""
+
+TABLES = ChainTables(
+    np.zeros(1, MACHINE),
+    CHAIN,
+    np.zeros(1, COLUMN),
+    np.zeros(1, np.int64),
+    np.zeros(1),
+    np.zeros((2, 6)),
+    np.zeros(2, np.int64),
+    np.zeros((1, 1)),
+    np.zeros((1, 4, 4)),
+)
+
+open_chain, open_chain_scratch = opener(CHAIN), opener(new_chain_scratch(CHAIN, 1, 0))
+open_tables, open_question = opener(TABLES), opener(Question(np.zeros(1, QUESTION)))
+"""Functions that open the arguments of kernels at the addresses of their handles."""

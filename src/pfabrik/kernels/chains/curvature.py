@@ -17,12 +17,11 @@ import math
 
 from ...arrays import Floats
 from .._jit import routine
+from ..closure.linearise_loops import turn_of_tilt, yaw_gradient
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
-from ..closure.pose_objective import turn_of_tilt, yaw_gradient
 from ..linear import solve_spd
 from .chain_constants import HELD_WEIGHT
-from .chain_records import SerialChain
-from .chain_state import ChainScratch
+from .chain_records import ChainScratch, SerialChain
 
 SMALL_TURN = 1e-3
 """Angle below which series replace the second derivative of a rotation's angle [rad]."""

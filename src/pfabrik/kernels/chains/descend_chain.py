@@ -31,8 +31,7 @@ from .chain_constants import (
     SUFFICIENT,
     SWEEPS,
 )
-from .chain_records import SerialChain
-from .chain_state import ChainScratch
+from .chain_records import ChainScratch, SerialChain
 from .curvature import fill_curvature, model_change, plan_newton_step
 from .reach_target import largest, measure_pose, reach_target
 from .walk_chain import copy_chain_state, move_chain

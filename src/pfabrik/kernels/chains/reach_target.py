@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from ...arrays import Floats
 from .._jit import routine
+from ..closure.linearise_loops import pose_gradient
 from ..closure.loops import PoseObjective
-from ..closure.pose_objective import pose_gradient
 from ..linear import solve_spd
 from .chain_constants import LONGEST_STEP, PATIENCE, PROGRESS, REACH_DAMPING, REACH_SWEEPS
-from .chain_records import SerialChain
-from .chain_state import ChainScratch, ChainState
+from .chain_records import ChainScratch, ChainState, SerialChain
 from .walk_chain import bound_steps, copy_chain_state, move_chain, walk_chain
 
 

@@ -15,8 +15,7 @@ from ..rows import HOLD_NOTHING
 from ..search_constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE
 from ..vectors import copy_table
 from .chain_constants import BENT, CLOSENESS, DESCENTS_NEARBY, NEARER, NEARLY, PULLED_FROM, PULLS, STEPS
-from .chain_records import ChainTables, SerialChain
-from .chain_state import ChainScratch
+from .chain_records import ChainScratch, ChainTables, SerialChain
 from .descend_chain import descend_chain, pull
 from .reach_target import largest, reach_target
 from .walk_chain import copy_chain_state, load_chain, walk_chain

@@ -9,8 +9,7 @@ from .._jit import inlined, routine
 from ..closure.loops import BALL, SLIDE
 from ..quaternions import logarithm, rotate_by, turn_ball
 from .chain_constants import ALONG, CORRECTIONS, NEAR_CONE
-from .chain_records import SerialChain
-from .chain_state import ChainScratch, ChainState
+from .chain_records import ChainScratch, ChainState, SerialChain
 
 
 @inlined

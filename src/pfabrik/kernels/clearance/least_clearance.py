@@ -7,9 +7,9 @@ import math
 from ...arrays import Floats, Ints
 from .._jit import routine, search
 from ..vectors import Vec, along, norm, put, scale, sub, vec
+from .capsules import between_axes, capsule_points, square_to_axes
 from .convex import Polytope, nearest_points, new_polytope, way_out
 from .distance_constants import MOST_CORNERS, NEAR, TOUCHING
-from .segments import between_axes, capsule_points, square_to_axes
 from .simplices import NOTHING
 from .solids import CAPSULE, DISC, KIND, ROUND, Solid, middle_of, reach_of
 

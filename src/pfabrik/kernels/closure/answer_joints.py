@@ -66,8 +66,7 @@ from .joint_tables import (
     new_joint_scratch,
 )
 from .loops import BASE_AXES, LOCKED, Closed, Objective, PoseObjective
-from .path_kinematics import LAYOUT, LOOPS, load_row
-from .path_links import are_apart
+from .path_kinematics import LAYOUT, LOOPS, are_apart, load_row
 
 
 def _sample() -> JointTables:

@@ -13,9 +13,9 @@ from ..vectors import copy_row, copy_table, norm, scale, vec
 from .close import close_row
 from .joint_constants import BRANCH_AGREEMENTS, MOST_CLOSING, SAME_GAP, STEPS, STRANGE
 from .joint_tables import EXPECTED, REACH, STEP, JointScratch, JointTables
+from .linearise_loops import turn_of_tilt
 from .loops import BASE_AXES, Closed, ClosureProblem
 from .path_kinematics import end_path, load_row, store_row, walk_path
-from .pose_objective import turn_of_tilt
 
 
 @routine

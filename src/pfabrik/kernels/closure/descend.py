@@ -35,12 +35,11 @@ from .linearise_loops import (
     cone_excess,
     linearise,
     open_scratch,
+    pose_gradient,
     walk_all,
 )
 from .loops import BALL, Closed, Loops, Objective
-from .path_kinematics import State, copy_state, load_row, open_loops, store_row
-from .path_links import add_pair_slope, place_links
-from .pose_objective import pose_gradient
+from .path_kinematics import State, add_pair_slope, copy_state, load_row, open_loops, place_links, store_row
 
 
 @routine

@@ -24,8 +24,7 @@ from ..platform.search_records import Starts
 from ..platform.starts import put_sides
 from ..rows import PENDING
 from ..vectors import copy_row
-from .codes import LEG, NO_ACTUATORS, NO_POSE, OTHER_MODE
-from .reached import Reaching, farthest_leg, rest_from, too_near
+from .reached import LEG, NO_ACTUATORS, NO_POSE, OTHER_MODE, Reaching, farthest_leg, rest_from, too_near
 
 
 class Assembling(NamedTuple):

@@ -11,8 +11,7 @@ from ..linear import solve_spd
 from ..quaternions import difference
 from ..walk_path import walk_row
 from .assembled import Assembling, assemble
-from .codes import LEG, NO_POSE
-from .reached import Reaching
+from .reached import LEG, NO_POSE, Reaching
 
 STEPS, LONGEST_STEP = 40, 0.5
 """Most Newton steps from a pose to joint coordinates, and the longest of them [L or rad]."""

@@ -13,8 +13,7 @@ from ..platform.tables import AnswerScratch, Question, Start, Tables
 from ..rows import PROJECTED as IS_PROJECTED
 from ..rows import REACHED, UNSURE
 from ..vectors import copy_row, copy_table
-from .codes import BUDGET, NO_POSE, PROJECTED
-from .reached import Reaching, rest
+from .reached import BUDGET, NO_POSE, PROJECTED, Reaching, rest
 
 
 class Projecting(NamedTuple):

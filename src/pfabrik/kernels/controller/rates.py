@@ -15,8 +15,7 @@ from ..legs.rods import put_proximal_slope
 from ..platform.equations import LegEvaluation, direction, has_proximal
 from ..platform.limits import coordinate_slope
 from ..vectors import copy_row
-from .codes import LEG
-from .reached import Reaching, rest
+from .reached import LEG, Reaching, rest
 
 RANK = 1e-9
 """Slope below which an equation does not determine a joint, or follows from others [L or rad]."""

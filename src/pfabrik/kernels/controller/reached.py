@@ -17,8 +17,15 @@ from ..platform.search_records import Starts
 from ..quaternions import difference
 from ..search_constants import NEARLY_CLOSED
 from ..vectors import along, angle_between, copy_row, copy_table, dot, norm, scale, vec, wrap
-from .codes import LEG, NO_POSE, PAIR
 from .links_on_bodies import LinksOnBodies, nearest_pair
+
+LEG, PAIR = 1000, 10000
+"""Plus the number of a leg that does not reach or close; plus that of the nearest pair of links, which is too near."""
+
+NO_POSE, NO_ACTUATORS, OTHER_MODE, PROJECTED, BUDGET = -1, -2, -3, -4, -5
+"""Not finite, or not a rotation; not finite; closed, but not in home's working mode; the nearest feasible pose; the
+same, or none, when the steps were spent."""
+
 
 ATTEMPTS = 3
 """Ways to a target: at once, step by step from the start, and step by step from home; then, with implicit joints, so
@@ -75,7 +82,7 @@ def reach(own: Reaching, target: Floats, pose: Floats, attempts: int) -> int:
 
 @routine
 def turn_along_tilt(own: Reaching) -> None:
-    """Turn the target so that its z axis is one that the only rotation leads to, as of `motion.tilt_axis`."""
+    """Turn the target so that its z axis is one that the only rotation leads to, as of `motion.fitting_task`."""
     axis, z = vec(own.tilt[0]), (own.wanted[0, 2], own.wanted[1, 2], own.wanted[2, 2])
     height, across = axis[2], along(z, -dot(z, axis), axis)
     length = norm(across)

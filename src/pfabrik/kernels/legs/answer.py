@@ -18,9 +18,8 @@ from .complete_poses import read_target, set_yaw, turn_pose
 from .frames import new_frames, orienting_coordinate, q_redundant_of, redundant_slope, set_frames
 from .kinds import leg_rows, leg_slopes, place_leg
 from .leg_constants import DAMPING, KEPT, LEAST_MARGIN, MOST_STEPS, MOST_STEPS_IMPLICIT
-from .open_table import open_table
 from .pivots import any_across
-from .records import N_VALUES, SHARED, Table
+from .records import N_VALUES, SHARED, Table, open_table
 from .rods import solve_proximal
 
 

@@ -46,8 +46,7 @@ from .columns import (
     project_on_platform_direction,
 )
 from .leg_constants import KEPT, LEAST_MARGIN, ROUNDED
-from .open_table import open_table
-from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE
+from .records import BASE_END, BASE_LINE, CARRIAGE, CRANK, HINGE, PLATFORM_END, Q_PROXIMAL, SHARED, SLIDE, open_table
 
 TURN = 2.0 * math.pi
 

@@ -15,8 +15,7 @@ from .answer import complete_pose, deviation, new_completion, put_rows
 from .complete_poses import put_pose, read_target, tilt_to, turn_pose
 from .endings import pointing_error
 from .leg_constants import KEPT, MORE_PARTS, PARTS
-from .open_table import open_table
-from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, SLIDE
+from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, SLIDE, open_table
 
 
 @routine

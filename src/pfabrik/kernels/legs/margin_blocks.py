@@ -29,8 +29,7 @@ from .columns import (
 )
 from .feasibility import relative_margin
 from .leg_constants import KEPT
-from .open_table import open_table
-from .records import SHARED, SLIDE
+from .records import SHARED, SLIDE, open_table
 
 # Difference up to which cosines of one group are equal, so that margins are to `KEPT`, but beside the axis of a cone.
 SAME = 1e-12

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Ints, Records
+from .._jit import opener
 
 # Kinds of legs. An idle leg does not constrain a platform that cannot turn.
 ROD, PIVOT, REDUNDANT, IDLE = 0, 1, 2, 3
@@ -140,3 +141,12 @@ class Table(NamedTuple):
     known: Records
     task: Records  # one
     columns: Ints  # (legs,): the unknown of the proximal or redundant joint; -1 if none
+
+
+_RECORDS = (LEG, COORDINATE, CONE, COORDINATE, COORDINATE, TASK, np.dtype(np.int64))
+
+SAMPLE = Table._make(np.zeros(1, record) for record in _RECORDS)
+"""A table of the array types that kernels are compiled for."""
+
+open_table = opener(SAMPLE)
+"""The table at the address of a `Handle`."""

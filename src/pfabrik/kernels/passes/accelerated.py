@@ -14,7 +14,6 @@ from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..quaternions import difference
 from ..vectors import copy_row, copy_table, dot, move, put, scale, vec
-from .fit import revise_target
 from .half_spaces import (
     PLATFORM,
     LeastStep,
@@ -25,7 +24,6 @@ from .half_spaces import (
     least_step,
 )
 from .meet import reach_end
-from .moving_frames import load_seed, move_carriers
 from .pass_constants import (
     CAME_BACK,
     CHEAP,
@@ -50,7 +48,8 @@ from .pass_constants import (
     WEAKER,
     WINDOW,
 )
-from .plan import TRANSLATES, TURNS, Configuration, Plan, Seeds, Settings
+from .plan import TRANSLATES, TURNS, Configuration, Plan, Seeds, Settings, load_seed, move_carriers
+from .restrict import revise_target
 
 
 @routine

@@ -7,9 +7,8 @@ from .._jit import routine
 from ..vectors import copy_row, copy_table, move, put, vec
 from .accelerated import reach_from_start
 from .half_spaces import LeastStep
-from .moving_frames import move_carriers
 from .pass_constants import PATIENT
-from .plan import Configuration, Plan, Settings
+from .plan import Configuration, Plan, Settings, move_carriers
 
 
 @routine

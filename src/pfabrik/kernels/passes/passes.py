@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from .._jit import routine
 from ..vectors import along, dot, move, norm, put, sub, turn, vec
-from .fit import fit_trunk
-from .moving_frames import move_carriers
 from .pass_constants import CONTENT, NO_LENGTH, OBLIQUE
-from .plan import Configuration, Plan, Settings
-from .restrict import clamp_stroke, restrict_step, restrict_step_inward
+from .plan import Configuration, Plan, Settings, move_carriers
+from .restrict import clamp_stroke, fit_trunk, restrict_step, restrict_step_inward
 
 
 @routine

@@ -6,11 +6,10 @@ from ...arrays import Floats
 from .._jit import routine, search
 from ..vectors import copy_row, copy_table
 from .accelerated import project_by_half_spaces
-from .fit import revise_target
 from .half_spaces import new_half_spaces
-from .moving_frames import load_seed
 from .passes import reach_by_passes
-from .plan import Configuration, PassResults, Plan, Seeds, Settings, new_configuration
+from .plan import Configuration, PassResults, Plan, Seeds, Settings, load_seed, new_configuration
+from .restrict import revise_target
 
 
 @routine

@@ -29,7 +29,7 @@ from ..rows import (
 )
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode, count_changes, note_choices, put_changed
-from .leg_links import are_on_legs, place_links
+from .limits import are_on_legs, place_links
 from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
 from .pose_constants import MOST_CHANGED, MOST_CHOICES, NEARLY
 from .redundant_sets import search_sets, step_trunks

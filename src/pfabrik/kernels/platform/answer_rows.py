@@ -6,7 +6,7 @@ from numpy import zeros
 
 from ...arrays import Floats, Ints
 from .._jit import opener, search
-from ..legs.open_table import SAMPLE
+from ..legs.records import SAMPLE
 from ..passes import plan as P
 from ..rows import PROJECTED, REACHED, TOO_NEAR
 from .answer_row import answer_row, are_apart

@@ -58,10 +58,8 @@ from ..sqp import note_multipliers, sum_of_multipliers
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
 from .descend_pose import take_step
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
-from .lagrangian import put_limited_gradient
-from .leg_links import place_links
-from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction
-from .linearise import linearise
+from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction, place_links
+from .linearise import linearise, put_limited_gradient
 from .pose_constants import BALANCED, CONTRADICTING, FARTHEST, NEARER
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective

@@ -29,8 +29,7 @@ from ..sqp import (
 )
 from ..vectors import wrap
 from .equations import PlatformState, close_rods
-from .lagrangian import lagrangian_hessian
-from .linearise import linearise
+from .linearise import lagrangian_hessian, linearise
 from .pose_constants import (
     ARRIVED,
     HOPELESS,

@@ -18,8 +18,7 @@ from ..legs.answer import deviation, excess_of, largest_entry
 from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
 from ..legs.endings import turned
 from ..legs.leg_constants import KEPT
-from ..legs.open_table import SAMPLE, open_table
-from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, Table
+from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, SAMPLE, Table, open_table
 from ..linear import solve_spd, solve_square
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
 from ..search_constants import CONTRACTION, NEWTON_STEP, SHORTEST_SHARE

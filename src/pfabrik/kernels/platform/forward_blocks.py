@@ -15,8 +15,7 @@ from ...arrays import Floats, Ints
 from .._jit import inlined, kernel, routine
 from ..legs.blocks import answer_blocks
 from ..legs.columns import PX, PY, PZ, XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ
-from ..legs.open_table import open_table
-from ..legs.records import COSINE, N_VALUES, Q_PROXIMAL, SINE, Table
+from ..legs.records import COSINE, N_VALUES, Q_PROXIMAL, SINE, Table, open_table
 from ..legs.rods import base_end_of
 from ..rows import PENDING, REACHED, RESIDUAL
 from ..search_constants import CONTRACTION, NEWTON_STEP

@@ -1,7 +1,9 @@
-"""Limits of legs at a configuration, with their derivatives by the unknowns of `equations`.
+"""Limits of legs and distances of their links, with their derivatives by the unknowns of `equations`.
 
 The derivatives of a rod's coordinates follow from y = du - B x u, the rate of its direction u in the body at one of its
 ends, which has angular velocity B: hinges and cones at that end change by t . y, each with its own vector t.
+
+Their bodies are numbered: the base, the platform, or the leg on whose crank or carriage they are.
 """
 
 from __future__ import annotations
@@ -10,23 +12,30 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
+from ..clearance.link_limits import put_pulls
+from ..clearance.link_records import BASE, PLATFORM, LinkLimits
+from ..clearance.solids import CAPSULE, KIND
 from ..legs.answer import deviation
-from ..legs.frames import ZERO, put_pose_slope
+from ..legs.endings import turned
+from ..legs.frames import CENTRE, ZERO, put_pose_slope
 from ..legs.records import (
     BASE_END,
     BASE_LINE,
+    COSINE,
     CRANK,
     CROSS,
+    FROM_BASE,
     HINGE,
     PIVOT,
     PLATFORM_END,
     Q_PROXIMAL,
+    SINE,
     SLIDE,
     TRIPLE,
     Table,
 )
 from ..legs.rods import base_end_of, turned_by_proximal, twist_mark
-from ..vectors import Vec, along, angle_between, cross, dot, norm, scale, sub, turn, vec
+from ..vectors import Vec, add, along, angle_between, cross, dot, move, norm, put, scale, sub, turn, vec
 from .equations import LegEvaluation, direction, owner_of, put_rate, put_redundant_slopes
 
 AT_BASE_END, AT_PLATFORM_END = 0, 1
@@ -178,3 +187,65 @@ def dead_point_slope(table: Table, k: int, leg_eval: LegEvaluation) -> float:
         axis = cross(axis, sub(base_end_of(leg, leg, values), vec(leg["proximal_point"])))
     put_turning(table, k, k, AT_BASE_END, axis, leg_eval)
     return dot(axis, direction(leg_eval.lines[k]))
+
+
+@routine
+def place_links(table: Table, links: LinkLimits, frames: Floats, values: Floats) -> None:
+    """Fill the places of all links, with legs evaluated."""
+    for i in range(links.home.shape[0]):
+        is_capsule = links.sizes[i, KIND] == CAPSULE
+        for k in range(4):
+            at, body = vec(links.home[i, k]), links.bodies[i, 1 if is_capsule and k == 1 else 0]
+            put(links.places[i, k], place_in(table, body, at, is_capsule or k == 0, frames, values))
+
+
+@routine
+def are_on_legs(links: LinkLimits) -> bool:
+    """True if some links move with proximal joints."""
+    for i in range(links.bodies.shape[0]):
+        if max(links.bodies[i, 0], links.bodies[i, 1]) >= 0:
+            return True
+    return False
+
+
+@routine
+def place_in(table: Table, body: int, at: Vec, is_point: bool, frames: Floats, values: Floats) -> Vec:
+    """A point of a body, or a direction in it, given at home, where it is now."""
+    if body == BASE:
+        return at
+    if body == PLATFORM:
+        frame = frames[FROM_BASE]
+        return move(frame, sub(at, vec(table.task[0]["reference"]))) if is_point else turn(frame, at)
+    leg = table.legs[body]
+    axis, point = vec(leg["proximal_axis"]), vec(leg["proximal_point"])
+    if leg["proximal"] == CRANK:
+        lever = turned(sub(at, point) if is_point else at, axis, values[body, COSINE], values[body, SINE])
+        return add(point, lever) if is_point else lever
+    return along(at, values[body, Q_PROXIMAL], axis) if is_point else at
+
+
+@routine
+def add_pair_slope(
+    table: Table, links: LinkLimits, pair: int, excess: float, factor: float, leg_eval: LegEvaluation, out: Floats
+) -> None:
+    """Add a factor times the derivative of the excess of the pair that was measured last."""
+    put_pulls(links, pair, excess, factor)
+    for end in range(4):
+        body = links.bodies[links.pairs[pair, end // 2], end % 2]
+        add_force(table, body, vec(links.pulls[end]), vec(links.pulls[end, 3:]), leg_eval, out)
+
+
+@routine
+def add_force(table: Table, body: int, x: Vec, force: Vec, leg_eval: LegEvaluation, out: Floats) -> None:
+    """Add the generalised force of a force at a point of a body."""
+    if body == PLATFORM:
+        moment = cross(sub(x, vec(leg_eval.frames[FROM_BASE, CENTRE])), force)
+        for i in range(3):
+            out[i] += force[i]
+            out[3 + i] += moment[i]
+    elif body >= 0:
+        leg = table.legs[body]
+        rate = vec(leg["proximal_axis"])
+        if leg["proximal"] == CRANK:
+            rate = cross(rate, sub(x, vec(leg["proximal_point"])))
+        out[table.columns[body]] += dot(force, rate)

@@ -11,13 +11,12 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import opener, routine, search
 from ..clearance.link_limits import links_excess
 from ..clearance.link_records import NO_LINKS
+from ..closure.linearise_loops import pose_gradient, turn_of_tilt
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
-from ..closure.pose_objective import pose_gradient, turn_of_tilt
 from ..holding import limit_multipliers
 from ..legs.answer import deviation, excess_of
 from ..legs.complete_poses import orthonormalise
-from ..legs.open_table import SAMPLE, open_table
-from ..legs.records import Table
+from ..legs.records import SAMPLE, Table, open_table
 from ..projecting import (
     TALLY,
     UNBOUNDED,
@@ -50,7 +49,7 @@ from ..vectors import copy_row, copy_table, norm, vec
 from .certificate import is_global, is_held_nowhere
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
-from .leg_links import place_links
+from .limits import place_links
 from .linearise import linearise
 from .pose_constants import EASING, HOLDABLE
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch

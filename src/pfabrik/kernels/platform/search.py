@@ -11,8 +11,8 @@ from ...arrays import Floats, Ints, Records
 from .._jit import routine
 from ..clearance.link_limits import new_link_limits
 from ..clearance.link_records import LinkLimits
+from ..closure.linearise_loops import PoseGradient, pose_gradient
 from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
-from ..closure.pose_objective import PoseGradient, pose_gradient
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
 from ..legs.complete_poses import turn_pose
 from ..legs.records import Table

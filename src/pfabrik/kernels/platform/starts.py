@@ -6,8 +6,8 @@ import math
 
 from ...arrays import Floats, Record
 from .._jit import routine
+from ..closure.linearise_loops import pose_gradient
 from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
-from ..closure.pose_objective import pose_gradient
 from ..legs.complete_poses import column, is_pose, middle_of, orthonormalise, set_yaw, turn_pose
 from ..legs.frames import ZERO, orienting_coordinate, q_redundant_of, set_frames
 from ..legs.kinds import place_frame
