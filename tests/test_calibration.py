@@ -283,6 +283,9 @@ def test_measurements_from_a_table(tmp_path: Path) -> None:
     file.write_text("# by hand; in a hurry\nA1,A2,A3,roll,pitch,yaw,roll_rad\n0,0,0,0,0,0,0\n")
     with pytest.raises(InvalidArgument, match="column 'roll' in two units"):
         pf.read_measurements(file, mechanism)
+    file.write_text("A1,A2,A3,z_deg\n0,0,0,0\n")
+    with pytest.raises(InvalidArgument, match="column 'z_deg', an angle; expected z, a length"):
+        pf.read_measurements(file, mechanism)
 
 
 def test_passive_joints_with_sensors() -> None:

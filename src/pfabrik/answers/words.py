@@ -269,10 +269,11 @@ def _pose(answer: Answer) -> list[str]:
 
 
 def pose_texts(answer: Answer) -> tuple[list[str], list[str]]:
-    """Position [length], and roll, pitch, yaw [deg]."""
+    """Position [length], and roll, pitch, yaw [deg]; half a turn is 180, whatever the sign that rounding gives it."""
     smallest = TOLERANCES.position * answer.mechanism.characteristic_length
     position = [plain(value, smallest) for value in answer.pose[:3, 3]]
-    return position, [plain(math.degrees(angle), 1e-7) for angle in to_rpy(answer.pose[:3, :3])]
+    angles = (math.degrees(angle) for angle in to_rpy(answer.pose[:3, :3]))
+    return position, [plain(180.0 if angle < 1e-7 - 180.0 else angle, 1e-7) for angle in angles]
 
 
 def pose_cells(answer: Answer) -> list[str]:

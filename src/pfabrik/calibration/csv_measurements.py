@@ -43,11 +43,14 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
     """
     checked_mechanism(mechanism)
     columns: dict[str, Floats] = {}
+    lengths = {*POSITION, HEIGHT, DISTANCE, *(each.name for each in mechanism.coordinates if each.kind == "length")}
     for column, values in _columns(Path(require_path("path", path))).items():
         bare = column.removesuffix("_rad")
         name = bare if bare in ANGLES else column.removesuffix("_deg")
         if name in columns:
             raise InvalidArgument("path", f"column '{name}' in two units", "one of them")
+        if column != name and name in lengths:
+            raise InvalidArgument("path", f"column '{column}', an angle", f"{name}, a length")
         columns[name] = np.radians(values) if column.endswith("_deg") or column in ANGLES else values
     _check_names(columns, mechanism)
     sensors = [n for n in mechanism.coordinate_names if n in columns and n not in mechanism.actuator_names]

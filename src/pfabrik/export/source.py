@@ -54,11 +54,8 @@ def checks_of(machine: Machine, limits: bool) -> Checks:
     """
     mechanism = machine.mechanism.with_clearance(None)  # distances are measured
     keeps_apart = limits and machine.links is not None
-    targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
-    targets[0] = mechanism.home_pose
     without_limits = mechanism.without_limits()
-    targets = targets[~(np.asarray(feasibility(without_limits, targets).margin) < 0.0)]
-    solution = solve_ik(without_limits, targets, options=KEEP)
+    targets, solution = _reached_around_home(without_limits)
     least = least_margins(mechanism, solution.q)
     distances = _distances(solution) if keeps_apart else None
     if distances is not None:
@@ -74,6 +71,21 @@ def checks_of(machine: Machine, limits: bool) -> Checks:
     chosen = np.concatenate([inside[: N_POSES - n_beyond], beyond[:n_beyond]])
     apart = None if distances is None else distances[chosen]
     return Checks(targets[chosen], solution.actuators[chosen], np.isin(chosen, inside), apart)
+
+
+def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
+    """Home and targets around it (n, 4, 4) that are not out of reach, with their answers.
+
+    Of a mechanism with fewer freedoms than its task sets, which reaches home alone of these, the nearest poses.
+    """
+    targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
+    targets[0] = mechanism.home_pose
+    within = targets[~(np.asarray(feasibility(mechanism, targets).margin) < 0.0)]
+    solution = solve_ik(mechanism, within, options=KEEP)
+    if (solution.status[1:] == 0).any():
+        return within, solution
+    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=KEEP).pose)
+    return nearest, solve_ik(mechanism, nearest, options=KEEP)
 
 
 def _distances(solution: Solution) -> Floats:
