@@ -287,7 +287,6 @@ def test_a_pose_that_is_answered_is_reached_without_a_start(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_attempt_reaches_what_is_said_to_be_out_of_reach(name: str) -> None:
-    """Neither those of the search's log, nor the working modes that closed forms list."""
     m = machine(name)
     targets, answer = asked(name, "far")
     for row in np.flatnonzero((answer.status == Status.PROJECTED) & ~answer.certified)[:2]:

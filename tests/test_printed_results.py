@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 import pfabrik as pf
 from pfabrik.cli import main
 from pfabrik.overview import Overview
+from pfabrik.printed import ResultTable
 
 
 def test_a_track_says_what_the_command_says(tmp_path: Path) -> None:
@@ -36,11 +38,41 @@ def test_forces_of_a_batch_show_the_largest_of_each_actuator() -> None:
     assert shown == pytest.approx(dict(zip(stewart.actuator_names, held.actuators.max(axis=0), strict=True)), rel=1e-5)
 
 
+def test_forces_say_which_rows_have_none() -> None:
+    stewart, given = pf.load("stewart"), np.full((3, 4, 4), np.nan)
+    mark = pf.Options(on_invalid="mark")
+    assert str(pf.forces(pf.solve_ik(stewart, given, options=mark), [0, 0, -200])).startswith(
+        "no forces in 3 of 3 rows: "
+    )
+    given[1] = stewart.home_pose
+    text = str(pf.forces(pf.solve_ik(stewart, given, options=mark), [0, 0, -200]))
+    assert text.startswith("no forces in 2 of 3 rows: the row is INVALID") and "BR3" in text
+    assert str(pf.forces(pf.solve_ik(stewart, given[:0]), [0, 0, -200])) == "no row"
+
+
+def test_clearances_of_batches_are_plain_numbers() -> None:
+    mechanism = pf.load("reachy_mini")
+    poses = np.stack([mechanism.home_pose, np.full((4, 4), np.nan)])
+    solution = pf.solve_ik(mechanism, poses, options=pf.Options(on_invalid="mark"))
+    plain = json.loads(json.dumps(pf.clearance(solution).to_dict(), allow_nan=False))
+    assert plain["distance"][0] == pytest.approx(pf.clearance(solution[0]).distance) and plain["distance"][1] is None
+
+
+def test_a_table_in_a_notebook_has_what_its_text_has_in_its_order() -> None:
+    table = ResultTable("name", ["above"], ("a", "b"), [("1", "2")], ["below\nfurther below"])
+    words = re.findall(r">([^<]+)<", table._repr_html_())
+    assert words == ["name", "above", "a", "b", "1", "2", "below", "further below"]
+    assert "<table>" not in ResultTable("name", ["nothing within reach"])._repr_html_()
+
+
 def test_a_largest_shape_shows_its_size_in_its_units_and_its_certificate() -> None:
     square = pf.largest(pf.load("five_bar"), "box")
     text = str(square)
     assert re.search(r"^z \[mm\] +[\d.]+ +129\.085$", text, re.MULTILINE)
     assert text.endswith(str(square.certificate))
     tilts = pf.workspace(pf.load("ankle_rss"), resolution=0.1).inscribed("box")
+    assert re.fullmatch(r"largest box, [\d,.]+ deg²", tilts.table().lines[0])
+    size = float(tilts.table().lines[0].split()[2].replace(",", ""))
+    assert size == pytest.approx(np.degrees(tilts.extents).prod(), rel=1e-5)
     assert [name for name, *_ in tilts.table().rows] == ["pivot[0] [deg]", "pivot[1] [deg]"]
     assert [float(extent) for *_, extent in tilts.table().rows] == pytest.approx(np.degrees(tilts.extents), rel=1e-5)

@@ -296,3 +296,9 @@ def test_internal_motions_take_load_off_the_actuator_that_limits_a_platform(mach
     near = np.array(slowest.direction) + 0.1 * random.normal(size=(10, 3))
     for direction in (*random.normal(size=(30, 3)), *near):
         assert slowest.speed <= most(np.append(direction / np.linalg.norm(direction), np.zeros(3))) * (1.0 + 1e-9)
+
+
+def test_an_answer_without_a_configuration_has_no_speed() -> None:
+    nothing = pf.solve_ik(pf.load("stewart"), np.full((1, 4, 4), np.nan), options=pf.Options(on_invalid="mark"))[0]
+    with pytest.raises(InvalidArgument, match="an answer that is INVALID"):
+        pf.platform_speed(nothing, speed=1.0)

@@ -505,6 +505,8 @@ def test_a_picture_has_every_limit_of_the_border_and_the_machine() -> None:
     assert all(bound in words for _, bound in solid.shares)
     with pytest.raises(InvalidArgument, match="two-dimensional axes for a workspace of three"):
         solid.plot(pyplot.figure().add_subplot())
+    with pytest.raises(InvalidArgument, match="three-dimensional axes for a workspace of two"):
+        found.plot(pyplot.figure().add_subplot(projection="3d"))
     turns = space("ankle_ups").plot()  # which has no place for the machine
     assert not [line for line in turns.lines if line.get_color() == "#404040"]
 

@@ -31,6 +31,7 @@ class CsvColumns:
     ----------
     spelled : the name of a column from its cell.
     known : names by which the separator is recognised; without them, by the number of cells.
+    columns : the columns that are expected, in words, of a file without any.
 
     Attributes
     ----------
@@ -42,14 +43,18 @@ class CsvColumns:
     """
 
     def __init__(
-        self, lines: Iterable[str], spelled: Callable[[str], str] = unmarked, known: Collection[str] = ()
+        self,
+        lines: Iterable[str],
+        spelled: Callable[[str], str] = unmarked,
+        known: Collection[str] = (),
+        columns: str = "names of columns",
     ) -> None:
         self._separator, lines = _separated(iter(lines), lambda cell: spelled(cell) in known)
         self._decimal = "." if self._separator == "," else None
         self._rows = (row for row in _numbered(lines, self._separator) if any(row[1]))
         self.line, header = next(self._rows, (1, []))
         if not header:
-            raise WrongText("empty; expected a header that names columns")
+            raise WrongText(f"empty; expected a header with {columns}")
         self.header = [spelled(name) for name in header]
         twice = [name for name in dict.fromkeys(self.header) if self.header.count(name) > 1]
         if twice:
@@ -95,7 +100,7 @@ def _separated(lines: Iterator[str], is_known: Callable[[str], bool]) -> tuple[s
         read.append(line)
         if line.strip():
             break
-    stated = SAID.fullmatch(read[-1].strip()) if read else None
+    stated = SAID.fullmatch(read[-1].strip(" \r\n")) if read else None
     if stated is not None:
         read[-1] = "\n"
         return stated[1], chain(read, lines)

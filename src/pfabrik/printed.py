@@ -41,10 +41,11 @@ class ResultTable:
         return f'<div style="display:flex;gap:1em;align-items:flex-start">{text}{self.drawing}</div>'
 
     def _words_and_tables(self) -> str:
-        words = "".join(f"<div>{escape(line)}</div>" for line in (*self.lines, *self.remarks))
         head, body = _html_row(self.header, "th"), "".join(map(_html_row, self.rows))
-        table = f"<table><thead>{head}</thead><tbody>{body}</tbody></table>"
-        return words + table + "".join(each._words_and_tables() for each in self.more)
+        table = f"<table><thead>{head}</thead><tbody>{body}</tbody></table>" if self.rows else ""
+        more = "".join(each._words_and_tables() for each in self.more)
+        remarks = [line for remark in self.remarks for line in remark.splitlines()]
+        return _html_lines(self.lines) + table + more + _html_lines(remarks)
 
 
 class Printed:
@@ -59,6 +60,10 @@ class Printed:
 
     def _repr_html_(self) -> str:
         return self.table()._repr_html_()
+
+
+def _html_lines(lines: Iterable[str]) -> str:
+    return "".join(f"<div>{escape(line)}</div>" for line in lines)
 
 
 def _html_row(cells: Sequence[str], tag: str = "td") -> str:

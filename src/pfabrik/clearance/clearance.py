@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.solution import Solution, checked_solution
+from ..answers.solution import Solution, as_plain, checked_solution
 from ..arrays import Floats, Ints, shaped
 from ..closure.link_distances import least_distances
 from ..closure.placed_links import PlacedLinks
@@ -71,7 +71,7 @@ class Clearance(Printed):
 
     def to_dict(self) -> dict[str, Any]:
         """Distance, links and points as plain numbers and lists, ready for JSON."""
-        return {"distance": self.distance, "links": self.links, "points": self.points.tolist()}
+        return {name: as_plain(getattr(self, name)) for name in ("distance", "links", "points")}
 
     @property
     def in_words(self) -> str:

@@ -51,7 +51,7 @@ class CsvTable:
 
     def __init__(self, lines: Iterable[str], mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._table = CsvColumns(lines, _spelled, NUMERIC)
+        self._table = CsvColumns(lines, _spelled, NUMERIC, "x, y, z")
         header = self._table.header
         by_joints = not any(name in OF_POSES for name in header)
         self._joints = joint_columns(mechanism, header) if by_joints else None

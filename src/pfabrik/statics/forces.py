@@ -14,6 +14,7 @@ from ..answers.solution import Solution, as_plain, checked_solution
 from ..arrays import Floats, Ints, Mask, shaped
 from ..derived import derived
 from ..description.mechanism import Mechanism
+from ..errors import counted
 from ..frozen import FrozenMapping
 from ..kinematics import actuator_units, end_effector_pose, joint_centres
 from ..printed import Printed, ResultTable, plain
@@ -72,13 +73,21 @@ class Forces(Printed):
         mechanism, exerted = self._mechanism, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names)))
         if isinstance(self.reason, str) and self.reason:
             return ResultTable(mechanism.name, [f"no forces: {self.reason}"])
-        known = np.where(np.isnan(exerted), 0.0, exerted)
+        is_known = ~np.isnan(exerted).any(axis=1)
+        n_unknown = len(exerted) - int(is_known.sum())
+        reason = next(filter(None, np.ravel(self.reason).tolist()), "")
+        lines = [f"no forces in {n_unknown} of {counted(len(exerted), 'row')}: {reason}"] if n_unknown else []
+        known = exerted[is_known]
+        if not len(known):
+            return ResultTable(mechanism.name, lines or ["no row"])
         largest = known[np.abs(known).argmax(axis=0), np.arange(known.shape[1])]
         least = 1e-9 * float(np.abs(largest).max(initial=0.0))
         units = ["force" if drive.kind == "length" else f"force {mechanism.length_unit}" for drive in mechanism.drives]
         values = [plain(value, least) for value in largest.tolist()]
-        header = ("actuator", "exerts" if np.ndim(self.actuators) == 1 else "exerts at most", "unit")
-        return ResultTable(mechanism.name, (), header, list(zip(mechanism.actuator_names, values, units, strict=True)))
+        header = ("actuator", "exerts" if np.ndim(self.actuators) == 1 else "of largest magnitude", "unit")
+        return ResultTable(
+            mechanism.name, lines, header, list(zip(mechanism.actuator_names, values, units, strict=True))
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """What actuators exert, None where unknown, and why: ready for JSON."""

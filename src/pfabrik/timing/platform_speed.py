@@ -11,6 +11,7 @@ import numpy as np
 
 from ..answers.differential import forward_jacobian, inverse_jacobian
 from ..answers.solution import Solution, checked_solution
+from ..answers.status import Status
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
@@ -93,11 +94,13 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
 
     Raises
     ------
-    InvalidArgument : a batch; actuators without any limit.
+    InvalidArgument : a batch, or no configuration; actuators without any limit.
     """
     mechanism = checked_solution(solution).mechanism
     if solution.shape:
         raise InvalidArgument("solution", f"batch shape {solution.shape}", "a single configuration")
+    if solution.status == Status.INVALID:
+        raise InvalidArgument("solution", "an answer that is INVALID", "one with a configuration")
     limits = limits_of(mechanism, "speed", speed)
     if not np.isfinite(limits).any():
         raise InvalidArgument("speed", f"'{mechanism.name}' without max_speed", "a limit: in the mechanism, or speed")

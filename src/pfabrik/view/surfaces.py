@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..checks import require_method
-from ..drawing import SMALL, new_figure, require_spatial
+from ..drawing import SMALL, is_spatial, new_figure, require_spatial
+from ..errors import InvalidArgument
 from ..workspace.workspace_table import labels
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def axes_for(ax: Axes | None, d: int) -> Axes:
 
     Raises
     ------
-    InvalidArgument : two-dimensional axes for what is drawn in space.
+    InvalidArgument : two-dimensional axes for what is drawn in space, or the other way round.
     MissingLibrary : matplotlib is not installed.
     """
     if ax is None:
@@ -58,6 +59,8 @@ def axes_for(ax: Axes | None, d: int) -> Axes:
     require_method("ax", ax, "tick_params", "matplotlib axes, or None")
     if d == 3:
         require_spatial(ax, "a workspace of three coordinates")
+    elif is_spatial(ax):
+        raise InvalidArgument("ax", "three-dimensional axes for a workspace of two coordinates", "two-dimensional ones")
     ax.tick_params(labelsize=SMALL)
     return ax
 

@@ -15,12 +15,12 @@ from ..arrays import Floats
 from ..checks import require_known
 from ..errors import InvalidArgument
 from ..printed import Printed, ResultTable
-from .workspace_table import for_people
+from .workspace_table import for_people, product_of
 
 if TYPE_CHECKING:
     from .region import Region
 
-Kind = Literal["sphere", "ball", "box", "cylinder"]
+Kind = Literal["sphere", "box", "cylinder"]
 
 NEAREST_FACES, POINTS_A_SIDE = 400, 12
 """Number of faces nearest to the shape that are sampled, and points along each of their sides."""
@@ -46,13 +46,13 @@ class Inscribed(Printed):
 
     Attributes
     ----------
-    kind : "sphere" (in a plane: a circle), "box" or "cylinder".
+    kind : "sphere" (in a plane: a circle), "box" or "cylinder"; of positions that are proved to be reached, "ball".
     centre : (d,) [length or rad].
     extents : length along each coordinate, (d,): the sides of a box, diameters, and a cylinder's height last.
     names, units : of the coordinates, d each.
     """
 
-    kind: Kind
+    kind: Kind | Literal["ball"]
     centre: Floats
     extents: Floats
     names: tuple[str, ...]
@@ -73,9 +73,10 @@ class Inscribed(Printed):
             (f"{name} [{unit}]", f"{middle * factor + 0.0:.6g}", f"{extent * factor:.6g}")
             for name, unit, middle, extent, factor in numbers
         ]
-        size = f", size {self.size:.6g}" if self.size else ""  # a box in a plane of space has none
+        size = math.prod(factors) * self.size  # of a box in a plane of space 0
+        words = f", {size:,.6g} {product_of(units)}" if size else ""
         header = ("coordinate", "centre", "extent")
-        return ResultTable(f"Largest {self.kind}", [f"largest {self.kind}{size}"], header, rows)
+        return ResultTable(f"Largest {self.kind}", [f"largest {self.kind}{words}"], header, rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, ready for JSON."""
@@ -147,7 +148,8 @@ def _extents(region: Region, kind: Kind, proportions: ArrayLike | None) -> Float
             "kind", f"'{kind}'", f"a box: the coordinates {', '.join(region.names)} differ in their units"
         )
     if proportions is None:
-        return np.ones(d) if len(set(region.units)) == 1 else np.ptp(region.bounds, axis=0)
+        extents = np.ones(d) if len(set(region.units)) == 1 else np.ptp(region.bounds, axis=0)
+        return extents if kind != "cylinder" else np.array([extents[:2].min()] * 2 + [extents[2]])
     n = {"sphere": 0, "box": d, "cylinder": 2}[kind]
     if not n:
         raise InvalidArgument("proportions", f"{proportions!r}", "None: a sphere has but one")

@@ -21,7 +21,9 @@ from ..errors import InvalidArgument, PfabrikError
 from ..printed import ResultTable
 from ..telling import OnProgress, telling
 from .ask import workspace
-from .inscribed import LEAST, Inscribed, Kind, largest_scale
+from .inscribed import LEAST, Inscribed, largest_scale
+
+ShapeKind = Literal["box", "cylinder", "ball"]
 
 BUDGET, MOST_ATTEMPTS = 50_000, 60
 """Cells that each attempt may look at: near the largest, many more would be needed for little. The most attempts."""
@@ -54,7 +56,7 @@ class Largest(Inscribed):
 
 def largest(
     mechanism: Mechanism,
-    kind: Literal["box", "cylinder", "ball"],
+    kind: ShapeKind,
     *,
     certified: bool = True,
     centre: ArrayLike | None = None,
@@ -131,12 +133,12 @@ def _attempts_ahead(low: float, high: float, step: float) -> int:
     return math.ceil(math.log2(max(gap, 1.0)))
 
 
-def _first(mechanism: Mechanism, kind: Kind, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
+def _first(mechanism: Mechanism, kind: ShapeKind, centre: Any, extents: Any, certified: bool) -> tuple[Floats, Floats]:
     """The centre and the half sizes to begin with, (3,) each."""
     middle = None if centre is None else array("centre", centre, "3")
     shape = None if extents is None else array("extents", extents, "3")
-    if shape is not None and not (shape >= 0.0).all():
-        raise InvalidArgument("extents", f"{shape.tolist()}", "three numbers that are not negative")
+    if shape is not None and not ((shape >= 0.0).all() and shape.any()):
+        raise InvalidArgument("extents", f"{shape.tolist()}", "three numbers that are not negative, and not all 0")
     if kind == "ball" and shape is not None and np.ptp(shape) > 0.0:
         raise InvalidArgument("extents", f"{shape.tolist()}", "three equal ones for a ball")
     if kind == "cylinder" and shape is not None and shape[0] != shape[1]:

@@ -13,8 +13,7 @@ from ..errors import InvalidArgument
 from .parts import Parts
 from .surface import BorderMesh, closeness
 from .verdicts import Limits, MapQuestion
-
-EXPONENTS = {1: "", 2: "²", 3: "³"}
+from .workspace_table import product_of
 
 
 class Region:
@@ -57,8 +56,7 @@ class Region:
     @property
     def size_unit(self) -> str:
         """Unit of `size`, such as "mm³", or "rad² mm"."""
-        counts = {unit: self.units.count(unit) for unit in sorted(set(self.units), reverse=True)}
-        return " ".join(unit + EXPONENTS[count] for unit, count in counts.items())
+        return product_of(self.units)
 
     @property
     def volume(self) -> float:
