@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats
 from ..derived import derived
 from ..description.joints import Joint
+from ..description.links import bodies_of_centre
 from ..description.structure import Structure
 from ..tolerances import TOLERANCES
 from .displacements import columns, home_coordinates, joint_displacements
@@ -82,27 +83,22 @@ def _outward(mechanism: Structure) -> _Outward | None:
     for joint in mechanism.joints:
         if joint.at is None:
             continue
-        bodies = [body for one in _in_its_place(mechanism, joint) for body in placed if body in _bodies_of_centre(one)]
+        bodies = [body for one in _in_its_place(mechanism, joint) for body in placed if body in bodies_of_centre(one)]
         if not bodies and joint.name != mechanism.end_effector:
             return None
         centre_bodies.append((joint, bodies[0] if bodies else None))
     return _Outward(tuple(steps), tuple(centre_bodies))
 
 
-def _bodies_of_centre(joint: Joint) -> tuple[str, ...]:
-    """The bodies that a joint's centre is a point of: of a joint that slides, the first alone."""
-    return joint.connects[:1] if joint.type in ("prismatic", "cylindrical") else joint.connects
-
-
 def _in_its_place(mechanism: Structure, joint: Joint) -> list[Joint]:
     """A joint, then those whose centres always are where its own is: at one point of one body."""
-    bodies, near = set(_bodies_of_centre(joint)), TOLERANCES.home_slack * mechanism.characteristic_length
+    bodies, near = set(bodies_of_centre(joint)), TOLERANCES.home_slack * mechanism.characteristic_length
     centre = np.array(joint.at)
     return [joint] + [
         other
         for other in mechanism.joints
         if other is not joint
         and other.at is not None
-        and bodies.intersection(_bodies_of_centre(other))
+        and bodies.intersection(bodies_of_centre(other))
         and np.linalg.norm(np.array(other.at) - centre) <= near
     ]
