@@ -82,7 +82,7 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
     targets[0] = mechanism.home_pose
     within = targets[~(np.asarray(feasibility(mechanism, targets).margin) < 0.0)]
     solution = solve_ik(mechanism, within, options=KEEP)
-    if (solution.status[1:] == 0).any():
+    if np.any(np.ravel(solution.status)[1:] == 0):
         return within, solution
     nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=KEEP).pose)
     return nearest, solve_ik(mechanism, nearest, options=KEEP)

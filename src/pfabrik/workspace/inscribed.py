@@ -15,7 +15,8 @@ from ..arrays import Floats
 from ..checks import require_known
 from ..errors import InvalidArgument
 from ..printed import Printed, ResultTable
-from .workspace_table import for_people, product_of
+from .region import product_of
+from .workspace_table import for_people
 
 if TYPE_CHECKING:
     from .region import Region

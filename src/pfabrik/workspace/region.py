@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +14,14 @@ from ..errors import InvalidArgument
 from .parts import Parts
 from .surface import BorderMesh, closeness
 from .verdicts import Limits, MapQuestion
-from .workspace_table import product_of
+
+EXPONENTS = {1: "", 2: "²", 3: "³"}
+
+
+def product_of(units: Sequence[str]) -> str:
+    """The product of units: "mm³", or "rad² mm"."""
+    counts = {unit: units.count(unit) for unit in sorted(set(units), reverse=True)}
+    return " ".join(unit + EXPONENTS[count] for unit, count in counts.items())
 
 
 class Region:

@@ -18,8 +18,6 @@ from .border import REST, groups_of
 if TYPE_CHECKING:
     from .region import Region
 
-EXPONENTS = {1: "", 2: "²", 3: "³"}
-
 BORDER = ("border", "formed by", "joint")
 
 LEAST_SHARE = 1e-3
@@ -42,12 +40,6 @@ def workspace_table(region: Region, remarks: Sequence[str]) -> ResultTable:
     rows[MOST_LIMITS:] = [("", f"and {n_more} more", "")] if n_more > 0 else []
     drawing = outline(region) if len(region.names) == 2 else ""
     return ResultTable(region.mechanism.name, lines, BORDER, rows, remarks, drawing)
-
-
-def product_of(units: Sequence[str]) -> str:
-    """The product of units: "mm³", or "rad² mm"."""
-    counts = {unit: units.count(unit) for unit in sorted(set(units), reverse=True)}
-    return " ".join(unit + EXPONENTS[count] for unit, count in counts.items())
 
 
 def for_people(units: Sequence[str]) -> tuple[list[float], list[str]]:
