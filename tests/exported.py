@@ -36,6 +36,9 @@ EXACT = {"double": 1e-12, "float": 1e-5}
 PASSED = "50 poses, 0 wrong\n"
 """What a file says that has checked itself."""
 
+WITHOUT_NEAREST: Any = ("ik", "limits", "fk", "rates")
+"""The parts of a file that are a tenth of it; the search for the nearest pose is the rest."""
+
 _FOLDER = TemporaryDirectory()
 
 
@@ -48,8 +51,12 @@ def machine(name: str) -> pf.Mechanism:
 
 
 @cache
-def text_of(name: str, precision: Any = "double") -> str:
-    return c_source(machine(name), precision=precision)
+def _written(name: str, precision: Any, parts: Any) -> str:
+    return c_source(machine(name), precision=precision, parts=parts)
+
+
+def text_of(name: str, precision: Any = "double", parts: Any = None) -> str:
+    return _written(name, precision, parts)
 
 
 @cache
@@ -198,8 +205,7 @@ def off(mechanism: pf.Mechanism, actuators: Array, expected: Array) -> Array:
     return np.abs(actuators - expected) / actuator_units(mechanism)
 
 
-@cache
-def program_of(name: str, precision: Any = "double") -> Path:
-    """The program of a machine, with the driver; two are run with all indices and memory checked."""
-    options = sanitizers_of(COMPILERS[0]) if (name, precision) in (("stewart", "double"), ("delta", "float")) else ()
-    return compiled(text_of(name, precision), *options)
+def program_of(name: str, precision: Any = "double", parts: Any = None) -> Path:
+    """The program of a machine, with the driver; a delta's with all parts has its indices and memory checked."""
+    options = sanitizers_of(COMPILERS[0]) if name == "delta" and parts is None else ()
+    return compiled(text_of(name, precision, parts), *options)

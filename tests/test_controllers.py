@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from exported import COMPILERS, needs_compiler
 from machines.redescribed import moved
 from pfabrik.errors import UnsupportedMechanism
+from pfabrik.export.export_c import c_source
 from pfabrik.export.firmware_settings import klipper
 from pfabrik.export.linuxcnc import linuxcnc
-from test_export_c import COMPILERS, needs_compiler
 
 STUBS = {
     "rtapi_app.h": "#define EXPORT_SYMBOL(name) struct unused_##name { int i; }\n"
@@ -96,7 +98,10 @@ UNIT = "mm */ setp x\nsetp y"
 
 
 @pytest.mark.parametrize(("name", "up"), [("linear_delta", 0.0), ("delta", 5.0), ("five_bar", 0.0)])
-def test_machines_that_stand_elsewhere_are_modules_of_their_own(name: str, up: float) -> None:
+def test_machines_that_stand_elsewhere_are_modules_of_their_own(
+    name: str, up: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pfabrik.export.linuxcnc.c_source", partial(c_source, parts=("ik",)))  # the shortest code
     text = linuxcnc(dataclasses.replace(turned(name, 0.0, up), length_unit=UNIT))
     assert "kinematicsInverse" in text
     assert not re.search("^setp", text, re.MULTILINE) and "*/ setp" not in text

@@ -109,14 +109,25 @@ def asked(name: str, question: str) -> tuple[np.ndarray, Solution]:
 
 
 TO_TARGETS = [question for question in QUESTIONS if "forward" not in question]
-every_answer = pytest.mark.parametrize(("name", "question"), [(n, q) for n in NAMES for q in QUESTIONS])
 
 
-@every_answer
-def test_a_configuration_is_closed_within_its_limits_and_is_what_the_answer_says(name: str, question: str) -> None:
-    """Measured by the description alone, and by the library's own measure of a joint vector."""
-    m, (_, answer) = machine(name), asked(name, question)
+@pytest.mark.parametrize("question", QUESTIONS)
+@pytest.mark.parametrize("name", NAMES)
+def test_an_answer_is_a_closed_configuration_as_near_as_it_says_and_has_reasons(name: str, question: str) -> None:
+    m, (request, answer) = machine(name), asked(name, question)
     assert_feasible(m, answer)
+    assert_configuration_is_what_the_answer_says(m, answer)
+    if question.startswith("forward"):
+        off = (np.abs(answer.actuators - request) / actuator_units(m)).max(axis=1)
+        np.testing.assert_allclose(answer.actuator_error, off, rtol=1e-9, atol=1e-9)
+        assert np.array_equal(answer.status == Status.REACHED, off <= 1e-9)
+    else:
+        assert_distance_from_targets_is_what_the_answer_says(m, request, answer)
+    assert_nothing_is_out_of_reach_without_a_reason(answer)
+
+
+def assert_configuration_is_what_the_answer_says(m: Mechanism, answer: Solution) -> None:
+    """By the library's own measure of a joint vector."""
     again, length = pf.configuration(m, answer.q), m.characteristic_length
     assert (
         again.status < Status.FAILED
@@ -127,19 +138,13 @@ def test_a_configuration_is_closed_within_its_limits_and_is_what_the_answer_says
     assert np.abs(off).max() <= 1e-8
     for joint, point in answer.points.items():
         np.testing.assert_allclose(again.points[joint], point, rtol=0, atol=2e-8 * length)
+    measured = pf.margins(again)
     for limit, margin in pf.margins(answer).items():
-        np.testing.assert_allclose(pf.margins(again)[limit], margin, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(measured[limit], margin, rtol=0, atol=1e-6)
         assert np.nanmin(margin) >= -1e-7
 
 
-@every_answer
-def test_reached_is_said_where_it_is_and_errors_are_what_they_are(name: str, question: str) -> None:
-    m, (request, answer) = machine(name), asked(name, question)
-    if question.startswith("forward"):
-        off = (np.abs(answer.actuators - request) / actuator_units(m)).max(axis=1)
-        np.testing.assert_allclose(answer.actuator_error, off, rtol=1e-9, atol=1e-9)
-        assert np.array_equal(answer.status == Status.REACHED, off <= 1e-9)
-        return
+def assert_distance_from_targets_is_what_the_answer_says(m: Mechanism, request: np.ndarray, answer: Solution) -> None:
     assert_honest(m, request, answer)
     apart = answer.position_error / m.characteristic_length
     turned = 0.0 if m.end_effector_is_joint else answer.rotation_error
@@ -149,10 +154,8 @@ def test_reached_is_said_where_it_is_and_errors_are_what_they_are(name: str, que
     assert np.all(apart[held == "position"] <= 1e-8)
 
 
-@every_answer
-def test_nothing_is_out_of_reach_without_a_reason(name: str, question: str) -> None:
+def assert_nothing_is_out_of_reach_without_a_reason(answer: Solution) -> None:
     """A limit that lies where the answer is, or a sentence that says what else stops it."""
-    _, answer = asked(name, question)
     for row, one in enumerate(answer):
         assert bool(one.reason) is (one.status != Status.REACHED), f"row {row}"
         measured = pf.margins(one)
@@ -199,6 +202,8 @@ def test_joint_space_reaches_the_same_and_is_no_nearer(name: str, question: str)
     m, (targets, answer) = machine(name), asked(name, question)
     if isinstance(engine_of(m), ClosureEngine):
         pytest.skip("its engine is this one")
+    if (name, question) == (ENDS_EARLY, "near"):
+        pytest.skip("seconds, and far targets ask the same of it")
     rows = ClosureEngine(model_of(m)).answer(targets, None, Options(), keep_mode=False).rows
     np.testing.assert_array_equal(answer.status, rows.status)
     own = distances(m, answer.position_error, answer.rotation_error)
@@ -289,7 +294,7 @@ def test_a_pose_that_is_answered_is_reached_without_a_start(name: str) -> None:
 def test_no_attempt_reaches_what_is_said_to_be_out_of_reach(name: str) -> None:
     m = machine(name)
     targets, answer = asked(name, "far")
-    for row in np.flatnonzero((answer.status == Status.PROJECTED) & ~answer.certified)[:2]:
+    for row in np.flatnonzero((answer.status == Status.PROJECTED) & ~answer.certified)[:1]:
         log = pf.search_log(m, targets[row])
         assert not any(attempt.ending == "reached" for attempt in log.attempts), row
 

@@ -91,7 +91,7 @@ class Pose(ctypes.Structure):
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 def test_exported_c_measures_a_tilt_along_the_only_freedom(tmp_path: Path) -> None:
     machine, turn = platform(TURNS[1]), TURNS[1]
-    pf.export_c(machine, tmp_path / "machine.c")
+    pf.export_c(machine, tmp_path / "machine.c", parts=("ik",))
     subprocess.run(["gcc", "-shared", "-fPIC", "machine.c", "-o", "machine.so", "-lm"], cwd=tmp_path, check=True)
     library, actuators = ctypes.CDLL(str(tmp_path / "machine.so")), (ctypes.c_double * 3)()
     known = pf.solve_fk(machine, [0.05, -0.08, 0.1] + np.array([drive.home for drive in machine.drives]))
