@@ -103,9 +103,8 @@ def test_type_checkers_see_every_public_name_where_it_is() -> None:
 def places_by_class(sources: dict[str, str]) -> dict[str, list[str]]:
     places = defaultdict(list)
     for place, source in sources.items():
-        for node in nodes(source):
-            if isinstance(node, ast.ClassDef):
-                places[node.name].append(place)
+        for name in re.findall(r"^ *class (\w+)[(:]", source, re.MULTILINE):
+            places[name].append(place)
     return places
 
 
@@ -216,7 +215,7 @@ def test_no_command_loads_what_it_does_not_use(tmp_path: Path) -> None:
             *(["ik", "delta", "--position", "0", "0", height], ["fk", "delta", "0", "0", "0"], ["travel", "delta"]),
             *(["speed", "delta", "--speed", "5"], ["track", "delta", str(path), "-o", "-"]),
             ["time", "delta", str(path), "--speed", "5", "--acceleration", "50"],
-            *(["export", "delta", "c"], ["workspace", "five_bar", "--resolution", "16"]),
+            *(["export", "delta", "c", "--parts", "ik"], ["workspace", "five_bar", "--resolution", "16"]),
         ],
     }
     lines = [line for group in groups.values() for line in group]

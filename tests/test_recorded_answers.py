@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,16 @@ def answers(*line: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(ROOT / "benchmarks" / "answers.py"), *map(str, line)]
     environment = os.environ | {"PYTHONPATH": str(Path(pf.__file__).parents[1])}
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def compared(path: Path, *line: object) -> tuple[int, str]:
+    """The exit code of a comparison of the five-bar in this process, and what it prints."""
+    with pytest.MonkeyPatch.context() as patched, redirect_stdout(StringIO()) as printed:
+        patched.syspath_prepend(ROOT / "benchmarks")
+        patched.setattr(sys, "argv", ["answers.py", "compare", str(path), "--only", "five_bar", *map(str, line)])
+        recorder = importlib.import_module("answers")
+        patched.setattr(recorder, "on_all_cores", map)
+        return recorder.main(), printed.getvalue()
 
 
 @pytest.fixture(scope="module")
@@ -74,27 +87,27 @@ def test_the_same_answers_are_the_same_to_the_last_bit(recording: Path) -> None:
 @pytest.mark.slow
 def test_a_number_that_differs_is_counted_unless_it_is_within_the_tolerance(recording: Path, tmp_path: Path) -> None:
     path = changed(recording, tmp_path, "scaled five_bar/given/ik", off_by(1e-9, 4))
-    done = answers("compare", path, "--only", "five_bar")
-    assert done.returncode == 1
-    rows, equal, differing, largest, statuses, *machines = row_of("ik", done.stdout)
+    code, printed = compared(path)
+    assert code == 1
+    rows, equal, differing, largest, statuses, *machines = row_of("ik", printed)
     assert (int(rows) - int(equal), differing, statuses) == (1, "1", "0")
     assert float(largest) == pytest.approx(1e-9, rel=0.5)
     assert machines == ["scaled", "five_bar", "1"]
-    assert answers("compare", path, "--only", "five_bar", "--tolerance", "1e-8").returncode == 0
+    assert compared(path, "--tolerance", "1e-8")[0] == 0
 
 
 @pytest.mark.slow
 def test_a_status_and_the_name_of_a_limit_differ_whatever_the_tolerance(recording: Path, tmp_path: Path) -> None:
     path = changed(recording, tmp_path, "scaled five_bar/given/track", off_by(1.0, 0))
-    done = answers("compare", path, "--only", "five_bar", "--tolerance", "1e-3")
-    assert done.returncode == 1
-    assert row_of("track", done.stdout)[4] == "1"
+    code, printed = compared(path, "--tolerance", "1e-3")
+    assert code == 1
+    assert row_of("track", printed)[4] == "1"
 
     def renamed(stored: np.ndarray) -> np.ndarray:
         columns, words = json.loads(str(stored))
         return np.array(json.dumps([columns, ["p9[0] max", *words[1:]]]))
 
     path = changed(recording, tmp_path, "scaled five_bar/words/active limits", renamed)
-    done = answers("compare", path, "--only", "five_bar", "--tolerance", "1e-3")
-    assert done.returncode == 1
-    assert row_of("active limits", done.stdout)[2] == "1"
+    code, printed = compared(path, "--tolerance", "1e-3")
+    assert code == 1
+    assert row_of("active limits", printed)[2] == "1"

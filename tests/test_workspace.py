@@ -417,7 +417,7 @@ EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor]]] = {
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
-@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("kind", ["threads", "processes", pytest.param("dask", marks=pytest.mark.campaign)])
 def test_the_answer_is_the_same_wherever_it_is_worked_out(kind: str) -> None:
     with EXECUTORS[kind]() as executor:
         for name, asked in (("five_bar", {"resolution": 4.0}), ("rpr", {"resolution": 0.2, "orientation": "any"})):
