@@ -40,19 +40,18 @@ def test_a_row_alone_is_answered_as_in_a_batch_and_survives_being_stored(name: s
     }
     for solve, asked in batches.items():
         together = solve(mechanism, asked)
-        stored = pickle.loads(pickle.dumps(together))
+        stored, joints = pickle.loads(pickle.dumps(together)), together.joints
         json.dumps(together.to_dict(), allow_nan=False)
         for row in range(rows):
             alone = solve(mechanism, asked[row])
             assert alone.status == together.status[row]
             np.testing.assert_allclose(alone.pose, together.pose[row], rtol=0, atol=1e-8 * length)
-            ours, theirs = (
-                [(limit.joint, limit.bound) for limit in each.active_limits] for each in (alone, together[row])
-            )
+            one, again = together[row], stored[row].joints
+            ours, theirs = ([(limit.joint, limit.bound) for limit in each.active_limits] for each in (alone, one))
             assert ours == theirs
             for each, value in alone.joints.items():
-                np.testing.assert_allclose(value, together[row].joints[each], rtol=0, atol=1e-8 * max(length, 1.0))
-                np.testing.assert_array_equal(stored[row].joints[each], together.joints[each][row])
+                np.testing.assert_allclose(value, one.joints[each], rtol=0, atol=1e-8 * max(length, 1.0))
+                np.testing.assert_array_equal(again[each], joints[each][row])
 
 
 @pytest.mark.parametrize("name", NAMES)

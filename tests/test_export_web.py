@@ -40,7 +40,7 @@ LARGEST = 250_000
 LONG = ("panda", "snake60")
 """Machines of the catalogue that have no closed form."""
 
-FEW = ("stewart", "delta", "agile_eye", "canfield", "nrpm", "serial_arm", "prs", "tricept")
+FEW = ("stewart", "delta", "canfield", "nrpm", "serial_arm", "prs")
 MACHINES = [name for name in pf.catalog() if name not in LONG]
 MANY = [name for name in MACHINES if name not in FEW]
 
