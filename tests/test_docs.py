@@ -80,14 +80,19 @@ def test_every_page_is_on_the_map(page: Path) -> None:
     assert page == index or page.resolve() in linked
 
 
+ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2")
+"""Programs of seconds: an export to C and a workspace, as pages of tasks have them as well."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "code",
     [
-        pytest.param(code, id=f"{page.relative_to(ROOT)}-{number}")
+        pytest.param(code, id=name, marks=[pytest.mark.campaign] * (name in ELSEWHERE_TOO))
         for page in PAGES
         if page.parent.name != "tasks" and page.name != "coming-from.md"  # one program each; run with their tables
         for number, code in enumerate(blocks(page, "python"), 1)
+        for name in [f"{page_id(page)}-{number}"]
     ],
 )
 @pytest.mark.usefixtures("folder")

@@ -11,6 +11,7 @@ from oracles.annuli import within
 from pfabrik.errors import InvalidArgument
 from pfabrik.view.singular_picture import Field, slices_of
 from pfabrik.workspace.locus import locus
+from test_pictures import faults
 
 Array = NDArray[np.float64]
 
@@ -141,7 +142,7 @@ def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Worksp
         pf.singularity_map(machine, free_five_bar, resolution=-1.0)
 
 
-def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure() -> None:
+def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     pyplot = pytest.importorskip("matplotlib.pyplot")
     machine = pf.load("stewart").without_limits()
     ends = {"x": (-40.0, 40.0), "y": (-40.0, 40.0), "z": (-60.0, 60.0)}
@@ -150,6 +151,7 @@ def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure() -> None:
     panels = [each for each in axes.figure.axes if each.images]
     assert len(panels) == 4
     assert all(panel.get_title().startswith("y = ") for panel in panels)
+    assert faults(axes.figure, monkeypatch) == []
     assert found.plot(pyplot.figure().add_subplot(projection="3d")).get_zlabel() == "z [mm]"
 
 
