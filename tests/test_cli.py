@@ -183,7 +183,7 @@ def test_any_finite_target_gets_an_answer(name: str, position: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("value", ["1e150", "-1e12", "0", "5e-324"])
+@pytest.mark.parametrize("value", ["1e150", "0", pytest.param("-1e12", marks=pytest.mark.campaign), "5e-324"])
 @pytest.mark.parametrize("name", pf.catalog())
 def test_any_finite_actuator_values_get_an_answer(name: str, value: str) -> None:
     result = pfabrik(["fk", name, *[value] * len(pf.load(name).actuator_names), "--json"])

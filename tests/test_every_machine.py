@@ -32,7 +32,7 @@ DISCONNECTED = {
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_row_alone_is_answered_as_in_a_batch_and_survives_being_stored(name: str) -> None:
-    mechanism, rows = machine(name), 2 if INTERPRETED else 3
+    mechanism, rows = machine(name), 2
     length = mechanism.characteristic_length
     batches = {
         pf.solve_ik: any_targets(mechanism, rows, seed=2),

@@ -195,15 +195,13 @@ def test_no_pose_that_is_known_is_nearer(name: str) -> None:
     assert n_beaten <= (1 if name in IN_PARTS else 0)
 
 
-@pytest.mark.parametrize("question", ["near", "far"])
+@pytest.mark.parametrize("question", [pytest.param("near", marks=pytest.mark.campaign), "far"])
 @pytest.mark.parametrize("name", NAMES)
 def test_joint_space_reaches_the_same_and_is_no_nearer(name: str, question: str) -> None:
     """Poses and chains are searched by engines of their own; one on all joints' coordinates answers every machine."""
     m, (targets, answer) = machine(name), asked(name, question)
     if isinstance(engine_of(m), ClosureEngine):
         pytest.skip("its engine is this one")
-    if (name, question) == (ENDS_EARLY, "near"):
-        pytest.skip("seconds, and far targets ask the same of it")
     rows = ClosureEngine(model_of(m)).answer(targets, None, Options(), keep_mode=False).rows
     np.testing.assert_array_equal(answer.status, rows.status)
     own = distances(m, answer.position_error, answer.rotation_error)
@@ -290,7 +288,9 @@ def test_a_pose_that_is_answered_is_reached_without_a_start(name: str) -> None:
     assert n_missed <= (0.2 * len(poses) if is_redundant else 0)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.campaign] * (n in EVERY and "." in n)) for n in NAMES]
+)
 def test_no_attempt_reaches_what_is_said_to_be_out_of_reach(name: str) -> None:
     m = machine(name)
     targets, answer = asked(name, "far")

@@ -52,8 +52,20 @@ def far_and_near(mechanism: Mechanism, n: int) -> np.ndarray:
     return targets
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", ["five_bar", "stewart", "nrpm", *machines.MACHINES, *TRUNKS])
+FIRST = ("five_bar", "stewart", "nrpm", *TRUNKS)
+"""Machines that are asked in all ways in every run; others in two."""
+
+
+@pytest.mark.parametrize(
+    ("name", "way"),
+    [
+        pytest.param(
+            name, way, marks=[pytest.mark.campaign] * (name not in FIRST and way not in ("paper", "accelerated"))
+        )
+        for name in (*FIRST, *machines.MACHINES)
+        for way in WAYS
+    ],
+)
 def test_limits_are_kept_and_loops_closed_for_any_target(name: str, way: str) -> None:
     mechanism, options = machine(name), WAYS[way]
     answer = pf.passes.solve(mechanism, far_and_near(mechanism, 4), options)
