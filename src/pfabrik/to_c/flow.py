@@ -14,9 +14,9 @@ State = tuple[frozenset[str], frozenset[str]] | None
 @cache
 def names_in(node: ast.AST, context: type[ast.expr_context] | None = None) -> frozenset[str]:
     """Names within a node, of all that read or set them, or of one kind."""
-    return frozenset(
-        {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and (context is None or isinstance(n.ctx, context))}
-    )
+    if isinstance(node, ast.Name):
+        return frozenset([node.id] if context is None or isinstance(node.ctx, context) else ())
+    return frozenset().union(*(names_in(child, context) for child in ast.iter_child_nodes(node)))
 
 
 def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
@@ -87,13 +87,16 @@ class Flow:
     def _counters(self, function: ast.FunctionDef) -> set[str]:
         """Names that only count loops: every mention is in a loop over a range that sets it, and no body sets it."""
         loops: dict[str, list[ast.For]] = {}
+        mentions_of: dict[str, list[ast.Name]] = {}
         for node in ast.walk(function):
+            if isinstance(node, ast.Name):
+                mentions_of.setdefault(node.id, []).append(node)
             if isinstance(node, ast.For) and isinstance(node.target, ast.Name) and is_range(node.iter):
                 loops.setdefault(node.target.id, []).append(node)
         found = set()
         for name, own in loops.items():
             inside = {id(n) for loop in own for part in (loop.target, *loop.body) for n in ast.walk(part)}
-            mentions = [n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id == name]
+            mentions = mentions_of[name]
             stores = sum(isinstance(n.ctx, ast.Store) for n in mentions)
             nested = any(name in names_in(s, ast.Store) for loop in own for s in loop.body)
             if all(id(n) in inside for n in mentions) and stores == len(own) and not nested:
