@@ -12,11 +12,16 @@ State = tuple[frozenset[str], frozenset[str]] | None
 
 
 @cache
-def names_in(node: ast.AST, context: type[ast.expr_context] | None = None) -> frozenset[str]:
+def mentions_in(node: ast.AST) -> frozenset[tuple[str, type[ast.expr_context]]]:
+    """Names within a node, with what is done there: `ast.Load` or `ast.Store`."""
+    own = [(node.id, type(node.ctx))] if isinstance(node, ast.Name) else []
+    return frozenset(own).union(*map(mentions_in, ast.iter_child_nodes(node)))
+
+
+@cache
+def names_in(node: ast.AST, context: type[ast.expr_context] = ast.expr_context) -> frozenset[str]:
     """Names within a node, of all that read or set them, or of one kind."""
-    if isinstance(node, ast.Name):
-        return frozenset([node.id] if context is None or isinstance(node.ctx, context) else ())
-    return frozenset().union(*(names_in(child, context) for child in ast.iter_child_nodes(node)))
+    return frozenset(name for name, use in mentions_in(node) if issubclass(use, context))
 
 
 def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
