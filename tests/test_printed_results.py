@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,6 +51,28 @@ def test_forces_say_which_rows_have_none() -> None:
     text = str(pf.forces(pf.solve_ik(stewart, given, options=mark), [0, 0, -200]))
     assert text.startswith("no forces in 2 of 3 rows: the row is INVALID") and "BR3" in text
     assert str(pf.forces(pf.solve_ik(stewart, given[:0]), [0, 0, -200])) == "no row"
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [
+        (pf.transmission, lambda found: found.translation.velocity[..., 0]),
+        (partial(pf.accuracy, errors=0.1), lambda found: found.position),
+        (partial(pf.wrench_capacity, limits=(-100.0, 100.0)), lambda found: found.radius),
+    ],
+    ids=["transmission", "accuracy", "wrench capacity"],
+)
+def test_first_order_results_show_numbers_ranges_and_reasons(
+    asked: Callable[..., Any], shown: Callable[..., Any]
+) -> None:
+    stewart, mark = pf.load("stewart"), pf.Options(on_invalid="mark")
+    for targets in ([(0, 0, 190), (0, 9, 190)], (0, 0, 190)):
+        found = asked(pf.solve_ik(stewart, targets))
+        values = np.unique(shown(found))
+        assert [float(word) for word in found.table().rows[0][1].split(" to ")] == pytest.approx(values, rel=1e-5)
+        assert not found.table().lines
+    nothing = asked(pf.solve_ik(stewart, np.full((2, 4, 4), np.nan), options=mark))
+    assert "in 2 of 2 rows: the row is INVALID" in str(nothing) and nothing.table().rows[0][1] == "-"
 
 
 def test_clearances_of_batches_are_plain_numbers() -> None:

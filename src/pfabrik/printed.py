@@ -102,6 +102,15 @@ def plain(value: float, smallest: float, form: str = ".6g") -> str:
     return "0" if abs(value) <= smallest else format(value, form)
 
 
+def spanned(values: Iterable[float], form: str = ".6g") -> str:
+    """One number, or the least and the greatest of several; "-" where none is known."""
+    known = [value for value in values if not math.isnan(value)]
+    if not known:
+        return "-"
+    low, high = (format(end, form) for end in (min(known), max(known)))
+    return low if low == high else f"{low} to {high}"
+
+
 def error_text(value: float, form: str, scale: float = 1.0) -> str:
     """An error as a number, or ``< 1e-12`` where it is rounding, whose digits differ between processors.
 

@@ -14,9 +14,10 @@ from ..arrays import Floats, Mask, shaped
 from ..checks import require_choice, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnknownName
+from ..printed import Printed, ResultTable, spanned
 from ..tolerances import TOLERANCES
 from .joint_balance import responses_of
-from .loads import Reasons, add_reason, has_reason, in_shape
+from .loads import Reasons, add_reason, has_reason, in_shape, reasons_in_words
 from .transmission import Maps, maps_of
 
 ROWS_A_BLOCK = 256
@@ -31,7 +32,7 @@ LOOSE = "a constraint singularity: what joints with play move is not determined"
 
 
 @dataclass(frozen=True, eq=False)
-class PoseAccuracy:
+class PoseAccuracy(Printed):
     """Pose errors, as `accuracy` returns them; r is 6, or 3 for a joint end effector.
 
     Attributes
@@ -53,6 +54,16 @@ class PoseAccuracy:
     covariance: Floats | None
     actuators: Floats | None
     reason: str | Reasons
+
+    def table(self) -> ResultTable:
+        """The errors of position and rotation; of a batch, their range."""
+        rows = [
+            ("position", spanned(np.ravel(self.position)), "length"),
+            ("rotation", spanned(np.degrees(np.ravel(self.rotation))), "deg"),
+        ]
+        return ResultTable(
+            "Accuracy", reasons_in_words(self.reason, "nothing known"), (f"{self.kind} error", "", "unit"), rows
+        )
 
 
 class Slopes(Protocol):

@@ -16,9 +16,10 @@ from ..arrays import Floats, shaped
 from ..checks import require_choice
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..kinematics import actuator_units
+from ..printed import Printed, ResultTable, plain, spanned
 from ..tolerances import TOLERANCES
 from .joint_balance import pairs_of
-from .loads import Bounds, Reasons, asked_of, bounds_of, has_reason, in_shape
+from .loads import Bounds, Reasons, asked_of, bounds_of, has_reason, in_shape, reasons_in_words
 from .transmission import Maps, is_redundantly_actuated, maps_of, twist_units
 
 MOST_FACETS = 20_000
@@ -119,7 +120,7 @@ PARTS = {"force": slice(0, 3), "moment": slice(3, 6), "wrench": slice(0, 6)}
 
 
 @dataclass(frozen=True, eq=False)
-class WrenchCapacity:
+class WrenchCapacity(Printed):
     """The loads that a machine's actuators can hold within their limits, as `wrench_capacity` returns it.
 
     x is what acts in addition to the given wrench: a force (d = 3), a moment (3) or a wrench (6), in the base frame.
@@ -142,6 +143,13 @@ class WrenchCapacity:
     weakest: Floats
     reason: str | Reasons
     _shape: tuple[int, ...] = field(repr=False)
+
+    def table(self) -> ResultTable:
+        """What can be held in any direction, and for a single answer the weakest direction; of a batch, the range."""
+        rows = [(f"{self.of} in any direction", spanned(np.ravel(self.radius)))]
+        if not self._shape:
+            rows.append(("weakest direction", "  ".join(plain(part, 1e-9) for part in self.weakest.tolist())))
+        return ResultTable("Wrench capacity", reasons_in_words(self.reason, "nothing known"), ("holds", ""), rows)
 
     @property
     def vertices(self) -> Floats | list[Floats]:

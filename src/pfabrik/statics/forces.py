@@ -14,7 +14,6 @@ from ..answers.solution import Solution, as_plain, checked_solution
 from ..arrays import Floats, Ints, Mask, shaped
 from ..derived import derived
 from ..description.mechanism import Mechanism
-from ..errors import counted
 from ..frozen import FrozenMapping
 from ..kinematics import actuator_units, end_effector_pose, joint_centres
 from ..printed import Printed, ResultTable, plain
@@ -32,6 +31,7 @@ from .loads import (
     has_reason,
     in_shape,
     no_reasons,
+    reasons_in_words,
 )
 from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
@@ -71,13 +71,8 @@ class Forces(Printed):
     def table(self) -> ResultTable:
         """What each actuator exerts, or why no forces hold the load; of a batch, the largest of each."""
         mechanism, exerted = self._mechanism, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names)))
-        if isinstance(self.reason, str) and self.reason:
-            return ResultTable(mechanism.name, [f"no forces: {self.reason}"])
-        is_known = ~np.isnan(exerted).any(axis=1)
-        n_unknown = len(exerted) - int(is_known.sum())
-        reason = next(filter(None, np.ravel(self.reason).tolist()), "")
-        lines = [f"no forces in {n_unknown} of {counted(len(exerted), 'row')}: {reason}"] if n_unknown else []
-        known = exerted[is_known]
+        lines = reasons_in_words(self.reason, "no forces")
+        known = exerted[~np.isnan(exerted).any(axis=1)]
         if not len(known):
             return ResultTable(mechanism.name, lines or ["no row"])
         largest = known[np.abs(known).argmax(axis=0), np.arange(known.shape[1])]

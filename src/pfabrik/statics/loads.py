@@ -14,7 +14,7 @@ from ..arguments import array, as_floats, is_positive
 from ..arrays import Floats, Ints, Mask
 from ..checks import require_each, require_known, require_mapping, require_positive
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, counted
 from ..kinematics import displacements, tree_of
 
 Bounds: TypeAlias = float | tuple[float, float] | ArrayLike | Mapping[str, float | tuple[float, float]]
@@ -65,6 +65,14 @@ def add_reason(reasons: Reasons, rows: Any, reason: str) -> None:
     """Give some rows this reason, by indices or a mask, unless they have one."""
     places = np.arange(len(reasons))[rows]
     reasons[places[~has_reason(reasons[places])]] = reason
+
+
+def reasons_in_words(reason: str | Reasons, lacking: str) -> list[str]:
+    """A line that says how many rows have no numbers, and why the first of them has none; none where all have."""
+    reasons = np.ravel(np.asarray(reason, dtype=object)).tolist()
+    given = [text for text in reasons if text]
+    rows = "" if isinstance(reason, str) else f" in {len(given)} of {counted(len(reasons), 'row')}"
+    return [f"{lacking}{rows}: {given[0]}"] if given else []
 
 
 def has_reason(reasons: Reasons) -> Mask:

@@ -15,8 +15,9 @@ from ..description.mechanism import Mechanism
 from ..errors import counted
 from ..kinematics import JointRates, columns, cycle_basis, generic_of, model_of, rate_units
 from ..platform.jacobians import regular_forward_map
+from ..printed import Printed, ResultTable, spanned
 from ..tolerances import TOLERANCES
-from .loads import Reasons, add_reason, has_reason, in_shape, no_reasons
+from .loads import Reasons, add_reason, has_reason, in_shape, no_reasons, reasons_in_words
 
 NO_CONFIGURATION = "the row is INVALID: it has no configuration"
 GIVES_WAY = "a parallel singularity: the end effector moves with all actuators locked"
@@ -107,7 +108,7 @@ class Factors:
 
 
 @dataclass(frozen=True, eq=False)
-class Transmission:
+class Transmission(Printed):
     """Factors of translation and rotation, as `transmission` returns them.
 
     Attributes
@@ -123,6 +124,21 @@ class Transmission:
     translation: Factors
     rotation: Factors
     reason: str | Reasons
+
+    def table(self) -> ResultTable:
+        """The factors of each direction; of a batch, their range."""
+        rows = [
+            (
+                f"{name} {place}",
+                spanned(np.ravel(factors.velocity[..., place])),
+                spanned(np.ravel(factors.force[..., place])),
+            )
+            for name, factors in (("translation", self.translation), ("rotation", self.rotation))
+            for place in range(factors.velocity.shape[-1])
+        ]
+        return ResultTable(
+            "Transmission", reasons_in_words(self.reason, "no factors"), ("direction", "velocity", "force"), rows
+        )
 
 
 def transmission(solution: Solution, joint: str | None = None) -> Transmission:
