@@ -20,6 +20,8 @@ from pfabrik.description.legs import read_chain
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning
 from pfabrik.files import dumps, loads
 from pfabrik.files.reading import MOST_JOINTS
+from test_files import TRIPOD as JOINTS
+from test_files import edited
 
 PAGE = Path(__file__).parents[1] / "docs" / "describing-a-mechanism.md"
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 195]\n'
@@ -63,14 +65,6 @@ B = { axis = "tangential", range = [-30, 30] }
 )
 THREE = [(2, 0, 0), (-1, 2, 0), (-1, -2, 0)]
 ABOVE = [(1, 0, 3), (-1, 1, 3), (-1, -1, 3)]
-
-
-def edited(text: str, *edits: tuple[str, str]) -> str:
-    """The text with each edit made once."""
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new, 1)
-    return text
 
 
 def faults_of(text: str) -> dict[str, str]:
@@ -533,11 +527,11 @@ class TestFaults:
         found = faults_of(HEXAPOD + "".join(f"k{number} = 1\n" for number in range(1000)))
         assert len(found) == MOST_FAULTS + 1
 
-    @given(st.sampled_from([HEXAPOD, SERVOS, TRIPOD]), st.data())
+    @given(st.sampled_from([HEXAPOD, SERVOS, TRIPOD, JOINTS]), st.data())
     @settings(max_examples=60, deadline=None)
     def test_no_edit_of_a_file_escapes_as_another_error(self, text, data):
         for _ in range(data.draw(st.integers(1, 3))):
-            parts = re.findall(r'\[[^\[\]]*\]|"[^"]*"|(?<= )\d+|\w+ =|(?<=[-"])[RPUS]\*?', text)
+            parts = re.findall(r'\[[^\[\]]*\]|"[^"]*"|(?<= )\d+|true|\w+ =|(?<=[-"])[RPUS]\*?', text)
             words = ['"base"', '"x"', "[0, 0]", "[]", "{}", "-1e300", "nan", "0", "x =", "P*", "C"]
             old, new = data.draw(st.sampled_from(parts)), data.draw(st.sampled_from(words))
             text = text.replace(old, new, data.draw(st.integers(1, 3)))

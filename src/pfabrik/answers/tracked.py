@@ -176,7 +176,7 @@ class Track(Solution):
         return fields
 
     def table(self) -> ResultTable:
-        """How many targets were reached, how far off the others are, where answers jump, and the worst step."""
+        """Counts of targets reached, the largest errors of the others, jumps, and the worst step."""
         summary = TrackSummary(self.mechanism)
         summary.add(self)
         return ResultTable(self.mechanism.name, list(filter(None, (summary.line(), summary.worst()))))

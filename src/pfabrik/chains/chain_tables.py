@@ -1,4 +1,4 @@
-"""What kernels need to answer targets of a chain: tables, seeds all over its ranges, and calls on all cores."""
+"""Kernel tables of a chain, seeds all over its ranges, and kernel calls on all cores."""
 
 from __future__ import annotations
 

@@ -116,13 +116,13 @@ def _wrapped(text: str, width: int, first: str, others: str) -> list[str]:
 
 
 def _last_column(lines: Sequence[str]) -> int | None:
-    """Where the last column of a table begins, which its header says; None if lines are no table."""
+    """The place of a table's last column, read from its header; None if the lines are not a table."""
     start = _last_of(lines[0])
     is_table = len(lines) > 1 and start and all(not line[start - 2 : start].strip() for line in lines)
     return start if is_table else None
 
 
 def _last_of(line: str) -> int:
-    """Where the last part of a line begins, of those two spaces apart; 0 if there is one alone."""
+    """The place of the last part of a line, parts being two spaces apart; 0 if there is one part."""
     gaps = list(re.finditer(r"\S( {2,})(?=\S)", line))
     return gaps[-1].end(1) if gaps else 0

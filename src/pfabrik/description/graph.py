@@ -305,7 +305,7 @@ def _detours(mechanism: Structure, chosen: list[Path]) -> Iterator[Path]:
 
 
 def _reduce(path: int, basis: list[int]) -> int:
-    """What is left of a path after the sum of some of the basis is taken away; 0 if it follows from them."""
+    """The remainder of a path modulo the basis; 0 if the path is a sum of its members."""
     for each in basis:
         path = min(path, path ^ each)
     return path
