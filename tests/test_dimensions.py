@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +66,17 @@ def test_another_dimension_changes_what_follows_from_it_also_after_it_was_saved(
     assert (arm.dimensions["lower"], arm.dimensions["tilt"]) == (200, 20)
     held = loads(PENDULUM).with_dimensions({"lower": 1}, upper=400)  # a dimension that follows may be set too
     assert held.dimensions["lower"] == 1 and held.reference_point[0] == pytest.approx(400 * math.cos(math.pi / 6) + 1)
+
+
+def test_dimensions_go_with_a_machine_to_other_processes() -> None:
+    for twin in (
+        pickle.loads(pickle.dumps(loads(PENDULUM))),
+        copy.deepcopy(loads(PENDULUM)),
+        copy.copy(loads(PENDULUM)),
+    ):
+        assert twin.dimensions == loads(PENDULUM).dimensions
+        name, value = next(iter(twin.dimensions.items()))
+        assert twin.with_dimensions({name: 1.01 * value}) == loads(PENDULUM).with_dimensions({name: 1.01 * value})
 
 
 def test_a_machine_changed_in_python_has_numbers_alone() -> None:

@@ -103,9 +103,13 @@ def test_python_blocks_run_as_they_are_written(code: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 @pytest.mark.usefixtures("folder")
-def test_examples_run(example: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_examples_run(example: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", [str(example)])
     runpy.run_path(str(example), run_name="__main__")
-    assert capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert printed
+    if example.name == "11_on_a_cluster.py":
+        assert blocks(ROOT / "docs" / "cluster.md", "text") == [printed]
 
 
 def test_the_page_of_python_names_everything_public() -> None:

@@ -7,8 +7,7 @@ import itertools
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import AbstractContextManager, contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
@@ -397,35 +396,6 @@ def test_all_of_the_largest_shape_is_within(kind: str) -> None:
         assert largest.extents[0] == pytest.approx(2.0 * largest.extents[2])
     assert found.contains(largest.centre + share * largest.extents).all()
     assert largest.size > 0.05 * found.volume
-
-
-@contextmanager
-def dask_workers() -> Iterator[Executor]:
-    """Two worker processes of a Dask cluster on this machine."""
-    distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "processes": True}
-    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
-        yield client.get_executor()
-
-
-EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor]]] = {
-    "threads": partial(ThreadPoolExecutor, 2),
-    "processes": partial(ProcessPoolExecutor, 2),
-    "dask": dask_workers,
-}
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("default")
-@pytest.mark.parametrize("kind", ["threads", "processes", pytest.param("dask", marks=pytest.mark.campaign)])
-def test_the_answer_is_the_same_wherever_it_is_worked_out(kind: str) -> None:
-    with EXECUTORS[kind]() as executor:
-        for name, asked in (("five_bar", {"resolution": 4.0}), ("rpr", {"resolution": 0.2, "orientation": "any"})):
-            there = pf.workspace(pf.load(name), executor=executor, **asked)
-            here = pf.workspace(pf.load(name), **asked)
-            assert np.array_equal(there.vertices, here.vertices)
-            assert np.array_equal(there.faces, here.faces)
-            assert np.array_equal(there.face_limit, here.face_limit)
 
 
 def test_who_interrupts_leaves_nothing_behind(tmp_path: Path) -> None:

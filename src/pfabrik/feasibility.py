@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
+from contextlib import closing
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +18,7 @@ from .decomposition.leg_table import LegTable
 from .derived import derived
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism, counted
+from .executors import Workers, slices
 from .kernels.threads import in_blocks
 from .model import Model, model_of
 from .platform.answers import sides_at
@@ -77,7 +80,9 @@ class Feasibility(NamedTuple):
         return ResultTable("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows)
 
 
-def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = None) -> Feasibility:
+def feasibility(
+    mechanism: Mechanism, targets: Target, *, start: Start | None = None, executor: Executor | None = None
+) -> Feasibility:
     """Margins of targets in one working mode, by the legs' closed forms; nothing is projected or searched for.
 
     A target whose margin is positive is reached by `solve_ik`; one whose margin is negative may still be, in another
@@ -87,28 +92,42 @@ def feasibility(mechanism: Mechanism, targets: Target, *, start: Start | None = 
     ----------
     targets : as of `solve_ik`; what the task leaves open is completed from the start.
     start : a single Solution or joint vector q that sets the working mode; default that of home.
+    executor : of `concurrent.futures`, or one like it, on whose workers blocks of targets are measured; default: here,
+        on all cores.
 
     Raises
     ------
     UnsupportedMechanism : some chain is no leg in closed form; the message names it, with the reason.
     InvalidArgument : targets of the wrong shape.
     """
-    model = model_of(checked_mechanism(mechanism))
+    model = measured(model_of(checked_mechanism(mechanism)))
     configuration = None if start is None else start_of(mechanism, start, ())
-    if measured(model) is not model:
-        model, configuration = measured(model), start_at_tip(configuration)
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"])
     poses, shape = as_targets(mechanism, targets)
-    margin, binding = _of_mode(model, poses, configuration)
-    for _, beside in starts_beside(model, configuration):  # a start on a fold is of both modes
-        other_margin, other_binding = _of_mode(model, poses, beside)
-        better = other_margin > margin
-        margin[better], binding[better] = other_margin[better], other_binding[better]
+    if executor is None:
+        margin, binding = _best_of_modes(mechanism, poses, configuration)
+    else:
+        blocks = [(poses[block], configuration) for block in slices(len(poses))]
+        with closing(Workers(executor, mechanism).results(_best_of_modes, blocks)) as results:
+            margin, binding = (np.concatenate(parts) for parts in zip(*results, strict=True))
     limits = _limits(model.legs)
     if mechanism.clearance is not None:
         limits += tuple((name, "clearance") for name in pair_names(mechanism))
     return Feasibility(shaped(margin, shape), shaped(binding, shape), limits)
+
+
+def _best_of_modes(mechanism: Mechanism, poses: Floats, configuration: Configurations | None) -> tuple[Floats, Ints]:
+    """Margins (n,) of poses (n, 4, 4), and the indices of their limits; a start on a fold is of both its modes."""
+    model = model_of(mechanism)
+    if measured(model) is not model:
+        model, configuration = measured(model), start_at_tip(configuration)
+    margin, binding = _of_mode(model, poses, configuration)
+    for _, beside in starts_beside(model, configuration):
+        other_margin, other_binding = _of_mode(model, poses, beside)
+        better = other_margin > margin
+        margin[better], binding[better] = other_margin[better], other_binding[better]
+    return margin, binding
 
 
 def _of_mode(model: Model, poses: Floats, start: Configurations | None) -> tuple[Floats, Ints]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import closing
 from math import hypot
 
 import numpy as np
@@ -19,6 +21,7 @@ from .closure.parasitic import has_parasitic_motion
 from .description.mechanism import Mechanism
 from .engine import engine_of, knows_all_modes
 from .errors import InvalidArgument
+from .executors import SLOWER, Workers, slices
 from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, ITERATIONS, PROJECTED, REACHED, RESIDUAL, Rows
 from .model import model_of
 from .options import Options, checked_options
@@ -27,7 +30,12 @@ from .tolerances import TOLERANCES
 
 
 def solve_ik(
-    mechanism: Mechanism, target: Target, *, start: Start | None = None, options: Options | None = None
+    mechanism: Mechanism,
+    target: Target,
+    *,
+    start: Start | None = None,
+    options: Options | None = None,
+    executor: Executor | None = None,
 ) -> Solution:
     """Actuator values that put the end effector on a target, or as near as possible, with every limit kept.
 
@@ -38,6 +46,8 @@ def solve_ik(
         ``{"pivot": [0.1, 0.05]}``; leading axes are a batch, whose rows are answered independently, on all cores.
     start : a Solution or joint vector q to start from, single or one for each target; its working mode is kept.
         Default: home, and any working mode.
+    executor : of `concurrent.futures`, or one like it, on whose workers blocks of a batch are answered, with the same
+        answers; default: here, on all cores.
 
     Returns
     -------
@@ -47,8 +57,7 @@ def solve_ik(
     ------
     InvalidArgument : a target or start of the wrong shape, or (unless marked) rows that are no poses.
     """
-    options = checked_options(options)
-    return solve_by(engine_of, mechanism, target, start, options)
+    return solve_by(engine_of, mechanism, target, start, checked_options(options), executor)
 
 
 def solve_by(
@@ -57,12 +66,54 @@ def solve_by(
     target: Target,
     start: Start | None,
     options: Options,
+    executor: Executor | None = None,
 ) -> Solution:
     """As `solve_ik`, by the engine that is chosen."""
     targets, shape = as_targets(mechanism, target)
     begin, before = start_of(mechanism, start, shape), start._request if isinstance(start, Solution) else None
+    if executor is None:
+        solutions = _answers(mechanism, targets, begin, before, options, choose_engine)
+    else:
+        solutions = _answers_elsewhere(executor, mechanism, targets, begin, before, options, choose_engine)
+    status = solutions.rows.status
+    refuse_invalid(targets, shape, status, options)
+    is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
+    return Solution(mechanism, solutions, shape, PoseRequest(targets.copy(), options) if is_missed else None)
+
+
+def _answers_elsewhere(
+    executor: Executor,
+    mechanism: Mechanism,
+    targets: Floats,
+    begin: Configurations | None,
+    before: PoseRequest | None,
+    options: Options,
+    choose_engine: Callable[[Mechanism], InverseEngine],
+) -> Configurations:
+    """As `_answers`, in blocks on the workers of an executor."""
+    blocks = []
+    for block in slices(len(targets), 1 if choose_engine(mechanism).bounds_steps else SLOWER):
+        rows = np.arange(len(targets))[block]
+        is_each = begin is not None and len(begin) > 1
+        begin_there = begin.at(rows) if begin is not None and is_each else begin
+        before_there = PoseRequest(before.targets[rows], before.options) if before is not None and is_each else before
+        blocks.append((targets[block], begin_there, before_there, options, choose_engine))
+    with closing(Workers(executor, mechanism).results(_answers, blocks)) as results:
+        first, *others = results
+    return first.followed_by(others)
+
+
+def _answers(
+    mechanism: Mechanism,
+    targets: Floats,
+    begin: Configurations | None,
+    before: PoseRequest | None,
+    options: Options,
+    choose_engine: Callable[[Mechanism], InverseEngine],
+) -> Configurations:
+    """Answers to poses (n, 4, 4) from a start, one or one for each, which answered the request `before`, if any."""
     if begin is not None and before is not None and _is_certified(begin, before, targets, options):
-        return Solution(mechanism, begin, shape, before)
+        return begin
     keep_mode, engine = keeps_mode(options, begin), choose_engine(mechanism)
     if options.most_steps and not engine.bounds_steps:
         raise InvalidArgument("options.most_steps", repr(options.most_steps), "None, as legs have no closed form")
@@ -72,18 +123,13 @@ def solve_by(
         )
     solutions = engine.answer(targets, begin, options, keep_mode=keep_mode)
     status = solutions.rows.status
-    refuse_invalid(targets, shape, status, options)
-    is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
-    if not is_missed:
-        return Solution(mechanism, solutions, shape)
+    if not (status[0] != REACHED if len(status) == 1 else (status != REACHED).any()):
+        return solutions
     if not (keep_mode or options.most_steps or knows_all_modes(mechanism)):
         solutions = _reach_missed(mechanism, solutions, targets, begin, options)
-        if (solutions.rows.status == REACHED).all():
-            return Solution(mechanism, solutions, shape)
-    request = PoseRequest(targets.copy(), options)
     if begin is not None and before is not None:
-        solutions = _prefer_start(mechanism, solutions, request, begin, before)
-    return Solution(mechanism, solutions, shape, request)
+        solutions = _prefer_start(mechanism, solutions, PoseRequest(targets, options), begin, before)
+    return solutions
 
 
 def _reach_missed(

@@ -52,8 +52,20 @@ CROSSED = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], 
 
 def from_rpy(angles: Floats) -> Floats:
     """Matrices (..., 3, 3) of roll, pitch, yaw (..., 3) [rad] about fixed x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    turns = from_rotvec(angles[..., :, None] * np.eye(3))
-    return np.asarray(turns[..., 2, :, :] @ turns[..., 1, :, :] @ turns[..., 0, :, :])
+    cosines, sines = np.cos(angles), np.sin(angles)
+    c_roll, c_pitch, c_yaw = cosines[..., 0], cosines[..., 1], cosines[..., 2]
+    s_roll, s_pitch, s_yaw = sines[..., 0], sines[..., 1], sines[..., 2]
+    rotations = np.empty((*angles.shape, 3))
+    rotations[..., 0, 0] = c_yaw * c_pitch
+    rotations[..., 0, 1] = c_yaw * s_pitch * s_roll - s_yaw * c_roll
+    rotations[..., 0, 2] = c_yaw * s_pitch * c_roll + s_yaw * s_roll
+    rotations[..., 1, 0] = s_yaw * c_pitch
+    rotations[..., 1, 1] = s_yaw * s_pitch * s_roll + c_yaw * c_roll
+    rotations[..., 1, 2] = s_yaw * s_pitch * c_roll - c_yaw * s_roll
+    rotations[..., 2, 0] = 0.0 - s_pitch  # never -0
+    rotations[..., 2, 1] = c_pitch * s_roll
+    rotations[..., 2, 2] = c_pitch * c_roll
+    return rotations
 
 
 def to_rpy(rotations: Floats) -> Floats:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from concurrent.futures import Executor
+from contextlib import closing
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from ..arrays import Floats
 from ..checks import require_count, require_finite, require_names, require_positive
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
+from ..executors import Workers
 from ..feasibility import feasibility
 from ..ik import solve_ik
 from ..kernels.certify.link_rows import ROWS_A_PAIR
@@ -23,10 +26,12 @@ from ..kernels.certify.prove import (
     BROKEN,
     DONE,
     FOUND_MARGIN,
+    HALF,
     LIMIT,
     N_OPEN,
     N_PROVED,
     N_STACK,
+    PROVED_LEGS,
     PROVED_MARGIN,
     SPENT,
     TOO_SMALL,
@@ -40,7 +45,15 @@ from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdic
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .links_over_cells import bounded_pairs, links_without_bounds
 from .pose_region import PoseRegion
-from .subdividing import Subdividing, first_cells, region_parameters, step_poses, track_parameters
+from .subdividing import (
+    MOST_LEFT,
+    MOST_PROVED,
+    Subdividing,
+    first_cells,
+    region_parameters,
+    step_poses,
+    track_parameters,
+)
 
 
 def require_no_clearance(mechanism: Mechanism, doing: str) -> None:
@@ -56,6 +69,9 @@ BUDGET = 200_000
 SAMPLES = 20_000
 """Random poses of a region of which links are left open, that may refute it: some hundredths of a second."""
 
+CELLS_A_ROUND, CELLS_A_BLOCK = 64, 20_000
+"""On an executor: cells that workers subdivide at a time, and how many of its parts each looks at: some ten ms."""
+
 MOST_DOUBTS = 16
 """Poses out of reach in home's working mode but reached in another, after which a region is left open."""
 
@@ -68,6 +84,7 @@ def certify(
     tolerance: float | None = None,
     budget: int = BUDGET,
     uncertain: float = 0.0,
+    executor: Executor | None = None,
     on_progress: OnProgress | None = None,
 ) -> Certificate:
     """Prove that `solve_ik` reaches every pose of a region, find a pose that it does not reach, or say what is open.
@@ -85,6 +102,8 @@ def certify(
     budget : number of cells to look at, at most.
     uncertain : radius of a ball about each joint's point that its true place may be anywhere in [length]: proved for
         all machines with such points and directions of axes as described.
+    executor : of `concurrent.futures`, or one like it, on whose workers parts of the region are looked at; default:
+        here. A proof holds either way; its cells are others, and of poses that refute a region it may find another.
     on_progress : called with (cells looked at, cells in all, about); default: a line on a terminal, if it takes more
         than two seconds.
 
@@ -109,7 +128,31 @@ def certify(
         parameters = track_parameters(model, poses, uncertain)
     ask = _RegionQuestion(model, region if isinstance(region, PoseRegion) else None, poses, parameters)
     with telling("certify", on_progress) as tell:
-        return ask.answer(gap, budget, tell)
+        return ask.answer(gap, budget, executor, tell)
+
+
+class _Looked(NamedTuple):
+    """What was seen of some cells.
+
+    Attributes
+    ----------
+    ending : of the kernel: DONE, SPENT, TOO_SMALL, or BROKEN where limits were broken too often.
+    open : cells that are still to be looked at.
+    left : cells too small to be halved, neither proved nor refuted.
+    proved : proved cells, as many as are kept of `n_proved`.
+    n_doubts : number of poses out of reach in home's working mode, but reached in another.
+    """
+
+    ending: int
+    open: Floats
+    left: Floats
+    proved: Floats
+    n_proved: int
+    n_cells: int
+    n_doubts: int
+    proved_margin: float
+    found_margin: float
+    refutation: Refutation | None
 
 
 class _RegionQuestion:
@@ -120,56 +163,106 @@ class _RegionQuestion:
     ) -> None:
         self.model, self.region, self.poses, self.parameters = model, region, poses, parameters
 
-    def answer(self, gap: float, budget: int, tell: OnProgress | None) -> Certificate:
+    def answer(self, gap: float, budget: int, executor: Executor | None, tell: OnProgress | None) -> Certificate:
         """Subdivide until there is a verdict."""
         first = first_cells(self.parameters)
-        subdividing = Subdividing(self.model, self.parameters, first, gap, budget)
-        work, n_doubts, reason = subdividing.work, 0, self._restriction()
-        while True:
-            result = subdividing.proceed(tell)
-            if result != BROKEN:
-                break
-            refutation = self._refuted(work.pose.copy(), int(work.counters[LIMIT]))
-            if refutation is not None:
-                return self._certificate(REFUTED, subdividing, "", refutation)
-            n_doubts += 1
-            if n_doubts >= MOST_DOUBTS:
-                break
-        if result in (SPENT, TOO_SMALL) and not n_doubts and len(bounded_pairs(self.model)):
-            refutation = self._sampled()
-            if refutation is not None:
-                work.measures[FOUND_MARGIN] = min(work.measures[FOUND_MARGIN], refutation.margin)
-                return self._certificate(REFUTED, subdividing, "", refutation)
-        if n_doubts:
+        if executor is None:
+            looked = self.look(first, gap, budget, tell)
+        else:
+            looked = self._look_elsewhere(executor, first, gap, budget, tell)
+        reason, refutation = self._restriction(), looked.refutation
+        if refutation is None and not looked.n_doubts and looked.ending in (SPENT, TOO_SMALL):
+            refutation = self._sampled() if len(bounded_pairs(self.model)) else None
+        if refutation is not None:
+            least_found = (
+                min(looked.found_margin, refutation.margin) if looked.refutation is None else looked.found_margin
+            )
+            return self._certificate(REFUTED, looked._replace(found_margin=least_found), "", refutation)
+        if looked.n_doubts:
             reason = reason or "some poses are reached in another working mode than home's"
-        elif result != DONE:
-            spent = f"after {subdividing.n_cells} cells" if result == SPENT else "cells became too small"
+        elif looked.ending != DONE:
+            spent = f"after {looked.n_cells} cells" if looked.ending == SPENT else "cells became too small"
             reason = reason or spent
-        return self._certificate(OPEN if reason else PROVED, subdividing, reason, None)
+        return self._certificate(OPEN if reason else PROVED, looked, reason, None)
+
+    def look(self, cells: Floats, gap: float, budget: int, tell: OnProgress | None = None) -> _Looked:
+        """Subdivide cells until they are proved, a pose refutes them, or the budget is spent."""
+        subdividing = Subdividing(self.model, self.parameters, cells, gap, budget)
+        work, n_doubts, refutation = subdividing.work, 0, None
+        while (ending := subdividing.proceed(tell)) == BROKEN:
+            refutation = self._refuted(work.pose.copy(), int(work.counters[LIMIT]))
+            n_doubts += refutation is None
+            if refutation is not None or n_doubts >= MOST_DOUBTS:
+                break
+        n_proved = int(work.counters[N_PROVED])
+        return _Looked(
+            ending,
+            work.stack[: int(work.counters[N_STACK]), :PROVED_LEGS],
+            work.left[: int(work.counters[N_OPEN])],
+            work.proved[: min(n_proved, len(work.proved))],
+            n_proved,
+            subdividing.n_cells,
+            n_doubts,
+            float(work.measures[PROVED_MARGIN]),
+            float(work.measures[FOUND_MARGIN]),
+            refutation,
+        )
+
+    def _look_elsewhere(
+        self, executor: Executor, cells: Floats, gap: float, budget: int, tell: OnProgress | None
+    ) -> _Looked:
+        """As `look`, on the workers of an executor, in rounds: what a round leaves open is looked at in the next."""
+        workers = Workers(executor, (self.model.mechanism, self.region, self.poses, self.parameters))
+        parts: list[_Looked] = []
+        whole, n_cells, n_left, n_doubts = _size(cells), 0, 0, 0
+        while len(cells) and n_cells < budget and n_left < MOST_LEFT and n_doubts < MOST_DOUBTS:
+            waiting, turn = cells[:-CELLS_A_ROUND], cells[-CELLS_A_ROUND:]
+            budget_each = min(CELLS_A_BLOCK, max((budget - n_cells) // len(turn), 1))
+            blocks = [(turn[i : i + 1, :PROVED_LEGS], gap, budget_each) for i in range(len(turn))]
+            with closing(workers.results(_look_at, blocks)) as results:
+                for part in results:
+                    parts.append(part)
+                    if part.refutation is not None:
+                        break
+            cells = np.concatenate([waiting, *(part.open for part in parts[-len(turn) :])])
+            n_cells, n_left = sum(part.n_cells for part in parts), sum(len(part.left) for part in parts)
+            n_doubts = sum(part.n_doubts for part in parts)
+            if parts[-1].refutation is not None:
+                break
+            if tell is not None:
+                share = max(1.0 - _size(cells) / whole, n_cells / budget)
+                tell(n_cells, math.ceil(n_cells / share))
+        proved = np.concatenate([part.proved for part in parts])[:MOST_PROVED]
+        return _Looked(
+            SPENT if len(cells) else TOO_SMALL if n_left else DONE,
+            cells,
+            np.concatenate([part.left for part in parts]),
+            proved,
+            sum(part.n_proved for part in parts),
+            n_cells,
+            n_doubts,
+            min(part.proved_margin for part in parts),
+            min(part.found_margin for part in parts),
+            parts[-1].refutation,
+        )
 
     def _certificate(
-        self, verdict: Verdict, subdividing: Subdividing, reason: str, refutation: Refutation | None
+        self, verdict: Verdict, looked: _Looked, reason: str, refutation: Refutation | None
     ) -> Certificate:
-        work = subdividing.work
-        margin = float(work.measures[PROVED_MARGIN]) if verdict == PROVED else -math.inf
-        proved = work.proved[: min(int(work.counters[N_PROVED]), len(work.proved))]
-        n_left = int(work.counters[N_OPEN])
-        left = np.concatenate([work.stack[: int(work.counters[N_STACK])], work.left[:n_left]])
-        is_whole = len(proved) == int(work.counters[N_PROVED])
         return Certificate(
             self.model.mechanism,
             self.region,
             self.poses,
             verdict,
-            margin,
-            float(work.measures[FOUND_MARGIN]),
+            looked.proved_margin if verdict == PROVED else -math.inf,
+            looked.found_margin,
             reason,
             refutation,
-            subdividing.n_cells,
-            is_whole,
+            looked.n_cells,
+            len(looked.proved) == looked.n_proved,
             self.parameters,
-            proved,
-            left,
+            looked.proved,
+            np.concatenate([looked.open, looked.left[:, :PROVED_LEGS]]),
         )
 
     def _restriction(self) -> str:
@@ -251,6 +344,19 @@ class _RegionQuestion:
         if pair < 0:
             return n_limits + (row - n_limits) // 2
         return n_limits + 2 * n_legs + int(bounded_pairs(self.model)[pair])
+
+
+def _look_at(
+    asked: tuple[Mechanism, PoseRegion | None, Floats | None, CellParameters], cells: Floats, gap: float, budget: int
+) -> _Looked:
+    """Look at cells on a worker."""
+    mechanism, region, poses, parameters = asked
+    return _RegionQuestion(model_of(mechanism), region, poses, parameters).look(cells, gap, budget)
+
+
+def _size(cells: Floats) -> float:
+    """The size of cells, of the coordinates that vary in the first."""
+    return float(np.prod(cells[:, HALF:PROVED_LEGS], axis=1, where=cells[:1, HALF:PROVED_LEGS] > 0.0).sum())
 
 
 def _with_limits_of(mechanism: Mechanism, limits: Any) -> Mechanism:

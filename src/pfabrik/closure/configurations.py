@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..batch import put, take
+from ..batch import joined, put, take
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from ..model import Model
 from ..motion.loops import Closure
@@ -122,6 +122,13 @@ class Configurations:
         put(rows, places, source.rows)
         coordinates[places] = source.coordinates
         return Configurations(rows, coordinates)
+
+    def followed_by(self, others: Sequence[Configurations]) -> Configurations:
+        """These configurations, and after them those of other batches."""
+        every = [self, *others]
+        return Configurations(
+            joined([each.rows for each in every]), np.concatenate([each.coordinates for each in every])
+        )
 
     def put(self, places: NDArray[np.intp], source: Configurations, rows: Mask) -> None:
         """Write some rows of other configurations at some places."""

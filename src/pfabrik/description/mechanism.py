@@ -204,6 +204,10 @@ class Mechanism(Structure):
         elif left == 0 and is_held(self):
             yield "the loops hold the end effector at home: it cannot move"
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The description, and the dimensions of its file."""
+        return super().__getstate__() | {name: self.__dict__[name] for name in ("_source",) if name in self.__dict__}
+
     @property
     def dimensions(self) -> Mapping[str, float]:
         """Values of the named dimensions of the file that it was read from, in their order; empty without any.
@@ -291,7 +295,7 @@ class Mechanism(Structure):
     def _with(self, **changes: Any) -> Mechanism:
         """A checked copy with other fields that freedoms do not depend on."""
         copy = object.__new__(Mechanism)
-        set_fields(copy, **(self.__getstate__() | changes))
+        set_fields(copy, **(super().__getstate__() | changes))
         copy._check()
         return copy
 

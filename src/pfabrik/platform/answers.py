@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -58,6 +58,18 @@ class LegAnswers(Configurations):
         answers = LegAnswers(rows, lambda block: self.coordinates_at(places[block]), self.sides[places], q_proximal)
         answers._layers = self._layers
         return answers
+
+    def followed_by(self, others: Sequence[Configurations]) -> Configurations:
+        """As of `Configurations`; answers of legs, where all of them are."""
+        plain, every = super().followed_by(others), [self, *others]
+        legs = [each for each in every if isinstance(each, LegAnswers)]
+        if len(legs) < len(every):
+            return plain
+        q_proximal = [
+            np.full(each.sides.shape, np.nan) if each.q_proximal is None else each.q_proximal for each in legs
+        ]
+        known = None if all(each.q_proximal is None for each in legs) else np.concatenate(q_proximal)
+        return LegAnswers(plain.rows, plain.coordinates, np.concatenate([each.sides for each in legs]), known)
 
     def with_rows(self, places: NDArray[np.intp], source: Configurations) -> Configurations:
         """As of `Configurations`; of legs' answers, coordinates are computed on access.

@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import math
-import pickle
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from functools import lru_cache
-from typing import Any, TypeVar
+from contextlib import closing
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..batch import joined, take, take_each
-from ..checks import require_method
 from ..engine import Starts
+from ..executors import SLOWER, Result, Workers, slices
 from ..telling import OnProgress
 from .verdicts import MapQuestion
-
-POSES_A_BLOCK = 1 << 14
-"""Poses of a block: enough to be worth sending to another process."""
-
-SLOWER = 64
-"""Factor by which a pose takes longer without closed forms, at least; blocks are smaller by that factor."""
-
-Result = TypeVar("Result")
-"""What a method of a question gives for a block."""
 
 LOOKS, LOOKS_GROWN, LOOKS_ONE_BY_ONE = 0.25, 0.75, 3.0
 """Time to locate the border in a cell, as a share of that to halve one: by margins, by searches, by answers."""
@@ -51,72 +41,41 @@ class Measure:
         self.question, self.fewest = question, fewest
         looks = LOOKS if question.has_margins else LOOKS_GROWN if question.is_grown else LOOKS_ONE_BY_ONE
         self.progress = MapProgress(on_progress, len(question.space.names), looks)
-        if executor is not None:
-            require_method("executor", executor, "submit", "an executor of concurrent.futures, or None")
-        self._executor = executor
-        self._sent = b"" if executor is None else pickle.dumps(question)
-        slower = 1 if question.has_margins else SLOWER
-        self._points_a_block = max(1, POSES_A_BLOCK // (slower * len(question.turns)))
+        self._workers = Workers(executor, question)
+        self._cost = (1 if question.has_margins else SLOWER) * len(question.turns)
 
     def __call__(
         self, points: Floats, known: Starts | None = None, *, anew: bool = False
     ) -> tuple[Floats, Ints, Starts]:
         """Margins and bindings of points (n, d), and configurations at or nearest to them, as of `MapQuestion.look`."""
         known = self.question.first_start if known is None else known
-        blocks = [(points[block], take_each(known, block), anew) for block in self._blocks(len(points))]
-        parts = self._measured(MapQuestion.look, blocks)
-        if not parts:
+        blocks = [(points[block], take_each(known, block), anew) for block in slices(len(points), self._cost)]
+        if not len(points):
             return np.zeros(0), np.zeros(0, np.int64), take(known, slice(0))
-        margins, bindings, ends = zip(*parts, strict=True)
+        margins, bindings, ends = zip(*self._measured(MapQuestion.look, blocks), strict=True)
         return np.concatenate(margins), np.concatenate(bindings), joined(ends)
 
     def name_limits(self, points: Floats, known: Starts) -> Ints:
         """The limits that points (n, d) just beyond the border exceed, as of `MapQuestion.name_limits`."""
-        blocks = [(points[block], take_each(known, block)) for block in self._blocks(len(points))]
-        return np.concatenate([np.zeros(0, np.int64), *self._measured(MapQuestion.name_limits, blocks, counts=False)])
+        blocks = [(points[block], take_each(known, block)) for block in slices(len(points), self._cost)]
+        if not len(points):
+            return np.zeros(0, np.int64)
+        return np.concatenate(self._measured(MapQuestion.name_limits, blocks, counts=False))
 
     def halvings(self, across: Floats) -> int:
         """How often cells must be halved for enough of them, where there are so many along each coordinate, (d,)."""
         return math.ceil(math.log2(max(self.fewest / float(across.min()), 1.0)))
 
-    def _blocks(self, n: int) -> list[slice]:
-        """Slices of n points, each of as many as are worth sending to another process."""
-        return [slice(i, i + self._points_a_block) for i in range(0, n, self._points_a_block)]
-
     def _measured(self, method: Callable[..., Result], blocks: list[Any], *, counts: bool = True) -> list[Result]:
         """What a method of the question gives for blocks: points, and what else it takes; counted if they are new."""
-        if self._executor is None:
-            return [self._counted(method(self.question, *block), counts * len(block[0])) for block in blocks]
-        return self._elsewhere(self._executor, method, blocks, counts)
-
-    def _elsewhere(
-        self, executor: Executor, method: Callable[..., Result], blocks: list[Any], counts: bool
-    ) -> list[Result]:
-        """Measure blocks on an executor's workers; on a failure or interruption, drop those that have not begun."""
-        futures = [executor.submit(measure_block, self._sent, method, *block) for block in blocks]
-        try:
+        with closing(self._workers.results(method, blocks)) as results:
             return [
-                self._counted(future.result(), counts * len(block[0]))
-                for future, block in zip(futures, blocks, strict=True)
+                self._counted(result, counts * len(block[0])) for result, block in zip(results, blocks, strict=True)
             ]
-        finally:
-            for future in futures:
-                future.cancel()
 
     def _counted(self, measured: Result, n: int) -> Result:
         self.progress.add(n)
         return measured
-
-
-def measure_block(sent: bytes, method: Callable[..., Result], *block: Any) -> Result:
-    """Measure a block on a worker; the question, which many blocks share, is unpacked once."""
-    return method(_question(sent), *block)
-
-
-@lru_cache(maxsize=4)
-def _question(sent: bytes) -> MapQuestion:
-    question: MapQuestion = pickle.loads(sent)
-    return question
 
 
 class MapProgress:
