@@ -59,8 +59,12 @@ class SubChain:
 
     Attributes
     ----------
-    parts : joints, and splits where the chain branches or holds a loop.
-    reason : why positions alone cannot express it, or None.
+    parts : tuple of Part
+        Joints, and splits where the chain branches or holds a loop.
+    reason : str or None
+        Why positions alone cannot express it; else None.
+    branch_forms : tuple of BranchForm
+        Nodes, links and cones of each branch; empty where positions alone cannot express it.
     """
 
     parts: tuple[Part, ...]
@@ -133,6 +137,11 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     sub-chain. A sub-chain that positions alone cannot express has the reason.
 
     Source: the paper's TDS. Which chains positions can express: `decomposition.positions`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
     """
     chains = sub_chains(RecordedHome(checked_mechanism(mechanism)))
     return tuple(_express(mechanism, chain) if chain.reason is None else chain for chain in chains)

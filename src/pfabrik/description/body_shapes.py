@@ -31,21 +31,33 @@ class Shape:
 
     Attributes
     ----------
-    body : the body that it belongs to.
-    kind : "capsule" (a rod with round ends), "sphere", "box", "disc" (a round plate, or a cylinder) or "mesh", the
-        convex hull of a file of triangles. A part that is not convex is several meshes, one for each convex piece.
-    thickness : diameter of a capsule; height of a disc [length].
-    between : the two joints between whose centres the axis of a capsule runs: joints of the body, or of one that slides
-        along it, as the two parts of a strut. By default the two joints of the body, where it has just two.
-    ends : in place of joints, both ends of the axis of a capsule, points of the body.
-    at : centre of a sphere, box or disc; of a mesh where the origin of its file is, by default that of the base.
-    diameter : of a sphere or disc.
-    axis : of a disc.
-    size : lengths of the edges of a box.
-    axes : directions of the first two edges of a box, or of the x and y axes of a mesh's file, square to each other; by
+    body : str
+        The body that it belongs to.
+    kind : {"capsule", "sphere", "box", "disc", "mesh"}
+        A capsule is a rod with round ends, a disc a round plate or a cylinder, a mesh the convex hull of a file of
+        triangles. A part that is not convex is several meshes, one for each convex piece.
+    thickness : float
+        Diameter of a capsule; height of a disc [length].
+    between : tuple of str or None
+        The two joints between whose centres the axis of a capsule runs: joints of the body, or of one that slides along
+        it, as the two parts of a strut. By default the two joints of the body, where it has just two.
+    ends : tuple of array (3,) or None
+        In place of joints, both ends of the axis of a capsule, points of the body.
+    at : array (3,) or None
+        Centre of a sphere, box or disc; of a mesh where the origin of its file is, by default that of the base.
+    diameter : float or None
+        Diameter of a sphere or disc [length].
+    axis : array (3,) or None
+        Axis of a disc.
+    size : array (3,) or None
+        Lengths of the edges of a box.
+    axes : tuple of array (3,) or None
+        Directions of the first two edges of a box, or of the x and y axes of a mesh's file, square to each other; by
         default x and y.
-    file : of a mesh, the path of its file: STL, OBJ, PLY and others.
-    scale : of a mesh, what the numbers of its file are multiplied by; 1 by default.
+    file : str or None
+        Path of the file of a mesh: STL, OBJ, PLY and others.
+    scale : float or None
+        Factor on the numbers of a mesh's file; 1 by default.
     """
 
     body: str

@@ -82,6 +82,15 @@ class Cone:
 
     The angle between `axis` (a unit vector, given at home, fixed to the body `fixed_to`) and the line from this joint
     to the next joint of the *other* body is at most `half_angle` [rad].
+
+    Attributes
+    ----------
+    axis : array (3,)
+        Axis of the cone at home, a unit vector, fixed to the body `fixed_to`.
+    half_angle : float
+        Largest angle between the axis and the line from this joint to the next joint of the other body [rad].
+    fixed_to : str
+        The body that the axis is fixed to.
     """
 
     axis: Vector
@@ -104,19 +113,34 @@ class Joint:
 
     Attributes
     ----------
-    connects : the two bodies; coordinates move the second relative to the first.
-    at : the joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
-    axis : the axis of R, P and C.
-    axes : the two axes of U; the first is fixed in the first body. By default they are square to each other and to the
+    name : str
+        Name of the joint.
+    type : {"revolute", "prismatic", "universal", "spherical", "cylindrical", "fixed"}
+        Kind of the joint; R, P, U, S and C are the letters of the first five.
+    connects : tuple of str
+        The two bodies; coordinates move the second relative to the first.
+    at : array (3,) or None
+        The joint's centre [length]; None only for a prismatic joint, which has no centre of its own.
+    axis : array (3,) or None
+        The axis of R, P and C.
+    axes : tuple of array (3,) or None
+        The two axes of U; the first is fixed in the first body. By default they are square to each other and to the
         line on which the next joints are, on the body farther from the base, else on the nearer one: so the joint keeps
-        its link from spinning about itself; x and y where there is no such line. Which two of the directions square
-        to the line they are is left open: give them where that counts, as in a leg without a spherical joint.
-    along : the two joints whose distance is the coordinate of a prismatic joint.
-    actuated : whether its coordinate is driven; of a C both of them, or as two values (angle, displacement) either.
-    home : value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
-    range : (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
-    max_speed, max_acceleration : of the driven coordinate [rad or length, per s and per s²], two values where a C has
-        both driven; None is no limit.
+        its link from spinning about itself; x and y where there is no such line. Which two of the directions square to
+        the line they are is left open: give them where that counts, as in a leg without a spherical joint.
+    along : tuple of str or None
+        The two joints whose distance is the coordinate of a prismatic joint.
+    actuated : bool or tuple of bool
+        True if its coordinate is driven; for a C both of them, or two values (angle, displacement).
+    home : float or tuple of float
+        Value of the coordinate in the home configuration; two values for C (angle, displacement) and U.
+    range : tuple of float or None
+        Range (lo, hi) for R and P; two such pairs for C (angle, displacement) and U.
+    cone : Cone or None
+        Limit of a U or S.
+    max_speed, max_acceleration : float or tuple of float or None
+        Limits of the driven coordinate [rad or length, per s and per s²], two values where a C has both driven; None is
+        no limit.
     """
 
     name: str

@@ -39,23 +39,33 @@ class Leg:
 
     Attributes
     ----------
-    chain : the joints from the base outward, `*` behind the actuated ones: "U-P*-S". They are called A, B, C by their
-        place in the chain, and A1, B1, C1 in the first leg.
-    base, platform : centres of the first and the last joint that has a centre (a prismatic one has none) [length]:
-        one point for each leg, or a single one.
-    via : centres of the joints between, one list of points for each joint; for a single joint the list alone.
-    axis : direction of the joints that need one: three numbers or a word ("radial", "tangential", "vertical", "x", "y",
+    chain : str
+        The joints from the base outward, `*` behind the actuated ones: "U-P*-S". They are called A, B, C by their place
+        in the chain, and A1, B1, C1 in the first leg.
+    base, platform : array (3,) or (n, 3) or None
+        Centres of the first and the last joint that has a centre (a prismatic one has none) [length]: one point for
+        each leg, or a single one.
+    via : array or None
+        Centres of the joints between, one list of points for each joint; for a single joint the list alone.
+    axis : array or str or sequence of str or None
+        Direction of the joints that need one: three numbers or a word ("radial", "tangential", "vertical", "x", "y",
         "z", "-" before it for the opposite), for all legs or one for each leg.
-    stroke : range of the prismatic joint.
-    thickness : diameter of the links between neighbouring joints of the chain that have a centre, for `clearance`.
-    name : what comes before the names of joints and bodies.
-    connects : the bodies that the legs lead from and to; the base and the end effector by default.
-    by_letter : what is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are
-        axis, axes, home, range, cone, max_speed and max_acceleration, as of a `Joint`, directions as above; and, of a C
-        with `*` in the chain, actuated: which of its coordinates is driven, by default both. A cone is a mapping too:
+    stroke : tuple of float or None
+        Range of the prismatic joint [length].
+    name : str
+        What comes before the names of joints and bodies.
+    connects : tuple of str or None
+        The bodies that the legs lead from and to; the base and the end effector by default.
+    by_letter : mapping of str to mapping
+        What is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are axis,
+        axes, home, range, cone, max_speed and max_acceleration, as in `Joint`, directions as above; and, of a C with
+        `*` in the chain, actuated: which of its coordinates is driven, by default both. A cone is a mapping too:
         half_angle; axis, by default the line that it limits, at home; fixed_to, by default the base or the end effector
         at the ends of the chain and the inner body between.
-    copies : {"count": 3, "axis": (0, 0, 1)}: rotational copies about an axis through the origin.
+    copies : mapping or None
+        {"count": 3, "axis": (0, 0, 1)}: rotational copies about an axis through the origin.
+    thickness : float or None
+        Diameter of the links between neighbouring joints of the chain that have a centre, for `clearance`.
     """
 
     chain: str

@@ -72,15 +72,28 @@ class Mechanism(Structure):
 
     Attributes
     ----------
-    end_effector : a body, or the name of a joint (a 5-bar's tip).
-    reference_point : the point of the end-effector body that targets place, at home [length]; the centre of the joint
-        when the end effector is a joint, and then left out.
-    length_unit, angle_unit : labels for people and files; nothing is ever converted by them.
-    task : what a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
+    name : str
+        Name of the machine.
+    joints : tuple of Joint
+        The joints.
+    end_effector : str
+        A body, or the name of a joint (a 5-bar's tip).
+    reference_point : array (3,)
+        The point of the end-effector body that targets place, at home [length]; the centre of the joint when the end
+        effector is a joint, and then left out.
+    base : str
+        The body that does not move.
+    length_unit, angle_unit : str
+        Labels for people and files; nothing is ever converted by them.
+    task : tuple of str
+        What a target sets: of "x", "y", "z", and one of "rotation", "tilt" (where the platform's z axis points) and
         "yaw" (the twist about z); by default everything. What it leaves out follows from the mechanism.
-    shapes : how thick bodies are, for clearances and pictures.
-    ignore : pairs of bodies that may touch each other.
-    clearance : the least distance that every answer keeps between links [length]; None where links may overlap.
+    shapes : tuple of Shape
+        Thickness of bodies, for clearances and pictures.
+    ignore : tuple of tuple of str
+        Pairs of bodies that may touch each other.
+    clearance : float or None
+        The least distance that every answer keeps between links [length]; None where links may overlap.
     """
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
@@ -149,20 +162,49 @@ class Mechanism(Structure):
 
         Parameters
         ----------
-        legs : a chain such as "U-P*-S"; or a `Leg`, or several, which then have the points and all else up to `copies`.
-        base, platform, via, axis, stroke, thickness, copies : as of a `Leg`; lengths, and angles in radians.
-        by_letter : what is said of single joints of the chain: `A={"axis": "radial", "range": (-1, 1)}`.
-        name : by default what the field calls it, such as "6-UPS".
-        end_effector, reference_point, task, length_unit, angle_unit : as of a `Mechanism`.
-        base_body : the name of the body that does not move.
-        joints : joints beside those of the legs, before which they come.
-        shapes : shapes beside those of legs with a `thickness`, before which they come.
-        ignore, clearance : as of a `Mechanism`.
+        legs : str or Leg or sequence of Leg
+            A chain such as "U-P*-S"; or a `Leg`, or several, which then have the points and all else up to `copies`.
+        base, platform : array (3,) or (n, 3), optional
+            Points of the legs, as in `Leg` [length].
+        via : array, optional
+            Points of the joints between, as in `Leg` [length].
+        axis : array or str or sequence of str, optional
+            Directions, as in `Leg`.
+        stroke : tuple of float, optional
+            Range of the prismatic joint [length].
+        thickness : float, optional
+            Diameter of the links, as in `Leg` [length].
+        copies : mapping, optional
+            Rotational copies, as in `Leg`.
+        name : str, optional
+            Name of the machine; default what the field calls it, such as "6-UPS".
+        end_effector : str, optional
+            As in `Mechanism`.
+        reference_point : array (3,), optional
+            As in `Mechanism`.
+        task : sequence of str, optional
+            As in `Mechanism`.
+        base_body : str, optional
+            The name of the body that does not move.
+        joints : iterable of Joint, optional
+            Joints beside those of the legs, before which they come.
+        shapes : iterable of Shape, optional
+            Shapes beside those of legs with a `thickness`, before which they come.
+        ignore : iterable of tuple of str, optional
+            As in `Mechanism`.
+        clearance : float, optional
+            As in `Mechanism`.
+        length_unit, angle_unit : str, optional
+            As in `Mechanism`.
+        **by_letter : mapping of str to object
+            What is said of single joints of the chain: `A={"axis": "radial", "range": (-1, 1)}`; angles in radians.
 
         Raises
         ------
-        InvalidMechanism : with every fault; places such as `leg[0].platform` are those of a file.
-        InvalidArgument : neither a chain nor legs, or both.
+        InvalidMechanism
+            With every fault; places such as `leg[0].platform` are those of a file.
+        InvalidArgument
+            Neither a chain nor legs, or both.
         """
         parts: dict[str, Any] = {"base": base, "platform": platform, "via": via, "axis": axis, "stroke": stroke}
         parts |= {"thickness": thickness, "copies": copies, "by_letter": by_letter}
@@ -222,12 +264,17 @@ class Mechanism(Structure):
 
         Parameters
         ----------
-        values, by_name : dimension name -> value, in the units of the file.
+        values : mapping of str to float, optional
+            Dimension name -> value, in the units of the file.
+        **by_name : float
+            The same by keywords.
 
         Raises
         ------
-        UnknownName : it has no dimension of that name.
-        InvalidMechanism : these values make no mechanism; with every fault, at its place in the file.
+        UnknownName
+            It has no dimension of that name.
+        InvalidMechanism
+            These values make no mechanism; with every fault, at its place in the file.
         """
         source: _Source | None = self.__dict__.get("_source")
         changed = {**(values or {}), **by_name}
@@ -241,12 +288,17 @@ class Mechanism(Structure):
 
         Parameters
         ----------
-        limits, by_name : joint name to its new range, its new cone, or None to drop both. What is not named stays.
+        limits : mapping of str to tuple or Cone or None, optional
+            Joint name -> its new range, its new cone, or None to drop both. What is not named stays.
+        **by_name : tuple or Cone or None
+            The same by keywords.
 
         Raises
         ------
-        UnknownName : no joint of that name.
-        InvalidMechanism : a limit that does not fit its joint, or that home exceeds.
+        UnknownName
+            No joint of that name.
+        InvalidMechanism
+            A limit that does not fit its joint, or that home exceeds.
         """
         changes = {**require_mapping("limits", limits, "limits by the names of joints"), **by_name}
         for name in changes:
@@ -273,9 +325,17 @@ class Mechanism(Structure):
     def with_shapes(self, shapes: Iterable[Shape], ignore: Iterable[Sequence[str]] = ()) -> Mechanism:
         """A copy with other shapes of bodies, and other pairs of bodies that may touch.
 
+        Parameters
+        ----------
+        shapes : iterable of Shape
+            The shapes, in place of those there are.
+        ignore : iterable of tuple of str, optional
+            Pairs of bodies that may touch each other.
+
         Raises
         ------
-        InvalidMechanism : a shape that is none, or links that overlap at home.
+        InvalidMechanism
+            A shape that is none, or links that overlap at home.
         """
         return self._with(shapes=items(shapes), ignore=as_pairs(ignore))
 
@@ -284,7 +344,8 @@ class Mechanism(Structure):
 
         Raises
         ------
-        InvalidMechanism : a clearance that is none, or links that are nearer at home.
+        InvalidMechanism
+            A clearance that is none, or links that are nearer at home.
         """
         return self._with(clearance=numbers(clearance))
 

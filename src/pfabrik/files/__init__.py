@@ -28,13 +28,16 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
 
     Parameters
     ----------
-    source : a catalogue name (a text equal to one of `catalog()`), or the path of a mechanism file, or of the settings
-        of a delta printer: Klipper's `printer.cfg`, RepRapFirmware's `config.g`, Marlin's `Configuration.h`.
+    source : str or PathLike
+        A catalogue name (a text equal to one of `catalog()`), or the path of a mechanism file, or of the settings of a
+        delta printer: Klipper's `printer.cfg`, RepRapFirmware's `config.g`, Marlin's `Configuration.h`.
 
     Raises
     ------
-    UnknownName : neither a file nor a catalogue name.
-    InvalidMechanism : the file does not describe a mechanism; carries every fault found.
+    UnknownName
+        Neither a file nor a catalogue name.
+    InvalidMechanism
+        The file does not describe a mechanism; carries every fault found.
     """
     if isinstance(source, str) and source in catalog():
         return loads(catalog_file(source).read_text(encoding="utf-8"), source)
@@ -73,6 +76,13 @@ def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
 
     The file is replaced as a whole or not at all. Copies, shorthands and expressions of the file that the mechanism
     came from are kept if that has dimensions. Paths of meshes are written relative to the folder of the new file.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike
+        The file to write.
     """
     checked_mechanism(mechanism)
     with whole_path(path) as part:
