@@ -19,17 +19,22 @@ def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:
 
     Parameters
     ----------
-    q : all joint coordinates (..., nq), in the order of `mechanism.coordinate_names` [rad or length], with the zeros of
-        the description.
+    mechanism : Mechanism
+        The machine.
+    q : array (..., nq)
+        All joint coordinates, in the order of `mechanism.coordinate_names` [rad or length], with the zeros of the
+        description.
 
     Returns
     -------
-    Solution : REACHED if all loops are closed and every limit is kept; EXCEEDED if a limit is exceeded, which
-        `active_limits` names; FAILED if loops are open, by `residual`. Errors are 0, as there is no target.
+    Solution
+        REACHED if all loops are closed and every limit is kept; EXCEEDED if a limit is exceeded, which `active_limits`
+        names; FAILED if loops are open, by `residual`. Errors are 0, as there is no target.
 
     Raises
     ------
-    InvalidArgument : coordinates of the wrong shape, or not finite.
+    InvalidArgument
+        Coordinates of the wrong shape, or not finite.
     """
     deviations, shape = joint_vectors(mechanism, q, "q")
     closing = measure_configurations(model_of(mechanism), deviations)

@@ -65,7 +65,17 @@ class MobilityWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with a description: where, what was found there, what was expected."""
+    """One thing wrong with a description: where, what was found there, what was expected.
+
+    Attributes
+    ----------
+    place : str
+        Where in the description.
+    found : str
+        What was found there.
+    expected : str
+        What was expected.
+    """
 
     place: str
     found: str
@@ -80,8 +90,10 @@ class InvalidMechanism(PfabrikError, ValueError):
 
     Attributes
     ----------
-    faults : the faults, in the order of the description.
-    source : the file they were found in, or None for a mechanism built in Python.
+    faults : tuple of Fault
+        The faults, in the order of the description.
+    source : str or None
+        The file they were found in, or None for a mechanism built in Python.
     """
 
     def __init__(self, faults: Sequence[Fault], source: str | None = None) -> None:
@@ -92,7 +104,15 @@ class InvalidMechanism(PfabrikError, ValueError):
 
 
 class UnsupportedMechanism(PfabrikError, ValueError):
-    """A valid mechanism that no engine of this version can solve; names the sub-chain and the reason."""
+    """A valid mechanism that no engine of this version can solve; names the sub-chain and the reason.
+
+    Attributes
+    ----------
+    mechanism : str
+        Its name.
+    reasons : tuple of str
+        The reasons, one for each sub-chain.
+    """
 
     def __init__(self, mechanism: str, reasons: Sequence[str], purpose: str = "solved") -> None:
         self.mechanism = mechanism
@@ -105,8 +125,10 @@ class ContinuumOfSolutions(PfabrikError, ValueError):
 
     Attributes
     ----------
-    mechanism : its name.
-    freedoms : how many independent motions are left.
+    mechanism : str
+        Its name.
+    freedoms : int
+        Number of independent motions that are left.
     """
 
     def __init__(
@@ -129,9 +151,12 @@ class ContinuumOfWorkingModes(ContinuumOfSolutions):
 
     Attributes
     ----------
-    mechanism : its name.
-    freedoms : how many independent motions of the actuators there are.
-    moving : names of the actuators that take part.
+    mechanism : str
+        Its name.
+    freedoms : int
+        Number of independent motions of the actuators.
+    moving : tuple of str
+        Names of the actuators that take part.
     """
 
     def __init__(self, mechanism: str, freedoms: int, moving: Iterable[str]) -> None:
@@ -145,8 +170,10 @@ class InvalidArgument(PfabrikError, ValueError):
 
     Attributes
     ----------
-    argument, found, expected : the argument's name, and both sides of the disagreement, as text.
-    rows : indices of the first offending rows of a batch, or an empty tuple.
+    argument, found, expected : str
+        The argument's name, and both sides of the disagreement, as text.
+    rows : tuple of int
+        Indices of the first offending rows of a batch, or an empty tuple.
     """
 
     def __init__(self, argument: str, found: str, expected: str, rows: Sequence[int] = ()) -> None:
@@ -178,9 +205,12 @@ class MissingLibrary(PfabrikError, ImportError):
 
     Attributes
     ----------
-    what : what needs it.
-    library : what is missing.
-    command : what installs it.
+    what : str
+        What needs it.
+    library : str
+        What is missing.
+    command : str
+        What installs it.
     """
 
     def __init__(self, what: str, library: str, command: str) -> None:

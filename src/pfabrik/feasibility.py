@@ -45,14 +45,17 @@ class Feasibility(NamedTuple):
 
     Attributes
     ----------
-    margin : the least margin of all limits, (...,): as of `margins` a share of the range, 1 in its middle or on the
-        axis of a cone, 0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a share of its
-        length; where a leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses.
-        Where the mechanism has a clearance and no other limit is exceeded, links count too: the rest of their distance
-        as a share of L, as of `margins`.
-    binding : index in `limits` of the limit that has it, (...,), the first of those equal to 1e-9; -1 if there is none.
-    limits : (joint, bound) of every limit: "min", "max" and "cone", as of `margins`; "reach" of a leg's proximal joint,
-        and "closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
+    margin : float or array (...)
+        The least margin of all limits: as in `margins` a share of the range, 1 in its middle or on the axis of a cone,
+        0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a share of its length; where a
+        leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses. Where the
+        mechanism has a clearance and no other limit is exceeded, links count too: the rest of their distance as a share
+        of L, as in `margins`.
+    binding : int or array of int (...)
+        Index in `limits` of the limit that has it, the first of those equal to 1e-9; -1 if there is none.
+    limits : tuple of tuple of str
+        Pairs (joint, bound) of every limit: "min", "max" and "cone", as in `margins`; "reach" of a leg's proximal
+        joint, and "closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
     """
 
     margin: Any
@@ -90,15 +93,22 @@ def feasibility(
 
     Parameters
     ----------
-    targets : as of `solve_ik`; what the task leaves open is completed from the start.
-    start : a single Solution or joint vector q that sets the working mode; default that of home.
-    executor : of `concurrent.futures`, or one like it, on whose workers blocks of targets are measured; default: here,
-        on all cores.
+    mechanism : Mechanism
+        The machine.
+    targets : array or RigidTransform or mapping
+        Targets as in `solve_ik`; what the task leaves open is completed from the start.
+    start : Solution or array (nq,), optional
+        A single Solution or joint vector q that sets the working mode; default that of home.
+    executor : Executor, optional
+        Of `concurrent.futures`, or one like it, on whose workers blocks of targets are measured; default: here, on all
+        cores.
 
     Raises
     ------
-    UnsupportedMechanism : some chain is no leg in closed form; the message names it, with the reason.
-    InvalidArgument : targets of the wrong shape.
+    UnsupportedMechanism
+        Some chain is no leg in closed form; the message names it, with the reason.
+    InvalidArgument
+        Targets of the wrong shape.
     """
     model = measured(model_of(checked_mechanism(mechanism)))
     configuration = None if start is None else start_of(mechanism, start, ())

@@ -42,21 +42,28 @@ def solve_fk(
 
     Parameters
     ----------
-    actuators : actuated coordinates (..., n_a) in the order of `mechanism.actuator_names` [length or rad]; or joint
-        name -> its values (...,), for every actuator.
-    start : a Solution or joint vector q to start from, single or one for each row. Default: home.
-    options : of these, `working_mode`, `actuator_tolerance` and `on_invalid`.
+    mechanism : Mechanism
+        The machine.
+    actuators : array (..., n_a) or mapping of str to array
+        Actuated coordinates in the order of `mechanism.actuator_names` [length or rad]; or joint name -> its values
+        (...), for every actuator.
+    start : Solution or array (..., nq), optional
+        A Solution or joint vector q to start from, single or one for each row. Default: home.
+    options : Options, optional
+        Of these, `working_mode`, `actuator_tolerance` and `on_invalid` count.
 
     Returns
     -------
-    Solution : REACHED, assembled at these values within every limit; or PROJECTED, where no such configuration is
-        found: a feasible one whose actuators are as near as a local search brings them, by least squares (lengths
-        relative to L, angles in rad). `actuator_error` is the largest difference; more actuators than freedoms
-        disagree by as much. FAILED where not even that is found: pose and residual are those of the attempt.
+    Solution
+        REACHED, assembled at these values within every limit; or PROJECTED, where no such configuration is found: a
+        feasible one whose actuators are as near as a local search brings them, by least squares (lengths relative to L,
+        angles in rad). `actuator_error` is the largest difference; more actuators than freedoms disagree by as much.
+        FAILED where not even that is found: pose and residual are those of the attempt.
 
     Raises
     ------
-    InvalidArgument : values of the wrong shape or, unless marked, not finite; a start that does not fit.
+    InvalidArgument
+        Values of the wrong shape or, unless marked, not finite; a start that does not fit.
     """
     options = checked_options(options)
     values, shape = as_values(mechanism, actuators)

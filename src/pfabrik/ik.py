@@ -41,21 +41,30 @@ def solve_ik(
 
     Parameters
     ----------
-    target : pose (..., 4, 4) of the end effector in the base frame [length], position (..., 3) at home orientation, a
-        SciPy RigidTransform, or the coordinates of the joint that carries the end effector on the base,
+    mechanism : Mechanism
+        The machine.
+    target : array or RigidTransform or mapping
+        Pose (..., 4, 4) of the end effector in the base frame [length], position (..., 3) at home orientation, a SciPy
+        RigidTransform, or the coordinates of the joint that carries the end effector on the base,
         ``{"pivot": [0.1, 0.05]}``; leading axes are a batch, whose rows are answered independently, on all cores.
-    start : a Solution or joint vector q to start from, single or one for each target; its working mode is kept.
-        Default: home, and any working mode.
-    executor : of `concurrent.futures`, or one like it, on whose workers blocks of a batch are answered, with the same
-        answers; default: here, on all cores.
+    start : Solution or array (..., nq), optional
+        A Solution or joint vector q to start from, single or one for each target; its working mode is kept. Default:
+        home, and any working mode.
+    options : Options, optional
+        Tolerances, working mode, and what a projection keeps.
+    executor : Executor, optional
+        Of `concurrent.futures`, or one like it, on whose workers blocks of a batch are answered, with the same answers;
+        default: here, on all cores.
 
     Returns
     -------
-    Solution : REACHED, or PROJECTED to the nearest feasible pose found; see `Solution`.
+    Solution
+        REACHED, or PROJECTED to the nearest feasible pose found; see `Solution`.
 
     Raises
     ------
-    InvalidArgument : a target or start of the wrong shape, or (unless marked) rows that are no poses.
+    InvalidArgument
+        A target or start of the wrong shape, or (unless marked) rows that are no poses.
     """
     return solve_by(engine_of, mechanism, target, start, checked_options(options), executor)
 

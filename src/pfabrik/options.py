@@ -24,21 +24,29 @@ class Options:
 
     Attributes
     ----------
-    tolerance : E, how close the end effector must come to be REACHED [length]; None is 1e-9 of the mechanism's
-        characteristic length.
-    rotation_tolerance : the same for the orientation [rad].
-    working_mode : "keep" stays in the start's working mode (home's without a start), "any" may change it to reach;
-        None keeps it if there is a start. `solve_fk` keeps the assembly mode, of home too, but with "any".
-    hold : what a projection keeps: "orientation" (the paper's choice) or "position" if a feasible pose has it that is
-        not much farther from the target than the start, None nothing. `Solution.held` tells what was kept.
-    rotation_length : how a rotation counts beside a distance: by the angle times this [length per rad], in
-        sqrt(distance^2 + (rotation_length angle)^2). None is `Mechanism.rotation_length`.
-    actuator_tolerance : how close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings
-        of more encoders than the mechanism has freedoms never agree better than they are exact.
-    most_steps : how many configurations the search for a projection may linearise in all; None for no bound. What it
-        finds until then is feasible, the start itself at worst, and `Solution.is_complete` is False. For control loops:
-        from a near start, answers are good. Of machines whose legs have closed forms.
-    on_invalid : what a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
+    tolerance : float or None
+        E, how close the end effector must come to be REACHED [length]; None is 1e-9 of the mechanism's characteristic
+        length.
+    rotation_tolerance : float
+        The same for the orientation [rad].
+    working_mode : {"any", "keep"} or None
+        "keep" stays in the start's working mode (home's without a start), "any" may change it to reach; None keeps it
+        if there is a start. `solve_fk` keeps the assembly mode, of home too, but with "any".
+    hold : {"orientation", "position"} or None
+        What a projection keeps: "orientation" (the paper's choice) or "position" if a feasible pose has it that is not
+        much farther from the target than the start, None nothing. `Solution.held` tells what was kept.
+    rotation_length : float or None
+        How a rotation counts beside a distance: by the angle times this [length per rad], in sqrt(distance^2 +
+        (rotation_length angle)^2). None is `Mechanism.rotation_length`.
+    actuator_tolerance : float
+        How close actuated coordinates must come to the asked values to be REACHED [L or rad]. Readings of more encoders
+        than the mechanism has freedoms never agree better than they are exact.
+    most_steps : int or None
+        How many configurations the search for a projection may linearise in all; None for no bound. What it finds until
+        then is feasible, the start itself at worst, and `Solution.is_complete` is False. For control loops: from a near
+        start, answers are good. Of machines whose legs have closed forms.
+    on_invalid : {"raise", "mark"}
+        What a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
     """
 
     tolerance: float | None = None

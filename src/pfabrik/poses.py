@@ -40,16 +40,23 @@ def pose(
 
     Parameters
     ----------
-    xyz : position of the reference point in the base frame, shape (..., 3) [length].
-    rpy : roll, pitch, yaw (..., 3) about the fixed x, y and z axes, in this order: R = Rz(yaw) Ry(pitch) Rx(roll).
-    rotvec : rotation vector, shape (..., 3).
-    quat_xyzw, quat_wxyz : quaternion (..., 4) of any nonzero norm, scalar last or first as the name says.
-    rotation : matrices (..., 3, 3), or an object with ``as_matrix`` such as a SciPy Rotation.
-    degrees : whether `rpy` and `rotvec` are in degrees; else in radians.
+    xyz : array (..., 3)
+        Position of the reference point in the base frame [length].
+    rpy : array (..., 3), optional
+        Roll, pitch, yaw about the fixed x, y and z axes, in this order: R = Rz(yaw) Ry(pitch) Rx(roll).
+    rotvec : array (..., 3), optional
+        Rotation vector.
+    quat_xyzw, quat_wxyz : array (..., 4), optional
+        Quaternion of any nonzero norm, scalar last or first as the name says.
+    rotation : array (..., 3, 3) or Rotation, optional
+        Matrices, or an object with ``as_matrix`` such as a SciPy Rotation.
+    degrees : bool, optional
+        True if `rpy` and `rotvec` are in degrees; else they are in radians.
 
     Raises
     ------
-    InvalidArgument : a wrong shape, a number that is not finite, more than one rotation, or not a rotation.
+    InvalidArgument
+        A wrong shape, a number that is not finite, more than one rotation, or not a rotation.
     """
     rotations = {"rpy": rpy, "rotvec": rotvec, "quat_xyzw": quat_xyzw, "quat_wxyz": quat_wxyz, "rotation": rotation}
     given = [name for name, value in rotations.items() if value is not None]

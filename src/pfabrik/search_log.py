@@ -33,11 +33,14 @@ class SearchLog(Printed):
 
     Attributes
     ----------
-    solution : the answer, that of `solve_ik`.
-    attempts : in the order in which they are made. The solver stops once enough of them agree: some of the last ones
-        may not have been needed.
-    blocked_by : (joint, bound) of the limit that the target exceeds most in the working mode of the start, and by how
-        much, as of `feasibility`; None where closed forms do not tell.
+    solution : Solution
+        The answer, that of `solve_ik`.
+    attempts : tuple of Attempt
+        The attempts, in the order in which they are made. The solver stops once enough of them agree: some of the last
+        ones may not have been needed.
+    blocked_by : tuple or None
+        (joint, bound) of the limit that the target exceeds most in the working mode of the start, and by how much, as
+        in `feasibility`; None where closed forms do not tell.
     """
 
     solution: Solution
@@ -89,11 +92,19 @@ def search_log(
 
     Parameters
     ----------
-    target : a single one.
+    mechanism : Mechanism
+        The machine.
+    target : array or RigidTransform or mapping
+        A single target.
+    start : Solution or array (nq,), optional
+        As in `solve_ik`.
+    options : Options, optional
+        As in `solve_ik`.
 
     Raises
     ------
-    InvalidArgument : as of `solve_ik`, or for several targets.
+    InvalidArgument
+        As in `solve_ik`, or for several targets.
     """
     options = checked_options(options)
     targets, shape = as_targets(mechanism, target)

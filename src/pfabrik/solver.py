@@ -34,14 +34,34 @@ class Solver:
     that are reached in closed form allocate no arrays; others take as long as `solve_ik`.
     An instance is for one thread: make one for each.
 
-    Attributes
-    ----------
-    status : the `Status` of the last answer; INVALID before the first one, and after a call that raised.
-    pose : T_base_platform achieved, (4, 4) [length]; NaN if `status` is INVALID.
-    actuators : in the order of `mechanism.actuator_names`, (n_a,) [length or rad]; NaN if `status` is INVALID.
-
     `pose`, `actuators` and the result of `jacobian` are read-only views of the same arrays each time: the next call
     overwrites them. Copy them to keep them, or use `solution`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
+    start : Solution or array (nq,), optional
+        The start of every search, as in `solve_ik`; its working mode and its assembly mode are kept. Default: home, and
+        any working mode.
+    options : Options, optional
+        Options of every call.
+    most_steps : int, optional
+        In place of that of `Options`.
+
+    Attributes
+    ----------
+    status : Status
+        Status of the last answer; INVALID before the first one, and after a call that raised.
+    pose : array (4, 4)
+        T_base_platform achieved [length]; NaN if `status` is INVALID.
+    actuators : array (n_a,)
+        Actuated coordinates in the order of `mechanism.actuator_names` [length or rad]; NaN if `status` is INVALID.
+
+    Raises
+    ------
+    InvalidArgument
+        No Mechanism; a start that is no single configuration of it.
     """
 
     def __init__(
@@ -52,19 +72,7 @@ class Solver:
         options: Options | None = None,
         most_steps: int | None = None,
     ) -> None:
-        """Prepare what answers need, which takes tenths of a second.
-
-        Parameters
-        ----------
-        start : the start of every search, as of `solve_ik`; its working mode and its assembly mode are kept. Default:
-            home, and any working mode.
-        options : of every call.
-        most_steps : in place of that of `Options`.
-
-        Raises
-        ------
-        InvalidArgument : no Mechanism; a start that is no single configuration of it.
-        """
+        """Prepare what answers need, which takes tenths of a second."""
         self.mechanism, self.options = checked_mechanism(mechanism), checked_options(options)
         if most_steps is not None:
             self.options = replace(self.options, most_steps=most_steps)
@@ -88,11 +96,13 @@ class Solver:
 
         Parameters
         ----------
-        target : a single target, as of `solve_ik`; an array (4, 4) of float64 is the fastest.
+        target : array or RigidTransform or mapping
+            A single target, as in `solve_ik`; an array (4, 4) of float64 is the fastest.
 
         Raises
         ------
-        InvalidArgument : as of `solve_ik`; then `status` is INVALID.
+        InvalidArgument
+            As in `solve_ik`; then `status` is INVALID.
         """
         if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE:
             self._target[0] = along_tilt(self.mechanism, target[None])[0] if self._has_tilt_axis else target
@@ -108,7 +118,8 @@ class Solver:
 
         Raises
         ------
-        InvalidArgument : as of `solve_fk`; then `status` is INVALID.
+        InvalidArgument
+            As in `solve_fk`; then `status` is INVALID.
         """
         if type(actuators) is np.ndarray and actuators.shape == self.actuators.shape and actuators.dtype is DOUBLE:
             self._rows.actuators[0] = actuators
@@ -124,7 +135,8 @@ class Solver:
 
         Raises
         ------
-        InvalidArgument : there is no answer.
+        InvalidArgument
+            There is no answer.
         """
         self._forward[:] = forward_jacobian(self.solution)
         return _read_only(self._forward)
@@ -135,7 +147,8 @@ class Solver:
 
         Raises
         ------
-        InvalidArgument : there is none: nothing was solved yet, or the last call raised.
+        InvalidArgument
+            There is none: nothing was solved yet, or the last call raised.
         """
         if self._solution is None:
             if self.status is Status.INVALID:

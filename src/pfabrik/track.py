@@ -55,25 +55,37 @@ def track(
 
     Parameters
     ----------
-    targets : as of `solve_ik`, with one batch axis: poses (n, 4, 4), positions (n, 3), joint coordinates.
-    start : a single Solution or joint vector q to start from; default home.
-    on_progress : called with (steps done, steps in all) every few steps; default: a line on a terminal, if it takes
-        more than two seconds.
-    sample_time : from one target to the next [s].
-    times : in place of `sample_time`, the time of each target, (n,) [s], as `read_path` returns them: never falling;
-        equal where the machine waits, NaN where unknown.
-    speed_limits : highest speeds of the actuators, by name or one for all [length/s or rad/s]; actuators that are not
-        named have no limit.
+    mechanism : Mechanism
+        The machine.
+    targets : array or RigidTransform or mapping
+        Targets as in `solve_ik`, with one batch axis: poses (n, 4, 4), positions (n, 3), joint coordinates.
+    start : Solution or array (nq,), optional
+        A single Solution or joint vector q to start from; default home.
+    options : Options, optional
+        As in `solve_ik`; the working mode is always kept.
+    on_progress : callable, optional
+        Called with (steps done, steps in all) every few steps; default: a line on a terminal, if it takes more than two
+        seconds.
+    sample_time : float, optional
+        Time from one target to the next [s].
+    times : array (n,), optional
+        In place of `sample_time`, the time of each target [s], as `read_path` returns them: never falling; equal where
+        the machine waits, NaN where unknown.
+    speed_limits : float or mapping of str to float, optional
+        Highest speeds of the actuators, by name or one for all [length/s or rad/s]; actuators that are not named have
+        no limit.
 
     Returns
     -------
-    Track : a Solution of batch shape (n,), with the steps at which answers jump and the actuators that would exceed
-        their speed limits. Angles of revolute actuators that may turn more than once continue through full turns, as
-        far as the range allows.
+    Track
+        A Solution of batch shape (n,), with the steps at which answers jump and the actuators that would exceed their
+        speed limits. Angles of revolute actuators that may turn more than once continue through full turns, as far as
+        the range allows.
 
     Raises
     ------
-    As `solve_ik`; also InvalidArgument for targets that are no path, and for options that change the working mode.
+    InvalidArgument
+        As in `solve_ik`; also for targets that are no path, and for options that change the working mode.
     """
     options = checked_options(options)
     poses = as_path(mechanism, targets, options)

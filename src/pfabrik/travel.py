@@ -52,12 +52,18 @@ class Reach:
 
     Attributes
     ----------
-    kind : "along" an axis, or "about" it.
-    direction : unit vector in the base frame.
-    distance : that the end effector can move [length or rad]; inf where nothing stops it.
-    stopped_by : the limits that stop it; empty if the links are stretched out or nothing stops it.
-    end : the last configuration in this direction; None if nothing stops it.
-    cause : of the stop if no limit stops it, in words: the links are stretched out, the drive of a linkage with one
+    kind : {"along", "about"}
+        "along" an axis, or "about" it.
+    direction : array (3,)
+        Unit vector in the base frame.
+    distance : float
+        Distance that the end effector can move [length or rad]; inf where nothing stops it.
+    stopped_by : tuple of ActiveLimit
+        The limits that stop it; empty if the links are stretched out or nothing stops it.
+    end : Solution or None
+        The last configuration in this direction; None if nothing stops it.
+    cause : str
+        Cause of the stop if no limit stops it, in words: the links are stretched out, the drive of a linkage with one
         freedom is at a dead point or the linkage at a change point, the mechanism has no freedom that way, or its task
         asks for more than it can do, whatever limits are active; else empty.
     """
@@ -77,7 +83,15 @@ class Reach:
 
 @dataclass(frozen=True, repr=False)
 class Travel(Printed, Sequence[Reach]):
-    """The result of `travel`: one `Reach` per direction, in the order of the arguments."""
+    """The result of `travel`: one `Reach` per direction, in the order of the arguments.
+
+    Attributes
+    ----------
+    origin : Solution
+        The configuration that the end effector moves from.
+    reaches : tuple of Reach
+        The travel in each direction.
+    """
 
     origin: Solution
     reaches: tuple[Reach, ...]
@@ -155,24 +169,28 @@ def travel(
 
     Parameters
     ----------
-    solution : one feasible configuration.
-    along : directions (n, 3) or (3,) of any length but zero, in the base frame, within the axes that the task has; the
-        orientation is kept. Default: both ways along each axis of the task, unless `about` is given.
-    about : axes of rotation (n, 3) or (3,), right-handed, in the base frame. Default, unless `along` is given: both
-        ways about each axis of the base where the task has a rotation, about the platform's x and y axes where it has a
-        tilt, about the base's z axis, which alone is then allowed, where it has a yaw.
-    pivot : point (3,) in the base frame that stays where it is as the end effector turns [length]; default: its
-        reference point.
+    solution : Solution
+        One feasible configuration.
+    along : array (n, 3) or (3,), optional
+        Directions of any length but zero, in the base frame, within the axes that the task has; the orientation is
+        kept. Default: both ways along each axis of the task, unless `about` is given.
+    about : array (n, 3) or (3,), optional
+        Axes of rotation, right-handed, in the base frame. Default, unless `along` is given: both ways about each axis
+        of the base where the task has a rotation, about the platform's x and y axes where it has a tilt, about the
+        base's z axis, which alone is then allowed, where it has a yaw.
+    pivot : array (3,), optional
+        Point in the base frame that stays where it is as the end effector turns [length]; default: its reference point.
 
     Returns
     -------
-    Travel : distance in each direction and the limits that stop it; first along, then about. Distances are inf where
-        nothing stops it within 1000 L, or a full turn. Coordinates that the task leaves out follow from the mechanism.
+    Travel
+        Distance in each direction and the limits that stop it; first along, then about. Distances are inf where nothing
+        stops it within 1000 L, or a full turn. Coordinates that the task leaves out follow from the mechanism.
 
     Raises
     ------
-    InvalidArgument : a batch, or a configuration that is not feasible; directions that are none or that the task
-        leaves out.
+    InvalidArgument
+        A batch, or a configuration that is not feasible; directions that are none or that the task leaves out.
     """
     mechanism = checked_solution(solution).mechanism
     if solution.shape != () or solution.status > Status.PROJECTED:

@@ -30,14 +30,18 @@ class ActiveLimit:
 
     Attributes
     ----------
-    joint, bound : which limit of which joint; of a clearance the two bodies that are as near: ``BC1–BC3``.
-    value, limit : the coordinate (or the angle at the cone, or the distance of the links) and its bound, of links
-        that are stretched the coordinate itself [length or rad].
-    coordinate : which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or
-        cylindrical joint.
-    multiplier : the most by which the answer comes nearer to its target per unit by which the limit is relaxed [length
-        per length or rad]; rotations count as lengths by `Options.rotation_length`. It is exact if the active limits
-        are independent; redundant limits (two parallel rods) share a multiplier, and relaxing one of them alone changes
+    joint, bound : str
+        The limit and its joint; for a clearance the two bodies that are as near: ``BC1–BC3``.
+    value, limit : float
+        The coordinate (or the angle at the cone, or the distance of the links) and its bound, of links that are
+        stretched the coordinate itself [length or rad].
+    coordinate : int
+        Which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or cylindrical
+        joint.
+    multiplier : float or None
+        The most by which the answer comes nearer to its target per unit by which the limit is relaxed [length per
+        length or rad]; rotations count as lengths by `Options.rotation_length`. It is exact if the active limits are
+        independent; redundant limits (two parallel rods) share a multiplier, and relaxing one of them alone changes
         nothing. None if the target was no pose.
     """
 

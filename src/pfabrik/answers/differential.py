@@ -24,6 +24,11 @@ def mobility(mechanism: Mechanism) -> Mobility:
     """Motions of a mechanism in general, counted at configurations reached from home without regard to limits.
 
     Overconstrained mechanisms count right: the loops are closed exactly before conditions are compared.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
     """
     return generic_of(model_of(checked_mechanism(mechanism)).mechanism).mobility
 
@@ -37,6 +42,11 @@ def forward_jacobian(solution: Solution) -> Floats:
     Rates that the mechanism cannot make are replaced by the nearest it can; freedoms that no actuator controls rest as
     far as possible. At a type 2 singularity no such map exists: the direction gained is left out (see `singularity`).
     INVALID rows are NaN.
+
+    Parameters
+    ----------
+    solution : Solution
+        One configuration or a batch.
     """
     model, found = _of(solution)
     by_chain = is_driven_chain(model)
@@ -53,6 +63,11 @@ def inverse_jacobian(solution: Solution) -> Floats:
     Moore-Penrose inverses (with lengths in units of L): twists that the mechanism cannot make are replaced by the
     nearest it can, and of all actuator rates that make a twist, the smallest are given. At a type 1 singularity the
     direction lost is left out (see `singularity`). INVALID rows are NaN.
+
+    Parameters
+    ----------
+    solution : Solution
+        One configuration or a batch.
     """
     model, found = _of(solution)
     by_chain = is_driven_chain(model)
@@ -62,7 +77,13 @@ def inverse_jacobian(solution: Solution) -> Floats:
 
 
 def singularity(solution: Solution) -> Singularity:
-    """Distances of a solution's configurations from singularities of every kind; NaN for INVALID rows."""
+    """Distances of a solution's configurations from singularities of every kind; NaN for INVALID rows.
+
+    Parameters
+    ----------
+    solution : Solution
+        One configuration or a batch.
+    """
     model, configurations = _of(solution)
     found = singularities(model, configurations.coordinates)
     numbers = {name: shaped(np.asarray(getattr(found, name)), solution.shape) for name in NUMBERS}

@@ -23,9 +23,15 @@ def closure_residual(solution: Solution) -> float | Floats:
     between the two bodies of every other joint, between the end effector and the pose of the answer, and between the
     actuated joints and its actuator values; angles are multiplied by L. NaN for INVALID rows.
 
+    Parameters
+    ----------
+    solution : Solution
+        One answer or a batch.
+
     Raises
     ------
-    InvalidArgument : the argument is no Solution.
+    InvalidArgument
+        The argument is no Solution.
     """
     mechanism = checked_solution(solution).mechanism
     length, rows, q = mechanism.characteristic_length, solution._rows, solution._coordinates
@@ -70,9 +76,15 @@ def margins(solution: Solution) -> Margins:
     Where the mechanism has a clearance c, every pair of links that may touch has a margin too, (d - c) / L, the rest of
     their distance d as a share of the characteristic length L: ("BC1–BC3", "clearance"), with the names of both bodies.
 
+    Parameters
+    ----------
+    solution : Solution
+        One answer or a batch.
+
     Raises
     ------
-    InvalidArgument : the argument is no Solution.
+    InvalidArgument
+        The argument is no Solution.
     """
     mechanism = checked_solution(solution).mechanism
     ranges, q = ranges_of(mechanism), solution._coordinates

@@ -29,30 +29,44 @@ class Solution(Answer):
 
     Attributes
     ----------
-    status : a `Status`; for a batch an integer array of them, (...,).
-    pose : T_base_platform achieved, (..., 4, 4) [length].
-    actuators : actuated coordinates in the order of `mechanism.actuator_names`, (..., n_a) [length or rad].
-    q : all joint coordinates (..., nq) in the order of `mechanism.coordinate_names`, with the zeros of the description
-        [rad or length]: one for R and P, two for U and C, three for S, whose rotation vector turns its second body
-        against its first, from home. What a configuration leaves open (a rod's spin about itself) is nearest to the
-        start, or to home; along a path, angles continue beyond full turns.
-    joints : joint name -> its part of `q`: (...,) for R and P, (..., 2) for U and C, (..., 3) for S.
-    points : joint name -> position of its centre in the base frame, (..., 3) [length].
-    position_error, rotation_error : distance of the pose from the target, (...,) [length], [rad]; 0 in forward
-        kinematics.
-    actuator_error : largest difference of an actuated coordinate from the given value, (...,); lengths relative to L,
-        angles in rad; 0 in inverse kinematics.
-    residual : largest gap of any loop: open ends, stretched rigid links, links out of their plane, (...,) [length].
-    limit_excess : largest excess over any limit, (...,); lengths relative to L, angles in rad; 0 if all are kept.
-    held : the part of the target that a projected answer keeps: "orientation", "position", or None; for a batch an
-        array of them, (...,). It is that of `Options.hold`, or None if no feasible pose has it.
-    certified : True if there is a proof that no feasible pose of the same orientation is nearer, in any working mode,
-        (...,). REACHED answers are certified, and most projected ones of machines whose legs are struts, or rods on
-        cranks and carriages, if the platform does not rotate or its orientation is held. False if only searches say so.
-    is_complete : False for a projection without a certificate where `Options.most_steps` bounded the search, (...,).
-    iterations, rounds : passes over the chains, and revisions of the target, (...,).
-    active_limits : limits that block a projected answer from its target, the largest multiplier first, or that another
-        answer exceeds; for a batch, one tuple per row, in row order. Limits on which a projected answer lies, but whose
+    status : Status or array of int (...)
+        The `Status`; for a batch an integer array of them.
+    pose : array (..., 4, 4)
+        T_base_platform achieved [length].
+    actuators : array (..., n_a)
+        Actuated coordinates in the order of `mechanism.actuator_names` [length or rad].
+    q : array (..., nq)
+        All joint coordinates in the order of `mechanism.coordinate_names`, with the zeros of the description [rad or
+        length]: one for R and P, two for U and C, three for S, whose rotation vector turns its second body against its
+        first, from home. What a configuration leaves open (a rod's spin about itself) is nearest to the start, or to
+        home; along a path, angles continue beyond full turns.
+    joints : mapping of str to array
+        Joint name -> its part of `q`: (...) for R and P, (..., 2) for U and C, (..., 3) for S.
+    points : mapping of str to array (..., 3)
+        Joint name -> position of its centre in the base frame [length].
+    position_error, rotation_error : float or array (...)
+        Distance of the pose from the target [length], [rad]; 0 in forward kinematics.
+    actuator_error : float or array (...)
+        Largest difference of an actuated coordinate from the given value; lengths relative to L, angles in rad; 0 in
+        inverse kinematics.
+    residual : float or array (...)
+        Largest gap of any loop: open ends, stretched rigid links, links out of their plane [length].
+    limit_excess : float or array (...)
+        Largest excess over any limit; lengths relative to L, angles in rad; 0 if all are kept.
+    held : str or None or array of str (...)
+        The part of the target that a projected answer keeps: "orientation", "position", or None. It is that of
+        `Options.hold`, or None if no feasible pose has it.
+    certified : bool or array of bool (...)
+        True if there is a proof that no feasible pose of the same orientation is nearer, in any working mode. REACHED
+        answers are certified, and most projected ones of machines whose legs are struts, or rods on cranks and
+        carriages, if the platform does not rotate or its orientation is held. False if only searches say so.
+    is_complete : bool or array of bool (...)
+        False for a projection without a certificate where `Options.most_steps` bounded the search.
+    iterations, rounds : int or array of int (...)
+        Passes over the chains, and revisions of the target.
+    active_limits : tuple of ActiveLimit or list
+        Limits that block a projected answer from its target, the largest multiplier first, or that another answer
+        exceeds; for a batch, one tuple per row, in row order. Limits on which a projected answer lies, but whose
         relaxation would not bring it nearer, are not listed. Where none blocks it, but links are stretched out or
         folded, this is listed, as bound "stretched" of the joint between them.
     """
@@ -65,7 +79,8 @@ class Solution(Answer):
 
         Raises
         ------
-        TypeError : the solution is a batch; its rows have one reason each: `solution[row].reason`.
+        TypeError
+            The solution is a batch; its rows have one reason each: `solution[row].reason`.
         """
         if self.shape != ():
             raise TypeError("a batch has a reason a row: solution[row].reason")

@@ -53,22 +53,32 @@ class Track(Solution):
 
     Attributes
     ----------
-    targets : target poses (n, 4, 4) [length].
-    times : of the targets, (n,) [s]; None if not given.
-    sample_time : from one target to the next [s]; None if not given, or if it varies.
-    jumps : mask of answers to which no continuous motion leads from the answer before, as the target moves, (n,). The
-        nearest feasible pose itself can jump if a workspace is not convex.
-    passing : of a machine with a clearance, the least distance between links on the way from the answer before, along
-        the straight line between the two poses, (n,) [length]; in the first row that of the answer. Where it is less
-        than the clearance, it is exact to 1e-3 L. None for other machines.
-    speeds : mean speed of every actuator since the answer before, (n, n_a) [length/s or rad/s]; 0 in the first row.
-        NaN where no time passes or times are unknown; None without times.
-    accelerations : change of the mean velocity from the step before to this one, per time, (n, n_a) [length/s^2 or
-        rad/s^2]; 0 in the first two rows. NaN and None as for speeds.
-    too_fast : names of actuators that exceed their speed limits, one tuple per row; None without times.
-    least_margins : the least margin of every row, `values` (n,), and the limit that has it, `names`.
-    largest_tilts : the largest tilt of any rod in every row, `values` (n,) [rad], and the body of that rod, `names`;
-        None for machines without rods.
+    targets : array (n, 4, 4)
+        Target poses [length].
+    times : array (n,) or None
+        Times of the targets [s]; None if not given.
+    sample_time : float or None
+        Time from one target to the next [s]; None if not given, or if it varies.
+    jumps : array of bool (n,)
+        Mask of answers to which no continuous motion leads from the answer before, as the target moves. The nearest
+        feasible pose itself can jump if a workspace is not convex.
+    passing : array (n,) or None
+        For a machine with a clearance, the least distance between links on the way from the answer before, along the
+        straight line between the two poses [length]; in the first row that of the answer. Where it is less than the
+        clearance, it is exact to 1e-3 L. None for other machines.
+    speeds : array (n, n_a) or None
+        Mean speed of every actuator since the answer before [length/s or rad/s]; 0 in the first row. NaN where no time
+        passes or times are unknown; None without times.
+    accelerations : array (n, n_a) or None
+        Change of the mean velocity from the step before to this one, per time [length/s^2 or rad/s^2]; 0 in the first
+        two rows. NaN and None as for speeds.
+    too_fast : list of tuple of str or None
+        Names of actuators that exceed their speed limits, one tuple per row; None without times.
+    least_margins : Extremes
+        The least margin of every row, `values` (n,), and the limit that has it, `names`.
+    largest_tilts : Extremes or None
+        The largest tilt of any rod in every row, `values` (n,) [rad], and the body of that rod, `names`; None for
+        machines without rods.
     """
 
     def __init__(

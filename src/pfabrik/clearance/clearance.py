@@ -25,8 +25,9 @@ class Clearance(Printed):
 
     Attributes
     ----------
-    distance : between the surfaces of the two links that are nearest, (...,) [length]; negative where they overlap: by
-        so much has one to move until they touch. NaN for INVALID rows.
+    distance : float or array (...)
+        Distance between the surfaces of the two links that are nearest [length]; negative where they overlap: by so
+        much has one to move until they touch. NaN for INVALID rows.
     """
 
     distance: float | Floats
@@ -101,10 +102,17 @@ def clearance(solution: Solution) -> Clearance:
     It is only measured: answers keep links apart where the mechanism has a `clearance`. Links that share a joint, parts
     of one body, and pairs in `ignore` are left out.
 
+    Parameters
+    ----------
+    solution : Solution
+        One configuration or a batch.
+
     Raises
     ------
-    InvalidArgument : the argument is no Solution.
-    UnsupportedMechanism : its mechanism has no two links with a thickness that may touch.
+    InvalidArgument
+        The argument is no Solution.
+    UnsupportedMechanism
+        Its mechanism has no two links with a thickness that may touch.
     """
     mechanism = checked_solution(solution).mechanism
     if not mechanism.shapes:

@@ -25,7 +25,17 @@ from .lists import ALONG, BATCH, LEAST_STARTS, STEPS, Clusters, Modes
 
 @dataclass(frozen=True)
 class AssemblyModes(Modes):
-    """Assembly modes found by a search, nearest to home first; see `Modes` for the fields."""
+    """Assembly modes found by a search, nearest to home first.
+
+    Attributes
+    ----------
+    modes : tuple of Solution
+        A Solution per mode: REACHED within all limits; EXCEEDED beyond those in `active_limits`.
+    hits : tuple of int
+        Number of starts that found each mode.
+    starts : int
+        Number of starts.
+    """
 
     kind = "assembly"
 
@@ -49,14 +59,21 @@ def assembly_modes(mechanism: Mechanism, actuators: Actuators, *, most_starts: i
 
     Parameters
     ----------
-    actuators : one set of actuated coordinates, (n_a,), in the order of `mechanism.actuator_names`
-        [length or rad], or joint name -> value.
+    mechanism : Mechanism
+        The machine.
+    actuators : array (n_a,) or mapping of str to float
+        One set of actuated coordinates, in the order of `mechanism.actuator_names` [length or rad], or joint name ->
+        value.
+    most_starts : int, optional
+        Most starts.
 
     Raises
     ------
-    ContinuumOfSolutions : the end effector still moves with these values locked (an architecturally singular machine,
-        or too few actuators).
-    InvalidArgument : values of the wrong shape, or not finite.
+    ContinuumOfSolutions
+        The end effector still moves with these values locked (an architecturally singular machine, or too few
+        actuators).
+    InvalidArgument
+        Values of the wrong shape, or not finite.
     """
     values, shape = as_values(mechanism, actuators)
     if shape != () or not np.isfinite(values).all():

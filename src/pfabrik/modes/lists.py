@@ -40,9 +40,12 @@ class Modes(Printed, Sequence[Solution]):
 
     Attributes
     ----------
-    modes : a Solution per mode: REACHED within all limits; EXCEEDED beyond those in `active_limits`.
-    hits : number of starts that found each mode.
-    starts : number of starts.
+    modes : tuple of Solution
+        A Solution per mode: REACHED within all limits; EXCEEDED beyond those in `active_limits`.
+    hits : tuple of int
+        Number of starts that found each mode.
+    starts : int
+        Number of starts.
     """
 
     kind: ClassVar[str]

@@ -25,13 +25,19 @@ from .lists import BATCH, Modes
 
 @dataclass(frozen=True)
 class WorkingModes(Modes):
-    """Working modes found by a search, nearest to home first; see `Modes` for the other fields.
+    """Working modes found by a search, nearest to home first.
 
     Attributes
     ----------
-    hits : number of starts that found the rarest leg branch of each mode.
-    branches : for every platform pose and every leg, the number of starts that found each branch of the leg.
-        Modes are the combinations of one branch per leg; there may be more than are listed.
+    modes : tuple of Solution
+        A Solution per mode: REACHED within all limits; EXCEEDED beyond those in `active_limits`.
+    hits : tuple of int
+        Number of starts that found the rarest leg branch of each mode.
+    starts : int
+        Number of starts.
+    branches : tuple of tuple of tuple of int
+        For every platform pose and every leg, the number of starts that found each branch of the leg. Modes are the
+        combinations of one branch per leg; there may be more than are listed.
     """
 
     kind = "working"
@@ -72,18 +78,27 @@ def working_modes(mechanism: Mechanism, target: Target, *, most_starts: int = 40
 
     Parameters
     ----------
-    target : one pose (4, 4) of the end effector in the base frame [length], or position (3,) at home orientation.
-    most : most modes to list, the nearest to home; `total` of the result counts all.
+    mechanism : Mechanism
+        The machine.
+    target : array or RigidTransform or mapping
+        One pose (4, 4) of the end effector in the base frame [length], or position (3,) at home orientation.
+    most_starts : int, optional
+        Most starts.
+    most : int, optional
+        Most modes to list, the nearest to home; `total` of the result counts all.
 
     Returns
     -------
-    WorkingModes : empty if no configuration has the end effector on the target.
+    WorkingModes
+        Empty if no configuration has the end effector on the target.
 
     Raises
     ------
-    ContinuumOfSolutions : actuators still move with the end effector on the target: a redundant machine, a task that
-        asks for less than the actuators do, or a serial singularity (a stretched wrist). The message names them.
-    InvalidArgument : a batch of targets, or a target that is not a pose.
+    ContinuumOfSolutions
+        Actuators still move with the end effector on the target: a redundant machine, a task that asks for less than
+        the actuators do, or a serial singularity (a stretched wrist). The message names them.
+    InvalidArgument
+        A batch of targets, or a target that is not a pose.
     """
     pose = _as_pose(mechanism, target)
     most_starts, most = require_count("most_starts", most_starts), require_count("most", most, 0)

@@ -88,9 +88,10 @@ class NearlyFree:
 
     Attributes
     ----------
-    singular_value : the largest resistance found around home [L and rad per rate]; exact loops resist by 0, others by
-        0.02 and more.
-    joints : names of the joints that take part in it most, the fastest first.
+    singular_value : float
+        The largest resistance found around home [L and rad per rate]; exact loops resist by 0, others by 0.02 and more.
+    joints : tuple of str
+        Names of the joints that take part in it most, the fastest first.
     """
 
     singular_value: float
@@ -103,15 +104,23 @@ class Mobility(Printed):
 
     Attributes
     ----------
-    mobility : motions of the whole mechanism: platform + internal + idle.
-    platform : freedoms of the end effector.
-    internal : motions that move actuators while the end effector rests (kinematic redundancy).
-    idle : motions in which neither the end effector nor an actuator moves (the spin of a rod between ball joints).
-    actuators : number of actuated joints.
-    uncontrolled : freedoms that the end effector keeps with all actuators locked.
-    over_constraints : loop conditions that follow from the others.
-    nearly_free : motions that the loops hardly resist, the freest first; those with a resistance up to
-        `TOLERANCES.alignment` are counted as motions, the others are not.
+    mobility : int
+        Motions of the whole mechanism: platform + internal + idle.
+    platform : int
+        Freedoms of the end effector.
+    internal : int
+        Motions that move actuators while the end effector rests (kinematic redundancy).
+    idle : int
+        Motions in which neither the end effector nor an actuator moves (the spin of a rod between ball joints).
+    actuators : int
+        Number of actuated joints.
+    uncontrolled : int
+        Freedoms that the end effector keeps with all actuators locked.
+    over_constraints : int
+        Loop conditions that follow from the others.
+    nearly_free : tuple of NearlyFree
+        Motions that the loops hardly resist, the freest first; those with a resistance up to `TOLERANCES.alignment` are
+        counted as motions, the others are not.
     """
 
     mobility: int

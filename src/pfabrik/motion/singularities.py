@@ -41,18 +41,24 @@ class Singularity(Printed):
 
     Attributes
     ----------
-    serial : platform speed per actuator speed in the most expensive direction, 1 / |inverse Jacobian|. 0 is a type 1
+    serial : float or array (...)
+        Platform speed per actuator speed in the most expensive direction, 1 / |inverse Jacobian|. 0 is a type 1
         singularity: actuators move, and the end effector has lost a freedom.
-    parallel : actuator speed per platform speed in the softest direction, 1 / |forward Jacobian|. 0 is a type 2
-        singularity: the end effector moves although all actuators are locked; always so where actuators are missing.
-    constraint : the smallest singular value of the loop conditions that is not zero in general. 0 is a constraint
-        singularity: the mechanism as a whole gains a motion.
-    passive : speed of end effector and actuators per speed of all joints in the motion that shows least of it. 0 is a
+    parallel : float or array (...)
+        Actuator speed per platform speed in the softest direction, 1 / |forward Jacobian|. 0 is a type 2 singularity:
+        the end effector moves although all actuators are locked; always so where actuators are missing.
+    constraint : float or array (...)
+        The smallest singular value of the loop conditions that is not zero in general. 0 is a constraint singularity:
+        the mechanism as a whole gains a motion.
+    passive : float or array (...)
+        Speed of end effector and actuators per speed of all joints in the motion that shows least of it. 0 is a
         singularity of passive joints: they move while end effector and actuators, which have lost a freedom, rest.
-    lost, gained : unit twists [velocity of the reference point in L/s; angular velocity in rad/s] nearest to being lost
-        or gained, in the base frame, (..., 6); of a joint end effector, the unit velocity of its centre, (..., 3). They
-        belong to `serial` and `parallel`, or to `passive` and `constraint` where these are singular, and the smaller.
-    kinds : the kinds whose measure is below `TOLERANCES.singular`; for a batch, one tuple a row, in row order.
+    lost, gained : array (..., 6)
+        Unit twists [velocity of the reference point in L/s; angular velocity in rad/s] nearest to being lost or gained,
+        in the base frame, (..., 6); of a joint end effector, the unit velocity of its centre, (..., 3). They belong to
+        `serial` and `parallel`, or to `passive` and `constraint` where these are singular, and the smaller.
+    kinds : tuple of str or list of tuple of str
+        The kinds whose measure is below `TOLERANCES.singular`; for a batch, one tuple a row, in row order.
     """
 
     serial: float | Floats

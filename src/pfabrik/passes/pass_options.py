@@ -16,11 +16,14 @@ class PassOptions(Options):
 
     Attributes
     ----------
-    method : "plain", the paper's passes and its projection to the centroid of the chains' ends; "accelerated",
-        closed-form intersections, half-spaces in place of points, and projection to the nearest pose in these;
-        "centroid", the paper's projection alone, of targets that `solve_ik` does not reach, exact to rounding.
-    max_iterations : K, most iterations (forward and backward pass) of a chain for one target.
-    max_rounds : most revisions of a target by the projection.
+    method : {"plain", "accelerated", "centroid"}
+        "plain", the paper's passes and its projection to the centroid of the chains' ends; "accelerated", closed-form
+        intersections, half-spaces in place of points, and projection to the nearest pose in these; "centroid", the
+        paper's projection alone, of targets that `solve_ik` does not reach, exact to rounding.
+    max_iterations : int
+        K, most iterations (forward and backward pass) of a chain for one target.
+    max_rounds : int
+        Most revisions of a target by the projection.
     """
 
     method: Literal["plain", "accelerated", "centroid"] = "plain"

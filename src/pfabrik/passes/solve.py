@@ -29,8 +29,14 @@ def solve(
 
     Parameters
     ----------
-    target, start : see `solve_ik`.
-    options : default `Options.paper()`.
+    mechanism : Mechanism
+        The machine.
+    target : array or RigidTransform or mapping
+        Target as in `solve_ik`.
+    options : Options, optional
+        Default `Options.paper()`.
+    start : Solution or array (..., nq), optional
+        Start as in `solve_ik`.
     """
     options = options_or(PAPER, options)
     return solve_by(lambda machine: _engine(model_of(machine), options), mechanism, target, start, options)
@@ -43,8 +49,14 @@ def track(
 
     Parameters
     ----------
-    targets, start : see `pfabrik.track`.
-    options : default `Options.paper()`.
+    mechanism : Mechanism
+        The machine.
+    targets : array or RigidTransform or mapping
+        Targets as in `pfabrik.track`.
+    options : Options, optional
+        Default `Options.paper()`.
+    start : Solution or array (nq,), optional
+        Start as in `pfabrik.track`.
     """
     options = options_or(PAPER, options)
     poses = as_path(mechanism, targets, options)
