@@ -58,14 +58,20 @@ def actuation(mechanism: Mechanism, joints: str | Sequence[str]) -> Actuation:
 
     Parameters
     ----------
-    joints : names of joints in series from base to end effector, in the order that coordinates are to have (a universal
+    mechanism : Mechanism
+        The machine.
+    joints : str or sequence of str
+        Names of joints in series from base to end effector, in the order that coordinates are to have (a universal
         joint has two); or "task" for the coordinates that the mechanism's task sets.
 
     Raises
     ------
-    UnknownName : no joint of that name.
-    InvalidArgument : joints that are not in series from the base to the end effector.
-    UnsupportedMechanism : the joints do not determine the actuators, or these not the joints; with the reason.
+    UnknownName
+        No joint of that name.
+    InvalidArgument
+        Joints that are not in series from the base to the end effector.
+    UnsupportedMechanism
+        The joints do not determine the actuators, or these not the joints; with the reason.
     """
     checked_mechanism(mechanism)
     if isinstance(joints, str) and joints == TASK and TASK not in {joint.name for joint in mechanism.joints}:
@@ -91,10 +97,14 @@ class Actuation:
 
     Attributes
     ----------
-    mechanism : the machine.
-    names : names of the coordinates.
-    low, high : their ranges, (k,) [rad or length]; infinite without one.
-    home : their values at home, (k,).
+    mechanism : Mechanism
+        The machine.
+    names : tuple of str
+        Names of the coordinates.
+    low, high : array (k,)
+        Their ranges [rad or length]; infinite without one.
+    home : array (k,)
+        Their values at home.
     """
 
     def __init__(self, coordinates: Coordinates) -> None:
@@ -123,8 +133,11 @@ class Actuation:
 
         Parameters
         ----------
-        start : a Solution; coordinates (..., k), or all joint coordinates (..., nq), single or one for each row.
-            Default: home.
+        x : array (..., n_a)
+            Actuator values [rad or length].
+        start : Solution or array, optional
+            A Solution; coordinates (..., k), or all joint coordinates (..., nq), single or one for each row. Default:
+            home.
         """
         solution = solve_fk(self.mechanism, vectors_of("x", x, self.mechanism.actuator_names), start=self._start(start))
         values = self._placer.values(solution).reshape(*solution.shape, len(self.names))
@@ -165,7 +178,10 @@ class Actuation:
 
         Parameters
         ----------
-        rotor_inertia : of the actuators behind their gears, one or (n_a,): gear ratio squared times the rotor's.
+        q : array (..., k)
+            Coordinates [rad or length].
+        rotor_inertia : float or array (n_a,)
+            Inertia behind the gears, one for all actuators or one for each: gear ratio squared times the rotor's.
         """
         return self._congruent(
             self.jacobian(q), per_actuator(self.mechanism.actuator_names, "rotor_inertia", rotor_inertia)
@@ -194,7 +210,10 @@ class Actuation:
 
         Parameters
         ----------
-        speed_max : [rad/s or length/s]; default `max_speed` of the mechanism's joints.
+        q : array (..., k)
+            Coordinates [rad or length].
+        speed_max : float or array (n_a,), optional
+            Highest speed [rad/s or length/s]; default `max_speed` of the mechanism's joints.
         """
         J = self.jacobian(q)
         limits = np.broadcast_to(speeds_of(self.mechanism, speed_max), J.shape[:-1])
@@ -211,7 +230,10 @@ class Actuation:
 
         Parameters
         ----------
-        box : lowest and highest coordinates, (2, k); default the joints' ranges.
+        box : array (2, k), optional
+            Lowest and highest coordinates; default the joints' ranges.
+        seed : int, optional
+            Seed of the configurations on which the share is measured.
         """
         return feasible_hull(self._placer, box, seed)
 
@@ -220,8 +242,14 @@ class Actuation:
 
         Parameters
         ----------
-        box : as of `hull`.
-        model : of the robot that `qpos` is of, as of `interop.qpos`; default what `to_mjcf` writes.
+        n : int
+            Number of configurations.
+        seed : int, optional
+            Seed of the random numbers.
+        box : array (2, k), optional
+            Lowest and highest coordinates; default the joints' ranges.
+        model : MjModel or str or PathLike, optional
+            The model of the robot that `qpos` belongs to, as in `interop.qpos`; default what `to_mjcf` writes.
         """
         return sample_feasible(self._placer, n, seed, box, model)
 
@@ -232,8 +260,12 @@ class Actuation:
 
         Parameters
         ----------
-        torque_max : as of `torque_limits`; by default what one unit of each actuator makes.
-        box : as of `hull`.
+        torque_max : float or array (n_a,), optional
+            Greatest torque of the actuators, as in `torque_limits`; default one unit of each actuator.
+        box : array (2, k), optional
+            Lowest and highest coordinates; default the joints' ranges.
+        ax : Axes, optional
+            Matplotlib axes to draw on; default those of a new figure.
         """
         from .torque_map import plot_torque_map
 
@@ -264,7 +296,8 @@ class Actuation:
 
         Raises
         ------
-        InvalidArgument : the coordinates are those of the task.
+        InvalidArgument
+            The coordinates are those of the task.
         """
         if isinstance(self._coordinates, TaskPath):
             raise InvalidArgument("path", "coordinates of the task", "an actuation of named joints")

@@ -56,16 +56,24 @@ def read_path(
 
     Parameters
     ----------
-    path : a file, or ``-`` for standard input.
-    tolerance : how far steps may be off an arc [length]; default 1e-5 L.
-    longest : of a step [length]; default 1e-2 L for G-code; targets of a table are as they are.
-    rate : steps per second instead, between the targets straight on [1/s].
-    rapid : feed of rapid moves [length/s], which say none.
+    path : str or PathLike
+        A file, or ``-`` for standard input.
+    mechanism : Mechanism
+        The machine that is to follow it.
+    tolerance : float, optional
+        How far steps may be off an arc [length]; default 1e-5 L.
+    longest : float, optional
+        Greatest length of a step [length]; default 1e-2 L for G-code; targets of a table are as they are.
+    rate : float, optional
+        Steps per second instead, between the targets straight on [1/s].
+    rapid : float, optional
+        Feed of rapid moves [length/s], which say none.
 
     Raises
     ------
-    InvalidArgument : a file that is no path, with its line; one of more than a million targets; a rate for a path that
-        says nothing of time.
+    InvalidArgument
+        A file that is no path, with its line; one of more than a million targets; a rate for a path that says nothing
+        of time.
     """
     path_read = joined(path_blocks(path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid))
     if path_read.times is not None and not np.isfinite(path_read.times).all():

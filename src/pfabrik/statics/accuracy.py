@@ -37,14 +37,20 @@ class PoseAccuracy(Printed):
 
     Attributes
     ----------
-    kind : "worst": no error within the bounds is larger; "rms": root mean squares.
-    position, rotation : size of the error of the reference point's position [length] and of the rotation [rad], (...).
-        Of a joint end effector the rotation is 0.
-    components : errors of position [length] and rotation vector [rad] one by one, (..., r), in the base frame.
-    covariance : of "rms", (..., r, r); of "worst", None.
-    actuators : of "worst", the actuators' errors that make the largest position error, and those that make the largest
-        rotation error, (..., 2, n_a): put them on the actuators, and `solve_fk` shows it. Of "rms", None.
-    reason : why nothing is known, (...), with NaN in the numbers; empty elsewhere. A text for a single answer.
+    kind : {"worst", "rms"}
+        "worst": no error within the bounds is larger; "rms": root mean squares.
+    position, rotation : float or array (...)
+        Size of the error of the reference point's position [length] and of the rotation [rad]. Of a joint end effector
+        the rotation is 0.
+    components : array (..., r)
+        Errors of position [length] and rotation vector [rad] one by one, in the base frame.
+    covariance : array (..., r, r) or None
+        Covariance of the components for "rms"; None for "worst".
+    actuators : array (..., 2, n_a) or None
+        For "worst", the actuators' errors that make the largest position error, and those that make the largest
+        rotation error: put them on the actuators, and `solve_fk` shows it. None for "rms".
+    reason : str or array of str (...)
+        Why nothing is known, with NaN in the numbers; empty elsewhere. A text for a single answer.
     """
 
     kind: Literal["worst", "rms"]
@@ -91,18 +97,25 @@ def accuracy(
 
     Parameters
     ----------
-    errors : actuator -> how far its coordinate may be off [length or rad], half its resolution and half its backlash
+    solution : Solution
+        One configuration or a batch.
+    errors : float or mapping of str to float
+        Actuator -> how far its coordinate may be off [length or rad], half its resolution and half its backlash
         together; a number alone for all actuators. Other joint -> how far its centre may be off, in any direction
         [length]: half the clearance of its diameter. Parameter of `sensitivity` -> its tolerance, in its unit. What is
         not named is exact.
-    kind : "worst", and errors are bounds; "rms", and they are standard deviations, of a joint in each direction.
-
-    sensitivity : of this solution, as `pf.sensitivity(solution, parameters)` gives it, if errors name parameters.
+    kind : {"worst", "rms"}, optional
+        "worst", and errors are bounds; "rms", and they are standard deviations, of a joint in each direction.
+    sensitivity : Sensitivity, optional
+        The derivatives of this solution, as `pf.sensitivity(solution, parameters)` gives them, if errors name
+        parameters.
 
     Raises
     ------
-    InvalidArgument, UnknownName : errors that are not positive, or of a joint without a centre; names not known.
-    UnsupportedMechanism : play in joints of a machine with redundant actuators.
+    InvalidArgument, UnknownName
+        Errors that are not positive, or of a joint without a centre; names not known.
+    UnsupportedMechanism
+        Play in joints of a machine with redundant actuators.
     """
     mechanism = checked_solution(solution).mechanism
     require_choice("kind", kind, ("worst", "rms"))

@@ -127,13 +127,20 @@ class WrenchCapacity(Printed):
 
     Attributes
     ----------
-    of : "force", "moment" or "wrench".
-    normals, offsets : the half-spaces normals . x <= offsets, (..., h, d) and (..., h); an infinite offset bounds
-        nothing. Directions in which the loops hold the end effector without its actuators are bounded by none.
-    radius : size of the largest x that can be held in any direction, the largest ball about 0, (...): of a force or a
-        moment; of a wrench, of a force, with moments divided by L. Negative where the given wrench itself is too much.
-    weakest : the direction in which no more can be held, a unit vector, (..., d).
-    reason : why nothing is known, (...), with NaN in the numbers; empty elsewhere. A text for a single answer.
+    of : {"force", "moment", "wrench"}
+        What varies.
+    normals : array (..., h, d)
+        Normals of the half-spaces normals . x <= offsets.
+    offsets : array (..., h)
+        Their offsets; an infinite one bounds nothing. Directions in which the loops hold the end effector without its
+        actuators are bounded by none.
+    radius : float or array (...)
+        Size of the largest x that can be held in any direction, the largest ball about 0: of a force or a moment; of a
+        wrench, of a force, with moments divided by L. Negative where the given wrench itself is too much.
+    weakest : array (..., d)
+        The direction in which no more can be held, a unit vector.
+    reason : str or array of str (...)
+        Why nothing is known, with NaN in the numbers; empty elsewhere. A text for a single answer.
     """
 
     of: Literal["force", "moment", "wrench"]
@@ -160,7 +167,8 @@ class WrenchCapacity(Printed):
 
         Raises
         ------
-        InvalidArgument : of wrenches, which have six dimensions.
+        InvalidArgument
+            For wrenches, which have six dimensions.
         """
         if self.of == "wrench":
             raise InvalidArgument(
@@ -201,16 +209,24 @@ def wrench_capacity(
 
     Parameters
     ----------
-    limits : of what actuators exert, in the sense of `forces`: a number for both ways, a pair (lowest, highest), an
-        array (n_a, 2) of these, or a mapping with either for each actuator. A cable only pulls: (-500, 0).
-    of : what varies.
-    wrench : what acts in any case, as of `forces`: what is asked for comes on top. By default none.
-    at : the point of both, as of `forces`.
+    solution : Solution
+        One configuration or a batch.
+    limits : float or tuple of float or array (n_a, 2) or mapping
+        Limits of what actuators exert, in the sense of `forces`: a number for both ways, a pair (lowest, highest), an
+        array of these, or a mapping with either for each actuator. A cable only pulls: (-500, 0).
+    of : {"force", "moment", "wrench"}, optional
+        What varies.
+    wrench : array (..., 6) or (..., 3), optional
+        What acts in any case, as in `forces`: what is asked for comes on top. By default none.
+    at : array (..., 3), optional
+        The point of both, as in `forces` [length].
 
     Raises
     ------
-    InvalidArgument, UnknownName : limits that are none, of no actuator, or missing; wrenches as of `forces`.
-    UnsupportedMechanism : so many redundant actuators that their polytope has more than 20,000 pairs of facets.
+    InvalidArgument, UnknownName
+        Limits that are none, of no actuator, or missing; wrenches as in `forces`.
+    UnsupportedMechanism
+        So many redundant actuators that their polytope has more than 20,000 pairs of facets.
     """
     mechanism = checked_solution(solution).mechanism
     require_choice("of", of, ("force",) if mechanism.end_effector_is_joint else PARTS)

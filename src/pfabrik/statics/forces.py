@@ -56,11 +56,14 @@ class Forces(Printed):
 
     Attributes
     ----------
-    actuators : force or torque that each actuator exerts, (..., n_a): positive drives its coordinate up. A strut that
-        is pressed has a positive one, a cable under tension a negative one. NaN where `reason` says why.
-    is_least_norm : True if there are more actuators than motions that they control: of all forces that hold the load,
-        those with the least sum of squares are given, torques compared with forces times L.
-    reason : why there are no such forces, (...); empty where there are. A text for a single answer.
+    actuators : array (..., n_a)
+        Force or torque that each actuator exerts: positive drives its coordinate up. A strut that is pressed has a
+        positive one, a cable under tension a negative one. NaN where `reason` says why.
+    is_least_norm : bool
+        True if there are more actuators than motions that they control: of all forces that hold the load, those with
+        the least sum of squares are given, torques compared with forces times L.
+    reason : str or array of str (...)
+        Why there are no such forces; empty where there are. A text for a single answer.
     """
 
     actuators: Floats
@@ -183,19 +186,24 @@ def forces(
 
     Parameters
     ----------
-    solution : one configuration or a batch.
-    wrench : what acts on the end effector from outside, in the base frame: (..., 6), force and moment, or (..., 3), a
-        force alone (the only choice where the end effector is a joint). Its batch goes with that of the solution, as
-        NumPy broadcasts.
-    at : the point that the force acts at, and the moment is about, (..., 3) [length], in the base frame; the reference
-        point by default.
-    loads : body -> (mass, centre), for its weight; (force, point) or (wrench, point) for what else acts on it, in the
-        base frame. Points are those of the body at home, in base coordinates [length].
-    gravity : of masses, (3,), in units of force per mass.
+    solution : Solution
+        One configuration or a batch.
+    wrench : array (..., 6) or (..., 3), optional
+        What acts on the end effector from outside, in the base frame: force and moment, or a force alone (the only
+        choice where the end effector is a joint). Its batch goes with that of the solution, as NumPy broadcasts.
+    at : array (..., 3), optional
+        The point that the force acts at, and the moment is about, in the base frame [length]; the reference point by
+        default.
+    loads : mapping of str to tuple, optional
+        Body -> (mass, centre), for its weight; (force, point) or (wrench, point) for what else acts on it, in the base
+        frame. Points are those of the body at home, in base coordinates [length].
+    gravity : array (3,), optional
+        Gravity, for masses, in units of force per mass.
 
     Raises
     ------
-    InvalidArgument, UnknownName : a wrong shape, numbers that are not finite, no such body.
+    InvalidArgument, UnknownName
+        A wrong shape, numbers that are not finite, no such body.
     """
     mechanism = checked_solution(solution).mechanism
     question = _Question(

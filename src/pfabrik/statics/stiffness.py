@@ -32,12 +32,16 @@ class Stiffness:
 
     Attributes
     ----------
-    matrix : K, (..., r, r): the wrench per displacement [of the reference point; rotation vector], in the base frame.
-        In directions in which the machine is rigid, because its loops let it move in no such way, K has 0.
-    compliance : C, (..., r, r): the displacement per wrench, 0 in rigid directions; K and C are inverses of each other
-        in all others. NaN where slack cables leave a direction without stiffness.
-    rigid : number of rigid directions, (...).
-    reason : why something is not known, (...), with NaN in its place; empty elsewhere. A text for a single answer.
+    matrix : array (..., r, r)
+        K: the wrench per displacement [of the reference point; rotation vector], in the base frame. In directions in
+        which the machine is rigid, because its loops let it move in no such way, K has 0.
+    compliance : array (..., r, r)
+        C: the displacement per wrench, 0 in rigid directions; K and C are inverses of each other in all others. NaN
+        where slack cables leave a direction without stiffness.
+    rigid : int or array of int (...)
+        Number of rigid directions.
+    reason : str or array of str (...)
+        Why something is not known, with NaN in its place; empty elsewhere. A text for a single answer.
     """
 
     matrix: Floats
@@ -62,16 +66,24 @@ def stiffness(
 
     Parameters
     ----------
-    k : stiffness of the actuators, force per length or torque per rad: a number for all, an array (n_a,), or by name.
-    rods : stiffness of links between two joints that are not driven, force per length: a number for all, or by the
-        names of their bodies. None: they are rigid.
-    cables : names of actuators that only pull: slack ones, which do not pull in `forces`, have no stiffness.
-    forces : what the actuators exert, as `forces` returns it, or (..., n_a).
+    solution : Solution
+        One configuration or a batch.
+    k : float or array (n_a,) or mapping of str to float
+        Stiffness of the actuators, force per length or torque per rad: a number for all, an array (n_a,), or by name.
+    rods : float or mapping of str to float, optional
+        Stiffness of links between two joints that are not driven, force per length: a number for all, or by the names
+        of their bodies. None: they are rigid.
+    cables : sequence of str, optional
+        Names of actuators that only pull: slack ones, which do not pull in `forces`, have no stiffness.
+    forces : Forces or array (..., n_a), optional
+        What the actuators exert, as `forces` returns it.
 
     Raises
     ------
-    InvalidArgument, UnknownName : stiffness that is not positive, names that are not known, cables without forces.
-    UnsupportedMechanism : rods that stretch in a machine with redundant actuators.
+    InvalidArgument, UnknownName
+        Stiffness that is not positive, names that are not known, cables without forces.
+    UnsupportedMechanism
+        Rods that stretch in a machine with redundant actuators.
     """
     mechanism = checked_solution(solution).mechanism
     values, by_rod = positive_values("k", k, mechanism.actuator_names), _of_rods(mechanism, rods)

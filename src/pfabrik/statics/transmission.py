@@ -91,10 +91,13 @@ class Factors:
 
     Attributes
     ----------
-    velocity : factors: the speed when the actuators' rates have a sum of squares of 1, (..., k). 0 where what moves is
-        at rest in that direction.
-    directions : unit vectors of these, (..., 3, k), in the base frame; of a joint's coordinates, (..., coordinates, k).
-    actuators : the actuators' rates that make them, (..., n_a, k).
+    velocity : array (..., k)
+        Factors: the speed when the actuators' rates have a sum of squares of 1. 0 where what moves is at rest in that
+        direction.
+    directions : array (..., 3, k)
+        Unit vectors of these, in the base frame; of a joint's coordinates, (..., coordinates, k).
+    actuators : array (..., n_a, k)
+        The actuators' rates that make them.
     """
 
     velocity: Floats
@@ -113,11 +116,14 @@ class Transmission(Printed):
 
     Attributes
     ----------
-    rates : velocities per actuator rate, (..., r, n_a): of the end effector [length/s, then rad/s], as of
-        `forward_jacobian`; of a joint, of its coordinates.
-    translation, rotation : the factors of each apart. Whatever the other does: a translation is that of the reference
-        point, which may turn as well. Their forces are those without a moment, or moments without a force.
-    reason : why nothing is known, (...), with NaN in the numbers; empty elsewhere. A text for a single answer.
+    rates : array (..., r, n_a)
+        Velocities per actuator rate: of the end effector [length/s, then rad/s], as in `forward_jacobian`; of a joint,
+        of its coordinates.
+    translation, rotation : Factors
+        The factors of each apart. Whatever the other does: a translation is that of the reference point, which may turn
+        as well. Their forces are those without a moment, or moments without a force.
+    reason : str or array of str (...)
+        Why nothing is known, with NaN in the numbers; empty elsewhere. A text for a single answer.
     """
 
     rates: Floats
@@ -149,12 +155,16 @@ def transmission(solution: Solution, joint: str | None = None) -> Transmission:
 
     Parameters
     ----------
-    joint : a joint's name, for the rates of its coordinates; of a spherical one, the angular velocity of its second
-        body relative to its first, in the base frame.
+    solution : Solution
+        One configuration or a batch.
+    joint : str, optional
+        A joint's name, for the rates of its coordinates; of a spherical one, the angular velocity of its second body
+        relative to its first, in the base frame.
 
     Raises
     ------
-    UnknownName : no joint of that name.
+    UnknownName
+        No joint of that name.
     """
     mechanism = checked_solution(solution).mechanism
     maps = maps_of(solution)

@@ -29,11 +29,15 @@ class PlatformSpeed(NamedTuple):
 
     Attributes
     ----------
-    kind : "along" or "about".
-    direction : unit vector (3,) in the base frame.
-    speed : [length/s or rad/s]; 0 where the machine cannot move so, infinite where no actuator would be limited. Where
-        it cannot do so without moving in what its task leaves out, that follows.
-    limited_by : the actuator that limits it, of a redundant machine the one that does so the most; "" where none does.
+    kind : {"along", "about"}
+        Along a direction, or about it.
+    direction : tuple of float
+        Unit vector (3,) in the base frame.
+    speed : float
+        The speed [length/s or rad/s]; 0 where the machine cannot move so, infinite where no actuator would be limited.
+        Where it cannot do so without moving in what its task leaves out, that follows.
+    limited_by : str
+        The actuator that limits it, of a redundant machine the one that does so the most; "" where none does.
     """
 
     kind: str
@@ -88,13 +92,16 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
 
     Parameters
     ----------
-    solution : a single configuration.
-    speed : highest of the actuators, by name or the same for all [length/s or rad/s]; those not named have the
+    solution : Solution
+        A single configuration.
+    speed : float or mapping of str to float, optional
+        Highest speed of the actuators, by name or the same for all [length/s or rad/s]; those not named have the
         `max_speed` of their joints.
 
     Raises
     ------
-    InvalidArgument : a batch, or no configuration; actuators without any limit.
+    InvalidArgument
+        A batch, or no configuration; actuators without any limit.
     """
     mechanism = checked_solution(solution).mechanism
     if solution.shape:

@@ -41,17 +41,21 @@ def time_path(
 
     Parameters
     ----------
-    track : all of its steps reached, without jumps.
-    speed, acceleration : highest of the actuators, by name or the same for all [length or rad, per s and per s^2];
-        those not named have the limits of their joints, `max_speed` and `max_acceleration`.
-    platform_speed : highest speed of the reference point [length/s].
-    rate : of the samples that are returned [1/s].
+    track : Track
+        A path, all of its steps reached, without jumps.
+    speed, acceleration : float or mapping of str to float, optional
+        Highest values of the actuators, by name or the same for all [length or rad, per s and per s^2]; those not named
+        have the limits of their joints, `max_speed` and `max_acceleration`.
+    platform_speed : float, optional
+        Highest speed of the reference point [length/s].
+    rate : float, optional
+        Rate of the samples that are returned [1/s].
 
     Raises
     ------
-    InvalidArgument : a track with steps that were not reached, leap, cross a parallel singularity, or between which the
-        spline leaves a range, by the number of the step; one that does not move; no limit at all; more than ten million
-        samples.
+    InvalidArgument
+        A track with steps that were not reached, leap, cross a parallel singularity, or between which the spline leaves
+        a range, by the number of the step; one that does not move; no limit at all; more than ten million samples.
     """
     require_type("track", track, Track, "a Track, as `track` returns")
     mechanism = track.mechanism

@@ -33,12 +33,24 @@ class Timed(Printed):
 
     Attributes
     ----------
-    times : (n,) [s].
-    steps : the step of the track that each sample is at, or after, (n,).
-    poses : (n, 4, 4), actuators, rates, accelerations : (n, n_a) [length or rad, per s, per s^2].
-    platform_speeds : of the reference point, (n,) [length/s].
-    used, binding : the largest share of any limit, (n,), and which of `limits` that is, (n,).
-    limits : (actuator, "speed" or "acceleration") of all actuators, and ("platform", "speed").
+    mechanism : Mechanism
+        The machine.
+    times : array (n,)
+        Times of the samples [s].
+    steps : array of int (n,)
+        The step of the track that each sample is at, or after.
+    poses : array (n, 4, 4)
+        Poses of the end effector [length].
+    actuators, rates, accelerations : array (n, n_a)
+        Coordinates of the actuators, their rates and accelerations [length or rad, per s, per s^2].
+    platform_speeds : array (n,)
+        Speeds of the reference point [length/s].
+    used : array (n,)
+        The largest share of any limit.
+    binding : array of int (n,)
+        Index of that limit in `limits`.
+    limits : tuple of tuple of str
+        Pairs (actuator, "speed" or "acceleration") of all actuators, and ("platform", "speed").
     """
 
     mechanism: Mechanism
