@@ -113,15 +113,22 @@ class Calibration(Printed):
 
     Attributes
     ----------
-    values : calibrated, (p,), in the order of `names`.
-    deviations : standard deviations, (p,); infinite where the data leave a parameter open, or nothing is left to
-        say how good they are. Residuals larger than `sigma` make them larger.
-    determined : which parameters the measurements determine, (p,).
-    rank : how many directions of parameters they determine.
-    rms_before, rms : root mean square of the residuals with the machine as described, and calibrated: in standard
-        deviations if `sigma` was given, else as lengths, angles times L.
-    rms_left_out : that of every row as predicted from the others.
-    residuals : measurement by measurement, quantity -> predicted less measured [length or rad].
+    values : array (p,)
+        Calibrated values, in the order of `names`.
+    deviations : array (p,)
+        Standard deviations; infinite where the data leave a parameter open, or nothing is left to say how good they
+        are. Residuals larger than `sigma` make them larger.
+    determined : array of bool (p,)
+        True for the parameters that the measurements determine.
+    rank : int
+        Number of directions of parameters that they determine.
+    rms_before, rms : float
+        Root mean square of the residuals with the machine as described, and calibrated: in standard deviations if
+        `sigma` was given, else as lengths, angles times L.
+    rms_left_out : float
+        Root mean square of the residuals of every row as predicted from the others.
+    residuals : dict of str to array
+        Quantity -> predicted less measured, measurement by measurement [length or rad].
     """
 
     def __init__(
@@ -262,8 +269,12 @@ class Calibration(Printed):
 
         Parameters
         ----------
-        criterion : "deviation" makes the worst deviation small, "determinant" the volume of the uncertainty.
-        seed : of the feasible configurations that are chosen from.
+        n : int
+            Number of configurations.
+        criterion : {"deviation", "determinant"}, optional
+            "deviation" makes the worst deviation small, "determinant" the volume of the uncertainty.
+        seed : int, optional
+            Seed of the feasible configurations that are chosen from.
         """
         return suggested(
             self.mechanism, self._parameters, self.values, self.measurements, self._data, n, criterion, seed

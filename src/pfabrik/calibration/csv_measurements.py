@@ -35,11 +35,17 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
 
     Parameters
     ----------
-    sigma : as of `Measurements`.
+    path : str or PathLike
+        The CSV file.
+    mechanism : Mechanism
+        The machine that was measured.
+    sigma : float or mapping of str to float, optional
+        Standard deviations, as in `Measurements`.
 
     Raises
     ------
-    InvalidArgument : a file that is no such table, with its line and column.
+    InvalidArgument
+        A file that is no such table, with its line and column.
     """
     checked_mechanism(mechanism)
     columns: dict[str, Floats] = {}

@@ -48,17 +48,31 @@ def calibrate(
 
     Parameters
     ----------
-    free, ties : what may vary, as of `parameters`; or parameters.
-    priors : what is known beforehand; asks for `sigma` of the measurements.
-    weights : of the rows, (n,); 0 leaves a row out.
-    start : configurations of the machine as described at the readings, (n,) or one for all, that say which assembly
-        mode it was in. Default: at measured poses, else home.
+    mechanism : Mechanism
+        The machine as described.
+    measurements : Measurements
+        What was measured of it.
+    free : str or sequence of str or Parameters, optional
+        What may vary, as in `parameters`; or parameters.
+    priors : mapping of str to float, optional
+        Parameter -> the standard deviation of its value as described, or a pair (value, standard deviation): what is
+        known beforehand; asks for `sigma` of the measurements.
+    weights : array (n,), optional
+        Weights of the rows; 0 leaves a row out.
+    ties : str, optional
+        "copies" lets copies of a joint vary as one, as in `parameters`.
+    start : Solution, optional
+        Configurations of the machine as described at the readings, (n,) or one for all, that say which assembly mode it
+        was in. Default: at measured poses, else home.
 
     Raises
     ------
-    InvalidArgument, UnknownName : what does not fit the machine.
-    UnsupportedMechanism : parameters that open the loops of an overconstrained machine.
-    MissingLibrary : SciPy is not installed.
+    InvalidArgument, UnknownName
+        What does not fit the machine.
+    UnsupportedMechanism
+        Parameters that open the loops of an overconstrained machine.
+    MissingLibrary
+        SciPy is not installed.
     """
     checked_mechanism(mechanism)
     require_type("measurements", measurements, Measurements, "Measurements")

@@ -112,23 +112,34 @@ class Measurements:
 
     Parameters
     ----------
-    actuators : readings, (n, n_a), in the order of `mechanism.actuator_names` [length or rad].
-    pose : measured T_base_platform, (n, 4, 4) [length]; NaN where there is none.
-    position : of the reference point in the base frame, (n, 3) [length]; NaN for components that are not measured.
-    orientation : R_base_platform, (n, 3, 3); NaN where there is none.
-    height : z of the reference point, (n,) [length], as a probe finds it.
-    distances : (i, j, distance): between the reference points of rows i and j [length], as on a printed part; (d, 3).
-    joints : coordinate name -> what its sensor reads, (n,) [length or rad].
-    sigma : standard deviation of a measurement [length or rad]: one number for all, or one for each of "position",
+    actuators : array (n, n_a)
+        Readings, in the order of `mechanism.actuator_names` [length or rad].
+    pose : array (n, 4, 4), optional
+        Measured T_base_platform [length]; NaN where there is none.
+    position : array (n, 3), optional
+        Position of the reference point in the base frame [length]; NaN for components that are not measured.
+    orientation : array (n, 3, 3), optional
+        R_base_platform; NaN where there is none.
+    height : array (n,), optional
+        z of the reference point [length], as a probe finds it.
+    distances : array (d, 3), optional
+        Rows (i, j, distance): between the reference points of rows i and j [length], as on a printed part.
+    joints : mapping of str to array (n,), optional
+        Coordinate name -> what its sensor reads [length or rad].
+    sigma : float or mapping of str to float, optional
+        Standard deviation of a measurement [length or rad]: one number for all, or one for each of "position",
         "orientation", "height", "distances", "joints". By default all are equally good, an angle times L as a length,
         and how good is estimated from what is left.
-    absolute_sigma : False if `sigma` only says how good quantities are relative to each other, and how good they all
-        are is estimated from what is left.
+    absolute_sigma : bool, optional
+        False if `sigma` only says how good quantities are relative to each other, and how good they all are is
+        estimated from what is left.
 
     Attributes
     ----------
-    rows : number of configurations.
-    has_deviations : True if it is known how good the measurements are.
+    rows : int
+        Number of configurations.
+    has_deviations : bool
+        True if it is known how good the measurements are.
     """
 
     def __init__(

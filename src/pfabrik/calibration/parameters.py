@@ -34,13 +34,20 @@ class Parameters:
 
     Attributes
     ----------
-    mechanism : the machine as described.
-    names : of the parameters, (p,).
-    values : of the machine as described, (p,), in `units`.
-    units : the mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
-    scales : changes that would be noticed, (p,): L, 1 rad, or the size of a dimension.
-    moves : derivatives of the instrument's frame and target, a rotation vector and a place each, (p, 2, 6).
-    factors : derivatives of the factors on the actuators' readings, (p, n_a).
+    mechanism : Mechanism
+        The machine as described.
+    names : tuple of str
+        Names of the p parameters.
+    values : array (p,)
+        Values of the machine as described, in `units`.
+    units : tuple of str
+        The mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
+    scales : array (p,)
+        Changes that would be noticed: L, 1 rad, or the size of a dimension.
+    moves : array (p, 2, 6)
+        Derivatives of the instrument's frame and target, a rotation vector and a place each.
+    factors : array (p, n_a)
+        Derivatives of the factors on the actuators' readings.
     """
 
     def __init__(self, mechanism: Mechanism, dimensions: Sequence[str], candidates: Candidates, shifts: list[Shift]):
@@ -73,7 +80,8 @@ class Parameters:
 
         Raises
         ------
-        InvalidMechanism : no machine has these values; with every fault.
+        InvalidMechanism
+            No machine has these values; with every fault.
         """
         values = self.checked(x)
         n = len(self._dimensions)
@@ -153,7 +161,10 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
 
     Parameters
     ----------
-    free : kinds, names, or a list of both:
+    mechanism : Mechanism
+        The machine.
+    free : str or sequence of str, optional
+        Kinds, names, or a list of both:
 
         - "dimensions": the named dimensions of the file that are numbers (`rod = 250`), in the file's units; not
           those that only set limits;
@@ -167,12 +178,14 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
         - the name of a dimension, of a joint (all its points), or of one parameter.
 
         By default the dimensions, or, of a machine without any, points and offsets.
-    ties : "copies" lets joints that are turned copies of each other (A1, A2, A3) vary as one, "A.x": those of copy 1,
-        and what the turn makes of it for the others.
+    ties : str, optional
+        "copies" lets joints that are turned copies of each other (A1, A2, A3) vary as one, "A.x": those of copy 1, and
+        what the turn makes of it for the others.
 
     Raises
     ------
-    UnknownName, InvalidArgument : no such parameter, or one that is named twice.
+    UnknownName, InvalidArgument
+        No such parameter, or one that is named twice.
     """
     require_choice("ties", ties, ("copies", None))
     if free is None:

@@ -25,9 +25,15 @@ def plot_calibration(calibration: Calibration) -> Figure:
     Changes are in the scale of each parameter (L, 1 rad, or the size of a dimension), so that they fit one axis; those
     that the data leave open are marked.
 
+    Parameters
+    ----------
+    calibration : Calibration
+        What `calibrate` returned.
+
     Raises
     ------
-    MissingLibrary : matplotlib is not installed.
+    MissingLibrary
+        Matplotlib is not installed.
     """
     require_method("calibration", calibration, "suggest", "a Calibration, as `calibrate` returns")
     figure = new_figure(7.0, 2.4 + 0.13 * min(len(calibration.names), MOST_NAMED))

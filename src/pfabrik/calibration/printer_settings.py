@@ -55,9 +55,15 @@ class KlipperDelta:
 def read_klipper(path: str | PathLike[str]) -> KlipperDelta:
     """A delta and its measurements from a `printer.cfg`.
 
+    Parameters
+    ----------
+    path : str or PathLike
+        Klipper's `printer.cfg`.
+
     Raises
     ------
-    InvalidMechanism : no settings of a delta, or a value that is missing or no number.
+    InvalidMechanism
+        No settings of a delta, or a value that is missing or no number.
     """
     file = Path(require_path("path", path))
     try:

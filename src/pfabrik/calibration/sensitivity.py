@@ -33,11 +33,14 @@ class Sensitivity:
 
     Attributes
     ----------
-    pose : of the end effector at held actuators, (..., 6, p): velocity of the reference point [length per unit of the
+    pose : array (..., 6, p)
+        Change of the end effector at held actuators: velocity of the reference point [length per unit of the
         parameter], angular velocity [rad per unit], in the base frame; (..., 3, p) for a joint end effector.
-    actuators : of the actuators at a held pose, (..., n_a, p); of the task's coordinates where the machine cannot hold
-        the whole pose. Where actuators are redundant, the least change.
-    names : of the parameters, (p,).
+    actuators : array (..., n_a, p)
+        Change of the actuators at a held pose; of the task's coordinates where the machine cannot hold the whole pose.
+        Where actuators are redundant, the least change.
+    names : tuple of str
+        Names of the p parameters.
     """
 
     pose: Floats
@@ -51,10 +54,19 @@ def sensitivity(solution: Solution, parameters: Parameters) -> Sensitivity:
     Implicit differentiation of the closed loops: with the present screws S of the coordinates z, and those T of the
     geometry's changes, loops ask for S dz + T dx = 0 around every loop; pose and actuators follow from dz and dx.
 
+    Parameters
+    ----------
+    solution : Solution
+        One configuration or a batch.
+    parameters : Parameters
+        Parameters of its machine.
+
     Raises
     ------
-    InvalidArgument : a solution of another machine, or one that is INVALID.
-    UnsupportedMechanism : loops that some parameters open: an overconstrained machine moves with some geometries only.
+    InvalidArgument
+        A solution of another machine, or one that is INVALID.
+    UnsupportedMechanism
+        Loops that some parameters open: an overconstrained machine moves with some geometries only.
     """
     mechanism = checked_solution(solution).mechanism
     if not isinstance(parameters, Parameters) or parameters.mechanism != mechanism:

@@ -58,16 +58,26 @@ class Certificate(Printed):
 
     Attributes
     ----------
-    mechanism : with the limits that count.
-    region : the `PoseRegion`; None for a track.
-    poses : of the track, (n, 4, 4); None for a region.
-    verdict : "PROVED": every pose is reached in home's working mode. "REFUTED": `refutation` is not reached. "OPEN".
-    margin : a proved lower bound of the margins of all poses, as of `margins`; minus infinity if not proved.
-    least_found : the least margin of a pose that the search measured; infinite if it measured none.
-    reason : why it is open; empty otherwise.
-    refutation : of a refuted region.
-    n_cells : cells looked at.
-    is_whole : True if all proved boxes were kept; beyond 100,000 they are not.
+    mechanism : Mechanism
+        The machine, with the limits that count.
+    region : PoseRegion or None
+        The region; None for a track.
+    poses : array (n, 4, 4) or None
+        Poses of the track; None for a region.
+    verdict : {"PROVED", "REFUTED", "OPEN"}
+        "PROVED": every pose is reached in home's working mode. "REFUTED": `refutation` is not reached. "OPEN".
+    margin : float
+        A proved lower bound of the margins of all poses, as in `margins`; minus infinity if not proved.
+    least_found : float
+        The least margin of a pose that the search measured; infinite if it measured none.
+    reason : str
+        Why it is open; empty otherwise.
+    refutation : Refutation or None
+        A pose that is not reached, of a refuted region.
+    n_cells : int
+        Number of cells looked at.
+    is_whole : bool
+        True if all proved boxes were kept; beyond 100,000 they are not.
     """
 
     mechanism: Mechanism

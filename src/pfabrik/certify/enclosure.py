@@ -36,11 +36,16 @@ class Enclosure:
 
     Attributes
     ----------
-    names : of the d coordinates.
-    lower, upper : bounds of its area or volume [product of the units of the coordinates].
-    inside : boxes that are wholly within reach, (n, 2, d): low and high ends [length or rad].
-    border : boxes that hold the rest of it, (m, 2, d). Everything in neither is out of reach.
-    n_cells : cells looked at.
+    names : tuple of str
+        Names of the d coordinates.
+    lower, upper : float
+        Bounds of its area or volume [product of the units of the coordinates].
+    inside : array (n, 2, d)
+        Boxes that are wholly within reach: low and high ends [length or rad].
+    border : array (m, 2, d)
+        Boxes that hold the rest of it. Everything in neither is out of reach.
+    n_cells : int
+        Number of cells looked at.
     """
 
     names: tuple[str, ...]

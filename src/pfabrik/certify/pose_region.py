@@ -31,12 +31,15 @@ class PoseRegion:
 
     Attributes
     ----------
-    low, high : the ends of the six parameters, (6,) each: the position x, y, z of the reference point [length], then
-        the orientation [rad].
-    shape : of positions: "box"; "cylinder" along z, or "ball", which touch the ends.
-    turning : "rotation vector": R = from_rotvec(r), with r between the ends. "tilt":
-        R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw), as of `workspace`, where the tilt is at most the largest
-        `tilt_x`, in any direction. Orientations are relative to that of home.
+    low, high : array (6,)
+        The ends of the six parameters: the position x, y, z of the reference point [length], then the orientation
+        [rad].
+    shape : {"box", "cylinder", "ball"}
+        Shape of the positions; a cylinder stands along z, it and a ball touch the ends.
+    turning : {"rotation vector", "tilt"}
+        "rotation vector": R = from_rotvec(r), with r between the ends. "tilt": R = from_rotvec([tilt_x, tilt_y, 0])
+        Rz(yaw), as in `workspace`, where the tilt is at most the largest `tilt_x`, in any direction. Orientations are
+        relative to that of home.
     """
 
     low: Floats
@@ -57,10 +60,14 @@ class PoseRegion:
 
         Parameters
         ----------
-        low, high : (3,) [length]; where both are equal the coordinate is fixed.
-        rotation : half sizes of a box of rotation vectors about zero, a number or (3,), or its ends, (2, 3) [rad].
-        tilt : largest angle of the platform's z axis with that of home, in any direction [rad].
-        yaw : turn about z before the tilt: an angle, or its two ends [rad].
+        low, high : array (3,)
+            The corners [length]; where both are equal the coordinate is fixed.
+        rotation : float or array (3,) or (2, 3), optional
+            Half sizes of a box of rotation vectors about zero, or its ends [rad].
+        tilt : float, optional
+            Largest angle of the platform's z axis with that of home, in any direction [rad].
+        yaw : float or array (2,), optional
+            Turn about z before the tilt: an angle, or its two ends [rad].
         """
         ends = np.stack([array("low", low, "3"), array("high", high, "3")])
         if (ends[0] > ends[1]).any():

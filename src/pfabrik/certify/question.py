@@ -94,23 +94,34 @@ def certify(
 
     Parameters
     ----------
-    region : a `PoseRegion`; or poses as of `solve_ik` (n, ...), or a Track, whose answers count: every pose between two
-        of them, with the position on a line and the rotation about one axis.
-    limits : names of the joints whose limits count; default all. The clearance of links counts where there is one.
-    tolerance : by how much the proved `margin` may be less than the least margin in the region, if the region is
-        proved; by default it is only known to be positive.
-    budget : number of cells to look at, at most.
-    uncertain : radius of a ball about each joint's point that its true place may be anywhere in [length]: proved for
-        all machines with such points and directions of axes as described.
-    executor : of `concurrent.futures`, or one like it, on whose workers parts of the region are looked at; default:
-        here. A proof holds either way; its cells are others, and of poses that refute a region it may find another.
-    on_progress : called with (cells looked at, cells in all, about); default: a line on a terminal, if it takes more
-        than two seconds.
+    mechanism : Mechanism
+        The machine.
+    region : PoseRegion or array or Track
+        A `PoseRegion`; or poses (n, ...) as in `solve_ik`, or a Track, whose answers count: every pose between two of
+        them, with the position on a line and the rotation about one axis.
+    limits : iterable of str, optional
+        Names of the joints whose limits count; default all. The clearance of links counts where there is one.
+    tolerance : float, optional
+        By how much the proved `margin` may be less than the least margin in the region, if the region is proved; by
+        default it is only known to be positive.
+    budget : int, optional
+        Number of cells to look at, at most.
+    uncertain : float, optional
+        Radius of a ball about each joint's point that its true place may be anywhere in [length]: proved for all
+        machines with such points and directions of axes as described.
+    executor : Executor, optional
+        Of `concurrent.futures`, or one like it, on whose workers parts of the region are looked at; default: here. A
+        proof holds either way; its cells are others, and of poses that refute a region it may find another.
+    on_progress : callable, optional
+        Called with (cells looked at, cells in all, about); default: a line on a terminal, if it takes more than two
+        seconds.
 
     Raises
     ------
-    UnsupportedMechanism : a chain has no closed form, or poses leave joints open; the message names them.
-    InvalidArgument : a region over coordinates that the task does not set.
+    UnsupportedMechanism
+        A chain has no closed form, or poses leave joints open; the message names them.
+    InvalidArgument
+        A region over coordinates that the task does not set.
     """
     mechanism = _with_limits_of(checked_mechanism(mechanism), limits)
     model = model_of(mechanism)
