@@ -41,24 +41,32 @@ def export_c(
 
     Parameters
     ----------
-    path : the file to write; whatever has this name is replaced, when the text is complete.
-    precision : "double", or "float" for controllers without double precision in hardware.
-    parts : "ik" from poses to actuators, completed where the task leaves something open; "limits" every limit, with the
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike
+        The file to write; whatever has this name is replaced, when the text is complete.
+    precision : {"double", "float"}, optional
+        "float" is for controllers without double precision in hardware.
+    parts : sequence of str, optional
+        "ik" from poses to actuators, completed where the task leaves something open; "limits" every limit, with the
         number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
         number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
         "rates" the Jacobian, speeds of actuators, and torques of them and back; "nearest", with "ik" and "limits", the
         nearest feasible pose to a target out of reach. All that the machine has, if left out.
-    name : prefix of all names in the file; lower-case letters, digits and underscores.
-    joints : names of joints in series from the base to the end effector: then there are functions of these too, and
-        rates are by them.
+    name : str, optional
+        Prefix of all names in the file; lower-case letters, digits and underscores.
+    joints : str or sequence of str, optional
+        Names of joints in series from the base to the end effector: then there are functions of these too, and rates
+        are by them.
 
     Raises
     ------
-    UnsupportedMechanism : some chain is no leg in closed form, or one that has no code here; the message says which,
-        and why. Also where "fk" is asked for and the actuators leave the end effector free, or "ik" and the task leaves
-        motions open that are a choice; and with "limits" and a
-        clearance where the place of a link follows from no leg.
-    InvalidArgument : an unknown precision or part, or a name that is not allowed.
+    UnsupportedMechanism
+        Some chain is no leg in closed form, or one that has no code here; the message says which, and why. Also where
+        "fk" is asked for and the actuators leave the end effector free, or "ik" and the task leaves motions open that
+        are a choice; and with "limits" and a clearance where the place of a link follows from no leg.
+    InvalidArgument
+        An unknown precision or part, or a name that is not allowed.
     """
     text = c_source(
         mechanism, precision=precision, parts=parts, name=name, joints=joints, file=require_path("path", path).name

@@ -94,16 +94,23 @@ def export_tensors(
 
     Parameters
     ----------
-    path : the file to write; whatever has this name is replaced, when the text is complete.
-    backend : "numpy", "torch" or "jax".
-    joints : names of joints in series from the base to the end effector, which then are the coordinates; "task" for
-        poses of the platform, of which what the task leaves open is completed.
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike
+        The file to write; whatever has this name is replaced, when the text is complete.
+    backend : {"numpy", "torch", "jax"}, optional
+        Library of the arrays.
+    joints : str or sequence of str, optional
+        Names of joints in series from the base to the end effector, which then are the coordinates; "task" for poses of
+        the platform, of which what the task leaves open is completed.
 
     Raises
     ------
-    UnsupportedMechanism : some chain is no leg in closed form, or one that has no code here; or joints that do not
-        determine the actuators, or the other way round.
-    UnknownName, InvalidArgument : of the joints, if they are none, or not in series; an unknown backend.
+    UnsupportedMechanism
+        Some chain is no leg in closed form, or one that has no code here; or joints that do not determine the
+        actuators, or the other way round.
+    UnknownName, InvalidArgument
+        Joints that are none, or not in series; an unknown backend.
     """
     text = tensor_source(mechanism, backend=backend, joints=joints)
     with whole_path(path) as part:
@@ -121,15 +128,45 @@ def tensor_source(mechanism: Mechanism, *, backend: Backend = "numpy", joints: s
 
 
 def export_numpy(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] = TASK) -> Path:
-    """Write a mechanism's kinematics as one file of NumPy arrays: `export_tensors` with backend "numpy"."""
+    """Write a mechanism's kinematics as one file of NumPy arrays: `export_tensors` with backend "numpy".
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike
+        The file to write.
+    joints : str or sequence of str, optional
+        As in `export_tensors`.
+    """
     return export_tensors(mechanism, path, backend="numpy", joints=joints)
 
 
 def export_torch(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] = TASK) -> Path:
-    """Write a mechanism's kinematics as one file of PyTorch tensors: `export_tensors` with backend "torch"."""
+    """Write a mechanism's kinematics as one file of PyTorch tensors: `export_tensors` with backend "torch".
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike
+        The file to write.
+    joints : str or sequence of str, optional
+        As in `export_tensors`.
+    """
     return export_tensors(mechanism, path, backend="torch", joints=joints)
 
 
 def export_jax(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] = TASK) -> Path:
-    """Write a mechanism's kinematics as one file of JAX arrays: `export_tensors` with backend "jax"."""
+    """Write a mechanism's kinematics as one file of JAX arrays: `export_tensors` with backend "jax".
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike
+        The file to write.
+    joints : str or sequence of str, optional
+        As in `export_tensors`.
+    """
     return export_tensors(mechanism, path, backend="jax", joints=joints)

@@ -43,9 +43,12 @@ class Imported:
 
     Attributes
     ----------
-    mechanism : closed at home.
-    gap : how far the loops of the description were open, before they were closed [length; an angle times the size].
-    notes : what was left out, changed or found, each with the names of what it is about.
+    mechanism : Mechanism
+        The machine, closed at home.
+    gap : float
+        How far the loops of the description were open, before they were closed [length; an angle times the size].
+    notes : tuple of Note
+        What was left out, changed or found, each with the names of what it is about.
     """
 
     mechanism: Mechanism
@@ -64,11 +67,15 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
 
     Parameters
     ----------
-    notes : notes that come first.
+    opened : OpenMechanism
+        The description.
+    notes : iterable of Note, optional
+        Notes that come first.
 
     Raises
     ------
-    InvalidMechanism : the loops cannot be closed, with how far they stay open, or what they make is no mechanism.
+    InvalidMechanism
+        The loops cannot be closed, with how far they stay open, or what they make is no mechanism.
     """
     if not isinstance(opened, OpenMechanism):
         raise InvalidArgument("opened", type(opened).__name__, "an OpenMechanism")

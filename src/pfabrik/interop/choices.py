@@ -32,7 +32,19 @@ Build = Callable[[str, str, Sequence[str] | None], Mechanism]
 
 @dataclass(frozen=True)
 class Moved:
-    """A body that moves against the base: its freedoms, those left with all drives at rest, what drives move it."""
+    """A body that moves against the base: its freedoms, those left with all drives at rest, what drives move it.
+
+    Attributes
+    ----------
+    body : str
+        The body.
+    freedoms : int
+        Freedoms of the body.
+    undriven : int
+        Freedoms that are left with all drives at rest.
+    actuators : tuple of str
+        Drives that move it.
+    """
 
     body: str
     freedoms: int
@@ -50,11 +62,18 @@ class Choice:
 
     Attributes
     ----------
-    loops : names of the loops that it consists of; none of an open chain.
-    end_effector : a body that makes a mechanism, one that most drives move; None where none does.
-    actuated : drives to name, where the file drives nothing here; else None.
-    moved : the bodies that move.
-    refusal : why no mechanism was made of it; empty where one was.
+    base : str
+        The body that rests.
+    loops : tuple of str
+        Names of the loops that it consists of; none of an open chain.
+    end_effector : str or None
+        A body that makes a mechanism, one that most drives move; None where none does.
+    actuated : tuple of str or None
+        Drives to name, where the file drives nothing here; else None.
+    moved : tuple of Moved
+        The bodies that move.
+    refusal : str
+        Why no mechanism was made of it; empty where one was.
     """
 
     base: str
@@ -76,7 +95,13 @@ class Choice:
 
 
 class NoEndEffector(InvalidArgument):
-    """No end effector was given; carries the choices that there are."""
+    """No end effector was given; carries the choices that there are.
+
+    Attributes
+    ----------
+    choices : tuple of Choice
+        The parts of the robot that are mechanisms.
+    """
 
     def __init__(self, choices: Sequence[Choice]) -> None:
         self.choices = tuple(choices)

@@ -30,14 +30,21 @@ def qpos(
 
     Parameters
     ----------
-    model : `mujoco.MjModel`, or the path or the text of a model; default what `to_mjcf` writes.
-    qpos : of the joints that the mechanism does not have, (..., nq); default the configuration's.
-    configuration : the mechanism's home in that model: "qpos0", or the name of a keyframe.
+    solution : Solution
+        One configuration or a batch.
+    model : MjModel or str or PathLike, optional
+        The model, or the path or the text of one; default what `to_mjcf` writes.
+    qpos : array (..., nq), optional
+        Positions of the joints that the mechanism does not have; default the configuration's.
+    configuration : str, optional
+        The mechanism's home in that model: "qpos0", or the name of a keyframe.
 
     Raises
     ------
-    UnknownName : a joint of the mechanism that the model does not have.
-    InvalidArgument : a loop of the model that does not close where the mechanism's joints are.
+    UnknownName
+        A joint of the mechanism that the model does not have.
+    InvalidArgument
+        A loop of the model that does not close where the mechanism's joints are.
     """
     mechanism, q = checked_solution(solution).mechanism, np.asarray(solution.q)
     if model is None:

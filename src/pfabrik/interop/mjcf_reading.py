@@ -51,32 +51,47 @@ def from_mjcf(
 
     Parameters
     ----------
-    source : the path of a model, or its text. Files that it includes must be in its folder; no other is opened.
-    base : the body that rests. Default: the one that the file names if this library wrote it, else the world.
-    end_effector : a body, a site (which is then the reference point), or a joint or equality (whose centre is moved).
-        Default: the one that the file names; else the error has the choices that there are.
-    actuated : names of the joints that are driven, in the order of the actuators. Default: those that an actuator
-        drives, in the order of these.
-    fixed : names of joints to hold where they are.
-    configuration : "qpos0", or the name of a keyframe: home.
-    length_unit : the unit of the mechanism: "mm", "m", ...; a model has metres.
-    task : what targets set, as of a `Mechanism`. Default: that of the file, else everything or, where the end effector
-        has fewer freedoms, as much of it as can be set independently.
-    within : how far what was meant to be parallel, to meet, or to be equal may be off [m and rad], and is made so.
-        Default: as far as the digits of the file explain.
-    leave_out : names of loops, and of joints that follow others, to read as if they were not bound.
+    source : str or PathLike
+        The path of a model, or its text. Files that it includes must be in its folder; no other is opened.
+    base : str, optional
+        The body that rests. Default: the one that the file names if this library wrote it, else the world.
+    end_effector : str, optional
+        A body, a site (which is then the reference point), or a joint or equality (whose centre is moved). Default: the
+        one that the file names; else the error has the choices that there are.
+    actuated : iterable of str, optional
+        Names of the joints that are driven, in the order of the actuators. Default: those that an actuator drives, in
+        the order of these.
+    fixed : iterable of str, optional
+        Names of joints to hold where they are.
+    configuration : str, optional
+        "qpos0", or the name of a keyframe: home.
+    length_unit : str, optional
+        The unit of the mechanism: "mm", "m", ...; a model has metres.
+    task : sequence of str, optional
+        What targets set, as in `Mechanism`. Default: that of the file, else everything or, where the end effector has
+        fewer freedoms, as much of it as can be set independently.
+    within : float, optional
+        How far what was meant to be parallel, to meet, or to be equal may be off [m and rad], and is made so. Default:
+        as far as the digits of the file explain.
+    leave_out : iterable of str, optional
+        Names of loops, and of joints that follow others, to read as if they were not bound.
 
     Returns
     -------
-    Imported : the mechanism, how far its loops were open, and notes of all that was left out or changed, by name.
+    Imported
+        The mechanism, how far its loops were open, and notes of all that was left out or changed, by name.
 
     Raises
     ------
-    MissingLibrary : MuJoCo is not installed.
-    InvalidMechanism : no model, or one that cannot be closed or asks for too much, with what and where; joints that
-        follow others where both are there; nothing that is driven. All errors carry the notes so far as `__notes__`.
-    UnknownName : a body, joint or keyframe that the model does not have.
-    NoEndEffector : none is given; an `InvalidArgument` that carries the `choices`: what loops move, by which drives.
+    MissingLibrary
+        MuJoCo is not installed.
+    InvalidMechanism
+        No model, or one that cannot be closed or asks for too much, with what and where; joints that follow others
+        where both are there; nothing that is driven. All errors carry the notes so far as `__notes__`.
+    UnknownName
+        A body, joint or keyframe that the model does not have.
+    NoEndEffector
+        No end effector is given; an `InvalidArgument` that carries the `choices`: what loops move, by which drives.
     """
     require("reading a MuJoCo model", "mujoco", "mujoco")
     root = read_xml(source, "mjcf")

@@ -44,19 +44,25 @@ def to_mjcf(
 
     Parameters
     ----------
-    path : the file to write; None writes none.
-    masses : body -> its mass [kg]. Those not given are made up, in proportion to the machine: what the model weighs,
-        and so every force in it, means nothing until they are.
-    gravity : [m/s²]; none by default, for with masses made up, its forces would be too.
+    mechanism : Mechanism
+        The machine.
+    path : str or PathLike, optional
+        The file to write; None writes none.
+    masses : mapping of str to float, optional
+        Body -> its mass [kg]. Those not given are made up, in proportion to the machine: what the model weighs, and so
+        every force in it, means nothing until they are.
+    gravity : array (3,), optional
+        Gravity [m/s²]; none by default, for with masses made up, its forces would be too.
 
     Returns
     -------
-    The text of the model.
+    str
+        The text of the model.
 
     Raises
     ------
-    UnknownName, InvalidArgument : a mass of no body, or not positive; gravity that is no vector; a unit of length
-        that is not known.
+    UnknownName, InvalidArgument
+        A mass of no body, or not positive; gravity that is no vector; a unit of length that is not known.
     """
     metres = metres_of(checked_mechanism(mechanism).length_unit)
     pull = array("gravity", gravity, "3", note=" [m/s²]")

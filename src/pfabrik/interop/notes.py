@@ -15,7 +15,15 @@ from ..motion.fitting_task import AXES, FittingTask, fitting_tasks, has_dependen
 
 @dataclass(frozen=True)
 class Note:
-    """Something that an import left out, changed, or found, with the names of what it is about."""
+    """Something that an import left out, changed, or found, with the names of what it is about.
+
+    Attributes
+    ----------
+    what : str
+        What was left out, changed, or found.
+    names : tuple of str
+        Names of what it is about.
+    """
 
     what: str
     names: tuple[str, ...] = ()

@@ -34,10 +34,16 @@ class Loop:
 
     Attributes
     ----------
-    type : "spherical" where two points are to meet, "revolute" where also two axes are, "fixed" where two frames are.
-    connects : the two bodies.
-    points : the point on each, (2, 3) [length], in base coordinates, where the joints are at their home values.
-    frames : the frame on each, (2, 3, 3), likewise; of a hinge, the third column is the axis. None for a ball.
+    name : str
+        Name of the joint.
+    type : {"spherical", "revolute", "fixed"}
+        "spherical" where two points are to meet, "revolute" where also two axes are, "fixed" where two frames are.
+    connects : tuple of str
+        The two bodies.
+    points : array (2, 3)
+        The point on each body [length], in base coordinates, where the joints are at their home values.
+    frames : array (2, 3, 3) or None
+        The frame on each body, likewise; of a hinge, the third column is the axis. None for a ball.
     """
 
     name: str
@@ -89,14 +95,29 @@ class OpenMechanism:
 
     Attributes
     ----------
-    joints : a tree from the base, with the joints at their home values, in base coordinates.
-    loops : the joints that close it.
-    base, end_effector, reference_point, length_unit, task : as of a `Mechanism`; the end effector may be a loop.
-    cones : joint or loop -> the cone that limits it.
-    roundings : joint or loop -> how far its digits put it from what was meant, at most [length, rad]; those that are
-        not named are as the worst of those that are. Empty where nothing is known.
-    collision : the collision geometry [length].
-    is_asked : these roundings are asked for, and not read off the digits of a file.
+    name : str
+        Name of the machine.
+    joints : tuple of Joint
+        A tree from the base, with the joints at their home values, in base coordinates.
+    loops : tuple of Loop
+        The joints that close it.
+    end_effector : str
+        A body, a joint or a loop.
+    reference_point : array (3,) or None
+        As in `Mechanism`.
+    base, length_unit : str
+        As in `Mechanism`.
+    task : tuple of str or None
+        As in `Mechanism`.
+    cones : mapping of str to Cone
+        Joint or loop -> the cone that limits it.
+    roundings : mapping of str to Rounding
+        Joint or loop -> how far its digits put it from what was meant, at most [length, rad]; those that are not named
+        are as the worst of those that are. Empty where nothing is known.
+    collision : Collision
+        The collision geometry [length].
+    is_asked : bool
+        True if these roundings are asked for, and not read off the digits of a file.
     """
 
     name: str

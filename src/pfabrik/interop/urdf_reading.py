@@ -53,26 +53,42 @@ def from_urdf(
 
     Parameters
     ----------
-    source : the path of a URDF file, or its text.
-    loops : the path of a YAML file, or the content of such a file: which links meet where, and which joints are driven;
-        in the plain form of the documentation, or that of Gepetto's example-parallel-robots (`closed_loop`, `type`,
+    source : str or PathLike
+        The path of a URDF file, or its text.
+    loops : str or PathLike or mapping, optional
+        The path of a YAML file, or the content of such a file: which links meet where, and which joints are driven; in
+        the plain form of the documentation, or that of Gepetto's example-parallel-robots (`closed_loop`, `type`,
         `name_mot`). Frames that are called `closing_<name>_1` and `closing_<name>_2` meet in balls, or in hinges where
         there are frames of the same names with `_z` behind them, unless this file says how they meet.
-    base : the link that rests. Default: the root.
-    end_effector : a link, or a joint or loop (whose centre is moved).
-    actuated : names of the joints that are driven, in the order of the actuators; a `velocity` that is not 0 is their
-        highest speed. Default: those of `loops`, else those with a transmission.
-    fixed, length_unit, task, within, leave_out : as of `from_mjcf`.
+    base : str, optional
+        The link that rests. Default: the root.
+    end_effector : str, optional
+        A link, or a joint or loop (whose centre is moved).
+    actuated : iterable of str, optional
+        Names of the joints that are driven, in the order of the actuators; a `velocity` that is not 0 is their highest
+        speed. Default: those of `loops`, else those with a transmission.
+    fixed, leave_out : iterable of str, optional
+        As in `from_mjcf`.
+    length_unit : str, optional
+        As in `from_mjcf`.
+    task : sequence of str, optional
+        As in `from_mjcf`.
+    within : float, optional
+        As in `from_mjcf`.
 
     Returns
     -------
-    Imported : the mechanism, how far its loops were open, and notes of all that was left out or changed, by name.
+    Imported
+        The mechanism, how far its loops were open, and notes of all that was left out or changed, by name.
 
     Raises
     ------
-    MissingLibrary : PyYAML is not installed, and `loops` is a file.
-    InvalidMechanism : no URDF, or one that cannot be closed, with every fault that was found; else as of `from_mjcf`.
-    UnknownName, NoEndEffector : as of `from_mjcf`.
+    MissingLibrary
+        PyYAML is not installed, and `loops` is a file.
+    InvalidMechanism
+        No URDF, or one that cannot be closed, with every fault that was found; else as in `from_mjcf`.
+    UnknownName, NoEndEffector
+        As in `from_mjcf`.
     """
     notes: list[Note] = []
     with noting(notes):

@@ -40,11 +40,15 @@ def to_urdf(
 
     Parameters
     ----------
-    path, loops : the files to write, URDF and YAML; None writes none.
+    mechanism : Mechanism
+        The machine.
+    path, loops : str or PathLike, optional
+        The files to write, URDF and YAML; None writes none.
 
     Returns
     -------
-    The text of the description, and the content of the file of loops, both as `from_urdf` takes them.
+    tuple
+        The text of the description, and the content of the file of loops, both as `from_urdf` takes them.
     """
     metres = metres_of(checked_mechanism(mechanism).length_unit)
     if path is not None and loops is not None and os.path.realpath(path) == os.path.realpath(loops):

@@ -39,11 +39,13 @@ class AgainstOriginal:
 
     Attributes
     ----------
-    loop_gap : how far the file's own loops stay open, by rounding [length; angles as they are].
-    position_difference, rotation_difference : between our pose and the file's, with the actuated joints where we have
-        them [length], [rad].
-    position_tolerance, rotation_tolerance : how far what import changes within the digits of the file puts poses off
-        [length], [rad], as found by importing it again, up to what digits explain; and rounding.
+    loop_gap : float
+        How far the file's own loops stay open, by rounding [length; angles as they are].
+    position_difference, rotation_difference : float
+        Difference between our pose and the file's, with the actuated joints where we have them [length], [rad].
+    position_tolerance, rotation_tolerance : float
+        How far what import changes within the digits of the file puts poses off [length], [rad], as found by importing
+        it again, up to what digits explain; and rounding.
     """
 
     loop_gap: float
@@ -64,14 +66,21 @@ class Verification(Printed):
 
     Attributes
     ----------
-    mechanism : whose answers they are.
-    poses : how many configurations were compared, of as many different targets.
-    loop_gap : how far MuJoCo finds our answers open, by its own constraint rows [length; angles times L].
-    position_difference, rotation_difference : between our pose and the one in which MuJoCo closes the loops by itself,
-        with the actuated joints where we have them [length], [rad].
-    tolerance : what counts as agreement [length].
-    travelled : how far the poses went from home.
-    original : the comparison with the original file; None where none was given, or there were no poses.
+    mechanism : Mechanism
+        The machine whose answers they are.
+    poses : int
+        Number of configurations that were compared, of as many different targets.
+    loop_gap : float
+        How far MuJoCo finds our answers open, by its own constraint rows [length; angles times L].
+    position_difference, rotation_difference : float
+        Difference between our pose and the one in which MuJoCo closes the loops by itself, with the actuated joints
+        where we have them [length], [rad].
+    tolerance : float
+        What counts as agreement [length].
+    travelled : Travelled
+        How far the poses went from home.
+    original : AgainstOriginal or None
+        The comparison with the original file; None where none was given, or there were no poses.
     """
 
     mechanism: Mechanism
@@ -170,16 +179,27 @@ def verify(
 
     Parameters
     ----------
-    poses : how many.
-    seed : of the random targets.
-    original : the path of the MuJoCo model or robot description (URDF) that the mechanism was imported from.
-    loops, configuration : as the original was imported with; see `from_urdf` and `from_mjcf`.
+    mechanism : Mechanism
+        The machine.
+    poses : int, optional
+        Number of targets.
+    seed : int, optional
+        Seed of the random targets.
+    original : str or PathLike, optional
+        The path of the MuJoCo model or robot description (URDF) that the mechanism was imported from.
+    loops : str or PathLike or mapping, optional
+        Loops that the original was imported with, as in `from_urdf`.
+    configuration : str, optional
+        Configuration that the original was imported with, as in `from_mjcf`.
 
     Raises
     ------
-    MissingLibrary : MuJoCo is not installed.
-    InvalidArgument : less than one pose.
-    UnknownName : an actuator, a joint or the end effector, where the original does not have it.
+    MissingLibrary
+        MuJoCo is not installed.
+    InvalidArgument
+        Less than one pose.
+    UnknownName
+        An actuator, a joint or the end effector, where the original does not have it.
     """
     checked_mechanism(mechanism)
     counts: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))

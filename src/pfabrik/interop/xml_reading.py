@@ -59,7 +59,13 @@ def read_xml(source: str | os.PathLike[str], *kinds: Kind) -> ET.Element:
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
-    """The kind of a file, by its first element; InvalidMechanism where it is none that is read."""
+    """The kind of a file, by its first element; InvalidMechanism where it is none that is read.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The file.
+    """
     tree = _parsed(_Budget().read(require_path("path", path)), os.fspath(path))
     return _kind(tree, os.fspath(path), tuple(KINDS.values()))
 
