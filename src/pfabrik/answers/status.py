@@ -13,12 +13,19 @@ NUMBERS = tuple("bdoxXneEfFgG%")
 class Status(IntEnum):
     """The status of an answer; the largest of a batch is the worst.
 
-    REACHED : on the target, closed and within every limit.
-    PROJECTED : near the target, closed and within every limit; no configuration that reaches it was found, and where
-        the answer is `certified` none exists.
-    EXCEEDED : on the target and closed, but beyond a limit; `assembly_modes` and `working_modes` search for such.
-    FAILED : no feasible configuration was found.
-    INVALID : the target is no pose, or not finite; only if such rows are to be marked.
+    Attributes
+    ----------
+    REACHED : Status
+        On the target, closed and within every limit.
+    PROJECTED : Status
+        Near the target, closed and within every limit; no configuration that reaches it was found, and where the answer
+        is `certified` none exists.
+    EXCEEDED : Status
+        On the target and closed, but beyond a limit; `assembly_modes` and `working_modes` search for such.
+    FAILED : Status
+        No feasible configuration was found.
+    INVALID : Status
+        The target is no pose, or not finite; only if such rows are to be marked.
     """
 
     REACHED = rows.REACHED

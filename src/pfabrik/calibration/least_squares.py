@@ -67,7 +67,7 @@ def calibrate(
 
     Raises
     ------
-    InvalidArgument, UnknownName
+    InvalidArgument or UnknownName
         What does not fit the machine.
     UnsupportedMechanism
         Parameters that open the loops of an overconstrained machine.

@@ -184,7 +184,7 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
 
     Raises
     ------
-    UnknownName, InvalidArgument
+    UnknownName or InvalidArgument
         No such parameter, or one that is named twice.
     """
     require_choice("ties", ties, ("copies", None))

@@ -109,7 +109,7 @@ def export_tensors(
     UnsupportedMechanism
         Some chain is no leg in closed form, or one that has no code here; or joints that do not determine the
         actuators, or the other way round.
-    UnknownName, InvalidArgument
+    UnknownName or InvalidArgument
         Joints that are none, or not in series; an unknown backend.
     """
     text = tensor_source(mechanism, backend=backend, joints=joints)

@@ -61,7 +61,7 @@ def to_mjcf(
 
     Raises
     ------
-    UnknownName, InvalidArgument
+    UnknownName or InvalidArgument
         A mass of no body, or not positive; gravity that is no vector; a unit of length that is not known.
     """
     metres = metres_of(checked_mechanism(mechanism).length_unit)

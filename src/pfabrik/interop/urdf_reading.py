@@ -87,7 +87,7 @@ def from_urdf(
         PyYAML is not installed, and `loops` is a file.
     InvalidMechanism
         No URDF, or one that cannot be closed, with every fault that was found; else as in `from_mjcf`.
-    UnknownName, NoEndEffector
+    UnknownName or NoEndEffector
         As in `from_mjcf`.
     """
     notes: list[Note] = []

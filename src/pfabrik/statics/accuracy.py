@@ -112,7 +112,7 @@ def accuracy(
 
     Raises
     ------
-    InvalidArgument, UnknownName
+    InvalidArgument or UnknownName
         Errors that are not positive, or of a joint without a centre; names not known.
     UnsupportedMechanism
         Play in joints of a machine with redundant actuators.

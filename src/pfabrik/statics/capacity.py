@@ -223,7 +223,7 @@ def wrench_capacity(
 
     Raises
     ------
-    InvalidArgument, UnknownName
+    InvalidArgument or UnknownName
         Limits that are none, of no actuator, or missing; wrenches as in `forces`.
     UnsupportedMechanism
         So many redundant actuators that their polytope has more than 20,000 pairs of facets.

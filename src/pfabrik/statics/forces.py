@@ -202,7 +202,7 @@ def forces(
 
     Raises
     ------
-    InvalidArgument, UnknownName
+    InvalidArgument or UnknownName
         A wrong shape, numbers that are not finite, no such body.
     """
     mechanism = checked_solution(solution).mechanism

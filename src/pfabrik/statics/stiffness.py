@@ -80,7 +80,7 @@ def stiffness(
 
     Raises
     ------
-    InvalidArgument, UnknownName
+    InvalidArgument or UnknownName
         Stiffness that is not positive, names that are not known, cables without forces.
     UnsupportedMechanism
         Rods that stretch in a machine with redundant actuators.
