@@ -71,7 +71,7 @@ def page_of(program: Path) -> Page:
     title, _, introduction = (ast.get_docstring(ast.parse(source)) or "").partition("\n")
     name = program.stem
     parts = [f"# {title.rstrip('.')}", introduction.strip()]
-    namespace: dict[str, object] = {"__name__": "__main__", "__file__": str(program)}
+    namespace: dict[str, object] = {"__name__": "__main__"}  # no file: what a reader pastes has none
     pictures: dict[str, bytes] = {}
     with _empty_folder() as folder:
         for piece in pieces_of(source):

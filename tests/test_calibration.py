@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -12,12 +13,13 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from pfabrik.calibration.printer_settings import KlipperDelta
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
 from pfabrik.files import loads
 from pfabrik.model import model_of
 from pfabrik.rotations import to_rotvec
 
-PRINTER = Path(__file__).parents[1] / "examples" / "data" / "printer.cfg"
+PROGRAM = Path(__file__).parents[1] / "examples" / "tasks" / "calibrate_printer.py"
 
 FIRMWARE = {
     "delta_radius": 162.76928,
@@ -31,6 +33,14 @@ FIRMWARE = {
     "arm_length_c": 346.713602,
 }
 """What the firmware of that printer identified: github.com/phnxdrgn536/FLSun-v400 @e0368ae (CC0-1.0)."""
+
+
+@pytest.fixture
+def printer(tmp_path: Path) -> KlipperDelta:
+    """The printer of the page on calibration, whose settings are in the program of that page."""
+    (settings,) = re.findall(r'"printer\.cfg"\)\.write_text\("""\\\n(.*?)"""\)', PROGRAM.read_text("utf-8"), re.DOTALL)
+    (tmp_path / "printer.cfg").write_text(settings, encoding="utf-8")
+    return pf.read_klipper(tmp_path / "printer.cfg")
 
 
 def off_home(mechanism: pf.Mechanism, seed: int) -> pf.Solution:
@@ -111,7 +121,7 @@ def test_pose_and_actuators_change_as_those_of_machines_with_other_values(make: 
         np.testing.assert_allclose(found.pose[:3, k], (moved[0] - moved[1]) / 2e-4, atol=1e-6)
 
 
-def test_parameters_change_what_they_name() -> None:
+def test_parameters_change_what_they_name(printer: KlipperDelta) -> None:
     delta = pf.load("linear_delta")
     own = pf.parameters(delta, ["lengths", "offsets", "BL1"])
     assert own.names[:4] == ("A1.rod", "A2.rod", "A3.rod", "A1.offset")
@@ -122,8 +132,8 @@ def test_parameters_change_what_they_name() -> None:
     low = pf.solve_ik(delta, [0.0, 0.0, -5.0]).actuators
     zeroed = pf.parameters(delta, "offsets").apply([0.5, 0.0, -0.25])
     np.testing.assert_allclose(pf.solve_ik(zeroed, [0.0, 0.0, -5.0]).actuators, low + [0.5, 0.0, -0.25], atol=1e-9)
-    printer = pf.parameters(pf.read_klipper(PRINTER).mechanism, ["delta_radius", "arm_length_a"])
-    assert printer.apply([164.0, 345.0]).dimensions["delta_radius"] == 164.0
+    of_printer = pf.parameters(printer.mechanism, ["delta_radius", "arm_length_a"])
+    assert of_printer.apply([164.0, 345.0]).dimensions["delta_radius"] == 164.0
     tied = pf.parameters(pf.load("stewart"), ["points", "offsets"], ties="copies")  # copies vary as one
     assert len(tied) == 14
     changed = tied.apply(tied.values + 0.3)
@@ -164,8 +174,7 @@ def test_without_tilt_a_hexapod_shows_what_it_leaves_open() -> None:
     assert abs(x["CL1.x"] - x["AL1.x"]) < 1e-9
 
 
-def test_a_printer_gets_the_values_of_its_firmware_and_shows_them() -> None:
-    printer = pf.read_klipper(PRINTER)
+def test_a_printer_gets_the_values_of_its_firmware_and_shows_them(printer: KlipperDelta) -> None:
     found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
     assert dict(zip(found.names, found.values, strict=True)) == pytest.approx(FIRMWARE, abs=1e-3)
     assert found.determined.all() and found.rms < found.rms_before
@@ -174,8 +183,7 @@ def test_a_printer_gets_the_values_of_its_firmware_and_shows_them() -> None:
     assert len(pf.plot_calibration(found).axes) == 2
 
 
-def test_heights_alone_leave_the_arms_open() -> None:
-    printer = pf.read_klipper(PRINTER)
+def test_heights_alone_leave_the_arms_open(printer: KlipperDelta) -> None:
     heights = printer.measurements.without(range(7, printer.measurements.rows))
     few = pf.calibrate(printer.mechanism, heights, free=printer.free)
     assert few.rank == 7 and not few.determined.any() and "arm_length_c change together" in few.undetermined[0]
