@@ -15,7 +15,7 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
-from pfabrik.description.sketch import HEIGHT, WIDTH, sketch
+from pfabrik.description.sketch import HEIGHT, HELD, WIDTH, sketch
 
 MARKED = pf.Options(on_invalid="mark")
 FIVE_BAR = pf.load("five_bar")
@@ -115,6 +115,16 @@ def test_an_answer_is_drawn_where_its_points_are_and_up_is_up(
 
     before, after = heights(at_home), heights(sketch(mechanism, lifted, reference + lift))
     assert all(low < high for low, high in zip(before, after, strict=True))
+
+
+def test_only_joints_at_a_limit_are_orange() -> None:
+    """As in pictures and in the viewer; at home none is, and out of reach those that the answer names."""
+    stewart = pf.load("stewart")
+    held = pf.solve_ik(stewart, [10, 0, 285])
+    for shown, names in ((stewart, set()), (held, {limit.joint for limit in held.active_limits})):
+        marked = [each for each in drawing(shown._repr_html_()).iter() if each.get("fill") == HELD]
+        assert {(each.findtext(f"{SVG}title") or "").rstrip("*") for each in marked} == names
+    assert 0 < len(held.active_limits) < 6
 
 
 def test_what_has_no_single_configuration_is_shown_without_a_drawing() -> None:

@@ -252,7 +252,8 @@ def answer_table(answer: Answer, counts: dict[str, int]) -> ResultTable:
     if not np.isfinite(answer.pose).all():
         return ResultTable(name, [str(answer.status).lower()])
     header, *rows = zip(*_actuators(answer), strict=True)
-    drawing = sketch(answer.mechanism, answer.points, answer.pose[:3, 3])
+    held = {limit.joint for limit in answer._limits[0]}
+    drawing = sketch(answer.mechanism, answer.points, answer.pose[:3, 3], held)
     return ResultTable(name, [as_sentence(answer), "", *_pose(answer)], header, rows, drawing=drawing)
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BEFORE, AFTER, OPEN = "#b0b0b0", "#0b5fa5", "#c44e00"
+BEFORE, AFTER = "#b0b0b0", "#0b5fa5"
 MOST_NAMED = 45
 """Parameters whose names are written; more would not be legible."""
 
@@ -23,7 +23,7 @@ def plot_calibration(calibration: Calibration) -> Figure:
     """Residuals of every measurement before and after, and changes of the parameters with their deviations.
 
     Changes are in the scale of each parameter (L, 1 rad, or the size of a dimension), so that they fit one axis; those
-    that the data leave open are marked.
+    that the data leave open have hollow markers.
 
     Parameters
     ----------
@@ -62,15 +62,24 @@ def _changes(ax: Axes, calibration: Calibration) -> None:
     changes = (calibration.values - own.values) / own.scales
     spread = np.where(np.isfinite(calibration.deviations), calibration.deviations / own.scales, 0.0)
     places = np.arange(len(own))
-    colors = np.where(calibration.determined, AFTER, OPEN)
-    for place, change, width, color in zip(places, changes, spread, colors, strict=True):
-        ax.errorbar(change, place, xerr=width, fmt="o", color=color, markersize=3.0, elinewidth=0.8, capsize=1.5)
+    for place, change, width, determined in zip(places, changes, spread, calibration.determined, strict=True):
+        face = AFTER if determined else "white"
+        ax.errorbar(
+            change,
+            place,
+            xerr=width,
+            fmt="o",
+            color=AFTER,
+            markerfacecolor=face,
+            markersize=3.0,
+            elinewidth=0.8,
+            capsize=1.5,
+        )
     ax.locator_params(axis="x", nbins=4)
     ax.axvline(0.0, color=BEFORE, linewidth=0.8)
     if len(own) <= MOST_NAMED:
         ax.set_yticks(places, own.names, fontsize=SMALL - 1.0)
     ax.invert_yaxis()
-    ax.set_xlabel(
-        "change, share of its scale" + (" (orange: not determined)" if OPEN in colors else ""), fontsize=SMALL
-    )
+    hollow = "" if calibration.determined.all() else " (hollow: not determined)"
+    ax.set_xlabel(f"change, share of its scale{hollow}", fontsize=SMALL)
     ax.tick_params(axis="x", labelsize=SMALL)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from html import escape
 
 import numpy as np
@@ -66,17 +66,30 @@ RADIUS, HALF_SIDE = 3.5, 5.0
 VIEWER = np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)
 """Where a machine in space, or a plane, is seen from: x to the right, y to the back, z up, all at one scale."""
 
-BASE, END_EFFECTOR, LINK, ACTUATED, PASSIVE = "#9a9a9a", "#0072b2", "#6a6a6a", "#d55e00", "#ffffff"
+BASE, END_EFFECTOR, LINK, ACTUATED, PASSIVE = "#9a9a9a", "#0072b2", "#6a6a6a", "#1a1a1a", "#ffffff"
+HELD = "#d55e00"
+"""Colour of a joint that is at a limit, in every picture, and of nothing else here."""
 
 
-def sketch(mechanism: Structure, points: Mapping[str, Floats] | None = None, reference: Floats | None = None) -> str:
+def sketch(
+    mechanism: Structure,
+    points: Mapping[str, Floats] | None = None,
+    reference: Floats | None = None,
+    held: Collection[str] = (),
+) -> str:
     """An SVG element: bodies as lines and faces between their joints, joints as circles, actuated ones filled.
 
-    Squares are prismatic joints, and a cross marks the reference point. Each marker has its joint's name as title.
+    Squares are prismatic joints, and a cross marks the reference point. Joints at a limit are orange. Each marker has
+    its joint's name as title.
 
     Parameters
     ----------
-    points, reference : joint centres and reference point of an answer [length]; by default those at home.
+    points : mapping of str to array (3,), optional
+        Joint centres of an answer [length]; default those at home.
+    reference : array (3,), optional
+        Reference point of an answer [length]; default that at home.
+    held : collection of str, optional
+        Names of the joints that are at a limit.
     """
     home = mechanism.home_pose[:3, 3]
     centre = home if reference is None else reference
@@ -95,8 +108,8 @@ def sketch(mechanism: Structure, points: Mapping[str, Floats] | None = None, ref
         f"<title>{escape(mechanism.name)}</title>",
         *(_body(mechanism, body, spots, drawn[-1]) for body in mechanism.bodies),
         f'<path d="M{x - 5:.1f} {y:.1f}h10M{x:.1f} {y - 5:.1f}v10" stroke="{END_EFFECTOR}"/>',
-        *(_square(joint, *spots[joint.name]) for joint in slides),
-        *(_circle(joint, *spots[joint.name]) for joint in others),
+        *(_square(_style(joint, held), *spots[joint.name]) for joint in slides),
+        *(_circle(_style(joint, held), *spots[joint.name]) for joint in others),
         "</svg>",
     ]
     return "".join(parts)
@@ -131,16 +144,16 @@ def _body(mechanism: Structure, body: str, spots: Places, reference: Floats) -> 
     return f'<polygon points="{listed}" {face} {outline}/>{tool}'
 
 
-def _square(joint: Joint, x: float, y: float) -> str:
+def _square(style: str, x: float, y: float) -> str:
     corner, side = f'x="{x - HALF_SIDE:.1f}" y="{y - HALF_SIDE:.1f}"', 2.0 * HALF_SIDE
-    return f'<rect {corner} width="{side:g}" height="{side:g}" {_style(joint)}</rect>'
+    return f'<rect {corner} width="{side:g}" height="{side:g}" {style}</rect>'
 
 
-def _circle(joint: Joint, x: float, y: float) -> str:
-    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS:g}" {_style(joint)}</circle>'
+def _circle(style: str, x: float, y: float) -> str:
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS:g}" {style}</circle>'
 
 
-def _style(joint: Joint) -> str:
+def _style(joint: Joint, held: Collection[str]) -> str:
     """The rest of a marker: its colours, and as its title the name, with ``*`` where it is actuated."""
-    colour = ACTUATED if joint.actuated else PASSIVE
+    colour = HELD if joint.name in held else ACTUATED if joint.actuated else PASSIVE
     return f'fill="{colour}" stroke="#1a1a1a"><title>{escape(joint.name)}{"*" * bool(joint.actuated)}</title>'
