@@ -1,7 +1,8 @@
 # Needs make and Python >= 3.11; everything else is installed into .venv, inside this folder.
 PYTHON ?= python3
 BIN := .venv/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Without a word of what the wheel of a robot, which tests read without running it, would need to run.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-warn-conflicts
 # What a run of the machines needs, and with it what tests and checks need.
 READY := .venv/.ready
 STAMP := .venv/.installed
