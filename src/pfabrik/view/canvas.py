@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ from ..drawing import (
     require_spatial,
     viewpoint,
 )
+from .eye import Eye
+from .looks import Look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -248,3 +251,48 @@ def _ticks(low: float, high: float, most: int) -> list[float]:
         if within:
             return within if number == most else within[len(within) // 2 :][:1]
     return []
+
+
+TRIAD, LETTER_OFF, ON_EDGE = 17.0, 7.0, 0.12
+"""Length of the arrows of a triad and distance of its letters from their tips [points]; share of its length below which
+an axis is seen on its edge, and is left out."""
+
+BAR, BAR_WIDTH, BAR_OFF = 0.28, 1.6, 3.0
+"""Longest scale bar, as a share of what it is a scale of; its width, and the distance of its words [points]."""
+
+SMALL_BAR, SMALLER = 0.1, {"m": ("mm", 1000.0)}
+"""Length below which a bar speaks of a smaller unit, and this unit, with how many of it are one of the other."""
+
+
+def draw_triad(axes: Any, eye: Eye, look: Look, at: Floats, names: Sequence[str] = "xyz") -> None:
+    """Draw the directions of the coordinates as arrows from a place (2,) of the axes, of one length in space."""
+    corner: dict[str, Any] = {"xy": at, "textcoords": "offset points", "annotation_clip": False}
+    arrow = {"arrowstyle": "<-", "color": look.soft, "linewidth": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
+    letters: dict[str, Any] = {"color": look.soft, "fontsize": SMALL, "ha": "center", "va": "center"}
+    for tip, name in zip(eye.seen(np.eye(3))[:, :2], names, strict=True):
+        length = float(np.linalg.norm(tip))
+        if length > ON_EDGE:
+            axes.annotate("", xytext=TRIAD * tip, arrowprops=arrow, **corner)
+            axes.annotate(name, xytext=(TRIAD + LETTER_OFF / length) * tip, **letters, **corner)
+
+
+def draw_scale_bar(axes: Any, look: Look, at: Floats, span: float, unit: str) -> None:
+    """Draw a bar of 1, 2 or 5 times a power of ten [length] that ends at a place (2,) of the axes.
+
+    Parameters
+    ----------
+    span : extent of what is drawn; the bar is at most a little more than a quarter of it [length].
+    """
+    length = round_length(BAR * span)
+    named, many = SMALLER[unit] if unit in SMALLER and length < SMALL_BAR else (unit, 1.0)
+    places = np.array([at - [length, 0.0], at])
+    axes.plot(*places.T, color=look.ink, linewidth=BAR_WIDTH, solid_capstyle="butt", clip_on=False)
+    words: dict[str, Any] = {"color": look.ink, "fontsize": SMALL, "ha": "center", "va": "top"}
+    below: dict[str, Any] = {"xytext": (0.0, -BAR_OFF), "textcoords": "offset points", "annotation_clip": False}
+    axes.annotate(f"{length * many:g} {named}", places.mean(axis=0), **below, **words)
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above `most`."""
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(max(step for step in (1.0, 2.0, 5.0) if step * power <= most) * power)

@@ -18,7 +18,7 @@ from ..errors import InvalidArgument, counted
 from ..kinematics import Readout, plane_of, readouts
 from ..skeleton import skeleton_of
 from .canvas import Canvas, canvas_on, new_axes
-from .looks import ACHIEVED, ASKED, HELD, LINE_COLOURS, SHADE
+from .looks import ACHIEVED, ASKED, HELD, LOOKS, SHADE
 from .machine import draw_machine, key_of
 
 if TYPE_CHECKING:
@@ -206,8 +206,8 @@ def draw_margins(axes: Axes, track: Track) -> None:
 
 def line_style(place: int) -> dict[str, Any]:
     """Colour and dashes of the line at a place: 18 that differ, neighbours in both."""
-    colour = LINE_COLOURS[place % len(LINE_COLOURS)]
-    return {"color": colour, "linestyle": DASHES[(place + place // len(LINE_COLOURS)) % len(DASHES)]}
+    colour = LOOKS["light"].lines[place % len(LOOKS["light"].lines)]
+    return {"color": colour, "linestyle": DASHES[(place + place // len(LOOKS["light"].lines)) % len(DASHES)]}
 
 
 def shade_steps(axes: Axes, marked: Mask) -> None:
