@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import os
 import shutil
+from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
@@ -19,7 +20,6 @@ import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
 from pfabrik.common_centre import common_centre
 from pfabrik.description.sketch import joint_places, joints_on, slider_place
-from pfabrik.drawing import viewpoint
 from pfabrik.drawn_parts import home_rail, order_around
 from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName
 from pfabrik.skeleton import skeleton_of
@@ -31,7 +31,9 @@ from matplotlib.text import Text
 from PIL import Image
 
 from pfabrik.description.plane import plane_of
-from pfabrik.view.looks import HELD
+from pfabrik.view.crossings import far_to_near
+from pfabrik.view.eye import Eye, eye_for, eye_of, eye_on
+from pfabrik.view.looks import HELD, LOOKS
 from pfabrik.view.save_picture import save_picture
 
 TRIPOD, FIVE_BAR = tripod_rps(), pf.load("five_bar")
@@ -158,18 +160,87 @@ def test_planar_is_what_cannot_leave_its_plane() -> None:
 @pytest.mark.parametrize("make", [tripod_rps, lambda: gantry(0, 1, 2), lambda: pf.load("nrpm")])
 def test_home_can_be_drawn_on_axes_of_ones_own(make: Callable[[], pf.Mechanism]) -> None:
     mechanism = make()
-    axes = Figure(figsize=(3, 3)).add_subplot(projection="3d")
+    axes = Figure(figsize=(3, 3)).add_subplot()
     assert pf.plot(mechanism, axes) is axes
-    markers = [each for each in axes.collections if hasattr(each, "get_offsets") and len(each.get_sizes())]
-    assert sum(len(each.get_offsets()) for each in markers) == len(mechanism.joints)
+    markers = [line for line in axes.lines if line.get_marker() not in ("None", "+")]
+    assert len(markers) == len(mechanism.joints)
 
 
-def test_a_planar_machine_is_drawn_in_its_plane_and_others_in_space() -> None:
-    flat, deep = pf.plot(FIVE_BAR), pf.plot(tripod_rps())
+def test_a_planar_machine_has_numbers_and_one_in_space_a_scale_of_its_length() -> None:
+    flat = pf.plot(FIVE_BAR)
     assert (flat.get_xlabel(), flat.get_ylabel(), flat.get_aspect()) == ("y [mm]", "z [mm]", 1.0)
-    assert (deep.get_xlabel(), deep.get_zlabel()) == ("x [mm]", "z [mm]")
-    spans = np.array([np.ptp(getattr(deep, f"get_{name}lim")()) for name in "xyz"])
-    assert np.ptp(deep._box_aspect / spans) == pytest.approx(0, abs=1e-12)
+    for shown, size in ((tripod_rps(), (4.0, 3.0)), (pf.load("g1_ankle"), (2.0, 5.0)), (pf.load("delta"), None)):
+        axes = pf.plot(shown, view="front", size=size)
+        assert axes.get_aspect() == 1.0
+        words = [text.get_text() for text in axes.texts if text.get_text() not in ("", "x", "y", "z")]
+        (bar,) = (line for line in axes.lines if line.get_solid_capstyle() == "butt")
+        length = np.ptp(bar.get_xdata())
+        assert words == [f"{1000 * length:g} mm" if shown.length_unit == "m" else f"{length:g} {shown.length_unit}"]
+        assert f"{length:.0e}"[0] in "125"
+        points = skeleton_of(shown).points
+        span = np.ptp(points[:, [0, 2]], axis=0).max()
+        assert 0.1 * span < length <= 0.28 * span
+        box = axes.viewLim
+        assert (box.min < points[:, [0, 2]].min(axis=0)).all()
+        assert (box.max > points[:, [0, 2]].max(axis=0)).all()
+
+
+def test_a_figure_has_the_shape_of_its_machine_unless_it_is_given_a_size() -> None:
+    tall, wide = (pf.plot(pf.load(name)).figure.get_size_inches() for name in ("g1_ankle", "delta"))
+    assert tall[1] > 1.5 * tall[0]
+    assert wide[0] > 1.2 * wide[1]
+    for machine in (TRIPOD, FIVE_BAR):
+        assert pf.plot(machine, size=(3.5, 2.5)).figure.get_size_inches() == pytest.approx([3.5, 2.5])
+
+
+def test_a_dark_picture_is_drawn_in_the_colours_of_its_ground() -> None:
+    for machine in (TRIPOD, FIVE_BAR):
+        axes = pf.plot(machine, theme="dark", names=True)
+        assert to_hex(axes.figure.get_facecolor()) == LOOKS["dark"].paper
+        texts = [*axes.texts, axes.title, *axes.get_legend().get_texts()]
+        colours = {to_hex(text.get_color()) for text in texts if text.get_text()}
+        assert colours <= {LOOKS["dark"].ink, LOOKS["dark"].soft}
+
+
+@pytest.mark.parametrize(
+    ("view", "right", "up"),
+    [("top", [1, 0, 0], [0, 1, 0]), ("front", [1, 0, 0], [0, 0, 1]), ("side", [0, 1, 0], [0, 0, 1])],
+)
+def test_views_are_those_of_drawings(view: Any, right: list[float], up: list[float]) -> None:
+    assert eye_of(view).axes == pytest.approx(np.array([right, up, np.cross(right, up)]))
+    plane = np.array([right, up], float)
+    assert eye_on(plane).axes[:2] == pytest.approx(plane)
+
+
+def test_an_eye_sees_three_equal_directions_and_turns_with_the_order_of_its_axes() -> None:
+    lengths = np.linalg.norm(eye_of("iso").axes[:2], axis=0)
+    assert lengths == pytest.approx(lengths[0])
+    for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        axes = Eye(20.0, 30.0, order).axes  # type: ignore[arg-type]
+        assert axes @ axes.T == pytest.approx(np.eye(3))
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        assert axes[0, order[2]] == pytest.approx(0.0)  # upright
+
+
+def test_what_is_nearer_crosses_over_what_is_farther() -> None:
+    rng = np.random.default_rng(3)
+    lines = [np.column_stack([rng.uniform(-1, 1, (2, 2)), [depth, depth]]) for depth in rng.permutation(30) / 30.0]
+    order = far_to_near(lines, [False] * 30)
+    assert sorted(order) == list(range(30))
+    place = np.argsort(order)
+    for a, b in itertools.combinations(range(30), 2):
+        across = np.linalg.solve(
+            np.column_stack([lines[a][1] - lines[a][0], lines[b][0] - lines[b][1]])[:2], (lines[b][0] - lines[a][0])[:2]
+        )
+        if (np.abs(across - 0.5) < 0.48).all():
+            assert (place[a] < place[b]) == (lines[a][0, 2] < lines[b][0, 2])
+
+
+def test_a_line_is_before_or_behind_a_plate_by_its_plane_and_not_by_its_middle() -> None:
+    corners = np.array([[-1, -1, -3], [1, -1, 3], [1, 1, 3], [-1, 1, -3], [-1, -1, -3]], float)  # it leans
+    behind, before = (np.array([[x, -0.5, depth], [x, 0.5, depth]]) for x, depth in ((0.9, 1.0), (-0.9, -1.0)))
+    order = far_to_near([behind, corners, before], [False, True, False])
+    assert order == [0, 1, 2]
 
 
 def test_limits_that_hold_an_answer_back_are_named_in_their_own_colour() -> None:
@@ -184,9 +255,9 @@ def test_limits_that_hold_an_answer_back_are_named_in_their_own_colour() -> None
 
 @pytest.mark.parametrize("name", ["five_bar", "canfield"])
 def test_all_joints_are_named_where_that_is_asked_for(name: str) -> None:
-    axes = pf.plot(pf.load(name), names=True)
-    assert sorted(text.get_text() for text in axes.texts) == sorted(joint.name for joint in pf.load(name).joints)
-    assert not pf.plot(pf.load(name), names=False).texts
+    bare, named = (pf.plot(pf.load(name), names=names) for names in (False, True))
+    added = Counter(text.get_text() for text in named.texts) - Counter(text.get_text() for text in bare.texts)
+    assert added == Counter(joint.name for joint in pf.load(name).joints)
 
 
 def machine(name: str) -> Any:
@@ -267,46 +338,42 @@ def test_a_pair_of_hinges_that_cross_is_no_spherical_linkage_unless_it_carries_t
     assert common_centre(pf.Mechanism("arm", moved, "tip", (20, 0, 0))) is None
 
 
-def test_a_flat_machine_is_looked_at_from_above_and_a_thin_one_from_the_side() -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    flat = np.column_stack([np.cos(angle), np.sin(angle), 0.05 * np.cos(3.0 * angle)])
-    assert viewpoint(flat)[0] > 40.0
-    upright = flat[:, [0, 2, 1]]  # thin along y
-    across = np.array([0.0, 1.0, 0.0])
-    up, turn = np.radians(viewpoint(upright))
-    eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
-    usual = np.radians([22.0, -58.0])
-    before = np.cos(usual[0]) * np.sin(usual[1])
-    assert abs(eye @ across) >= abs(before)
-    assert viewpoint(1e3 * flat + [5.0, 6.0, 7.0]) == viewpoint(flat)
-    assert viewpoint(np.zeros((4, 3))) == (22.0, -58.0)
+def test_a_machine_is_seen_where_its_joints_are_apart_whatever_its_size_and_never_along_an_axis() -> None:
+    for name in ("delta", "stewart", "orthoglide"):
+        home = skeleton_of(pf.load(name))
+        points = np.array([mark.place for mark in home.marks])
+        eye = eye_for(points, home.lines)
+        assert eye_for(1e3 * points + [5.0, 6.0, 7.0], 1e3 * home.lines + [5.0, 6.0, 7.0]) == eye
+        assert np.linalg.norm(eye.axes[:2], axis=0).min() > 0.2
+    none = np.zeros((0, 2, 3))
+    thin = np.column_stack([np.zeros(9), np.arange(9.0), np.arange(9.0) ** 2 / 9.0])
+    assert np.linalg.norm(eye_for(thin, none).axes[:2, 1]) > 0.7  # not along its length
+    assert eye_for(np.zeros((4, 3)), none).elevation == 22.0
 
 
 def test_lines_are_thinner_where_joints_are_close_and_in_small_axes() -> None:
     def width(machine: pf.Mechanism, size: float) -> float:
-        axes = pf.plot(machine, Figure(figsize=(size, size)).add_subplot(projection="3d"))
-        return max(line.get_linewidth() for line in axes.lines)
+        axes = pf.plot(machine, Figure(figsize=(size, size)).add_subplot())
+        return max(line.get_linewidth() for line in axes.lines if line.get_path_effects())
 
     stewart, snake = pf.load("stewart"), pf.load("snake60")
-    assert width(stewart, 2.0) < width(stewart, 5.0)
+    assert width(stewart, 1.5) < width(stewart, 5.0)
     assert width(snake, 5.0) < width(stewart, 5.0)
 
 
-def test_an_axis_that_is_short_has_few_numbers_but_one() -> None:
-    axes = pf.plot(pf.load("delta"))
-    axes.figure.canvas.draw()
-    numbers = [len([tick for tick in axis.get_ticklabels() if tick.get_text()]) for axis in (axes.xaxis, axes.zaxis)]
-    assert 1 <= numbers[1] < numbers[0]
-
-
 BATCH = pf.solve_ik(TRIPOD, [[0, 0, 200], [np.nan] * 3], options=pf.Options(on_invalid="mark"))
-FLAT_AXES = Figure().add_subplot()
+SPATIAL_AXES = Figure().add_subplot(projection="3d")
 SHORT = pf.track(FIVE_BAR, FIVE_BAR.home_pose[None])
 WRONG: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: pf.plot(BATCH), InvalidArgument, "batch of shape"),
     (lambda: pf.plot(BATCH[1]), InvalidArgument, "INVALID"),
     (lambda: pf.plot("stewart"), InvalidArgument, "str"),  # type: ignore[arg-type]
-    (lambda: pf.plot(TRIPOD, FLAT_AXES), InvalidArgument, "two-dimensional axes"),
+    (lambda: pf.plot(TRIPOD, SPATIAL_AXES), InvalidArgument, "found three-dimensional axes; expected two-dimensional"),
+    (lambda: pf.plot(TRIPOD, view="below"), InvalidArgument, "expected 'top', 'front', 'side', 'iso', or "),  # type: ignore[arg-type]
+    (lambda: pf.plot(TRIPOD, view=(91.0, 0.0)), InvalidArgument, "elevation from -90 to 90"),
+    (lambda: pf.plot(TRIPOD, size=(3.0, -1.0)), InvalidArgument, "size: .* positive number"),
+    (lambda: pf.plot(TRIPOD, size=3.0), InvalidArgument, "width and height in inches"),  # type: ignore[arg-type]
+    (lambda: pf.plot(TRIPOD, theme="blue"), InvalidArgument, "'light' or 'dark'"),  # type: ignore[arg-type]
     (lambda: pf.plot(TRIPOD, names=["AA1"]), UnknownName, "did you mean 'A1'"),
     (lambda: pf.plot_travel(pf.Travel(BATCH[0], ())), InvalidArgument, "no direction"),
     (lambda: pf.plot_track(BATCH), InvalidArgument, "expected a Track"),  # type: ignore[arg-type]

@@ -190,11 +190,19 @@ def _ball(mechanism: Mechanism, joint: Joint) -> Part:
 
 def _is_plate(mechanism: Mechanism, role: Role, points: list[Floats]) -> bool:
     """True if points are apart from each other in a plane, which of a base is level, and above which nothing hangs."""
-    _, sizes, axes = np.linalg.svd(np.array(points) - middle(points))
-    size = size_of(mechanism)
-    if len(points) < 3 or sizes[1] <= FLAT * size or (len(points) > 3 and sizes[2] > FLAT * size):
+    if not is_flat(mechanism, points):
         return False
-    return role == "platform" or (not hangs(mechanism) and bool(abs(axes[2][2]) > ACROSS))
+    upright = np.linalg.svd(np.array(points) - middle(points))[2][2][2]
+    return role == "platform" or (not hangs(mechanism) and bool(abs(upright) > ACROSS))
+
+
+def is_flat(mechanism: Mechanism, points: list[Floats]) -> bool:
+    """True if points are the corners of a plate: three or more, in a plane, and not on one line."""
+    if len(points) < 3:
+        return False
+    sizes = np.linalg.svd(np.array(points) - middle(points), compute_uv=False)
+    size = size_of(mechanism)
+    return bool(sizes[1] > FLAT * size and (len(points) == 3 or sizes[2] <= FLAT * size))
 
 
 def order_around(points: list[Floats]) -> list[int]:

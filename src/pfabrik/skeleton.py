@@ -12,8 +12,8 @@ from .checks import require_type
 from .clearance.solid_meshes import SolidMesh, solids_of
 from .common_centre import arc, common_centre
 from .description.mechanism import Joint, Mechanism
-from .description.sketch import Places, joint_places, middle
-from .drawn_parts import Part, Place, home_rail, parts_of
+from .description.sketch import Places, joint_places, joints_on, middle
+from .drawn_parts import Part, Place, home_rail, is_flat, order_around, parts_of
 from .errors import InvalidArgument
 
 ARC_STEPS = 12
@@ -53,6 +53,8 @@ class Skeleton:
     Attributes
     ----------
     rails : both ends of the travel of every prismatic joint on the base, (k, 2, 3) [length].
+    ground : corners (k, 3) [length] of the base, in order around it; none where fewer than three joints that have no
+        rail are on it, or these are not in a plane.
     solids : the shapes of bodies that have one.
     """
 
@@ -61,6 +63,7 @@ class Skeleton:
     marks: tuple[Mark, ...]
     rails: Floats
     reference: Floats
+    ground: Floats
     solids: tuple[SolidMesh, ...] = ()
 
     @property
@@ -105,8 +108,16 @@ def skeleton_of(shown: Mechanism | Solution) -> Skeleton:
         tuple(Mark(joint, places[joint.name], tuple(held.get(joint.name, ()))) for joint in mechanism.joints),
         np.reshape(rails, (-1, 2, 3)),
         np.array(reference),
+        _ground(mechanism, places),
         solids_of(mechanism, solution) if mechanism.shapes else (),
     )
+
+
+def _ground(mechanism: Mechanism, places: Places) -> Floats:
+    """The corners of the base that is drawn as the ground; none where it has no plane."""
+    on_base = [mechanism.joint(name) for name in joints_on(mechanism, mechanism.base)]
+    corners = [places[joint.name] for joint in on_base if home_rail(mechanism, joint) is None]
+    return np.array([corners[k] for k in order_around(corners)] if is_flat(mechanism, corners) else []).reshape(-1, 3)
 
 
 def checked_shown(shown: object) -> tuple[Mechanism, Solution | None]:

@@ -17,13 +17,13 @@ from ..checks import require_ending, require_positive
 from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
-from ..kinematics import plane_of
 from ..skeleton import Skeleton, skeleton_of
 from ..telling import OnProgress, telling
 from ..whole_files import whole_path
-from .canvas import canvas_on, new_axes
-from .looks import ACHIEVED, ASKED, HELD
-from .machine import draw_key, draw_machine
+from .canvas import canvas_on, checked_size
+from .eye import View
+from .looks import HELD, Look, Theme, look_of
+from .machine import draw_machine, key_of, machine_eye
 from .plot_track import checked_track, places_along
 from .save_picture import FILMS
 
@@ -33,12 +33,18 @@ if TYPE_CHECKING:
 FRAMES_A_SECOND = 20
 MOST_FRAMES = 10_000
 
+SIZE, CAPTION, DPI = (6.0, 5.4), 0.45, 100
+"""Width and height of a film, the height of what is written above it [inches], and pixels an inch."""
+
 
 def animate(
     track: Track,
     path: str | os.PathLike[str],
     *,
     seconds: float | None = None,
+    view: View | None = None,
+    size: tuple[float, float] | None = None,
+    theme: Theme = "light",
     on_progress: OnProgress | None = None,
 ) -> None:
     """Write a film of a path that was followed: the machine, its targets, and the limits that block them.
@@ -51,12 +57,14 @@ def animate(
     path : of the film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
     seconds : how long it runs; default: as long as the path takes if the track has a `sample_time`, else a
         twentieth of a second a step. There are 20 frames a second, each the step that is due.
+    view, theme : as of `plot`.
+    size : width and height of the film [inches], of 100 pixels each.
     on_progress : called with (frames done, frames in all); default: a line on a terminal, if it takes more than two
         seconds.
 
     Raises
     ------
-    InvalidArgument : no Track, another ending, or no positive time.
+    InvalidArgument : no Track, another ending, no positive time, or no such view, size or theme.
     MissingLibrary : matplotlib, or for ".mp4" `ffmpeg`, is not there.
     """
     known = checked_track(track)
@@ -64,7 +72,8 @@ def animate(
     steps = _steps(track, known, seconds)
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)
-    film = _Film(track, [skeleton_of(track[int(step)]) for step in np.unique(steps)], np.unique(steps))
+    skeletons = {step: skeleton_of(track[step]) for step in np.unique(steps).tolist()}
+    film = _Film(track, skeletons, view, checked_size(size or SIZE), look_of(theme))
     with (
         telling(f"drawing {os.fspath(path)}", on_progress) as tell,
         whole_path(path) as part,
@@ -115,19 +124,25 @@ def _own_ffmpeg() -> str | None:
 class _Film:
     """One figure, whose machine is drawn anew for each frame."""
 
-    def __init__(self, track: Track, skeletons: list[Skeleton], steps: NDArray[np.intp]) -> None:
+    def __init__(
+        self, track: Track, skeletons: dict[int, Skeleton], view: View | None, size: tuple[float, float], look: Look
+    ) -> None:
         from matplotlib.figure import Figure
 
-        self._track = track
-        self._skeletons = dict(zip(steps.tolist(), skeletons, strict=True))
-        plane = plane_of(track.mechanism)
-        self.figure: Figure = Figure(figsize=(6.0, 5.4), dpi=100, layout=None if plane is None else "constrained")
-        above, below = np.ravel(self.figure.subfigures(2, 1, height_ratios=(1, 11), squeeze=False))
+        self._track, self._skeletons = track, skeletons
+        eye, is_plane = machine_eye(track.mechanism, view)
+        self.figure: Figure = Figure(figsize=size, dpi=DPI, layout="constrained", facecolor=look.paper)
+        high = size[1] - CAPTION
+        above, below = np.ravel(
+            self.figure.subfigures(2, 1, height_ratios=(CAPTION, high), squeeze=False, facecolor=look.paper)
+        )
         self._caption = above.text(0.02, 0.9, " ", fontsize=SMALL + 1.0, va="top")
-        self._canvas = canvas_on(new_axes(below, plane), plane)
-        draw_key(self._canvas, next((each for each in skeletons if each.held), skeletons[0]))
-        everything = np.vstack([places_along(track), *(skeleton.points for skeleton in skeletons)])
-        self._canvas.frame(everything, track.mechanism.length_unit)
+        self._canvas = canvas_on(below.add_subplot(), eye, look, is_plane=is_plane)
+        everything = np.vstack([places_along(track), *(skeleton.points for skeleton in skeletons.values())])
+        told = next((each for each in skeletons.values() if each.held), next(iter(skeletons.values())))
+        self._canvas.frame(everything, track.mechanism.length_unit, key_of(told, look))
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # all stays where it is, whatever a caption says
         self._artists: list[Any] = []
 
     def show(self, step: int) -> None:
@@ -135,15 +150,16 @@ class _Film:
         for artist in self._artists:
             artist.remove()
         track, canvas = self._track, self._canvas
+        look = canvas.look
         self._artists = draw_machine(canvas, self._skeletons[step])
         taken = track.pose[: step + 1, :3, 3]
         targets = track.targets[:, :3, 3]
         self._artists += [
-            canvas.line(targets, color=ASKED, linestyle="--", linewidth=1.2, zorder=20),
-            canvas.line(taken, color=ACHIEVED, linewidth=1.8, zorder=21),
-            canvas.line(targets[step][None], marker="x", color=ASKED, markersize=6, zorder=22),
+            canvas.line(targets, color=look.asked, linestyle="--", linewidth=1.2, zorder=20),
+            canvas.line(taken, color=look.achieved, linewidth=1.8, zorder=21),
+            canvas.line(targets[step], marker="x", color=look.asked, markersize=6, zorder=22),
         ]
-        colour = ACHIEVED if track.status[step] == Status.REACHED else HELD
+        colour = look.achieved if track.status[step] == Status.REACHED else HELD
         self._caption.set(text=_caption(track[step], step, len(track)), color=colour)
 
 
@@ -151,4 +167,4 @@ def _caption(solution: Solution, step: int, steps: int) -> str:
     """Which step it is, what became of it, and what holds it back."""
     held = short_names(solution._limits[0])
     status = as_sentence(solution).partition(";")[0]
-    return f"step {step + 1} of {steps}: {status}\n{held or ' '}"
+    return f"{solution.mechanism.name}, step {step + 1} of {steps}: {status}\n{held or ' '}"

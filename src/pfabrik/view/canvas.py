@@ -1,257 +1,48 @@
-"""Axes to draw points of space on: three-dimensional, or two-dimensional for a planar machine."""
+"""Axes to draw points of space on, as an eye sees them: with numbers for a plane, else with a triad and a scale bar."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import require_method
-from ..drawing import (
-    NAME_STEP,
-    SMALL,
-    axes_of,
-    hidden_names,
-    is_spatial,
-    new_figure,
-    numbers_at,
-    part_ticks,
-    require_spatial,
-    viewpoint,
-)
+from ..checks import require_method, require_positive
+from ..drawing import SMALL, new_figure, require_flat
+from ..errors import InvalidArgument
 from .eye import Eye
-from .looks import Look
+from .looks import Look, dress
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.artist import Artist
 
-MARGIN = 1.1
-"""Extent of the axes, as a multiple of the drawing's."""
+SIDE, LEAST = 4.4, 0.5
+"""Longer side of a machine in a new figure [inches], and the least of its shorter side, as a share of it."""
 
-THINNEST = 0.3
-"""The least that the axes of a flat machine in space span across it, as a share of its largest extent."""
+NUMBERS = (0.75, 0.5)
+"""Room for numbers and names of axes beside and below a plane [inches]."""
 
-TICKS, ROOM_ACROSS, ROOM_UP = 6, 24.0, 18.0
-"""Ticks of an axis at most, and the room each needs on an axis of any direction, and on an upright one [points]."""
+EDGE_FREE, STRIP_FREE = 9.0, 3.0
+"""Distance of what is drawn from the edge of its axes, and from the key above and the bar below it [points]."""
 
-OFF_CORNERS = 0.06
-"""Distance of ticks from the corners of a box, where those of two axes would meet, as a share of its side."""
+TITLE, TITLE_LINE = SMALL + 2.0, 15.0
+"""Size of the letters of a title, and the height of one of its lines [points]."""
 
-TICKS_OFF, TICKS_OFF_THIN = 2.0, 12.0
-"""Distance of the numbers at ticks beyond matplotlib's own, in a cube, and what it grows to where the box is thin."""
+LETTER = 0.56
+"""Width of a letter, as a share of its size: more than the mean, so that what is estimated fits."""
 
-ZOOMS = (1.1, 1.05, 1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
-"""Sizes of a box in space, tried until all that belongs to it is within the figure."""
-
-MOST_ADJUSTMENTS = 30
-"""Largest number of adjustments of a picture in space."""
-
-FREE_EDGE = 2.0
-"""Least distance of all that belongs to a box from the edge of the figure [points]."""
-
-LABEL_OFF = 4.0
-"""Distance of the names of axes in space from their ticks, beyond matplotlib's own [points]."""
-
-SPATIAL = (0.0, 0.0, 1.0, 0.9)
-"""Place of axes in space in a figure: left, bottom, width, height."""
-
-PANE, GRID = (1.0, 1.0, 1.0, 0.0), "#d9d9d9"
-
-
-@dataclass(frozen=True)
-class Canvas:
-    """Axes, with the map of points (n, 3) of the base frame to their coordinates.
-
-    Attributes
-    ----------
-    plane : the directions to the right and up, (2, 3), of two-dimensional axes; None for three-dimensional ones.
-    """
-
-    axes: Any
-    plane: Floats | None
-
-    def seen(self, points: Floats) -> Floats:
-        """Points (..., 3) in the coordinates of the axes, (..., 2 or 3)."""
-        return points if self.plane is None else points @ self.plane.T
-
-    def line(self, points: Floats, **style: Any) -> Any:
-        """Straight lines from point to point, (n, 3)."""
-        return self.axes.plot(*self.seen(points).T, **style)[0]
-
-    def face(self, points: Floats, **style: Any) -> Any:
-        """A filled polygon of corners (n, 3)."""
-        if self.plane is None:
-            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-            return self.axes.add_collection3d(Poly3DCollection([points], linewidth=0, **style))
-        from matplotlib.patches import Polygon
-
-        return self.axes.add_patch(Polygon(self.seen(points), linewidth=0, **style))
-
-    def solid(self, triangles: Floats, **style: Any) -> Any:
-        """A solid of triangles (n, 3, 3)."""
-        if self.plane is None:
-            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-            return self.axes.add_collection3d(Poly3DCollection(triangles, linewidth=0, **style))
-        from matplotlib.collections import PolyCollection
-
-        return self.axes.add_collection(PolyCollection(list(self.seen(triangles)), linewidth=0, **style))
-
-    def marks(self, points: Floats, **style: Any) -> Any:
-        """Markers at points (n, 3)."""
-        style |= {"depthshade": False} if self.plane is None else {}
-        return self.axes.scatter(*self.seen(points).T, **style)
-
-    def words(self, place: Floats, text: str, **style: Any) -> Any:
-        """A text at a point (3,)."""
-        from matplotlib.patheffects import withStroke
-
-        outline = withStroke(linewidth=2.0, foreground="white")
-        return self.axes.text(*self.seen(place), text, **({"fontsize": SMALL, "path_effects": [outline]} | style))
-
-    def frame(self, points: Floats, unit: str) -> None:
-        """Show all of points (n, 3), at one scale, with axes named and ticks that keep out of each other's way."""
-        seen = self.seen(points)
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        largest = float(np.max(high - low)) or 1.0
-        spans = MARGIN * np.maximum(high - low, THINNEST * largest)
-        ends = np.stack([(low + high - spans) / 2.0, (low + high + spans) / 2.0])
-        for name, limits in zip("xyz", ends.T.tolist(), strict=False):
-            self.axes.set(**{f"{name}lim": limits})
-        if self.plane is not None:
-            self.axes.set_aspect("equal")
-        else:
-            self.axes.set_box_aspect(spans)
-            self.axes.computed_zorder = False
-            elevation, azimuth = viewpoint(points)
-            self.axes.view_init(elev=elevation, azim=azimuth)
-            for place, name in enumerate("xyz"):  # matplotlib's own distance shrinks with the other two sides
-                others = float(np.delete(spans, place).mean() / spans.max())
-                self.axes.tick_params(axis=name, pad=TICKS_OFF + TICKS_OFF_THIN * (1.0 - others))
-        for place, name in enumerate("xyz"[: len(spans)]):
-            low_end, high_end = ends[:, place].tolist()
-            ticks = _ticks(low_end, high_end, self._most_ticks(place, ends))
-            self.axes.set(**{f"{name}ticks": ticks, f"{name}label": f"{self._direction(place)} [{unit}]"})
-        if self.plane is None:
-            self._fit(spans)
-            part_ticks(self.axes)
-
-    def _fit(self, spans: Floats) -> None:
-        """Move the names of axes in space off their ticks, and shrink the box until all of them are in the figure."""
-        root = self.axes.get_figure(root=True)
-        zooms = iter(ZOOMS)
-        self.axes.set_box_aspect(spans, zoom=next(zooms))
-        for _ in range(MOST_ADJUSTMENTS):
-            root.draw_without_rendering()
-            edge = self.axes.figure.bbox.padded(-FREE_EDGE * root.dpi / 72.0)
-            boxes = [text.get_window_extent() for text in self.axis_words]
-            hidden = hidden_names(self.axes)
-            for axis in hidden:
-                axis.labelpad += NAME_STEP
-            if hidden:
-                continue
-            if all(edge.x0 <= box.x0 and box.x1 <= edge.x1 and edge.y0 <= box.y0 for box in boxes):
-                return
-            self.axes.set_box_aspect(spans, zoom=next(zooms, ZOOMS[-1]))
-
-    @property
-    def axis_words(self) -> list[Any]:
-        """The names of all axes, then the numbers at their ticks, where they were drawn last."""
-        axes = axes_of(self.axes)
-        return [axis.label for axis in axes] + [text for axis in axes for _, text in numbers_at(axis)]
-
-    def on_screen(self, places: Floats) -> Floats:
-        """Points (n, 3), or points of the axes themselves, in pixels, (n, 2)."""
-        seen = self.seen(places) if places.shape[1] == 3 else places
-        if self.plane is None:
-            from mpl_toolkits.mplot3d.proj3d import proj_transform
-
-            seen = np.transpose(proj_transform(*seen.T, self.axes.get_proj()))[:, :2]
-        return np.asarray(self.axes.transData.transform(seen))
-
-    def _most_ticks(self, place: int, ends: Floats) -> int:
-        """The number of ticks that fit on an axis of the figure as it is; `ends` are its lowest and highest corner."""
-        if self.plane is None:
-            line = np.repeat(ends.mean(axis=0)[None], 2, axis=0)
-            line[:, place] = ends[:, place]
-            self.axes.apply_aspect()
-            length = np.linalg.norm(np.diff(self.on_screen(line), axis=0))
-            upright = place == 2
-        else:
-            box = self.axes.get_window_extent()
-            length, upright = (box.width, box.height)[place], place == 1
-        points = length * 72.0 / self.axes.get_figure(root=True).dpi
-        return int(np.clip(points / (ROOM_UP if upright else ROOM_ACROSS), 2, TICKS))
-
-    def _direction(self, place: int) -> str:
-        """The name of an axis: "x" if it is one of the base frame, else its direction."""
-        if self.plane is None:
-            return "xyz"[place]
-        along = self.plane[place]
-        nearest = int(np.argmax(np.abs(along)))
-        is_base_axis = np.isclose(along[nearest], 1.0)
-        return "xyz"[nearest] if is_base_axis else f"along ({', '.join(f'{part:.3g}' for part in along)})"
-
-
-def canvas_on(ax: Axes | None, plane: Floats | None) -> Canvas:
-    """A canvas on axes that are given, or on new ones; planar machines take both kinds.
-
-    Raises
-    ------
-    InvalidArgument : two-dimensional axes for a machine in space.
-    MissingLibrary : matplotlib is not installed.
-    """
-    if ax is None:
-        ax = new_axes(new_figure(5.0, 4.5, layout=None if plane is None else "constrained"), plane)
-    require_method("ax", ax, "tick_params", "matplotlib axes, or None")
-    if plane is None:
-        require_spatial(ax, "a machine that is not planar")
-    if is_spatial(ax):
-        plane = None
-        _dress(ax)
-    ax.tick_params(labelsize=SMALL)
-    for name in "xyz"[: 2 if plane is not None else 3]:
-        getattr(ax, f"{name}axis").label.set_size(SMALL + 1.0)
-    return Canvas(ax, plane)
-
-
-def _dress(axes: Any) -> None:
-    """Remove the walls of axes in space, and write their names upright."""
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.labelpad = LABEL_OFF
-        axis.set_rotate_label(False)
-        axis.label.set_rotation(90.0 if axis is axes.zaxis else 0.0)
-        axis.set_pane_color(PANE)
-        axis._axinfo["grid"] |= {"color": GRID, "linewidth": 0.6}
-
-
-def new_axes(figure: Figure | Any, plane: Floats | None) -> Axes:
-    """New axes that fill a figure but for a key above: two-dimensional ones for what is planar."""
-    if plane is not None:
-        axes: Axes = figure.add_subplot()
-        axes.spines[["top", "right"]].set_visible(False)
-        return axes
-    spatial: Axes = figure.add_axes(SPATIAL, projection="3d")  # no layout engine knows how much room its names need
-    return spatial
-
-
-def _ticks(low: float, high: float, most: int) -> list[float]:
-    """Round numbers between both ends of an axis, off its corners."""
-    from matplotlib.ticker import MaxNLocator
-
-    off = OFF_CORNERS * (high - low)
-    for number in (most, TICKS):  # an axis with room for few has one at least
-        ticks = MaxNLocator(number, steps=[1, 2, 5, 10]).tick_values(low, high)
-        within = [float(tick) for tick in ticks if low + off <= tick <= high - off]
-        if within:
-            return within if number == most else within[len(within) // 2 :][:1]
-    return []
-
+KEY: dict[str, Any] = {
+    "loc": "upper center",
+    "frameon": False,
+    "fontsize": SMALL,
+    "handletextpad": 0.4,
+    "columnspacing": 1.2,
+    "borderaxespad": 0.0,
+}
+"""Settings of a key in the upper part of axes."""
 
 TRIAD, LETTER_OFF, ON_EDGE = 17.0, 7.0, 0.12
 """Length of the arrows of a triad and distance of its letters from their tips [points]; share of its length below which
@@ -262,6 +53,200 @@ BAR, BAR_WIDTH, BAR_OFF = 0.28, 1.6, 3.0
 
 SMALL_BAR, SMALLER = 0.1, {"m": ("mm", 1000.0)}
 """Length below which a bar speaks of a smaller unit, and this unit, with how many of it are one of the other."""
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """Two-dimensional axes, with the eye that they show points (n, 3) of the base frame to, in a theme's colours.
+
+    Attributes
+    ----------
+    is_plane : True for a planar machine in its plane, which has numbers at its axes.
+    """
+
+    axes: Any
+    eye: Eye
+    look: Look
+    is_plane: bool = False
+
+    def seen(self, points: Floats) -> Floats:
+        """Points (..., 3) in the coordinates of the axes, (..., 2)."""
+        return self.eye.seen(points)[..., :2]
+
+    def line(self, points: Floats, **style: Any) -> Any:
+        """Straight lines from point to point, (n, 3)."""
+        return self.axes.plot(*self.seen(np.atleast_2d(points)).T, **style)[0]
+
+    def face(self, points: Floats, **style: Any) -> Any:
+        """A filled polygon of corners (n, 3)."""
+        from matplotlib.patches import Polygon
+
+        return self.axes.add_patch(Polygon(self.seen(points), joinstyle="round", **style))
+
+    def words(self, place: Floats, text: str, **style: Any) -> Any:
+        """A text beside a point (3,), at an offset from it [points]."""
+        from matplotlib.patheffects import withStroke
+
+        middle = {"ha": "center", "va": "center", "fontsize": SMALL, "annotation_clip": False}
+        around = [withStroke(linewidth=2.0, foreground=self.look.paper)]
+        places: dict[str, Any] = {"xytext": (0.0, 0.0), "textcoords": "offset points", "path_effects": around}
+        return self.axes.annotate(text, self.seen(place), **(middle | places | style))
+
+    @property
+    def points_per_length(self) -> float:
+        """The size of a unit of length on the screen [points]."""
+        ends = self.axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
+        return float(ends[1, 0] - ends[0, 0]) * 72.0 / float(self.axes.get_figure(root=True).dpi)
+
+    def frame(self, points: Floats, unit: str, key: Sequence[Artist] = (), beside: float = 0.0) -> None:
+        """Show all of points (n, 3) at one scale, between a key above and what tells directions and lengths below.
+
+        Parameters
+        ----------
+        beside : room for names on the left and right [points].
+        """
+        flat = self.seen(points)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        if self.is_plane:  # first, for they take room
+            self.axes.set(xlabel=f"{self._direction(0)} [{unit}]", ylabel=f"{self._direction(1)} [{unit}]")
+            self.axes.update_datalim([low, high])
+            self.axes.autoscale_view()
+        size = _size(self.axes)
+        above = self._draw_key(key, size[0])
+        triad = self._triad_box
+        below = 0.0 if self.is_plane else float(max(triad[3] - triad[1], SMALL + 2.0 * BAR_OFF)) + STRIP_FREE
+        room = np.array([[EDGE_FREE + beside, EDGE_FREE + below], [EDGE_FREE + beside, EDGE_FREE + above]])
+        spans = np.maximum(high - low, 1e-9 * (float((high - low).max()) or 1.0))
+        per_point = float(np.max(spans / np.maximum(size - room.sum(axis=0), 0.1 * size))) or 1.0
+        spare = 0.5 * (size * per_point - room.sum(axis=0) * per_point - (high - low))
+        start = low - room[0] * per_point - spare
+        self.axes.set_aspect("equal")
+        self.axes.set(xlim=(start[0], start[0] + size[0] * per_point), ylim=(start[1], start[1] + size[1] * per_point))
+        if self.is_plane:
+            return
+        draw_triad(self.axes, self.eye, self.look, start + (EDGE_FREE - triad[:2]) * per_point)
+        corner = start + [size[0] * per_point, 0.0] + np.array([-EDGE_FREE, EDGE_FREE + SMALL + BAR_OFF]) * per_point
+        draw_scale_bar(self.axes, self.look, corner, float((high - low).max()) or 1.0, unit)
+
+    def _draw_key(self, key: Sequence[Artist], width: float) -> float:
+        """Draw a key in as few rows as fit into a width; its height with what is free below it [points]."""
+        if not key:
+            return 0.0
+        dpi = float(self.axes.get_figure(root=True).dpi)
+        for columns in range(len(key), 0, -1):
+            legend = self.axes.legend(handles=key, ncols=columns, labelcolor=self.look.ink, **KEY)
+            legend.set_zorder(ON_TOP)
+            box = legend.get_window_extent()
+            if box.width * 72.0 / dpi <= width:
+                break
+        return float(box.height) * 72.0 / dpi + STRIP_FREE
+
+    @property
+    def _triad_box(self) -> Floats:
+        """Left, bottom, right and top of a triad and its letters, from where it starts [points]."""
+        tips = self.seen(np.eye(3))
+        lengths = np.linalg.norm(tips, axis=1, keepdims=True)
+        letters = (TRIAD + LETTER_OFF / np.maximum(lengths, ON_EDGE)) * tips * (lengths > ON_EDGE)
+        half = 0.5 * SMALL
+        return np.concatenate(
+            [np.minimum(letters.min(axis=0) - half, 0.0), np.maximum(letters.max(axis=0) + half, 0.0)]
+        )
+
+    def _direction(self, place: int) -> str:
+        """The name of an axis: "x" if it is one of the base frame, else its direction."""
+        along = self.eye.axes[place]
+        nearest = int(np.argmax(np.abs(along)))
+        is_base_axis = np.isclose(along[nearest], 1.0)
+        return "xyz"[nearest] if is_base_axis else f"along ({', '.join(f'{part:.3g}' for part in along)})"
+
+
+ON_TOP = 40.0
+"""Order of what is written, above all that is drawn."""
+
+
+def canvas_on(ax: Any, eye: Eye, look: Look, *, is_plane: bool = False) -> Canvas:
+    """A canvas on two-dimensional axes: with their lines and numbers for a plane, without them for what is in space.
+
+    Raises
+    ------
+    InvalidArgument : no axes, or three-dimensional ones.
+    """
+    require_method("ax", ax, "tick_params", "matplotlib axes, or None")
+    require_flat(ax)
+    if is_plane:
+        dress(ax, look)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=SMALL)
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.label.set_size(SMALL + 1.0)
+    else:
+        ax.axis("off")
+    return Canvas(ax, eye, look, is_plane)
+
+
+def new_canvas(
+    points: Floats,
+    eye: Eye,
+    look: Look,
+    *,
+    is_plane: bool,
+    title: str,
+    size: tuple[float, float] | None,
+    beside: float = 0.0,
+) -> Canvas:
+    """A canvas in a new figure, which takes the shape of points (n, 3) where it is given no size.
+
+    Parameters
+    ----------
+    size : of the whole figure [inches].
+    beside : room for names on the left and right [points].
+
+    Raises
+    ------
+    InvalidArgument : a size that is not two positive numbers.
+    MissingLibrary : matplotlib is not installed.
+    """
+    if size is None:
+        spans = np.ptp(eye.seen(points)[:, :2], axis=0)
+        shape = np.maximum(spans / (float(spans.max()) or 1.0), LEAST) * SIDE
+        rest = NUMBERS if is_plane else (0.0, 2.0 * STRIP / 72.0)
+        width, height = (shape + rest + [2.0 * beside / 72.0, 0.0]).tolist()
+    else:
+        width, height = checked_size(size)
+    figure = new_figure(width, height, layout="constrained" if is_plane else None)
+    figure.set_facecolor(look.paper)
+    lines = wrap(title, max(int(width * 72.0 / (LETTER * TITLE)), 1))
+    if is_plane:
+        axes = figure.add_subplot()
+    else:
+        high = TITLE_LINE * len(lines) / 72.0
+        if size is None:
+            figure.set_size_inches(width, height := height + high)
+        axes = figure.add_axes((0.0, 0.0, 1.0, max(1.0 - high / height, 0.1)))
+    axes.set_title("\n".join(lines), fontsize=TITLE, color=look.ink, pad=1.0)
+    return canvas_on(axes, eye, look, is_plane=is_plane)
+
+
+STRIP = 30.0
+"""Room above and below a machine in a new figure, for its key and its scale [points]."""
+
+
+def checked_size(size: Any) -> tuple[float, float]:
+    """Width and height of a figure [inches]; InvalidArgument for what is not two positive numbers."""
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise InvalidArgument("size", repr(size), "two numbers: width and height in inches") from None
+    return require_positive("size", width), require_positive("size", height)
+
+
+def _size(axes: Any) -> Floats:
+    """Width and height of axes as they are laid out [points]."""
+    root = axes.get_figure(root=True)
+    if root.get_layout_engine() is not None:
+        root.draw_without_rendering()
+    box = axes.get_window_extent()
+    return np.array([box.width, box.height]) * 72.0 / float(root.dpi)
 
 
 def draw_triad(axes: Any, eye: Eye, look: Look, at: Floats, names: Sequence[str] = "xyz") -> None:

@@ -99,6 +99,14 @@ def eye_of(view: View, order: tuple[int, int, int] = (0, 1, 2)) -> Eye:
     raise InvalidArgument("view", repr(view), f"{names}, or (elevation from -90 to 90, azimuth) in degrees")
 
 
+def eye_on(plane: Floats) -> Eye:
+    """The eye that looks straight at a plane, of directions to the right and up (2, 3) as `plane_of` returns."""
+    x, y, z = np.cross(*plane).tolist()
+    level = float(np.hypot(x, y))
+    azimuth = float(np.degrees(np.arctan2(y, x))) if level > SAME else VIEWS["top"][1]
+    return Eye(float(np.degrees(np.arctan2(z, level))), azimuth)
+
+
 def _is_angle(value: object) -> bool:
     return not isinstance(value, bool) and isinstance(value, Real) and bool(np.isfinite(float(value)))
 

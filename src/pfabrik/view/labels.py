@@ -10,29 +10,30 @@ import numpy as np
 from ..arrays import Floats
 from .canvas import Canvas
 
-DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 45))), np.sin(np.radians(range(0, 360, 45)))], axis=1)
+DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 30))), np.sin(np.radians(range(0, 360, 30)))], axis=1)
 """Directions from its joint in which a name is tried, to the right first."""
 
-DISTANCES = (6.0, 14.0)
+DISTANCES = (8.0, 15.0)
 """Distances at which it is tried, one after the other [points]."""
 
-OFF = 12.0
+OFF = 6.0
 """Area [points²] that a name may rather cover than be a point farther from its joint."""
 
-JOINT, LINE = 4.0, 1.5
+JOINT, LINE = 4.5, 2.5
 """Half the sides of the squares kept free around a joint's marker, and around a dot of a line [points]."""
 
-DOTS = 24
+DOTS = 32
 """Dots that represent a line."""
 
 APART = 1.0
 """Least distance between two names [points]."""
 
+OUTSIDE = 4.0
+"""What it counts for a name to be outside the axes, against covering something."""
+
 
 def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Floats) -> None:
-    """Move texts, each of which is at its joint, to free places nearby.
-
-    A text stays where it is in space: in three-dimensional axes it turns with the machine.
+    """Move texts, each of which is an annotation of its joint, to free places nearby.
 
     Parameters
     ----------
@@ -40,33 +41,31 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
     """
     if not texts:
         return
-    figure = canvas.axes.figure
-    root = figure.get_figure(root=True)
-    root.draw_without_rendering()
+    axes = canvas.axes
+    root = axes.get_figure(root=True)
     point = root.dpi / 72.0
     shares = np.linspace(0.0, 1.0, DOTS)[:, None, None]
     dots = (lines[:, 0] + shares * (lines[:, 1] - lines[:, 0])).reshape(-1, 3)
-    squares = [(place, JOINT) for place in canvas.on_screen(joints)] + [
-        (place, LINE) for place in canvas.on_screen(dots)
-    ]
+    pixels = axes.transData.transform
+    squares = [(place, JOINT) for place in pixels(canvas.seen(joints))]
+    squares += [(place, LINE) for place in pixels(canvas.seen(dots))]
     taken = [np.concatenate([place - half * point, place + half * point]) for place, half in squares]
-    legend = canvas.axes.get_legend()
-    words = canvas.axis_words + ([] if legend is None else [legend])
-    taken += [word.get_window_extent().extents for word in words]
+    legend = axes.get_legend()
+    taken += [] if legend is None else [legend.get_window_extent().extents]
+    taken += [each.get_window_extent().extents for each in axes.texts if each not in texts and each.get_text()]
+    box = axes.get_window_extent().extents
     for text in texts:
-        place = canvas.on_screen(_place(canvas, text)[None])[0]
+        at = pixels(text.xy)
         extent = text.get_window_extent()
         size = np.array([extent.width, extent.height])
-        boxes = [
-            np.concatenate([centre - size / 2.0, centre + size / 2.0])
-            for off in DISTANCES
-            for direction in DIRECTIONS
-            for centre in [place + direction * (off * point + np.abs(direction) @ size / 2.0)]
-        ]
+        offsets = np.array([way * off * point + way * size / 2.0 for off in DISTANCES for way in DIRECTIONS])
+        boxes = np.concatenate([at + offsets - size / 2.0, at + offsets + size / 2.0], axis=1)
         far = np.repeat(DISTANCES, len(DIRECTIONS)) * OFF * point**2
-        best = boxes[int(np.argmin(_overlaps(np.array(boxes), np.array(taken), APART * point) + far))]
-        taken.append(best)
-        _move(canvas, text, (best[:2] + best[2:]) / 2.0)
+        covered = _overlaps(boxes, np.array(taken), APART * point)
+        outside = np.prod(size) - _overlaps(boxes, box[None], 0.0)
+        best = int(np.argmin(covered + OUTSIDE * outside + far))
+        taken.append(boxes[best])
+        text.set_position(offsets[best] / point)
 
 
 def _overlaps(boxes: Floats, taken: Floats, apart: float) -> Floats:
@@ -74,22 +73,3 @@ def _overlaps(boxes: Floats, taken: Floats, apart: float) -> Floats:
     low = np.maximum(boxes[:, None, :2] - apart, taken[:, :2])
     high = np.minimum(boxes[:, None, 2:] + apart, taken[:, 2:])
     return np.asarray(np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1))
-
-
-def _place(canvas: Canvas, text: Any) -> Floats:
-    """Where a text is in the coordinates of its axes."""
-    return np.array(text.get_position_3d() if canvas.plane is None else text.get_position())
-
-
-def _move(canvas: Canvas, text: Any, centre: Floats) -> None:
-    """Centre a text at a place of the screen [pixels], as far from the viewer as it was."""
-    text.set(horizontalalignment="center", verticalalignment="center")
-    flat = canvas.axes.transData.inverted().transform(centre)
-    if canvas.plane is not None:
-        text.set_position(flat)
-        return
-    from mpl_toolkits.mplot3d.proj3d import inv_transform, proj_transform
-
-    projection = canvas.axes.get_proj()
-    depth = proj_transform(*_place(canvas, text), projection)[2]
-    text.set_position_3d(np.ravel(inv_transform(*flat, depth, np.linalg.inv(projection))))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..answers.solution import Solution
+from ..arrays import Floats
 from ..checks import require_names
 from ..description.joints import JointType
 from ..description.mechanism import Mechanism
@@ -15,57 +17,84 @@ from ..drawing import SMALL
 from ..kinematics import plane_of
 from ..skeleton import Line, Mark, Skeleton, checked_shown, skeleton_of
 from ..tolerances import TOLERANCES
-from .canvas import Canvas, canvas_on
+from .canvas import LETTER, ON_TOP, Canvas, canvas_on, new_canvas
+from .crossings import far_to_near
+from .eye import Eye, View, eye_for, eye_of, eye_on
 from .labels import place_names
-from .looks import ACTUATED, EDGE, HELD, LINK, MARKERS, PASSIVE, of_a_body
+from .looks import HELD, MARKERS, Look, Theme, look_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-SIZE, SLIDE_SIZE = 20.0, 44.0
-"""Areas of markers [points²]: that of a slide is larger, so that it shows behind a joint in the same place."""
+HALO, INK, BORDER = 2.2, 4.2, 1.8
+"""Width of a usual link; of this its border on both sides, and beyond it the ground that parts it from what is farther
+[points]."""
 
-USUAL_SIDE = 290.0
-"""Shorter side of axes in which lines and markers have their usual size [points]."""
+PLATE_EDGE, GROUND_EDGE = 1.3, 1.0
+"""Widths of the borders of plates and of the ground [points]."""
 
-MARKS_APART = 16.0
-"""Distance between neighbouring joints from which on markers have their usual size [points]."""
+FRAME = 0.75
+"""Width of the bars of a base, against that of a usual link."""
 
-PENS = (0.45, 1.5)
+RAIL, RAIL_FILLING = 5.0, 3.2
+"""Widths of a rail and of its filling [points]."""
+
+DRIVEN, PASSIVE, SLIDE = 7.4, 5.6, 2.4
+"""Diameters of markers of joints, and what that of a carriage is larger by, so that it shows behind a joint in the same
+place [points]."""
+
+MARKS_APART = 24.0
+"""Distance between neighbouring joints from which on lines and markers have their usual size [points]."""
+
+PENS = (0.5, 1.25)
 """Least and greatest size of lines and markers, against the usual."""
 
-SOLID_ALPHA, NEAREST_ALPHA = 0.06, 0.16
-"""How opaque each of both sides of a thick link is, and of the two that are nearest to each other."""
+PLATE = 0.93
+"""How opaque plates are."""
 
-WIDTH = 2.0
-"""Width of the line of a usual bar [points]."""
+SOLID, NEAREST, SOLID_EDGE = 0.12, 0.3, 0.5
+"""How opaque a thick link is, the two that are nearest to each other, and their borders."""
 
-RAIL_DASHES = (0, (4, 2))
+CROSS, CROSS_WIDTH = 9.0, 1.6
+"""Size of the cross at the reference point, and width of its lines [points]."""
 
 
-def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence[str] | bool = ()) -> Axes:
+def plot(
+    shown: Mechanism | Solution,
+    ax: Axes | None = None,
+    *,
+    names: Sequence[str] | bool = (),
+    view: View | None = None,
+    size: tuple[float, float] | None = None,
+    theme: Theme = "light",
+) -> Axes:
     """Draw a machine at home, or one answer: in space, or a planar machine in its plane.
 
-    Joints are markers by type, actuated ones filled; links are lines, and bodies with three or more joints faces. The
-    base is grey, the end effector blue, dashed lines are rails, and a cross marks the reference point. What holds an
-    answer back, or what it exceeds, is orange, and named: "B3 max". Links with a thickness are drawn as they are, of an
-    answer the two that are nearest to each other darker, and orange where they stop it, or overlap.
+    Joints are markers by type, actuated ones filled; nearer links cross over farther ones, and bodies with three or
+    more joints are plates. The base is the pale ground, the end effector blue, pale rails are those of slides, and a
+    cross marks the reference point. What holds an answer back, or what it exceeds, is orange, and named: "B3 max".
+    Links with a thickness are drawn as they are, of an answer the two that are nearest to each other darker, and orange
+    where they stop it, or overlap.
 
     Parameters
     ----------
     shown : a Mechanism, or one Solution.
-    ax : matplotlib axes to draw on: three-dimensional ones, or any for a planar machine. Default: those of a new
-        figure, which is `ax.figure`; its `savefig` writes PNG, SVG and PDF.
+    ax : two-dimensional matplotlib axes to draw on. Default: those of a new figure, which is `ax.figure`; its `savefig`
+        writes PNG, SVG and PDF.
     names : joints whose names are written beside them, such as `mechanism.actuator_names`; True for all joints.
+    view : "top", "front", "side" or "iso", or elevation and azimuth [deg]; from -y at (0, -90), from x at (0, 0).
+        Default: where joints are seen best apart; of a planar machine its plane.
+    size : of a new figure, width and height [inches]. Default: the machine's shape.
+    theme : "light" or "dark".
 
     Returns
     -------
-    Axes : what was drawn on, in the mechanism's unit of length.
+    Axes : what was drawn on; lengths in it are in the mechanism's unit.
 
     Raises
     ------
-    InvalidArgument : a batch, or two-dimensional axes for a machine in space.
+    InvalidArgument : a batch, three-dimensional axes, or no such view, size or theme.
     UnknownName : no joint of such a name.
     MissingLibrary : matplotlib is not installed.
     """
@@ -74,128 +103,191 @@ def plot(shown: Mechanism | Solution, ax: Axes | None = None, *, names: Sequence
         names = [joint.name for joint in mechanism.joints] if names else ()
     owners = {each.name: each.joint.name for each in mechanism.coordinates}
     named = {mechanism.joint(owners.get(name, name)).name for name in require_names("names", names)}
-    skeleton = skeleton_of(shown)
-    canvas = canvas_on(ax, plane_of(mechanism))
+    look, skeleton = look_of(theme), skeleton_of(shown)
+    eye, is_plane = machine_eye(mechanism, view)
+    beside = _beside(skeleton, named)
+    if ax is None:
+        canvas = new_canvas(
+            skeleton.points, eye, look, is_plane=is_plane, title=mechanism.name, size=size, beside=beside
+        )
+    else:
+        canvas = canvas_on(ax, eye, look, is_plane=is_plane)
+    canvas.frame(skeleton.points, mechanism.length_unit, key_of(skeleton, look), beside)
     draw_machine(canvas, skeleton)
-    draw_key(canvas, skeleton)
-    canvas.frame(skeleton.points, mechanism.length_unit)
     write_names(canvas, skeleton, named)
     axes: Axes = canvas.axes
     return axes
 
 
-def draw_machine(canvas: Canvas, skeleton: Skeleton) -> list[Artist]:
-    """Bodies, rails, reference point and joints, as artists that can be removed again."""
-    pen = pen_of(canvas, skeleton.mechanism)
-    artists: list[Artist] = [each for line in skeleton.parts for each in _part(canvas, line, skeleton.held, pen)]
-    for solid in skeleton.solids:
-        colour = HELD if solid.is_stopped else LINK
-        alpha = NEAREST_ALPHA if solid.is_nearest else SOLID_ALPHA
-        artists.append(canvas.solid(solid.vertices[solid.faces], facecolor=colour, alpha=alpha, zorder=0))
-    for rail in skeleton.rails:
-        artists.append(canvas.line(rail, color=EDGE, linewidth=0.9, linestyle=RAIL_DASHES, zorder=1))
-    artists.append(canvas.line(skeleton.reference[None], marker="+", color=EDGE, markersize=9, zorder=4))
-    return artists + _joints(canvas, skeleton.marks, pen)
-
-
-def pen_of(canvas: Canvas, mechanism: Mechanism) -> float:
-    """The thickness of lines and size of markers, against that of a picture of usual size with few joints.
-
-    It grows with the axes, and shrinks where joints at home are so close together that their markers would meet.
-    """
+def machine_eye(mechanism: Mechanism, view: View | None = None) -> tuple[Eye, bool]:
+    """The eye that a machine is drawn for, and True if it is seen in its plane; of all its answers the same."""
+    if view is not None:
+        return eye_of(view), False
+    plane = plane_of(mechanism)
+    if plane is not None:
+        return eye_on(plane), True
     home = skeleton_of(mechanism)
-    places = np.array([mark.place for mark in home.marks])
-    extent = float(np.ptp(home.points, axis=0).max())
-    box = canvas.axes.get_window_extent()
-    side = min(box.width, box.height) * 72.0 / canvas.axes.get_figure(root=True).dpi
-    apart = np.linalg.norm(places[:, None] - places, axis=2)
-    nearest = np.where(apart > TOLERANCES.alignment * extent, apart, np.inf).min(axis=1)
-    nearest = nearest[np.isfinite(nearest)]
-    between = side * float(np.median(nearest)) / extent if len(nearest) and extent > 0.0 else side
-    return float(np.clip(min(side / USUAL_SIDE, between / MARKS_APART), *PENS))
+    return eye_for(np.array([*(mark.place for mark in home.marks), home.reference]), home.lines), False
 
 
-def _part(canvas: Canvas, line: Line, held: Set[str], pen: float) -> list[Artist]:
-    """A part of a body: base and end effector light and broad, links dark and narrow; those of a joint at its limit
-    orange.
+def _beside(skeleton: Skeleton, named: set[str]) -> float:
+    """Room for the longest name on both sides [points]."""
+    words = [_words(mark) for mark in skeleton.marks if mark.held_by or mark.joint.name in named]
+    return max(map(len, words), default=0) * LETTER * SMALL
+
+
+def _words(mark: Mark) -> str:
+    """The name of a joint, with the limits that are active there."""
+    return " ".join([mark.joint.name, *mark.held_by])
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Lines (n, 3) of one link that are drawn together, each with its width against the usual one; or a plate."""
+
+    outlines: tuple[Floats, ...]
+    widths: tuple[float, ...]
+    role: str
+    is_plate: bool = False
+    is_held: bool = False
+
+
+def draw_machine(canvas: Canvas, skeleton: Skeleton, *, zorder: float = 2.0) -> list[Artist]:
+    """The ground, rails, bodies, reference point and joints, as artists that can be removed again.
+
+    They are drawn between `zorder` and one more, on axes whose limits are set.
     """
-    part = line.part
-    colour = HELD if held & set(part.joints) else of_a_body(part.role)
-    artists: list[Artist] = []
-    if part.kind == "plate":
-        artists.append(canvas.face(line.corners, facecolor=colour, alpha=0.55, zorder=0))
-    width = WIDTH * (0.8 if part.kind == "plate" else part.radius) * pen
-    artists.append(canvas.line(line.outline, color=colour, linewidth=width, solid_capstyle="round", zorder=1))
+    look, pen = canvas.look, pen_of(canvas, skeleton)
+    artists = _draw_ground(canvas, skeleton, zorder, pen)
+    strokes = _strokes(skeleton)
+    order = far_to_near([canvas.eye.seen(each.outlines[0]) for each in strokes], [each.is_plate for each in strokes])
+    for place, index in enumerate(order):
+        at = zorder + 0.3 + 0.4 * place / len(order)
+        artists += _draw_stroke(canvas, strokes[index], at, pen)
+    for mark in sorted(skeleton.marks, key=lambda mark: float(canvas.eye.seen(mark.place)[2])):
+        style = marker_style(mark.joint.type, bool(mark.joint.actuated), bool(mark.held_by), look, pen)
+        is_carriage = mark.joint.type == "prismatic" and mark.joint.along is None
+        style["markersize"] += SLIDE * pen * is_carriage
+        at = zorder + (0.75 if is_carriage else 0.8)
+        artists.append(canvas.line(mark.place, linestyle="", zorder=at, **style))
+    for colour, more in ((look.paper, 1.4), (look.ink, 0.0)):
+        cross = {"marker": "+", "markersize": CROSS + more, "markeredgewidth": CROSS_WIDTH + more}
+        artists.append(canvas.line(skeleton.reference, color=colour, linestyle="", zorder=zorder + 0.9, **cross))
     return artists
 
 
-def _joints(canvas: Canvas, marks: Sequence[Mark], pen: float) -> list[Artist]:
-    """A marker for every joint, those of a kind together, slides behind the others."""
-    kinds: dict[tuple[JointType, bool, bool], list[Mark]] = {}
-    for mark in marks:
-        kinds.setdefault((mark.joint.type, bool(mark.joint.actuated), bool(mark.held_by)), []).append(mark)
-    return [
-        canvas.marks(
-            np.array([mark.place for mark in marks_of_kind]),
-            zorder=2 if kind == "prismatic" else 3,
-            **marker_style(*key, pen),
-        )
-        for key, marks_of_kind in sorted(kinds.items())
-        for kind in key[:1]
-    ]
+def _draw_ground(canvas: Canvas, skeleton: Skeleton, zorder: float, pen: float) -> list[Artist]:
+    """What is behind all: the base, rails, and how thick links are."""
+    look = canvas.look
+    faces, edges = look.faces["base"], look.edges["base"]
+    base = [line for line in skeleton.parts if line.part.role == "base"]
+    plates = [line.corners for line in base if line.part.kind == "plate"]
+    if not plates and len(skeleton.ground) and not any(line.part.kind == "arc" for line in base):
+        plates = [skeleton.ground]
+    style: dict[str, Any] = {"facecolor": faces, "edgecolor": edges, "linewidth": GROUND_EDGE}
+    artists: list[Artist] = [canvas.face(corners, zorder=zorder, **style) for corners in plates]
+    for line in base if not plates else ():
+        artists += _draw_stroke(canvas, Stroke((line.outline,), (FRAME,), "base"), zorder, pen)
+    for rail in skeleton.rails:
+        for colour, width in ((edges, RAIL), (look.paper, RAIL_FILLING)):
+            style = {"color": colour, "linewidth": width * pen, "solid_capstyle": "round"}
+            artists.append(canvas.line(rail, zorder=zorder + 0.1, **style))
+    for solid in sorted(skeleton.solids, key=lambda each: float(canvas.eye.seen(each.vertices)[:, 2].mean())):
+        colour = HELD if solid.is_stopped else look.soft
+        style = {"facecolor": (colour, NEAREST if solid.is_nearest else SOLID), "edgecolor": (colour, SOLID_EDGE)}
+        artists.append(canvas.face(_silhouette(canvas, solid.vertices), zorder=zorder + 0.2, linewidth=0.7, **style))
+    return artists
 
 
-def marker_style(kind: JointType, actuated: bool, held: bool, pen: float = 1.0) -> dict[str, Any]:
+def _silhouette(canvas: Canvas, vertices: Floats) -> Floats:
+    """Those of the corners (n, 3) of a convex solid that are its border on the screen, in order around it."""
+    flat = canvas.seen(vertices)
+    border: list[int] = []
+    for places in (np.lexsort(flat.T[::-1]), np.lexsort(flat.T[::-1])[::-1]):  # one half, then the other
+        chain: list[int] = []
+        for place in places.tolist():
+            while len(chain) > 1 and _turn(*flat[[*chain[-2:], place]]) <= 0.0:
+                chain.pop()
+            chain.append(place)
+        border += chain[:-1]
+    return vertices[border]
+
+
+def _turn(a: Floats, b: Floats, c: Floats) -> float:
+    """Above zero where one turns left at b, from a to c."""
+    return float((b - a)[0] * (c - b)[1] - (b - a)[1] * (c - b)[0])
+
+
+def _strokes(skeleton: Skeleton) -> list[Stroke]:
+    """What is drawn in front of the ground: both parts of a strut together, and nothing that is a point."""
+    strokes: list[Stroke] = []
+    parts = [line for line in skeleton.parts if line.part.role != "base"]
+    barrels: dict[tuple[str, ...], Line] = {line.part.joints: line for line in parts if line.part.kind == "barrel"}
+    for line in parts:
+        part = line.part
+        if part.kind == "barrel" or float(np.ptp(line.outline, axis=0).max()) == 0.0:
+            continue
+        drawn = [line, *([barrels[part.joints]] if part.joints in barrels else [])]
+        widths = tuple(float(np.sqrt(each.part.radius)) for each in drawn)
+        is_held = bool(skeleton.held & set(part.joints))
+        outlines = tuple(each.outline for each in drawn)
+        strokes.append(Stroke(outlines, widths, part.role, part.kind == "plate", is_held))
+    return strokes
+
+
+def _draw_stroke(canvas: Canvas, stroke: Stroke, zorder: float, pen: float) -> list[Artist]:
+    """A plate, or lines with a border and some ground around; those of a joint at its limit are orange."""
+    from matplotlib.patheffects import Normal
+    from matplotlib.patheffects import Stroke as Around
+
+    look = canvas.look
+    filling, edge = HELD if stroke.is_held else look.faces[stroke.role], look.edges[stroke.role]
+    if stroke.is_plate:
+        style: dict[str, Any] = {"facecolor": filling, "edgecolor": edge, "linewidth": PLATE_EDGE * pen, "alpha": PLATE}
+        return [canvas.face(stroke.outlines[0][:-1], zorder=zorder, **style)]
+    artists = []
+    for outline, width in zip(stroke.outlines, stroke.widths, strict=True):
+        around: list[Any] = [
+            Around(linewidth=(INK * width + HALO) * pen, foreground=look.paper, capstyle="butt"),
+            Around(linewidth=INK * width * pen, foreground=edge),
+            Normal(),
+        ]
+        style = {"color": filling, "linewidth": (INK * width - BORDER) * pen, "solid_capstyle": "round"}
+        artists.append(canvas.line(outline, zorder=zorder, path_effects=around, **style))
+    return artists
+
+
+def pen_of(canvas: Canvas, skeleton: Skeleton) -> float:
+    """The thickness of lines and size of markers: less where joints are so close together that markers would meet."""
+    places = np.array([mark.place for mark in skeleton.marks])
+    apart = np.linalg.norm(places[:, None] - places, axis=2) * canvas.points_per_length
+    same = TOLERANCES.alignment * float(np.ptp(skeleton.points, axis=0).max()) * canvas.points_per_length
+    nearest = np.where(apart > same, apart, np.inf).min(axis=1)
+    nearest = nearest[np.isfinite(nearest)]
+    return float(np.clip(np.median(nearest) / MARKS_APART, *PENS)) if len(nearest) else 1.0
+
+
+def marker_style(kind: JointType, actuated: bool, held: bool, look: Look, pen: float = 1.0) -> dict[str, Any]:
     """The style of a joint's marker: shape by type, filled if it is actuated, orange at a limit."""
+    colour = HELD if held else look.ink
     return {
         "marker": MARKERS[kind],
-        "s": pen**2 * (SLIDE_SIZE if kind == "prismatic" else SIZE),
-        "facecolor": (HELD if held else ACTUATED) if actuated else PASSIVE,
-        "edgecolor": HELD if held else EDGE,
-        "linewidths": 1.8 if held else 0.8,
+        "markersize": (DRIVEN if actuated else PASSIVE) * pen,
+        "markerfacecolor": colour if actuated else look.paper,
+        "markeredgecolor": colour,
+        "markeredgewidth": 1.8 * pen if held else 0.9 * pen,
     }
 
 
-def draw_key(canvas: Canvas, skeleton: Skeleton) -> None:
-    """Draw the key of markers above the axes."""
-    handles = key_of(skeleton)
-    canvas.axes.legend(handles=handles, **KEY, ncols=min(len(handles), 3))
-
-
-KEY: dict[str, Any] = {
-    "loc": "lower center",
-    "bbox_to_anchor": (0.5, 1.0),
-    "frameon": False,
-    "fontsize": SMALL,
-    "handletextpad": 0.2,
-    "columnspacing": 1.2,
-    "borderaxespad": 0.0,
-}
-"""Settings of a key above axes."""
-
-
-def key_of(skeleton: Skeleton) -> list[Artist]:
+def key_of(skeleton: Skeleton, look: Look) -> list[Artist]:
     """A marker and a word for each kind of joint that occurs, and for limits if there is one that holds."""
     from matplotlib.lines import Line2D
 
     kinds = sorted({(mark.joint.type, bool(mark.joint.actuated)) for mark in skeleton.marks})
-    looks = [(kind + ", actuated" * actuated, marker_style(kind, actuated, False)) for kind, actuated in kinds]
+    looks = [(kind + ", actuated" * actuated, marker_style(kind, actuated, False, look)) for kind, actuated in kinds]
     if skeleton.held:
-        looks.append(("at a limit", marker_style("fixed", False, True) | {"marker": "o", "facecolor": HELD}))
-    return [
-        Line2D(
-            [],
-            [],
-            linestyle="",
-            marker=each["marker"],
-            markersize=np.sqrt(each["s"]),
-            markerfacecolor=each["facecolor"],
-            markeredgecolor=each["edgecolor"],
-            markeredgewidth=each["linewidths"],
-            label=label,
-        )
-        for label, each in looks
-    ]
+        looks.append(("at a limit", marker_style("revolute", True, True, look)))
+    return [Line2D([], [], linestyle="", label=label, **style) for label, style in looks]
 
 
 def write_names(canvas: Canvas, skeleton: Skeleton, named: set[str]) -> None:
@@ -203,7 +295,6 @@ def write_names(canvas: Canvas, skeleton: Skeleton, named: set[str]) -> None:
     texts = []
     for mark in skeleton.marks:
         if mark.held_by or mark.joint.name in named:
-            words = " ".join([mark.joint.name, *mark.held_by])
-            colour = HELD if mark.held_by else LINK
-            texts.append(canvas.words(mark.place, words, color=colour, zorder=30))
+            style: dict[str, Any] = {"color": HELD if mark.held_by else canvas.look.ink, "zorder": ON_TOP}
+            texts.append(canvas.words(mark.place, _words(mark), **style))
     place_names(canvas, texts, np.array([mark.place for mark in skeleton.marks]), skeleton.lines)

@@ -15,16 +15,20 @@ from ..arrays import Floats, Mask
 from ..checks import require_method, require_type
 from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument, counted
-from ..kinematics import Readout, plane_of, readouts
+from ..kinematics import Readout, readouts
 from ..skeleton import skeleton_of
-from .canvas import Canvas, canvas_on, new_axes
-from .looks import ACHIEVED, ASKED, HELD, LOOKS, SHADE
-from .machine import draw_machine, key_of
+from .canvas import Canvas, canvas_on, checked_size
+from .eye import View
+from .looks import HELD, Look, Theme, dress, look_of
+from .machine import draw_machine, key_of, machine_eye
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+SIZE = (11.5, 6.2)
+"""Width and height of a new figure [inches]."""
 
 MOST_STRIPS = 6
 """Strips of actuators one below the other; further ones make another column."""
@@ -38,11 +42,18 @@ ROOM = 0.14
 LIMIT_DASHES = (0, (8, 3, 1, 3))
 DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
 
-MOST_MARGINS = 6
-"""Limits whose margins are named; further ones are grey."""
+MOST_MARGINS, OTHERS = 6, 0.5
+"""Limits whose margins are named; how opaque the grey lines of others are."""
 
 
-def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
+def plot_track(
+    track: Track,
+    figure: Figure | None = None,
+    *,
+    view: View | None = None,
+    size: tuple[float, float] | None = None,
+    theme: Theme = "light",
+) -> dict[str, Axes]:
     """Draw a path that was followed: the machine on it, its actuators between their limits, and all margins.
 
     The machine is drawn where it is farthest from its target. Steps whose target is out of reach have a grey band,
@@ -52,6 +63,8 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
     ----------
     track : what `track` answered.
     figure : matplotlib figure or subfigure to draw in; default: a new one. Its `savefig` writes PNG, SVG and PDF.
+    view, theme : as of `plot`.
+    size : of a new figure, width and height [inches].
 
     Returns
     -------
@@ -59,25 +72,28 @@ def plot_track(track: Track, figure: Figure | None = None) -> dict[str, Axes]:
 
     Raises
     ------
-    InvalidArgument : what is no Track, or one without a step that has a configuration.
+    InvalidArgument : what is no Track, or one without a step that has a configuration; no such view, size or theme.
     MissingLibrary : matplotlib is not installed.
     """
-    known = checked_track(track)
-    figure = new_figure(11.5, 6.2, dpi=130) if figure is None else figure
-    require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
+    known, look = checked_track(track), look_of(theme)
     mechanism = track.mechanism
-    figure.suptitle(f"{mechanism.name}: {reached_in_words(track)}", fontsize=SMALL + 4.0)
-    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False))
-    axes = {"path": draw_path(left, track, known)}  # first: its numbers are placed by drawing all there is
+    eye, is_plane = machine_eye(mechanism, view)
+    figure = new_figure(*checked_size(size or SIZE), dpi=130) if figure is None else figure
+    require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
+    figure.set_facecolor(look.paper)
+    figure.suptitle(f"{mechanism.name}: {reached_in_words(track)}", fontsize=SMALL + 4.0, color=look.ink)
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False, facecolor=look.paper))
+    axes = {"path": draw_path(canvas_on(left.add_subplot(), eye, look, is_plane=is_plane), track, known)}
     strips, below = _grid(right, len(mechanism.actuator_names), has_margins := bool(limits_of(track)))
     for index, (strip, readout) in enumerate(zip(strips, readouts(mechanism), strict=True)):
-        draw_actuator(strip, readout, np.asarray(readout.display(track.actuators[:, index])), track)
+        draw_actuator(strip, readout, np.asarray(readout.display(track.actuators[:, index])), track, look)
         axes[readout.name] = strip
     right.align_ylabels(strips)
     if has_margins:
-        draw_margins(below, track)
+        draw_margins(below, track, look)
         axes["margins"] = below
-    right.legend(handles=common_keys(), loc="outside upper center", ncols=3, frameon=False, fontsize=SMALL)
+    above: dict[str, Any] = {"loc": "outside upper center", "frameon": False, "fontsize": SMALL}
+    right.legend(handles=common_keys(look), ncols=3, labelcolor=look.ink, **above)
     return axes
 
 
@@ -114,15 +130,12 @@ def _grid(figure: Any, actuators: int, with_margins: bool) -> tuple[list[Axes], 
     return strips, figure.add_subplot(grid[rows, :], sharex=strips[0]) if with_margins else strips[0]
 
 
-def draw_path(figure: Any, track: Track, known: NDArray[np.intp]) -> Axes:
+def draw_path(canvas: Canvas, track: Track, known: NDArray[np.intp]) -> Axes:
     """Draw the machine at the step that is farthest from its target, the target path and the achieved path."""
     shown = skeleton_of(track[int(known[np.argmax(track.position_error[known])])])
-    canvas = canvas_on(new_axes(figure, plane := plane_of(track.mechanism)), plane)
+    key = [*key_of(shown, canvas.look), *draw_paths(canvas, track)]
+    canvas.frame(np.vstack([shown.points, places_along(track)]), track.mechanism.length_unit, key)
     draw_machine(canvas, shown)
-    lines = draw_paths(canvas, track)
-    labels = [*key_of(shown), *lines]
-    figure.legend(handles=labels, loc="outside upper center", ncols=3, frameon=False, fontsize=SMALL)
-    canvas.frame(np.vstack([shown.points, places_along(track)]), track.mechanism.length_unit)
     axes: Axes = canvas.axes
     return axes
 
@@ -140,10 +153,10 @@ def draw_paths(canvas: Canvas, track: Track) -> list[Artist]:
     on_target, projected = (
         np.where(mask[:, None], achieved, np.nan) for mask in (~is_unreached | next_to(is_unreached), is_unreached)
     )
-    target_style = {"color": ASKED, "linestyle": "--", "linewidth": 1.4, "label": "asked for", "zorder": 20}
+    target_style = {"color": canvas.look.asked, "linestyle": "--", "linewidth": 1.4, "label": "asked for", "zorder": 20}
     lines = [
         canvas.line(track.targets[:, :3, 3], **target_style),
-        canvas.line(on_target, color=ACHIEVED, linewidth=2.0, label="reached", zorder=21),
+        canvas.line(on_target, color=canvas.look.achieved, linewidth=2.0, label="reached", zorder=21),
     ]
     if is_unreached.any():
         style = {"marker": "o", "markersize": 2.6, "markeredgewidth": 0.0}  # a single step has no line
@@ -157,13 +170,14 @@ def next_to(marked: Mask) -> Mask:
     return np.asarray(marked & ~(padded[:-2] & padded[2:]))
 
 
-def draw_actuator(axes: Axes, readout: Readout, values: Floats, solution: Solution) -> None:
+def draw_actuator(axes: Axes, readout: Readout, values: Floats, solution: Solution, look: Look) -> None:
     """Draw one actuator over the steps, its limits named at the axis, in orange where it is at one."""
-    shade_steps(axes, np.asarray(solution.status) != Status.REACHED)
+    dress(axes, look)
+    shade_steps(axes, np.asarray(solution.status) != Status.REACHED, look)
     bounds = [bound for bound in readout.limits if np.isfinite(bound)]
     for bound in bounds:
-        axes.axhline(bound, color="black", linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
-    axes.plot(values, color=ACHIEVED, linewidth=1.5)
+        axes.axhline(bound, color=look.ink, linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
+    axes.plot(values, color=look.achieved, linewidth=1.5)
     finite = values[np.isfinite(values)]
     if bounds:
         near = np.min([np.abs(values - bound) for bound in bounds], axis=0) <= HELD_BY * np.ptp([*finite, *bounds])
@@ -184,45 +198,47 @@ def limits_of(track: Track) -> dict[str, Floats]:
     return dict(sorted(by_name.items(), key=lambda item: float(np.nanmin(item[1]))))
 
 
-def draw_margins(axes: Axes, track: Track) -> None:
+def draw_margins(axes: Axes, track: Track, look: Look) -> None:
     """Draw the margin of every limit; those that are the smallest at some step are named."""
-    shade_steps(axes, track.status != Status.REACHED)
+    dress(axes, look)
+    shade_steps(axes, track.status != Status.REACHED, look)
     by_name = limits_of(track)
     values = np.array(list(by_name.values()))
     least = np.nanmin(np.where(np.isnan(values), np.inf, values), axis=0)
     tightest = [name for name, margin in by_name.items() if (margin <= least).any()][:MOST_MARGINS]
     for margin in (margin for name, margin in by_name.items() if name not in tightest):
-        axes.plot(margin, color="#cccccc", linewidth=0.7, zorder=1)
+        axes.plot(margin, color=look.asked, alpha=OTHERS, linewidth=0.7, zorder=1)
     for place, name in enumerate(tightest):
-        axes.plot(by_name[name], label=name, linewidth=1.5, zorder=2, **line_style(place))
-    axes.axhline(0.0, color="black", linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
+        axes.plot(by_name[name], label=name, linewidth=1.5, zorder=2, **line_style(place, look))
+    axes.axhline(0.0, color=look.ink, linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
     axes.set(xlabel="step", ylabel="margin", xlim=(0, max(len(track) - 1, 1)), ylim=(min(-0.05, *least), 1.05))
     axes.tick_params(labelsize=SMALL)
     for label in (axes.xaxis.label, axes.yaxis.label):
         label.set_fontsize(SMALL)
     beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False}
-    axes.legend(title="limit", title_fontsize=SMALL, fontsize=SMALL, **beside)
+    legend = axes.legend(title="limit", title_fontsize=SMALL, fontsize=SMALL, labelcolor=look.ink, **beside)
+    legend.get_title().set_color(look.ink)
 
 
-def line_style(place: int) -> dict[str, Any]:
+def line_style(place: int, look: Look) -> dict[str, Any]:
     """Colour and dashes of the line at a place: 18 that differ, neighbours in both."""
-    colour = LOOKS["light"].lines[place % len(LOOKS["light"].lines)]
-    return {"color": colour, "linestyle": DASHES[(place + place // len(LOOKS["light"].lines)) % len(DASHES)]}
+    colour = look.lines[place % len(look.lines)]
+    return {"color": colour, "linestyle": DASHES[(place + place // len(look.lines)) % len(DASHES)]}
 
 
-def shade_steps(axes: Axes, marked: Mask) -> None:
+def shade_steps(axes: Axes, marked: Mask, look: Look) -> None:
     """Draw a grey band behind every run of marked steps."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
     for start, stop in edges.reshape(-1, 2):
-        axes.axvspan(start - 0.5, stop - 0.5, color=SHADE, linewidth=0, zorder=0)
+        axes.axvspan(start - 0.5, stop - 0.5, color=look.faint, linewidth=0, zorder=0)
 
 
-def common_keys() -> list[Artist]:
+def common_keys(look: Look) -> list[Artist]:
     """The entries of the legend that all panels share."""
     from matplotlib.lines import Line2D
 
     return [
-        Line2D([], [], color="black", linewidth=1, linestyle=LIMIT_DASHES, label="limit"),
+        Line2D([], [], color=look.ink, linewidth=1, linestyle=LIMIT_DASHES, label="limit"),
         Line2D([], [], color=HELD, linewidth=3, label="at a limit"),
-        Line2D([], [], color=SHADE, linewidth=7, label="target out of reach"),
+        Line2D([], [], color=look.faint, linewidth=7, label="target out of reach"),
     ]
