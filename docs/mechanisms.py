@@ -6,26 +6,26 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib import pyplot
 from PIL import Image
 
 import pfabrik as pf
 from pfabrik.catalog import catalog_file, description
 from pfabrik.chains.serial_chain import is_chain
-from pfabrik.description.plane import plane_of
 from pfabrik.model import model_of
-from pfabrik.view.canvas import new_axes
+from pfabrik.view.looks import LOOKS, Theme
 
 PAGE = Path(__file__).with_suffix(".md")
 PICTURES = PAGE.parent / "pictures"
 MANY = 12  # joints of a chain from which equal ones are counted
 COLOURS = 64  # of a picture: enough for smooth edges, and a third of the file
+DPI = 110
 HEAD = """# Mechanisms of the catalogue
 
 Each is loaded by its name, as in `pf.load("stewart")`. The pictures show home, the base grey and the end effector blue:
-actuated joints are filled, dashed lines are rails, a cross marks the reference point. In the sub-chains, `*` marks the
+actuated joints are filled, pale bars are rails, a cross marks the reference point. In the sub-chains, `*` marks the
 actuated joint and `Pa` a parallelogram of pins; [How it works](how-it-works.md) has more on them, and tells the engines
 apart. [Adding a mechanism](adding-a-mechanism.md) says how to bring your own.
 
@@ -37,10 +37,13 @@ apart. [Adding a mechanism](adding-a-mechanism.md) says how to bring your own.
 def main() -> None:
     """Write the page and its pictures; pictures of what is no longer in the catalogue go."""
     PICTURES.mkdir(exist_ok=True)
-    for stale in set(PICTURES.glob("*.png")) - {picture(name) for name in pf.catalog()}:
+    wanted: dict[Path, tuple[str, Theme]] = {
+        picture(name, theme): (name, theme) for name in pf.catalog() for theme in LOOKS
+    }
+    for stale in set(PICTURES.glob("*.png")) - set(wanted):
         stale.unlink()
-    for name in pf.catalog():
-        draw_picture(name)
+    for path, (name, theme) in wanted.items():
+        draw_picture(path, name, theme)
     PAGE.write_text(page(), encoding="utf-8")
 
 
@@ -72,7 +75,8 @@ def section(name: str) -> str:
         f"\n## {name}\n",
         f"**{first}**\n",
         *[f"{' '.join(rest)}\n"] * bool(rest),
-        f"![{mechanism.name}]({PICTURES.name}/{name}.png)\n",
+        "".join(f"![{mechanism.name}]({PICTURES.name}/{picture(name, theme).name}#only-{theme})" for theme in LOOKS)
+        + "\n",
         "| | |\n|---|---|",
         *[f"| {key} | {fact} |" for key, fact in facts.items()],
     ]
@@ -125,21 +129,22 @@ def engine(mechanism: pf.Mechanism) -> str:
     return "chains" if is_chain(model) else f"closure, without closed forms: {model.why_no_legs}"
 
 
-def picture(name: str) -> Path:
-    """The picture of a machine."""
-    return PICTURES / f"{name}.png"
+def picture(name: str, theme: str = "light") -> Path:
+    """The picture of a machine for pages of a theme."""
+    return PICTURES / (f"{name}.png" if theme == "light" else f"{name}-{theme}.png")
 
 
-def draw_picture(name: str) -> None:
-    """Draw a machine at home, 440 x 374 pixels in few colours; the file names neither program nor time."""
-    mechanism = pf.load(name)
-    plane = plane_of(mechanism)
-    figure = Figure(figsize=(4, 3.4), dpi=110, layout=None if plane is None else "constrained")
-    pf.plot(mechanism, new_axes(figure, plane))
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    image.quantize(COLOURS, method=Image.Quantize.FASTOCTREE).save(picture(name), optimize=True)
+def draw_picture(path: Path, name: str, theme: Theme) -> None:
+    """Draw a machine at home in few colours, its ground left clear; the file names neither program nor time."""
+    matplotlib.use("Agg")
+    figure = pf.plot(pf.load(name), theme=theme).figure
+    for ground in (figure.patch, *(axes.patch for axes in figure.axes)):
+        ground.set_alpha(0.0)
+    figure.set_dpi(DPI)
+    figure.canvas.draw()
+    image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba()))
+    pyplot.close(figure)
+    image.quantize(COLOURS, method=Image.Quantize.FASTOCTREE).save(path, optimize=True)
 
 
 if __name__ == "__main__":

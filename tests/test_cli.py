@@ -415,6 +415,12 @@ REFUSED = [
     ("track five_bar path.csv --animate a.png", "expected a name that ends in .gif or .mp4"),
     ("track five_bar path.csv --plot a.gif", "expected a name that ends in .png, .svg or .pdf"),
     # pictures
+    ("plot stewart --view up", "--view: found 'up'; expected top, front, side, iso, or EL,AZ"),
+    ("plot stewart --view 95,0", "elevation from -90 to 90 and azimuth [deg]"),
+    ("plot stewart --size 6", "--size: found '6'; expected WxH in inches, such as 6x4"),
+    ("travel stewart --size 6x-1", "expected WxH in inches"),
+    ("plot stewart --size 400x400 --dpi 600", "expected a picture of at most 100,000,000 pixels"),
+    ("plot ankle_ups --torque-map --view top", "it does not go with --view or --theme"),
     ("plot five_bar -o a.bmp", "'a.bmp'; expected a name that ends in .png, .svg or .pdf"),
     ("plot five_bar -o none/a.png", "none/a.png: No such file or directory"),
     ("plot mine.toml -o mine.png", "mine.png: found a file that was read"),

@@ -259,6 +259,23 @@ def test_pictures_are_written_and_told_of(line: str, code: int, name: str, begin
     assert listed() == sorted(["path.csv", name])
 
 
+SHOWN = "--view 20,-60 --size 6x4 --dpi 50 --theme dark"
+
+
+@pytest.mark.parametrize("line", ["plot stewart -o a.png", "track five_bar path.csv --plot a.png"])
+def test_a_picture_has_the_size_and_the_ground_that_it_is_asked_for(line: str) -> None:
+    pytest.importorskip("matplotlib")
+    from PIL import Image
+
+    write_files("path.csv")
+    assert pfabrik(f"{line} {SHOWN}").exit_code < 2
+    with Image.open("a.png") as picture:
+        assert picture.size == (300, 200)
+        assert max(picture.convert("RGB").getpixel((0, 0))) < 50
+    without = pfabrik("travel five_bar --theme dark")
+    assert (without.exit_code, without.stderr) == (0, "pfabrik: note: --theme has no effect without --plot\n")
+
+
 def test_plot_writes_the_names_of_all_joints(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     written: list[set[str]] = []

@@ -30,9 +30,11 @@ def test_the_page_is_what_its_generator_writes() -> None:
     assert written == generator().page(), "run: python docs/mechanisms.py"
 
 
-def test_every_machine_has_a_small_picture_and_no_other_has_one() -> None:
+def test_every_machine_has_small_pictures_for_light_and_dark_pages_and_no_other_has_one() -> None:
     pictures = {path.stem: path.stat().st_size for path in (DOCS / "pictures").glob("*.png")}
-    assert set(pictures) == set(pf.catalog()), "run: python docs/mechanisms.py"
+    assert set(pictures) == {f"{name}{ending}" for name in pf.catalog() for ending in ("", "-dark")}, (
+        "run: python docs/mechanisms.py"
+    )
     assert max(pictures.values()) < LARGEST_PICTURE
 
 
@@ -45,5 +47,5 @@ def test_pictures_are_the_same_every_time_and_stale_ones_go(tmp_path: Path, monk
     first = module.picture("five_bar").read_bytes()
     module.picture("gone").touch()
     module.main()
-    assert [path.name for path in module.PICTURES.iterdir()] == ["five_bar.png"]
+    assert {path.name for path in module.PICTURES.iterdir()} == {"five_bar.png", "five_bar-dark.png"}
     assert module.picture("five_bar").read_bytes() == first

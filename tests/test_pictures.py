@@ -377,6 +377,7 @@ WRONG: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: pf.plot(TRIPOD, names=["AA1"]), UnknownName, "did you mean 'A1'"),
     (lambda: pf.plot_travel(pf.Travel(BATCH[0], ())), InvalidArgument, "no direction"),
     (lambda: pf.plot_track(BATCH), InvalidArgument, "expected a Track"),  # type: ignore[arg-type]
+    (lambda: pf.plot_track(SHORT, size=(3.0, 2.0)), InvalidArgument, "found 3 x 2 inches; expected 6 x 4 at least"),
     (lambda: pf.animate(SHORT, "film.avi"), InvalidArgument, r"ends in \.gif or \.mp4"),
     (lambda: pf.animate(SHORT, "film.gif", seconds=-1.0), InvalidArgument, "a positive number"),
     (lambda: save_picture(Figure(), Path("a.bmp")), InvalidArgument, r"'a\.bmp'; .* ends in \.png, \.svg or \.pdf"),
@@ -494,7 +495,7 @@ def test_travel_is_drawn_with_what_stops_it(monkeypatch: pytest.MonkeyPatch) -> 
     axes = pf.plot_travel(found)
     assert list(axes) == ["along", "about"]
     widths = [abs(bar.get_width()) for bar in axes["about"].patches]
-    assert sorted(widths) == pytest.approx(sorted(np.degrees(found.distances[6:])))
+    assert sorted(widths) == pytest.approx(sorted(np.degrees(found.distances[6:])), rel=1e-5)  # as in the table
     assert "138.6\nBL3 max" in [text.get_text() for text in axes["along"].texts]
     assert faults(axes["along"].figure, monkeypatch) == []
 

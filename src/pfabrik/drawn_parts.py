@@ -30,6 +30,9 @@ FLAT = 0.02
 ACROSS = 0.7
 """Cosine of the angle to the direction across a body, or to the vertical, up to which a direction counts as that."""
 
+WITHIN_PLANE = 0.3
+"""The same cosine up to which a direction counts as one within the plane of a body."""
+
 HANGS = 0.3
 """Share of a machine's height below which the end effector is at home where the machine hangs from its base."""
 
@@ -119,7 +122,7 @@ def _body(mechanism: Mechanism, body: str, rails: dict[str, Floats]) -> list[Par
     points = _corners(mechanism, names, rails if role == "base" else {})
     ends: list[Place] = list(points) if role == "base" else [(name,) for name in names]
     lit = tuple(names) if role == "link" else ()
-    if len(ends) < 2:
+    if len(ends) < 2 or (role == "base" and _has_oblique_rails(mechanism, points, rails)):
         return []
     centre = common_centre(mechanism)
     if centre is not None and is_around(mechanism, names, centre):
@@ -145,6 +148,14 @@ def _corners(mechanism: Mechanism, names: list[str], rails: dict[str, Floats]) -
         if name in rails and len(points) > 2 and abs(np.array(mechanism.home_axis(name)) @ normal) > ACROSS:
             points[k] = max(rails[name], key=lambda end: float(np.linalg.norm(end - mechanism.home_pose[:3, 3])))
     return points
+
+
+def _has_oblique_rails(mechanism: Mechanism, points: list[Floats], rails: dict[str, Floats]) -> bool:
+    """True if rails run neither within nor across the plane through their middles: bars there would join nothing."""
+    if not is_flat(mechanism, points):
+        return False
+    normal = np.linalg.svd(np.array(points) - middle(points))[2][2]
+    return any(WITHIN_PLANE < abs(np.array(mechanism.home_axis(name)) @ normal) <= ACROSS for name in rails)
 
 
 def _cycle(ends: list[Place]) -> list[tuple[Place, Place]]:

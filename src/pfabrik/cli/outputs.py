@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
+import functools
 import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -19,6 +21,10 @@ from ..checks import require_ending
 from ..extras import require
 from ..whole_files import whole_path
 from .printing import note
+
+if TYPE_CHECKING:
+    from ..view.eye import View
+    from ..view.looks import Theme
 
 STANDARD = Path("-")
 """Standard input or output, in place of a file."""
@@ -162,9 +168,99 @@ def whole_folder(path: Path) -> Iterator[Path]:
             item.replace(path / item.name)
 
 
+@dataclass(frozen=True)
+class PictureOptions:
+    """The values of ``--view``, ``--size`` [inches], ``--theme`` and ``--dpi``; None where one is not given."""
+
+    view: View | None = None
+    size: tuple[float, float] | None = None
+    theme: Theme = "light"
+    dpi: int | None = None
+
+    @property
+    def looks(self) -> dict[str, Any]:
+        """Size and theme, as functions take them that draw something without a view."""
+        return {"size": self.size, "theme": self.theme}
+
+    @property
+    def in_space(self) -> dict[str, Any]:
+        """View, size and theme, as functions take them that draw a machine."""
+        return {"view": self.view, **self.looks}
+
+
+def pictured(*, with_view: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add ``--view``, ``--size``, ``--dpi`` and ``--theme``, which the command gets as one `drawn`."""
+    options = [
+        click.option("--size", callback=_size, metavar="WxH", help="Width and height of a picture [inches]."),
+        click.option("--dpi", type=click.IntRange(10, 2400), metavar="N", help="Pixels an inch."),
+        click.option("--theme", type=click.Choice(["light", "dark"]), help="Colours for this ground. Default: light."),
+    ]
+    if with_view:
+        seen = "Where it is seen from: top, front, side, iso, or elevation and azimuth [deg]."
+        options.insert(0, click.option("--view", callback=_view, metavar="NAME|EL,AZ", help=seen))
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def with_pictures(
+            *, size: Any, dpi: int | None, theme: Theme | None, view: View | None = None, **parameters: Any
+        ) -> Any:
+            if size is not None and size[0] * size[1] * (dpi or USUAL_DPI) ** 2 > MOST_PIXELS:
+                raise click.UsageError(f"--size and --dpi: expected a picture of at most {MOST_PIXELS:,} pixels")
+            return command(drawn=PictureOptions(view, size, theme or "light", dpi), **parameters)
+
+        for option in reversed(options):
+            with_pictures = option(with_pictures)
+        return with_pictures
+
+    return decorate
+
+
+USUAL_DPI, MOST_PIXELS = 150, 100_000_000
+"""Pixels an inch where no other number is asked for, and pixels of a picture at most: more takes gigabytes."""
+
+
+def _view(context: click.Context, parameter: click.Parameter, words: str | None) -> View | None:
+    """A direction by name or by two angles [deg]."""
+    if words is None:
+        return None
+    from ..view.eye import VIEWS, eye_of
+
+    try:
+        view: Any = words if words in VIEWS else tuple(map(float, words.split(",")))
+        eye_of(view)
+    except ValueError:
+        names = ", ".join(VIEWS)
+        expected = f"{names}, or EL,AZ: elevation from -90 to 90 and azimuth [deg]"
+        raise click.UsageError(f"--view: found '{words}'; expected {expected}") from None
+    return view  # type: ignore[no-any-return]
+
+
+def _size(context: click.Context, parameter: click.Parameter, words: str | None) -> tuple[float, float] | None:
+    """Width and height [inches]."""
+    if words is None:
+        return None
+    from ..view.canvas import checked_size
+
+    try:
+        return checked_size(tuple(map(float, words.lower().split("x"))))
+    except ValueError:
+        raise click.UsageError(f"--size: found '{words}'; expected WxH in inches, such as 6x4") from None
+
+
+def note_no_picture(*without: str) -> None:
+    """Note the options of a picture that are given where there is none."""
+    context = click.get_current_context()
+    for name in ("view", "size", "dpi", "theme"):
+        if name in context.params and context.params[name] is not None:
+            note(f"--{name} has no effect without {' or '.join(without)}")
+
+
 @contextmanager
-def picture(path: Path) -> Iterator[None]:
-    """Write to a file what a block draws in one new figure; a name that cannot be is refused before it draws."""
+def picture(path: Path, drawn: PictureOptions | None = None) -> Iterator[None]:
+    """Write to a file what a block draws in one new figure; a name that cannot be is refused before it draws.
+
+    It is cropped to what is drawn, unless a size is asked for.
+    """
     from ..view.save_picture import PICTURES, save_picture
 
     require_ending(path, PICTURES)
@@ -173,9 +269,12 @@ def picture(path: Path) -> Iterator[None]:
     from matplotlib import pyplot
 
     matplotlib.use("Agg")  # no window, whatever the user's settings
+    drawn = drawn or PictureOptions()
     yield
     figure = pyplot.gcf()
+    if drawn.size is not None:
+        figure.set_size_inches(drawn.size)
     try:
-        save_picture(figure, path)
+        save_picture(figure, path, tight=drawn.size is None, dpi=drawn.dpi)
     finally:
         pyplot.close(figure)

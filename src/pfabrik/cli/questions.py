@@ -25,7 +25,7 @@ from .arguments import (
     projecting,
     targeted,
 )
-from .outputs import check_outputs, picture
+from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured
 from .printing import complain, json_option, note, print_answer, print_result
 
 if TYPE_CHECKING:
@@ -193,6 +193,7 @@ def coordinates(mechanism: pf.Mechanism, values: tuple[float, ...]) -> Floats:
 @click.option("--about", type=FINITE, nargs=3, multiple=True, metavar="X Y Z", help="An axis to turn about. Likewise.")
 @click.option("--pivot", type=FINITE, nargs=3, metavar="X Y Z", help="What stays where it is. Default: --position.")
 @click.option("--plot", "path", type=click.Path(path_type=Path), metavar="FILE", help="Picture too: PNG, SVG or PDF.")
+@pictured(with_view=False)
 @json_option()
 def travel(
     mech: str,
@@ -201,6 +202,7 @@ def travel(
     about: tuple[Triple, ...],
     pivot: Triple | None,
     path: Path | None,
+    drawn: PictureOptions,
     as_json: bool,
 ) -> int:
     """Tell how far the end effector can go along and about axes.
@@ -214,9 +216,11 @@ def travel(
     if not start:
         raise click.ClickException(f"cannot start there: {str(start.status).lower()}; see `pfabrik ik`")
     distances = pf.travel(start, along=along or None, about=about or None, pivot=pivot)
-    if path is not None:
-        with picture(path):
-            pf.plot_travel(distances)
+    if path is None:
+        note_no_picture("--plot")
+    else:
+        with picture(path, drawn):
+            pf.plot_travel(distances, **drawn.looks)
         click.echo(f"wrote {path}", err=True)
     print_result(as_json, distances)
     return 0

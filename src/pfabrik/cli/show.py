@@ -15,7 +15,7 @@ import pfabrik as pf
 
 from ..checks import require_ending
 from .arguments import FINITE, MECH, STANDARD_INPUT, TargetOptions, load, named_joints, targeted
-from .outputs import check_outputs, picture
+from .outputs import PictureOptions, check_outputs, picture, pictured
 from .printing import note
 
 
@@ -67,12 +67,20 @@ def torque_map_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @targeted
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="PNG, SVG or PDF.  [default: NAME.png]")
 @click.option("--names", is_flag=True, help="Write the names of joints beside them.")
+@pictured()
 @torque_map_options
-def plot(mech: str, target: TargetOptions, output: Path | None, names: bool, torque_map: TorqueMap | None) -> int:
+def plot(
+    mech: str,
+    target: TargetOptions,
+    output: Path | None,
+    names: bool,
+    drawn: PictureOptions,
+    torque_map: TorqueMap | None,
+) -> int:
     """Draw a machine at home, or where a target takes it.
 
-    A planar machine is drawn in its plane. A target out of reach shows the nearest feasible pose, the joints that hold
-    it back in orange and named; the exit code is then 1.
+    A planar machine is drawn in its plane, any other from where its joints are seen best apart. A target out of reach
+    shows the nearest feasible pose, the joints that hold it back in orange and named; the exit code is then 1.
 
     With --torque-map: the torques that the actuators give two joints in series, over the range of these.
     """
@@ -82,13 +90,15 @@ def plot(mech: str, target: TargetOptions, output: Path | None, names: bool, tor
     if torque_map is not None:
         if target.is_given or names:
             raise click.UsageError("--torque-map is of the whole range: it does not go with a target or --names")
-        with picture(path):
+        if drawn.view is not None or drawn.theme != "light":
+            raise click.UsageError("--torque-map is no picture of a machine: it does not go with --view or --theme")
+        with picture(path, drawn):
             torque_map.draw(mechanism)
         click.echo(f"wrote {path}")
         return 0
     shown = pf.solve_ik(mechanism, target.of(mechanism)) if target.is_given else mechanism
-    with picture(path):
-        pf.plot(shown, names=names)
+    with picture(path, drawn):
+        pf.plot(shown, names=names, **drawn.in_space)
     click.echo(f"wrote {path}")
     return 0 if shown else 1
 

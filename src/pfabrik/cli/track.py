@@ -17,7 +17,17 @@ from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
 from .arguments import FINITE, MECH, load, note_left_out, projecting
-from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, whole_file
+from .outputs import (
+    OUTPUT,
+    STANDARD,
+    PictureOptions,
+    check_outputs,
+    note_no_picture,
+    picture,
+    pictured,
+    refuse_both_on_stdout,
+    whole_file,
+)
 from .printing import json_option, note, print_json, print_result, print_text
 from .questions import own_limits, speed_limits, speed_option
 
@@ -46,6 +56,7 @@ MOST_TARGETS = 1_000_000_000
     "--plot", "picture_path", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF."
 )
 @click.option("--animate", "film_path", type=click.Path(path_type=Path), metavar="FILE", help="Film: GIF or MP4.")
+@pictured()
 @json_option()
 def track(
     mech: str,
@@ -55,6 +66,7 @@ def track(
     speeds: tuple[str, ...],
     picture_path: Path | None,
     film_path: Path | None,
+    drawn: PictureOptions,
     as_json: bool,
     **sampling: float | None,
 ) -> int:
@@ -79,6 +91,8 @@ def track(
     outputs = [("-o", output), ("--plot", picture_path), ("--animate", film_path)]
     check_outputs(outputs, [path, Path(mech)], as_json=as_json)
     check_pictures(picture_path, film_path)
+    if not is_drawn:
+        note_no_picture("--plot", "--animate")
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     from ..answers.tracked import TrackSummary
@@ -91,7 +105,7 @@ def track(
     summary = TrackSummary(mechanism)
     with nullcontext() if output is None else whole_file(output) as handle:
         solution = follow(mechanism, blocks, options, own_limits(mechanism) | limits, handle, summary, n_targets)
-    draw(solution, picture_path, film_path)
+    draw(solution, picture_path, film_path, drawn)
     if as_json:
         print_json(solution.to_dict())
     print_text(summary.line(), to_stderr=as_json or output == STANDARD)
@@ -200,14 +214,14 @@ def follow(
     return part.track
 
 
-def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None) -> None:
+def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, drawn: PictureOptions) -> None:
     """Write the picture and the film that are wanted."""
     if picture_path is not None:
-        with picture(picture_path):
-            pf.plot_track(solution)
+        with picture(picture_path, drawn):
+            pf.plot_track(solution, **drawn.in_space)
         click.echo(f"wrote {picture_path}", err=True)
     if film_path is not None:
-        pf.animate(solution, film_path)
+        pf.animate(solution, film_path, dpi=drawn.dpi, **drawn.in_space)
         click.echo(f"wrote {film_path}", err=True)
 
 

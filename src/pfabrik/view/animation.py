@@ -13,7 +13,7 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
-from ..checks import require_ending, require_positive
+from ..checks import require_count, require_ending, require_positive
 from ..drawing import SMALL
 from ..errors import MissingLibrary
 from ..extras import require
@@ -45,6 +45,7 @@ def animate(
     view: View | None = None,
     size: tuple[float, float] | None = None,
     theme: Theme = "light",
+    dpi: int | None = None,
     on_progress: OnProgress | None = None,
 ) -> None:
     """Write a film of a path that was followed: the machine, its targets, and the limits that block them.
@@ -58,7 +59,8 @@ def animate(
     seconds : how long it runs; default: as long as the path takes if the track has a `sample_time`, else a
         twentieth of a second a step. There are 20 frames a second, each the step that is due.
     view, theme : as of `plot`.
-    size : width and height of the film [inches], of 100 pixels each.
+    size : width and height of the film [inches].
+    dpi : pixels an inch; default: 100.
     on_progress : called with (frames done, frames in all); default: a line on a terminal, if it takes more than two
         seconds.
 
@@ -73,7 +75,7 @@ def animate(
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)
     skeletons = {step: skeleton_of(track[step]) for step in np.unique(steps).tolist()}
-    film = _Film(track, skeletons, view, checked_size(size or SIZE), look_of(theme))
+    film = _Film(track, skeletons, view, checked_size(size or SIZE), require_count("dpi", dpi or DPI), look_of(theme))
     with (
         telling(f"drawing {os.fspath(path)}", on_progress) as tell,
         whole_path(path) as part,
@@ -125,13 +127,19 @@ class _Film:
     """One figure, whose machine is drawn anew for each frame."""
 
     def __init__(
-        self, track: Track, skeletons: dict[int, Skeleton], view: View | None, size: tuple[float, float], look: Look
+        self,
+        track: Track,
+        skeletons: dict[int, Skeleton],
+        view: View | None,
+        size: tuple[float, float],
+        dpi: int,
+        look: Look,
     ) -> None:
         from matplotlib.figure import Figure
 
         self._track, self._skeletons = track, skeletons
         eye, is_plane = machine_eye(track.mechanism, view)
-        self.figure: Figure = Figure(figsize=size, dpi=DPI, layout="constrained", facecolor=look.paper)
+        self.figure: Figure = Figure(figsize=size, dpi=dpi, layout="constrained", facecolor=look.paper)
         high = size[1] - CAPTION
         above, below = np.ravel(
             self.figure.subfigures(2, 1, height_ratios=(CAPTION, high), squeeze=False, facecolor=look.paper)

@@ -215,29 +215,37 @@ def new_canvas(
         width, height = checked_size(size)
     figure = new_figure(width, height, layout="constrained" if is_plane else None)
     figure.set_facecolor(look.paper)
-    lines = wrap(title, max(int(width * 72.0 / (LETTER * TITLE)), 1))
+    title = wrapped(title, width)
     if is_plane:
         axes = figure.add_subplot()
     else:
-        high = TITLE_LINE * len(lines) / 72.0
+        high = TITLE_LINE * (title.count("\n") + 1) / 72.0
         if size is None:
             figure.set_size_inches(width, height := height + high)
         axes = figure.add_axes((0.0, 0.0, 1.0, max(1.0 - high / height, 0.1)))
-    axes.set_title("\n".join(lines), fontsize=TITLE, color=look.ink, pad=1.0)
+    axes.set_title(title, fontsize=TITLE, color=look.ink, pad=1.0)
     return canvas_on(axes, eye, look, is_plane=is_plane)
+
+
+def wrapped(title: str, width: float, letters: float = TITLE) -> str:
+    """A title in as many lines as its letters [points] need in a width [inches]."""
+    return "\n".join(wrap(title, max(int(width * 72.0 / (LETTER * letters)), 1)))
 
 
 STRIP = 30.0
 """Room above and below a machine in a new figure, for its key and its scale [points]."""
 
 
-def checked_size(size: Any) -> tuple[float, float]:
-    """Width and height of a figure [inches]; InvalidArgument for what is not two positive numbers."""
+def checked_size(size: Any, least: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
+    """Width and height of a figure [inches]; InvalidArgument for what is not two positive numbers, or too small."""
     try:
         width, height = size
     except (TypeError, ValueError):
         raise InvalidArgument("size", repr(size), "two numbers: width and height in inches") from None
-    return require_positive("size", width), require_positive("size", height)
+    width, height = require_positive("size", width), require_positive("size", height)
+    if width < least[0] or height < least[1]:
+        raise InvalidArgument("size", f"{width:g} x {height:g} inches", f"{least[0]:g} x {least[1]:g} at least")
+    return width, height
 
 
 def _size(axes: Any) -> Floats:

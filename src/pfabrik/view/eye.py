@@ -35,7 +35,7 @@ APART, LONG = 0.08, 0.6
 """Distance of two joints on the screen from which on they are apart, as a share of the machine's extent; share of its
 length that a link is long enough with."""
 
-WEIGHTS = {"apart": 1.0, "long": 0.7, "area": 0.8, "crossings": -0.35, "turn": -0.35}
+WEIGHTS = {"apart": 2.0, "long": 0.7, "area": 0.8, "crossings": -0.35, "turn": -0.35}
 """Of the mean share of `APART` between joints, of the share of `LONG` of the shortest link, of the root of the share of
 a square that is covered, of crossings per link, and of the angle from the usual direction [1/rad]."""
 

@@ -17,7 +17,7 @@ from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument, counted
 from ..kinematics import Readout, readouts
 from ..skeleton import skeleton_of
-from .canvas import Canvas, canvas_on, checked_size
+from .canvas import Canvas, canvas_on, checked_size, wrapped
 from .eye import View
 from .looks import HELD, Look, Theme, dress, look_of
 from .machine import draw_machine, key_of, machine_eye
@@ -27,8 +27,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SIZE = (11.5, 6.2)
-"""Width and height of a new figure [inches]."""
+SIZE, LEAST = (11.5, 6.2), (6.0, 4.0)
+"""Width and height of a new figure, and the least that has room for all of it [inches]."""
+
+TITLE = SMALL + 4.0
+"""Size of the letters of the title [points]."""
 
 MOST_STRIPS = 6
 """Strips of actuators one below the other; further ones make another column."""
@@ -78,10 +81,11 @@ def plot_track(
     known, look = checked_track(track), look_of(theme)
     mechanism = track.mechanism
     eye, is_plane = machine_eye(mechanism, view)
-    figure = new_figure(*checked_size(size or SIZE), dpi=130) if figure is None else figure
+    figure = new_figure(*checked_size(size or SIZE, LEAST), dpi=130) if figure is None else figure
     require_method("figure", figure, "subfigures", "a matplotlib figure, or None")
     figure.set_facecolor(look.paper)
-    figure.suptitle(f"{mechanism.name}: {reached_in_words(track)}", fontsize=SMALL + 4.0, color=look.ink)
+    title = wrapped(f"{mechanism.name}: {reached_in_words(track)}", figure.bbox.width / figure.dpi, TITLE)
+    figure.suptitle(title, fontsize=TITLE, color=look.ink)
     left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1, 1.2), squeeze=False, facecolor=look.paper))
     axes = {"path": draw_path(canvas_on(left.add_subplot(), eye, look, is_plane=is_plane), track, known)}
     strips, below = _grid(right, len(mechanism.actuator_names), has_margins := bool(limits_of(track)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +14,15 @@ from ..checks import require_method
 from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument
 from ..travel import Reach, Travel
-from .looks import EDGE, LINK, PLATFORM
+from .canvas import TITLE, checked_size, round_length, wrapped
+from .looks import Look, Theme, dress, look_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-HEIGHT = 0.55
-"""Height of a row [inches]."""
+HEIGHT, THICK = 0.55, 0.42
+"""Height of a row [inches]; thickness of a bar, as a share of it."""
 
 MOST_FOR_NAMES = 0.8
 """The largest share of a side that names beyond its bars may take."""
@@ -38,7 +40,9 @@ SAME = 1e-9
 """Directions that differ by less, up to their sign, have one row."""
 
 
-def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
+def plot_travel(
+    found: Travel, figure: Figure | None = None, *, size: tuple[float, float] | None = None, theme: Theme = "light"
+) -> dict[str, Axes]:
     """Draw how far the end effector can go along and about each axis, with the limit that stops it at the end.
 
     Opposite directions share a row. A dashed bar has no end: nothing stops it.
@@ -47,6 +51,8 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
     ----------
     found : what `travel` answered.
     figure : matplotlib figure or subfigure to draw in; default: a new one.
+    size : of a new figure, width and height [inches].
+    theme : "light" or "dark".
 
     Returns
     -------
@@ -54,7 +60,7 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
 
     Raises
     ------
-    InvalidArgument : what is no Travel, or one without a direction.
+    InvalidArgument : what is no Travel, or one without a direction; no such size or theme.
     MissingLibrary : matplotlib is not installed.
     """
     if not isinstance(found, Travel) or not len(found):
@@ -62,20 +68,40 @@ def plot_travel(found: Travel, figure: Figure | None = None) -> dict[str, Axes]:
         raise InvalidArgument("found", what, "a Travel, as `travel` returns")
     kinds = {kind: _rows([each for each in found if each.kind == kind]) for kind in ("along", "about")}
     kinds = {kind: rows for kind, rows in kinds.items() if rows}
+    look = look_of(theme)
     if figure is None:
-        figure = new_figure(4.4 * len(kinds) + 0.4, 1.6 + HEIGHT * max(map(len, kinds.values())))
+        usual = (4.4 * len(kinds) + 0.4, 1.6 + HEIGHT * max(map(len, kinds.values())))
+        figure = new_figure(*checked_size(size or usual))
     require_method("figure", figure, "subplots", "a matplotlib figure, or None")
+    figure.set_facecolor(look.paper)
     mechanism = found.origin.mechanism
     place = ", ".join(f"{part:.4g}" for part in found.origin.pose[:3, 3])
-    figure.suptitle(f"{mechanism.name} from ({place}) {mechanism.length_unit}", fontsize=SMALL + 2.0)
+    title = f"Travel of {mechanism.name} from ({place}) {mechanism.length_unit}"
+    figure.suptitle(wrapped(title, figure.bbox.width / figure.dpi), fontsize=TITLE, color=look.ink)
     panels = figure.subplots(1, len(kinds), squeeze=False)[0]
     longest = []
     for axes, (kind, rows) in zip(panels, kinds.items(), strict=True):
-        longest.append(_draw(axes, kind, rows, mechanism.length_unit if kind == "along" else "deg"))
+        dress(axes, look)
+        longest.append(_draw(axes, kind, [[_bar_of(found, reach) for reach in row] for row in rows], look))
     figure.get_figure(root=True).draw_without_rendering()
+    share = max(_names_share(axes) for axes in panels)  # of all panels the same, so that their longest bars are alike
     for axes, length in zip(panels, longest, strict=True):
-        _make_room(axes, length)
+        _make_room(axes, length, share)
     return dict(zip(kinds, panels, strict=True))
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A reach as it is drawn: as long as its table says [length or deg], inf without an end, and what stops it."""
+
+    reach: Reach
+    length: float
+    unit: str
+
+
+def _bar_of(found: Travel, reach: Reach) -> Bar:
+    words, unit = found._distance(reach)
+    return Bar(reach, float(words) if np.isfinite(reach.distance) else np.inf, unit)
 
 
 def _rows(reaches: Sequence[Reach]) -> list[list[Reach]]:
@@ -91,50 +117,50 @@ def _rows(reaches: Sequence[Reach]) -> list[list[Reach]]:
     return rows
 
 
-def _draw(axes: Axes, kind: str, rows: list[list[Reach]], unit: str) -> float:
+def _draw(axes: Axes, kind: str, rows: list[list[Bar]], look: Look) -> float:
     """Draw one panel, a row for each direction, its own side to the right; returns the length of the longest bar."""
-    from matplotlib.ticker import MaxNLocator
-
-    ends = [_shown(each, unit) for row in rows for each in row if np.isfinite(each.distance)]
-    longest = max(ends, default=0.0) or 1.0
+    longest = max((bar.length for row in rows for bar in row if np.isfinite(bar.length)), default=0.0) or 1.0
     for height, row in enumerate(rows):
-        for reach, side in zip(row, (1.0, -1.0), strict=False):
-            _bar(axes, reach, side, height, longest, unit)
-    axes.axvline(0.0, color=EDGE, linewidth=0.9)
+        for bar, side in zip(row, (1.0, -1.0), strict=False):
+            _draw_bar(axes, bar, side, height, longest, look)
+    axes.axvline(0.0, color=look.ink, linewidth=0.9)
     left = -longest if any(len(row) > 1 for row in rows) else 0.0
-    axes.set(xlim=(left, longest), ylim=(len(rows) - 0.4, -0.6), xlabel=f"{kind} [{unit}]")
-    axes.set_yticks(range(len(rows)), [_name(row[0].direction) for row in rows])
-    ticks = [tick for tick in MaxNLocator(4).tick_values(left, longest) if left <= tick <= longest]
-    axes.set_xticks(ticks, [f"{abs(tick):g}" for tick in ticks])
+    axes.set(xlim=(left, longest), ylim=(len(rows) - 0.4, -0.6), xlabel=f"{kind} [{rows[0][0].unit}]")
+    axes.set_yticks(range(len(rows)), [_name(row[0].reach.direction) for row in rows])
+    step = round_length(longest) / (1.0 if longest >= 2.0 * round_length(longest) else 2.0)
+    ticks = np.arange(np.ceil(left / step), np.floor(longest / step) + 1.0) * step
+    axes.set_xticks(ticks.tolist(), [f"{abs(tick):g}" for tick in ticks.tolist()])
+    axes.grid(axis="x", color=look.faint, linewidth=0.8)
+    axes.set_axisbelow(True)
     axes.tick_params(labelsize=SMALL, left=False)
     axes.xaxis.label.set_fontsize(SMALL + 1.0)
     axes.spines[["top", "right", "left"]].set_visible(False)
     return longest
 
 
-def _make_room(axes: Axes, longest: float) -> None:
-    """Widen a panel until the text beyond the bars is within it."""
-    left = axes.get_xlim()[0]
+def _names_share(axes: Axes) -> float:
+    """The share of a panel that the text beyond its bars takes."""
     width = axes.get_window_extent().width
     widest = max(text.get_window_extent().width for text in axes.texts) + BESIDE * axes.figure.dpi / 72.0
-    sides = 2.0 if left < 0.0 else 1.0
-    share = min(sides * widest / width, MOST_FOR_NAMES)
-    axes.set_xlim(left / (1.0 - share), longest / (1.0 - share))
+    sides = 2.0 if axes.get_xlim()[0] < 0.0 else 1.0
+    return float(min(sides * widest / width, MOST_FOR_NAMES))
 
 
-def _bar(axes: Axes, reach: Reach, side: float, height: int, longest: float, unit: str) -> None:
+def _make_room(axes: Axes, longest: float, share: float) -> None:
+    """Widen a panel until the text beyond the bars is within it."""
+    axes.set_xlim(axes.get_xlim()[0] / (1.0 - share), longest / (1.0 - share))
+
+
+def _draw_bar(axes: Axes, bar: Bar, side: float, height: int, longest: float, look: Look) -> None:
     """Draw one reach as a bar, with the limit that stops it on two lines at its end."""
-    is_bounded = np.isfinite(reach.distance)
-    length = _shown(reach, unit) if is_bounded else STUB * longest
-    colour = PLATFORM if is_bounded else "none"
-    axes.barh(
-        height, side * length, 0.5, color=colour, edgecolor=EDGE, linewidth=0.8, linestyle="-" if is_bounded else "--"
-    )
-    lines = [f"{length:.4g}", *_stop(reach)] if is_bounded else ["unlimited"]
-    align = "left" if side > 0.0 else "right"
-    offset = (BESIDE * side, 0.0)
-    style: dict[str, Any] = {"ha": align, "va": "center", "fontsize": SMALL - 1.0, "color": LINK}
-    axes.annotate("\n".join(lines), (side * length, height), offset, textcoords="offset points", **style)
+    is_bounded = np.isfinite(bar.length)
+    length = side * (bar.length if is_bounded else STUB * longest)
+    fill, edge = look.faces["platform"] if is_bounded else "none", look.edges["platform"]
+    axes.barh(height, length, THICK, color=fill, edgecolor=edge, linewidth=1.0, linestyle="-" if is_bounded else "--")
+    lines = [f"{bar.length:.4g}", *_stop(bar.reach)] if is_bounded else ["unlimited"]
+    beside: dict[str, Any] = {"textcoords": "offset points", "ha": "left" if side > 0.0 else "right", "va": "center"}
+    letters: dict[str, Any] = {"fontsize": SMALL - 1.0, "color": look.ink, "linespacing": 1.1}
+    axes.annotate("\n".join(lines), (length, height), (BESIDE * side, 0.0), **beside, **letters)
 
 
 def _stop(reach: Reach) -> list[str]:
@@ -144,10 +170,6 @@ def _stop(reach: Reach) -> list[str]:
     named = short_names(reach.stopped_by[:2])
     n_more = len(reach.stopped_by) - 2
     return wrap(f"{named}; {n_more} more" if n_more > 0 else named, LETTERS)
-
-
-def _shown(reach: Reach, unit: str) -> float:
-    return float(np.degrees(reach.distance)) if unit == "deg" and reach.kind == "about" else reach.distance
 
 
 def _name(direction: tuple[float, float, float]) -> str:

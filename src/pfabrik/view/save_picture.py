@@ -27,16 +27,17 @@ ROOM = 0.05
 """Free edge around what is drawn [inches]."""
 
 
-def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = True) -> None:
+def save_picture(figure: Figure, path: str | os.PathLike[str], *, tight: bool = True, dpi: int | None = None) -> None:
     """Write a picture as PNG, SVG or PDF, as the ending of its name says.
 
     Parameters
     ----------
     tight : True to crop the picture to the drawing; else it is as large as the figure.
+    dpi : pixels an inch; default: the figure's.
     """
     from matplotlib import rc_context
 
     suffix = require_ending(path, PICTURES)
     box: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": ROOM} if tight else {}
     with whole_path(path) as part, rc_context(SETTINGS):
-        figure.savefig(part, metadata=WITHOUT_DATES[suffix], **box)
+        figure.savefig(part, dpi=dpi or "figure", metadata=WITHOUT_DATES[suffix], **box)
