@@ -74,6 +74,7 @@ _NAMES = {
     "export.export_c": ("export_c",),
     "export.export_web": ("export_web",),
     "export.ros2_control": ("export_ros2_control",),
+    "export.ros2_node": ("export_ros2_node",),
     "export.tensors": ("export_jax", "export_numpy", "export_tensors", "export_torch"),
     "feasibility": ("Feasibility", "feasibility"),
     "files": ("load", "save"),
@@ -152,6 +153,7 @@ if TYPE_CHECKING:
     from .export.export_c import export_c as export_c
     from .export.export_web import export_web as export_web
     from .export.ros2_control import export_ros2_control as export_ros2_control
+    from .export.ros2_node import export_ros2_node as export_ros2_node
     from .export.tensors import (
         export_jax as export_jax,
         export_numpy as export_numpy,

@@ -73,13 +73,20 @@ def text_of(
     help="Write a package with a transmission for ros2_control.",
 )
 @click.option(
+    "--ros2-node",
+    "node",
+    metavar="FOLDER",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Write a package with a ROS 2 node for a platform: poses in, commands of actuators out.",
+)
+@click.option(
     "--joints",
     metavar="NAME[,NAME]...",
     multiple=True,
     help="Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.",
 )
 @click.option(
-    "--name", metavar="NAME", help="Of c, c-float, --ros2-control: what names begin with.  [default: pfk, or FOLDER's]"
+    "--name", metavar="NAME", help="Of c, c-float, --ros2-...: what names begin with.  [default: pfk, or FOLDER's]"
 )
 @click.option(
     "--parts",
@@ -93,6 +100,7 @@ def export(
     words: tuple[str, ...],
     output: Path,
     folder: Path | None,
+    node: Path | None,
     joints: tuple[str, ...],
     name: str | None,
     parts: list[str] | None,
@@ -112,10 +120,12 @@ def export(
     reprap    M665 and M666, or M669, of a delta printer, for RepRapFirmware
     marlin    M665 and M666 of a delta printer
 
-    In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --web, --ros2-control.
+    In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --web, --ros2-control,
+    --ros2-node.
     """
     outputs = {form: path for form in FILES if (path := files[form]) is not None}
-    if words and not (outputs or folder):
+    packages = [option for option, path in (("--ros2-control", folder), ("--ros2-node", node)) if path is not None]
+    if words and not (outputs or packages):
         form, words = words[0], words[1:]
         if form not in FORMATS:
             raise click.UsageError(f"'{form}' is no FORMAT: choose from {', '.join(FORMATS)}")
@@ -124,11 +134,11 @@ def export(
         raise click.UsageError("-o is of a FORMAT: give one")
     if words and not joints:
         raise click.UsageError(f"found {' '.join(words)}; expected one FORMAT, or names after --joints")
-    if not outputs and folder is None:
-        options = "--torch, --jax, --numpy, --web or --ros2-control"
+    if not outputs and not packages:
+        options = "--torch, --jax, --numpy, --web, --ros2-control or --ros2-node"
         raise click.UsageError(f"expected a FORMAT ({', '.join(FORMATS)}), {options}")
     joints = named_joints(joints, words)
-    _check_settings(outputs, folder, name, joints)
+    _check_settings([*outputs, *packages], name, joints)
     if parts and not outputs.keys() & {*NAMED}:
         raise click.UsageError(f"--parts is of {', '.join(NAMED)}")
     for path in outputs.values():
@@ -139,7 +149,15 @@ def export(
         file = "FILE" if path == STANDARD else path.name
         _write(path, form, text_of(mechanism, form, "pfk" if name is None else name, joints or None, file, parts))
     if folder is not None:
-        _write_package(mechanism, folder, joints, name, force)
+        from ..export.ros2_control import ros2_control_texts
+
+        _write_package(folder, ros2_control_texts(mechanism, folder, joints=joints, name=name), force)
+    if node is not None:
+        from ..export.ros2_node import commands, ros2_node_texts
+
+        _write_package(node, ros2_node_texts(mechanism, node, name=name), force)
+        for line in ("build it in a workspace, and try it:", *commands(mechanism, node, name)):
+            click.echo(line, err=True)
     return 0
 
 
@@ -147,16 +165,16 @@ def _option(form: str) -> str:
     return f"--{form}" if form in FILES else "-o"
 
 
-def _check_settings(outputs: dict[str, Path], folder: Path | None, name: str | None, joints: tuple[str, ...]) -> None:
+def _check_settings(forms: Sequence[str], name: str | None, joints: tuple[str, ...]) -> None:
     """Stop where a setting is of no output."""
-    forms = [*outputs, *(["--ros2-control"] if folder else [])]
     for form in forms:
-        if name is not None and form not in (*NAMED, "--ros2-control"):
-            raise click.UsageError(f"--name is of {', '.join(NAMED)} and --ros2-control: {form} has none")
+        if name is not None and form not in (*NAMED, "--ros2-control", "--ros2-node"):
+            raise click.UsageError(f"--name is of {', '.join(NAMED)}, --ros2-control and --ros2-node: {form} has none")
         if joints and form not in (*NAMED, *BACKENDS, "--ros2-control"):
             raise click.UsageError(f"--joints is of {', '.join((*NAMED, *BACKENDS))} and --ros2-control, not of {form}")
-    if folder is not None and not joints:
-        raise click.UsageError("--ros2-control needs --joints: those of the robot's description, in series")
+    if "--ros2-control" in forms and not joints:
+        series = "--ros2-control needs --joints: those of the robot's description, in series"
+        raise click.UsageError(f"{series}; for poses of a platform use --ros2-node")
 
 
 def _write(path: Path, form: str, text: str) -> None:
@@ -168,12 +186,10 @@ def _write(path: Path, form: str, text: str) -> None:
         note("LinuxCNC has no kinematics that are this machine's: a module for it")
 
 
-def _write_package(
-    mechanism: pf.Mechanism, folder: Path, joints: tuple[str, ...], name: str | None, force: bool
-) -> None:
-    from ..export.ros2_control import prefix_of, ros2_control_texts
+def _write_package(folder: Path, texts: dict[str, str], force: bool) -> None:
+    from ..export.ros2_texts import write_package
 
-    for place in ros2_control_texts(mechanism, joints, prefix_of(folder, name)):
+    for place in texts:
         refuse_existing(folder / place, force)
-    pf.export_ros2_control(mechanism, folder, joints=joints, name=name)
-    click.echo(f"wrote {folder}", err=True)
+    write_package(folder, texts)
+    click.echo(f"wrote {folder}: {', '.join(texts)}", err=True)

@@ -70,6 +70,11 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
    reach or close. */
 int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair);
 #endif
+#if BODIES
+/* Fills the displacements from home of the bodies in the list at the top, at a whole pose: what is at x at home is at
+   R x + p. Returns what pfk_limits does; where a leg is stretched, bodies are where it comes nearest. */
+int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES]);
+#endif
 #if FK
 /* The pose at given actuators, by Newton's method from `pose`; `steps` may be 0, or is set to the number of its steps.
    Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
@@ -140,7 +145,7 @@ static pfk_Floats2 pfk_opened(const pfk_pose *pose, pfk_real at[16])
     return opened;
 }
 
-#if IK || FK || JOINTS
+#if IK || FK || JOINTS || BODIES
 static void pfk_close(const pfk_real at[16], pfk_pose *pose)
 {
     int i, j;
@@ -302,6 +307,21 @@ int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair)
     *pair = 1 + (int)pfk_measure(&pfk_reaching);
     *distance = pfk_reaching_distance[0] * PFK_SIZE;
     return pfk_reaching_distance[0] >= pfk_reaching_links_least[0] - pfk_KEPT ? 0 : PFK_PAIR + *pair;
+}
+
+#endif
+#if BODIES
+int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES])
+{
+    pfk_real own[16];
+    const int code = (int)pfk_put_bodies(&pfk_reaching, pfk_opened(pose, own));
+    int i, j;
+    for (i = 0; i < PFK_BODIES && code != PFK_NO_POSE; ++i) {
+        pfk_close(pfk_reaching_links_displaced + 16 * i, &bodies[i]);
+        for (j = 0; j < 3; ++j)
+            bodies[i].p[j] *= PFK_SIZE;
+    }
+    return code;
 }
 
 #endif

@@ -35,7 +35,7 @@ from ..platform.seeds import seeds_of
 from ..platform.table import kernel_table
 from ..platform.tables import tables_of
 from .machine_data import Machine
-from .moved_bodies import angles_needed
+from .moved_bodies import FIRST_MOVED, Motion, angles_needed
 
 NEAR = 0.5
 """Largest step of implicit joints on the way to a target [L or rad]: more than one pose may close."""
@@ -82,8 +82,8 @@ def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | 
 def _reaching(machine: Machine, model: Model, parts: Sequence[str]) -> Reaching:
     table, n = kernel_table(model.legs), len(machine.legs)
     links = _links_on_bodies(machine, parts)
-    if len(links.pairs):
-        table = table._replace(legs=_aimed(machine, table.legs))
+    if motions := machine.motions(parts):
+        table = table._replace(legs=_aimed(motions, table.legs))
     if "limits" not in parts:
         table = table._replace(limited=table.limited[:0], cones=table.cones[:0])
     far = table
@@ -132,19 +132,19 @@ def _whole(task: Records) -> Records:
     return task
 
 
-def _aimed(machine: Machine, legs: Records) -> Records:
-    """Legs whose angles are computed where links need them."""
+def _aimed(motions: Sequence[Motion], legs: Records) -> Records:
+    """Legs whose angles are computed where bodies need them."""
     legs = legs.copy()
     for k, leg in enumerate(legs):
         for end, start in (("base_end", 1), ("platform_end", 5)):
-            if angles_needed(machine.links, k, start):
+            if angles_needed(motions, k, start):
                 leg[f"{end}_aimed"] = 1
     return legs
 
 
 def _links_on_bodies(machine: Machine, parts: Sequence[str]) -> LinksOnBodies:
     links, length = machine.links_kept(parts), machine.mechanism.characteristic_length
-    motions, limits = ([], NO_LINKS) if links is None else (links.motions, links.limits)
+    motions, limits = machine.motions(parts), NO_LINKS if links is None else links.limits
     numbers = [(each.sense, *each.axis, *np.asarray(each.point) / length) for each in motions]
     return LinksOnBodies(
         np.array([(each.on, each.kind, each.leg, each.place) for each in motions], np.int64).reshape(-1, 4),
@@ -154,7 +154,7 @@ def _links_on_bodies(machine: Machine, parts: Sequence[str]) -> LinksOnBodies:
         limits.bodies,
         limits.pairs,
         limits.least,
-        np.zeros((2 + len(motions) if links is not None else 0, 4, 4)),
+        np.zeros((FIRST_MOVED + len(motions) if links is not None or "bodies" in parts else 0, 4, 4)),
         np.zeros_like(limits.home),
         new_polytope(MOST_CORNERS if limits.sizes[limits.pairs, KIND].any() else 0),
         np.zeros((2, 3)),

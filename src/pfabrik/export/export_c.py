@@ -18,7 +18,7 @@ from .machine_data import Machine, fitting_path
 from .source import source
 from .static_data import Precision
 
-Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest"]
+Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest", "bodies"]
 PARTS: tuple[Part, ...] = get_args(Part)
 _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -52,7 +52,8 @@ def export_c(
         number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
         number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
         "rates" the Jacobian, speeds of actuators, and torques of them and back; "nearest", with "ik" and "limits", the
-        nearest feasible pose to a target out of reach. All that the machine has, if left out.
+        nearest feasible pose to a target out of reach; "bodies" where every body is at a pose, for pictures. All that
+        the machine has but "bodies", if left out.
     name : str, optional
         Prefix of all names in the file; lower-case letters, digits and underscores.
     joints : str or sequence of str, optional
@@ -95,7 +96,7 @@ def c_source(
     require_identifier(name)
     machine = Machine(mechanism)
     if parts is None:
-        parts = [part for part in PARTS if part != "nearest" or not machine.why_no_nearest]
+        parts = parts_of(machine)
     if "nearest" in parts and machine.why_no_nearest:
         reason = f"{machine.why_no_nearest}: leave 'nearest' out of `parts` (--parts ik,limits,fk,rates)"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
@@ -110,6 +111,12 @@ def c_source(
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     path = None if joints is None else fitting_path(mechanism, joints)
     return source(machine, name, precision, parts, path, quote(file))
+
+
+def parts_of(machine: Machine) -> list[Part]:
+    """All parts of a machine's file but "bodies"."""
+    left_out = ("bodies", "nearest") if machine.why_no_nearest else ("bodies",)
+    return [part for part in PARTS if part not in left_out]
 
 
 def require_identifier(name: object) -> None:

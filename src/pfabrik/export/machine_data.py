@@ -19,7 +19,7 @@ from ..kernels.legs import records as K
 from ..kinematics import JointPath, generic_of, joint_path, model_of, require_determined
 from ..platform.links_of_legs import keeps_links
 from ..rotations import nearest_turn, square_to
-from .moved_bodies import ExportedLinks, exported_links
+from .moved_bodies import ExportedLinks, Motion, MovedBodies, exported_links
 
 PURPOSE = "exported"
 
@@ -130,14 +130,40 @@ class Machine:
         self.driven = [_coordinate(record, mechanism.drives[record["column"]].kind) for record in drives]
         self.equations = int(table.legs["n_rows"].sum()) + sum(leg.keeps_its_length for leg in self.legs)
 
+    @property
+    def bounds(self) -> list[tuple[float, bool]]:
+        """The value of every limit, and if it is a length [length or rad]."""
+        ranges = [(each.home + bound, each.is_length) for each in self.limited for bound in (each.lo, each.hi)]
+        return ranges + [(float(cone["half_angle"]), False) for cone in self.cones]
+
     @cached_property
     def links(self) -> ExportedLinks | None:
         """The links that stay apart; None of a machine without a clearance."""
-        return exported_links(self.mechanism)
+        return exported_links(self.mechanism, MovedBodies(self.mechanism))
+
+    @cached_property
+    def bodies(self) -> MovedBodies:
+        """All bodies whose places follow, rods between balls among them."""
+        bodies = MovedBodies(self.mechanism)
+        bodies.number_all()
+        return bodies
+
+    @cached_property
+    def _links_on_all(self) -> ExportedLinks | None:
+        return exported_links(self.mechanism, self.bodies)
 
     def links_kept(self, parts: Sequence[str]) -> ExportedLinks | None:
         """The links that the parts of a file keep apart: the clearance is one of its limits."""
-        return self.links if "limits" in parts else None
+        if "limits" not in parts:
+            return None
+        return self._links_on_all if "bodies" in parts else self.links
+
+    def motions(self, parts: Sequence[str]) -> list[Motion]:
+        """The motions of the bodies that the parts of a file place."""
+        links = self.links_kept(parts)
+        if "bodies" in parts:
+            return self.bodies.motions
+        return [] if links is None else links.motions
 
     @property
     def why_no_nearest(self) -> str:

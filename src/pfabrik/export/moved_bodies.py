@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +40,9 @@ class Motion(NamedTuple):
     kind : a slide along the axis, a turn about it through the point; or with an end of a rod, along its line.
     leg, place, sense : of the coordinate: the deviation from home is sense * value.
     axis, point : at home, in base coordinates.
+    joint : whose motion it is, or at the end that a rod moves with.
+    column, sign : of the joint's coordinate, which moves the body by sign * coordinate; -1 of a rod.
+    body : the body that moves; empty if another motion of the joint follows.
     """
 
     on: int
@@ -49,20 +52,60 @@ class Motion(NamedTuple):
     sense: float
     axis: Floats
     point: Floats
+    joint: str
+    column: int
+    sign: float
+    body: str
 
 
 class MovedBodies:
-    """The bodies whose places follow from the pose and from coordinates of legs, each numbered when it is needed."""
+    """The bodies whose places follow from the pose and from coordinates of legs, each numbered when it is needed.
+
+    Attributes
+    ----------
+    numbers : of the bodies; bodies that are fixed to each other have one number.
+    motions : of the bodies from number `FIRST_MOVED`.
+    """
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.motions: list[Motion] = []
         self._mechanism = mechanism
         self._known = {int(record["column"]): record for record in model_of(mechanism).legs.known}
-        self._numbers = {mechanism.base: BASE}
+        self.numbers = {mechanism.base: BASE}
         if not mechanism.end_effector_is_joint:
-            self._numbers[mechanism.end_effector] = PLATFORM
+            self.numbers[mechanism.end_effector] = PLATFORM
         self._columns = {(each.joint.name, each.place): each.column for each in mechanism.coordinates}
-        self._ways, self._lengths = self._shortest_ways()
+        self._ways, self._lengths = self._shortest_ways([*self.numbers])
+
+    @property
+    def count(self) -> int:
+        """The number of bodies, those between the motions of a joint among them."""
+        return FIRST_MOVED + len(self.motions)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the bodies of each number."""
+        names = ["", self._mechanism.end_effector, *(f"within joint {motion.joint}" for motion in self.motions)]
+        for number in set(self.numbers.values()):
+            names[number] = ", ".join(body for body, its_number in self.numbers.items() if its_number == number)
+        return names
+
+    def number_all(self) -> None:
+        """Number all bodies: those that follow from the base, from the platform, and from rods between balls."""
+        self._number_from([self._mechanism.base])
+        self._number_from([*self.numbers])
+        while True:
+            waiting = [body for body in self._mechanism.bodies if body not in self.numbers]
+            rod = next((rod for body in waiting for rod in self._rods_of(body)), None)
+            if rod is None:
+                return
+            self._number_along(rod)
+            self._number_from([*self.numbers])
+
+    def _number_from(self, sources: Sequence[str]) -> None:
+        self._ways, self._lengths = self._shortest_ways(sources)
+        for body in filter(self.is_placed, self._mechanism.bodies):
+            self.number(body)
 
     def is_placed(self, body: str) -> bool:
         """True if a body's place follows."""
@@ -79,14 +122,16 @@ class MovedBodies:
 
     def number(self, body: str) -> int:
         """The number of a body; its motions are added where it has none yet."""
-        if body not in self._numbers:
+        if body not in self.numbers:
             before, joint = self._ways[body]
             on = self.number(before)
             for motion in self._motions(joint, before == joint.connects[0]):
                 self.motions.append(motion._replace(on=on))
                 on = FIRST_MOVED + len(self.motions) - 1
-            self._numbers[body] = on
-        return self._numbers[body]
+            if not joint.is_rigid:
+                self.motions[-1] = self.motions[-1]._replace(body=body)
+            self.numbers[body] = on
+        return self.numbers[body]
 
     def along_rod(self, solid: int) -> int | None:
         """The number of a body that moves along the line of a rod as a solid on it does; None unless it is round there.
@@ -95,12 +140,9 @@ class MovedBodies:
         """
         mechanism, links = self._mechanism, links_of(self._mechanism)
         sizes, place = links.sizes[solid], links.places[solid]
-        table, body = model_of(mechanism).legs, mechanism.shapes[solid].body
         near = TOLERANCES.alignment * mechanism.characteristic_length
-        for leg, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
-            kind = _end_with(form, body)
-            if kind is None or record["frame"] not in (K.FROM_BASE, K.FROM_PLATFORM):
-                continue
+        for rod in self._rods_of(mechanism.shapes[solid].body):
+            record = model_of(mechanism).legs.legs[rod.leg]
             start, line = record["base_end_point"] * mechanism.characteristic_length, record["line"]
             points = place[:2] if sizes[KIND] == CAPSULE else place[:1]
             is_on_line = bool((np.linalg.norm(np.cross(points - start, line), axis=1) <= near).all())
@@ -108,21 +150,32 @@ class MovedBodies:
                 sizes[KIND] == DISC and np.linalg.norm(np.cross(place[1], line)) <= TOLERANCES.alignment
             )
             if is_on_line and is_round:
-                return self._number_along(leg, kind, BASE if record["frame"] == K.FROM_BASE else PLATFORM)
+                return self._number_along(rod)
         return None
 
-    def _number_along(self, leg: int, kind: int, on: int) -> int:
-        motion = Motion(on, kind, leg, K.Q_PROXIMAL, 1.0, np.zeros(3), np.zeros(3))
+    def _rods_of(self, body: str) -> Iterator[Motion]:
+        """Yield the motions of a body along the lines of rods."""
+        table = model_of(self._mechanism).legs
+        for leg, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
+            end = _end_with(form, body)
+            if end is not None and record["frame"] in (K.FROM_BASE, K.FROM_PLATFORM):
+                on = BASE if record["frame"] == K.FROM_BASE else PLATFORM
+                point = record["base_end_point" if end[0] == WITH_BASE_END else "platform_end_point"]
+                numbers = 1.0, record["line"], point * self._mechanism.characteristic_length
+                yield Motion(on, end[0], leg, K.Q_PROXIMAL, *numbers, end[1], -1, 1.0, body)
+
+    def _number_along(self, rod: Motion) -> int:
         for place, before in enumerate(self.motions):
-            if (before.leg, before.kind) == (leg, kind):
+            if (before.leg, before.kind) == (rod.leg, rod.kind):
                 return FIRST_MOVED + place
-        self.motions.append(motion)
+        self.motions.append(rod)
+        self.numbers.setdefault(rod.body, FIRST_MOVED + len(self.motions) - 1)
         return FIRST_MOVED + len(self.motions) - 1
 
-    def _shortest_ways(self) -> tuple[dict[str, tuple[str, Joint]], dict[str, int]]:
+    def _shortest_ways(self, sources: Sequence[str]) -> tuple[dict[str, tuple[str, Joint]], dict[str, int]]:
         """Of every body that follows: the body before it and the joint between them, and the number of coordinates."""
         ways: dict[str, tuple[str, Joint]] = {}
-        lengths = dict.fromkeys(self._numbers, 0)
+        lengths = dict.fromkeys(sources, 0)
         joints = [joint for joint in self._mechanism.joints if self._follows(joint)]
         is_changed = True
         while is_changed:
@@ -160,21 +213,22 @@ class MovedBodies:
         point = np.array(mechanism.reference_point if joint.at is None else joint.at)
         motions = []
         for place, axis, kind in zip(places, axes, kinds, strict=True):
-            record = self._known[self._columns[joint.name, place]]
-            sense = float(record["sense"]) * (1.0 if forward else -1.0)
-            motions.append(Motion(BASE, kind, int(record["leg"]), int(record["place"]), sense, axis, point))
+            column, sign = self._columns[joint.name, place], 1.0 if forward else -1.0
+            record = self._known[column]
+            leg, at, sense = int(record["leg"]), int(record["place"]), float(record["sense"]) * sign
+            motions.append(Motion(BASE, kind, leg, at, sense, axis, point, joint.name, column, sign, ""))
         return motions if forward else motions[::-1]
 
 
-def _end_with(form: LegForm, body: str) -> int | None:
-    """The end of a rod that a body moves with, along the rod's line; None of other bodies."""
+def _end_with(form: LegForm, body: str) -> tuple[int, str] | None:
+    """The end of a rod that a body moves with, along the rod's line, and the joint there; None of other bodies."""
     if not isinstance(form, Rod):
         return None
-    slide = form.slide
-    if body == (slide.inward if slide is not None else form.base_ending.elements[-1].outward):
-        return WITH_BASE_END
-    if body == (slide.outward if slide is not None else form.platform_ending.elements[0].inward):
-        return WITH_PLATFORM_END
+    slide, first, last = form.slide, form.base_ending.elements[-1], form.platform_ending.elements[0]
+    if body == (slide.inward if slide is not None else first.outward):
+        return WITH_BASE_END, first.joint.name
+    if body == (slide.outward if slide is not None else last.inward):
+        return WITH_PLATFORM_END, last.joint.name
     return None
 
 
@@ -192,8 +246,12 @@ class ExportedLinks(NamedTuple):
     names: list[tuple[str, str]]
 
 
-def exported_links(mechanism: Mechanism) -> ExportedLinks | None:
+def exported_links(mechanism: Mechanism, bodies: MovedBodies) -> ExportedLinks | None:
     """The links of a mechanism with a clearance; None without one.
+
+    Parameters
+    ----------
+    bodies : of the mechanism; those that links are on are numbered.
 
     Raises
     ------
@@ -201,7 +259,7 @@ def exported_links(mechanism: Mechanism) -> ExportedLinks | None:
     """
     if mechanism.clearance is None:
         return None
-    links, bodies = links_of(mechanism), MovedBodies(mechanism)
+    links = links_of(mechanism)
     used = np.unique(links.pairs).tolist()
     reasons = [reason for solid in used for reason in _faults(mechanism, solid, bodies)]
     if reasons:
@@ -248,9 +306,9 @@ def _bodies_of(mechanism: Mechanism, solid: int, bodies: MovedBodies) -> tuple[i
     return first, second
 
 
-def angles_needed(links: ExportedLinks | None, leg: int, start: int) -> bool:
-    """True if angles of an end of a rod place links; `start` is the first place of that end's angles."""
-    return links is not None and any(
+def angles_needed(motions: Sequence[Motion], leg: int, start: int) -> bool:
+    """True if angles of an end of a rod place bodies; `start` is the first place of that end's angles."""
+    return any(
         motion.leg == leg and start <= motion.place < start + 3 and start in (K.BASE_END, K.PLATFORM_END)
-        for motion in links.motions
+        for motion in motions
     )

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
-from importlib import resources
 from os import PathLike
 from pathlib import Path
 
 from ..checks import require_path
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..kinematics import JointPath
-from ..whole_files import whole_path
-from .export_c import c_source, require_identifier
+from .export_c import c_source
 from .machine_data import Machine, fitting_path
-from .static_data import comment, literal
+from .ros2_texts import filled, in_xml, package_name, plain, write_package
+from .static_data import literal
 
 FILES = {
     "CMakeLists.txt": "CMakeLists.txt",
@@ -53,51 +51,37 @@ def export_ros2_control(
     UnknownName, InvalidArgument : of the joints or the name.
     """
     path = require_path("folder", folder)
-    for place, text in ros2_control_texts(mechanism, joints, prefix_of(path, name)).items():
-        file = path / place
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with whole_path(file) as part:
-            part.write_text(text, encoding="utf-8")
-    return path
+    return write_package(path, ros2_control_texts(mechanism, path, joints=joints, name=name))
 
 
-def prefix_of(folder: Path, name: str | None) -> str:
-    """The prefix of all names: the one given, or the folder's name without "_transmission"."""
-    return folder.resolve().name.removesuffix("_transmission") if name is None else name
-
-
-def ros2_control_texts(mechanism: Mechanism, joints: str | Sequence[str], name: str) -> dict[str, str]:
+def ros2_control_texts(
+    mechanism: Mechanism, folder: Path, *, joints: str | Sequence[str], name: str | None = None
+) -> dict[str, str]:
     """The files of the package by their place in its folder."""
     checked_mechanism(mechanism)
-    require_identifier(name)
+    name = package_name(folder, name, "_transmission")
     Machine(mechanism)  # its legs have closed forms
     path = fitting_path(mechanism, joints)
-    words, templates = _words(mechanism, path, name), resources.files(__package__).joinpath("ros2_package")
     texts = {f"src/{name}_kinematics.c": c_source(mechanism, parts=("ik", "fk", "rates"), name=name, joints=path.names)}
-    for template, place in FILES.items():
-        text = templates.joinpath(template).read_text(encoding="utf-8")
-        for word, meant in words.items():
-            text = text.replace(f"@{word}@", meant)
-        texts[place.format(name=name)] = text
-    return texts
+    return texts | filled("ros2_package", FILES, _words(mechanism, path, name))
 
 
 def _words(mechanism: Mechanism, path: JointPath, name: str) -> dict[str, str]:
     joints, actuators = ", ".join(path.names), ", ".join(mechanism.actuator_names)
     elements = [
-        f'  <actuator name="{_xml(each)}" role="actuator{n}"/>' for n, each in _counted(mechanism.actuator_names)
+        f'  <actuator name="{in_xml(each)}" role="actuator{n}"/>' for n, each in _counted(mechanism.actuator_names)
     ]
-    elements += [f'  <joint name="{_xml(each)}" role="joint{n}"/>' for n, each in _counted(path.names)]
+    elements += [f'  <joint name="{in_xml(each)}" role="joint{n}"/>' for n, each in _counted(path.names)]
     return {
         "NAME": name,
         "GUARD": f"{name}_transmission__{name}".upper(),
         "MACRO": name.upper(),
-        "MACHINE": _plain(mechanism.name),
-        "JOINTS": _plain(joints),
-        "ACTUATORS": _plain(actuators),
-        "MACHINE_XML": _xml(mechanism.name),
-        "JOINTS_XML": _xml(joints),
-        "ACTUATORS_XML": _xml(actuators),
+        "MACHINE": plain(mechanism.name),
+        "JOINTS": plain(joints),
+        "ACTUATORS": plain(actuators),
+        "MACHINE_XML": in_xml(mechanism.name),
+        "JOINTS_XML": in_xml(joints),
+        "ACTUATORS_XML": in_xml(actuators),
         "N_JOINTS": str(len(path.names)),
         "N_ACTUATORS": str(len(mechanism.actuator_names)),
         "HOME": literal(path.home)[1:-1],
@@ -107,12 +91,3 @@ def _words(mechanism: Mechanism, path: JointPath, name: str) -> dict[str, str]:
 
 def _counted(names: Sequence[str]) -> list[tuple[int, str]]:
     return list(enumerate(names, 1))
-
-
-def _plain(text: str) -> str:
-    """Text safe in a comment and in a string of C++."""
-    return comment(text).replace("\\", "/").replace('"', "'")
-
-
-def _xml(text: str) -> str:
-    return escape(text).replace("--", "- -")

@@ -212,6 +212,7 @@ def _machine_h(machine: Machine, tables: ControllerTables, parts: Sequence[str],
     counts |= {} if path is None else {"PFK_JOINTS": len(path.coordinates)}
     counts |= {"PFK_RATES": 6 if path is None else len(path.coordinates)} if "rates" in parts else {}
     counts |= {} if tables.projecting is None else {"PFK_STARTS": len(tables.projecting.tables.plan.seeds.poses)}
+    counts |= {"PFK_BODIES": machine.bodies.count} if "bodies" in parts else {}
     links = machine.links_kept(parts)
     counts |= {} if links is None else {"PFK_PAIRS": len(links.names)}
     constants = f"enum {{ {', '.join(f'{name} = {count}' for name, count in counts.items())} }};\n"
@@ -313,11 +314,7 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
             )
     if "limits" in parts:
         lines += ["", "limit     joint                 bound"]
-        bounds = [
-            (driven.home + bound, driven.is_length) for driven in machine.limited for bound in (driven.lo, driven.hi)
-        ]
-        bounds += [(float(cone["half_angle"]), False) for cone in machine.cones]
-        for place, ((joint, bound), (at, is_length)) in enumerate(zip(machine.limits, bounds, strict=True), 1):
+        for place, ((joint, bound), (at, is_length)) in enumerate(zip(machine.limits, machine.bounds, strict=True), 1):
             lines.append(f"{place:<9} {joint:<21} {bound} {at:.10g} {unit if is_length else 'rad'}")
     if (links := machine.links_kept(parts)) is not None:
         lines += ["", "pair      links that are at least this far apart"]
@@ -325,6 +322,9 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
         lines += [f"{place:<9} {' and '.join(names):<33} {least}" for place, names in enumerate(links.names, 1)]
     elif mechanism.clearance is not None:
         lines += ["", "Links may be too near: the clearance of the machine is kept where limits are."]
+    if "bodies" in parts:
+        lines += ["", "body      name"]
+        lines += [f"{place:<9} {name}" for place, name in enumerate(machine.bodies.names)]
     lines += ["", "leg       joints"]
     lines += [f"{place:<9} {', '.join(leg.joints)}" for place, leg in enumerate(machine.legs, 1)]
     body = [f"   {comment(line)}".rstrip() for line in [*lines, "", *NOTICE.splitlines()]]

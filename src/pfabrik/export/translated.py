@@ -15,7 +15,7 @@ from ..kernels.controller.assembled import assemble
 from ..kernels.controller.joints_in_series import put_joints, walk
 from ..kernels.controller.projected import project_target
 from ..kernels.controller.rates import put_rates
-from ..kernels.controller.reached import measure, put_reached, put_turns, reach, rest
+from ..kernels.controller.reached import measure, put_bodies, put_reached, put_turns, reach, rest
 from ..kernels.legs import records as K
 from ..kernels.platform.search_records import SETTINGS
 from ..kernels.platform.tables import MACHINE
@@ -76,6 +76,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
         ("RESTS", rest, (reaching, matrix)),
         ("TURNS", put_turns, (reaching, row, row)),
         ("CLEARANCE", measure, (reaching,)),
+        ("BODIES", put_bodies, (reaching, matrix)),
         ("FK", assemble, (assembling, reaching, row, matrix)),
         ("RATES", put_rates, (tables.rating, reaching, matrix, number, number)),
         ("JOINTS", walk, (tables.series, row)),

@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from ..files.units import metres_of
 from ..kinematics import columns
 from ..whole_files import whole_path
 from .cuts import Branch, cut_tree
-from .mjcf_bodies import axes_of, si_unit
 from .names import unique
-from .xml_reading import number_text
+from .urdf_tree import UrdfTree, kind_of_joint, left_out
 
 Table = dict[str, Any]
 
@@ -54,8 +52,7 @@ def to_urdf(
     if path is not None and loops is not None and os.path.realpath(path) == os.path.realpath(loops):
         raise InvalidArgument("loops", f"'{os.fspath(loops)}', where the description goes", "a file of its own")
     description = _Description(mechanism, metres)
-    ET.indent(description.root)
-    text = ET.tostring(description.root, encoding="unicode") + "\n"
+    text = description.text()
     for file, content in ((path, text), (loops, json.dumps(description.table, indent=1) + "\n")):
         if file is not None:
             with whole_path(Path(file)) as part:
@@ -63,17 +60,15 @@ def to_urdf(
     return text, description.table
 
 
-class _Description:
-    """The elements of a description, and its table of loops."""
+class _Description(UrdfTree):
+    """A description, and its table of loops."""
 
     def __init__(self, mechanism: Mechanism, metres: float) -> None:
-        self.mechanism, self.metres = mechanism, metres
-        self.root = ET.Element("robot", name=mechanism.name)
+        super().__init__(mechanism, metres)
         for remark in _remarks(mechanism):
-            self.root.append(ET.Comment(f" {remark} ".replace("--", "- -")))
+            self.remark(remark)
         motors = [drive.name for drive in mechanism.drives]
         self.table: Table = {"closed_loop": [], "type": [], "name_mot": motors, "joint_name": [], "joint_type": []}
-        self._origins: dict[str, Floats] = {}
         self._carriers: dict[str, str] = {}
         self._joint_names = {joint.name for joint in mechanism.joints} | set(mechanism.coordinate_names)
         self._link_names = set(mechanism.bodies)
@@ -88,7 +83,7 @@ class _Description:
     def _add_branch(self, branch: Branch) -> None:
         """A body and the joints that it hangs on, from its parent outward."""
         joint, parent = branch.joint, self._carriers[branch.parent]
-        origin = self._origins[parent] if joint.at is None else np.array(joint.at) * self.metres
+        origin = self.origins[parent] if joint.at is None else np.array(joint.at) * self.metres
         coordinates = self.mechanism.coordinates[columns(self.mechanism)[joint.name]]
         parts: list[tuple[str, str, JointCoordinate | None]]
         if joint.type == "spherical" or not coordinates:
@@ -97,13 +92,13 @@ class _Description:
             parts = [(joint.name, "floating" if joint.type == "spherical" else "fixed", None)]
         else:
             ordered = coordinates if branch.forward else coordinates[::-1]
-            parts = [(each.name, _kind(each), each) for each in ordered]
+            parts = [(each.name, kind_of_joint(each), each) for each in ordered]
         for place, (name, kind, coordinate) in enumerate(parts):
             is_last = place == len(parts) - 1
             link = self._body_link(branch.body) if is_last else unique(f"{branch.body}:{name}", self._link_names)
-            element = self._join(name, kind, parent, link, origin)
+            element = self.join(name, kind, parent, link, origin)
             if coordinate is not None:
-                self._move(element, coordinate, branch)
+                self.move(element, coordinate, 1.0 if branch.forward else -1.0, from_home=True)
             parent = link
         self._add_body(branch.body, parent, origin)
         if branch.double_of is not None:
@@ -117,54 +112,21 @@ class _Description:
     def _add_body(self, body: str, link: str, origin: Floats) -> None:
         """The link of a body, in the place of its joint; the end effector's at the reference point."""
         if link in ("", body):
-            self._link(body, origin)
+            self.link(body, origin)
             self._carriers[body] = body
         else:
             self._carriers[body] = link
             point = np.array(self.mechanism.reference_point) * self.metres
-            self._join(unique(f"{body}:at", self._joint_names), "fixed", link, body, point)
-
-    def _join(self, name: str, kind: str, parent: str, child: str, origin: Floats) -> ET.Element:
-        """A joint, with its child at an origin [m]."""
-        element = ET.SubElement(self.root, "joint", name=name, type=kind)
-        ET.SubElement(element, "parent", link=parent)
-        ET.SubElement(element, "child", link=child)
-        ET.SubElement(element, "origin", xyz=number_text(origin - self._origins[parent]), rpy="0 0 0")
-        self._link(child, origin)
-        return element
-
-    def _link(self, name: str, origin: Floats) -> None:
-        if name not in self._origins:
-            ET.SubElement(self.root, "link", name=name)
-        self._origins[name] = origin
-
-    def _move(self, element: ET.Element, coordinate: JointCoordinate, branch: Branch) -> None:
-        """The axis and the limits of a joint, counted from home."""
-        axis = axes_of(self.mechanism, branch.joint)[coordinate.place] * (1.0 if branch.forward else -1.0)
-        ET.SubElement(element, "axis", xyz=number_text(axis))
-        unit, limit = si_unit(coordinate, self.metres), {"effort": "0"}
-        if branch.joint.range is not None:
-            lower, upper = (np.array(coordinate.limits) - coordinate.home) * unit
-            limit |= {"lower": repr(float(lower)), "upper": repr(float(upper))}
-        speeds = branch.joint.max_speed
-        speed = speeds[coordinate.place] if isinstance(speeds, tuple) else speeds
-        limit["velocity"] = repr(float((speed or 0.0) * unit))
-        ET.SubElement(element, "limit", limit)
+            self.join(unique(f"{body}:at", self._joint_names), "fixed", link, body, point)
 
     def _close(self, name: str, bodies: tuple[str, str], at: Floats, *, is_weld: bool) -> None:
         """A loop, by a link on each of two bodies that meet at a point [m]."""
         ends = [unique(f"closing_{name}_{side}", self._link_names) for side in (1, 2)]
         for body, end in zip(bodies, ends, strict=True):
-            self._join(unique(end, self._joint_names), "fixed", self._carriers[body], end, at)
+            self.join(unique(end, self._joint_names), "fixed", self._carriers[body], end, at)
         if is_weld:
             self.table["closed_loop"].append(ends)
             self.table["type"].append("6d")
-
-
-def _kind(coordinate: JointCoordinate) -> str:
-    if coordinate.kind != "angle":
-        return "prismatic"
-    return "continuous" if coordinate.joint.range is None else "revolute"
 
 
 def _remarks(mechanism: Mechanism) -> Iterator[str]:
@@ -173,8 +135,4 @@ def _remarks(mechanism: Mechanism) -> Iterator[str]:
     for drive in mechanism.coordinates:
         if drive.home:
             yield f"{drive.name} counts {drive.home:.9g} more in the machine's own file"
-    for joint in mechanism.joints:
-        if joint.cone is not None:
-            yield f"a limit that URDF has no word for: the cone of {joint.name}"
-    if mechanism.shapes or mechanism.clearance is not None:
-        yield "shapes of bodies and their clearance are left out"
+    yield from left_out(mechanism)

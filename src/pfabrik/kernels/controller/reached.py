@@ -17,7 +17,7 @@ from ..platform.search_records import Starts
 from ..quaternions import difference
 from ..search_constants import NEARLY_CLOSED
 from ..vectors import along, angle_between, copy_row, copy_table, dot, norm, scale, vec, wrap
-from .links_on_bodies import LinksOnBodies, nearest_pair
+from .links_on_bodies import LinksOnBodies, nearest_pair, place_bodies
 
 LEG, PAIR = 1000, 10000
 """Plus the number of a leg that does not reach or close; plus that of the nearest pair of links, which is too near."""
@@ -193,6 +193,16 @@ def too_near(
 def measure(own: Reaching) -> int:
     """Index of the nearest pair of links where legs are placed; fills their distance."""
     return nearest_pair(own.links, own.near, own.scratch.frames, own.scratch.values, own.scratch.lines, own.distance)
+
+
+@routine
+def put_bodies(own: Reaching, pose: Floats) -> int:
+    """Place bodies at a whole pose (4, 4) [length], as near as legs come to it where they do not reach; a code."""
+    code = rest(own, pose)
+    if code != NO_POSE:
+        scratch = own.scratch
+        place_bodies(own.links, own.near, scratch.frames, scratch.values, scratch.lines)
+    return code
 
 
 @routine

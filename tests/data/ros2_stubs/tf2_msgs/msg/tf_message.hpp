@@ -1,0 +1,14 @@
+// Stub of tf2_msgs/TFMessage.
+#pragma once
+
+#include <vector>
+
+#include "geometry_msgs/msg/pose_stamped.hpp"
+
+namespace tf2_msgs::msg
+{
+struct TFMessage
+{
+  std::vector<geometry_msgs::msg::TransformStamped> transforms;
+};
+}  // namespace tf2_msgs::msg

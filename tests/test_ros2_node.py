@@ -1,0 +1,259 @@
+"""The ROS 2 node of a platform, compiled against stubs of the documented interface: it answers as the library does."""
+
+from __future__ import annotations
+
+import ast
+import json
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
+
+import pfabrik as pf
+from checks import actuator_units
+from exported import KEEP, STRICT, home_of
+from machines import machine
+from pfabrik.cli import main
+from pfabrik.errors import InvalidArgument, UnsupportedMechanism
+from pfabrik.export.source import targets_around_home
+from pfabrik.files.units import metres_of
+
+Array = np.ndarray
+DATA = Path(__file__).parent / "data"
+needs_compilers = pytest.mark.skipif(
+    not (shutil.which("gcc") and shutil.which("g++")), reason="no compilers of C and C++ here: gcc, g++"
+)
+SURE = "steps=200", "starts=24"
+"""Parameters with which the search finds what the library does."""
+
+MACHINES = ("stewart", "linear_delta", "five_bar")
+"""Struts between U and S; carriages with rods between balls, whose orientation is not set; a tip that is a joint."""
+
+OFTEN = [*MACHINES, *(pytest.param(name, marks=pytest.mark.campaign) for name in ("delta", "prs", "serial_arm", "ucu"))]
+
+_FOLDER = TemporaryDirectory()
+
+
+def package(name: str) -> Path:
+    return pf.export_ros2_node(machine(name), Path(_FOLDER.name) / name / "rig_node")
+
+
+@cache
+def node(name: str) -> Path:
+    """The program of a machine's node in the stubs, compiled without one warning."""
+    source = package(name) / "src"
+    program, stubs = source / "run", f"-I{DATA / 'ros2_stubs'}"
+    commands = [
+        ["gcc", "-std=c99", *STRICT, "-c", str(source / "rig_kinematics.c"), "-o", str(source / "c.o")],
+        ["g++", "-std=c++17", *STRICT, stubs, f'-DNODE="{source / "rig_node.cpp"}"', str(DATA / "run_node.cpp"),
+         str(source / "c.o"), "-o", str(program), "-lm"],
+    ]  # fmt: skip
+    for command in commands:
+        run = subprocess.run(command, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+    return program
+
+
+def answers(name: str, lines: list[str], *parameters: str) -> list[dict[str, Any]]:
+    """What the node says to each line."""
+    text = "\n".join(lines) + "\n"
+    run = subprocess.run([str(node(name)), *parameters], input=text, capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout + run.stderr
+    return [json.loads(line) for line in run.stdout.splitlines()]
+
+
+def line_of(target: Array, metres: float, frame: str = "base") -> str:
+    numbers = [*target[:3, 3] * metres, *Rotation.from_matrix(target[:3, :3]).as_quat()]
+    return " ".join([frame, *map(repr, map(float, numbers))])
+
+
+def matrix(numbers: list[float], metres: float) -> Array:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.from_quat(numbers[3:]).as_matrix(), np.array(numbers[:3]) / metres
+    return T
+
+
+def targets_of(mechanism: pf.Mechanism) -> Array:
+    """A hundred targets around home, half of them mostly out of reach."""
+    rng = np.random.default_rng(3)
+    targets = targets_around_home(mechanism, 100, rng)
+    targets[50:, :3, 3] += 0.6 * mechanism.characteristic_length * rng.uniform(-1.0, 1.0, (50, 3))
+    return rng.permutation(targets)
+
+
+class Urdf:
+    """A description, and where its links are: by the pose of the end effector and the values of joints."""
+
+    def __init__(self, text: str) -> None:
+        self.root: Any = ET.fromstring(text)
+        self.joints = list(self.root.iterfind("joint"))
+        self.moving = [each for each in self.joints if each.get("type") not in ("fixed", "floating")]
+
+    def places(self, base: str, tip: Array, values: dict[str, float]) -> dict[str, Array]:
+        """The frame of every link, (4, 4) [m]."""
+        frames, waiting = {base: np.eye(4)}, list(self.joints)
+        while waiting:
+            joint = next(each for each in waiting if each.find("parent").get("link") in frames)
+            waiting.remove(joint)
+            parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
+            assert child not in frames
+            frames[child] = frames[parent] @ (tip if joint.get("type") == "floating" else self._step(joint, values))
+        assert len(frames) == len(self.root.findall("link"))
+        return frames
+
+    @staticmethod
+    def _step(joint: Any, values: dict[str, float]) -> Array:
+        step, moved = np.eye(4), np.eye(4)
+        xyz, rpy = (np.array(joint.find("origin").get(each).split(), float) for each in ("xyz", "rpy"))
+        step[:3, :3], step[:3, 3] = Rotation.from_euler("xyz", rpy).as_matrix(), xyz
+        if joint.get("type") != "fixed":
+            along = values[joint.get("name")] * np.array(joint.find("axis").get("xyz").split(), float)
+            if joint.get("type") == "prismatic":
+                moved[:3, 3] = along
+            else:
+                moved[:3, :3] = Rotation.from_rotvec(along).as_matrix()
+        return step @ moved
+
+
+@needs_compilers
+@pytest.mark.parametrize("name", OFTEN)
+def test_a_node_answers_as_the_library_does_in_reach_and_out_of_it(name: str) -> None:
+    """From its last answer, in one working mode; and measured actuators are where the pose is that they were for."""
+    mechanism, metres = machine(name), metres_of(machine(name).length_unit)
+    size, targets = mechanism.characteristic_length, targets_of(mechanism)
+    units = np.where([drive.kind == "angle" for drive in mechanism.drives], 1.0, metres)
+    lines = [line for each in targets for line in (line_of(each, metres, mechanism.base), "measure")]
+    said = answers(name, lines, *SURE)
+    start, reached = home_of(mechanism), []
+    for target, answer, measured in zip(targets, said[::2], said[1::2], strict=True):
+        expected = pf.solve_ik(mechanism, target, start=start, options=KEEP)
+        start, report = expected.q, answer["rig: target"]
+        assert report["message"].partition(":")[0] == expected.status.name
+        assert report["level"] == int(not expected)
+        at_limits = {" ".join(text.split()[:2]) for text in report["active limits"].split("; ")}
+        assert {f"{limit.joint} {limit.bound}" for limit in expected.active_limits} <= at_limits
+        far = float(report["distance from target [m]"]), float(report["rotation from target [rad]"])
+        expected_far = expected.position_error * metres, expected.rotation_error
+        np.testing.assert_allclose(far, expected_far, rtol=1e-5, atol=1e-9 * size * metres)
+        difference = np.array(answer["command"]) / units - expected.actuators
+        assert np.abs(difference / actuator_units(mechanism)).max() <= 1e-9
+        for key in ("achieved", "tf"):
+            difference = matrix(answer[key], metres) - expected.pose
+            assert max(np.abs(difference[:3, 3]).max() / size, np.abs(difference[:3, :3]).max()) <= 1e-9
+        if expected:  # at a dead point a pose has half its digits
+            np.testing.assert_allclose(measured["pose"], answer["achieved"], atol=1e-9)
+        assert answer["frame"] == mechanism.base and answer["child"] == mechanism.end_effector
+        reached.append(bool(expected))
+    assert 20 < sum(reached) < 95
+
+
+@needs_compilers
+@pytest.mark.parametrize("name", OFTEN)
+def test_the_description_with_the_published_joints_is_the_machine(name: str) -> None:
+    """The centres of joints, on both bodies that meet there, are those of the library's answer; loops are closed."""
+    mechanism, metres = machine(name), metres_of(machine(name).length_unit)
+    urdf, base = Urdf((package(name) / "urdf/rig.urdf").read_text()), mechanism.base
+    homes = {each.name: each.home * (1.0 if each.kind == "angle" else metres) for each in mechanism.coordinates}
+    tip = mechanism.home_pose.copy()
+    tip[:3, 3] *= metres
+    home = urdf.places(base, tip, dict.fromkeys((joint.get("name") for joint in urdf.moving), 0.0) | homes)
+    for frame in home.values():
+        np.testing.assert_allclose(frame[:3, :3], np.eye(3), atol=1e-12)
+    said = answers(name, [line_of(target, metres, base) for target in targets_of(mechanism)[:40]], *SURE)
+    reached = [answer for answer in said if answer["rig: target"]["message"] == "REACHED"]
+    points = pf.solve_ik(mechanism, np.array([matrix(answer["tf"], metres) for answer in reached]), options=KEEP).points
+    n_compared = 0
+    for row, answer in enumerate(reached):
+        values = dict(zip(answer["names"], answer["joints"], strict=True))
+        at = urdf.places(base, matrix(answer["tf"], 1.0), values)
+        for each in mechanism.joints:
+            bodies = each.connects[:1] if each.type in ("prismatic", "cylindrical") else each.connects
+            for body in {*bodies} & {*at} if each.at is not None else ():
+                point = at[body][:3] @ np.append(np.array(each.at) * metres - home[body][:3, 3], 1.0)
+                off = np.abs(point / metres - points[each.name][row]).max()
+                assert off <= 1e-9 * mechanism.characteristic_length, (each.name, body)
+                n_compared += 1
+    assert n_compared >= 100
+    coordinates = {each.name: each for each in mechanism.coordinates if each.joint.range is not None}
+    for joint in urdf.moving:
+        if (named := coordinates.get(joint.get("name"))) is not None:
+            bounds = [float(joint.find("limit").get(end)) for end in ("lower", "upper")]
+            unit = 1.0 if named.kind == "angle" else metres
+            np.testing.assert_allclose(bounds, np.array(named.limits) * unit, rtol=1e-12)
+
+
+@needs_compilers
+def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
+    """Neither is commanded, and both are said; what follows is answered as if they had not been."""
+    mechanism, metres = machine("stewart"), 1e-3
+    near, away = mechanism.home_pose.copy(), mechanism.home_pose.copy()
+    near[0, 3] += 5.0
+    away[2, 3] += 500.0
+    good, far = line_of(near, metres), line_of(away, metres)
+    bad = [good.replace("base", "world"), "base nan 0 0.2 0 0 0 1", "base 0 0 inf 0 0 0 1", "base 0 0 0.2 0 0 0 0"]
+    bad += ["base 0 0 0.2 0 0 nan 1", "base 0 0 0.2 0 0 0 1.1"]
+    said = answers("stewart", [*bad, far, good, "measure", far], "out_of_reach=hold")
+    for answer in said[: len(bad)]:
+        assert answer["rig: target"]["message"].startswith("REFUSED: ") and answer["rig: target"]["level"] == 2
+        assert not {"command", "achieved"} & {*answer}
+    assert said[0]["rig: target"]["message"] == "REFUSED: found frame 'world'; expected 'base'"
+    for held in (said[len(bad)], said[-1]):
+        assert held["rig: target"]["message"].startswith("HELD: beyond a limit: joint B")
+        assert not {"command", "achieved"} & {*held}
+    (alone,) = answers("stewart", [good])
+    kept = said[len(bad) + 1]
+    assert kept["rig: target"]["message"] == "REACHED" and kept["command"] == alone["command"]
+    assert said[-1]["rig: target"]["REFUSED"] == "6" and said[-1]["rig: target"]["HELD"] == "2"
+    assert said[-1]["tf"] == kept["achieved"] and said[-1]["rig: actuators"]["level"] == 0
+    (jump,) = answers("stewart", [far], "largest_step=0.01")
+    assert jump["rig: target"]["message"].startswith("REFUSED: a jump of an actuator: B") and "command" not in jump
+    (measured,) = answers("stewart", ["measure"], "show=measured")
+    assert measured["rig: actuators"]["message"] == "no position of BL1"
+    for wrong, expected in (("command=both", "expected one of array, joint_state"), ("show_rate=0", "more than 0 Hz")):
+        run = subprocess.run([str(node("stewart")), wrong], capture_output=True, text=True)
+        assert run.returncode == 2 and expected in run.stdout
+
+
+def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
+    folder = pf.export_ros2_node(machine("linear_delta"), tmp_path / "my_delta")
+    files = {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()}
+    assert not [place for place, text in files.items() if "@" in text.replace("maintainer@example.com", "")]
+    assert ET.fromstring(files["package.xml"]).findtext("name") == "my_delta_node"
+    assert ET.fromstring(files["urdf/my_delta.urdf"]).get("name") == "Linear delta"
+    assert "project(my_delta_node " in files["CMakeLists.txt"]
+    ast.parse(files["launch/my_delta.launch.py"])
+    parameters = yaml.safe_load(files["config/params.yaml"])["my_delta"]["ros__parameters"]
+    assert {name for name in parameters if f'"{name}"' in files["src/my_delta_node.cpp"]} == {*parameters}
+    assert parameters["base_frame"] == "base" and parameters["out_of_reach"] == "project"
+
+
+def test_the_command_writes_a_package_and_says_how_to_run_it(tmp_path: Path) -> None:
+    line = ["export", "five_bar", "--ros2-node", str(tmp_path / "rig_node")]
+    result = CliRunner().invoke(main, line)
+    assert result.exit_code == 0 and "ros2 launch rig_node rig.launch.py" in result.output
+    assert "colcon build --packages-select rig_node" in result.output and "ros2 topic pub" in result.output
+    again = CliRunner().invoke(main, line)
+    assert again.exit_code == 2 and "exists already" in again.output
+    elsewhere = ["--ros2-node", str(tmp_path / "x")]
+    refused = [CliRunner().invoke(main, ["export", "panda", *rest]).output for rest in (["c"], elsewhere)]
+    assert refused[0] == refused[1] and not (tmp_path / "x").exists()
+    for rest, said in (
+        ([*elsewhere, "--joints", "p1"], "not of --ros2-node"),
+        (["--ros2-control", str(tmp_path / "x")], "for poses of a platform use --ros2-node"),
+    ):
+        result = CliRunner().invoke(main, ["export", "five_bar", *rest])
+        assert result.exit_code == 2 and said in result.output, result.output
+    with pytest.raises(InvalidArgument, match="lower-case"):
+        pf.export_ros2_node(machine("five_bar"), tmp_path / "x", name="Rig")
+    with pytest.raises(UnsupportedMechanism):
+        pf.export_ros2_node(machine("panda"), tmp_path / "x")
+    assert not (tmp_path / "x").exists()
