@@ -22,8 +22,10 @@ from command import pfabrik, write_files
 from machines import tripod_rps
 from pfabrik.answers.margins import nearest_first
 from pfabrik.errors import InvalidArgument, MissingLibrary
-from pfabrik.view.live import panel
-from pfabrik.view.live.live_machine import backed_off
+from pfabrik.view.live.distances import limits_left
+from pfabrik.view.live.live_machine import backed_off, eye_of
+from pfabrik.view.live.panel import VIEWS
+from pfabrik.view.live.panel_html import BARS, NAME, NOTE, margins_html, singular_html, status_html
 from pfabrik.view.live.scene import SHAPES, cylinder, fan, quaternion, upright_to
 from pfabrik.view.live.session import Session, moved
 from pfabrik.view.live.workers import Newest, Watch
@@ -149,6 +151,65 @@ def test_coordinates_of_a_target_are_changed_one_by_one_and_its_copy_is_the_targ
     assert eval(session.pose_as_python, {"pf": pf}) == pytest.approx(session.target)
 
 
+def test_what_is_left_to_a_limit_is_its_margin_of_half_the_range() -> None:
+    for name in ("stewart", "reachy_mini", "five_bar", "g1_ankle"):
+        machine = pf.load(name)
+        for left in limits_left(pf.solve_ik(machine, machine.home_pose)):
+            joint, bound = left.name.split()
+            described = machine.joint(joint)
+            half = described.cone.half_angle if bound == "cone" else 0.5 * np.ptp(described.range)
+            expected = left.margin * half
+            assert left.left == pytest.approx(np.degrees(expected) if left.unit == "deg" else expected, abs=1e-6), left
+
+
+def test_each_gesture_is_a_step_that_is_undone() -> None:
+    session = Session(pf.load("stewart"))
+    for gesture, height in (("drag", 195.0), ("drag", 200.0), ("slider", 205.0)):
+        session.remember(gesture)
+        session.go_to(pf.pose((0, 0, height)))
+    heights = []
+    while session.can_undo:
+        session.undo()
+        heights.append(session.target[2, 3])
+    assert heights == pytest.approx([200.0, session.mechanism.home_pose[2, 3]])
+    session.undo()
+
+
+# Singularities: forearms of a 5-bar in line with each other, straight below home.
+
+
+def test_a_five_bar_is_dragged_through_its_singularity_and_driven_no_farther() -> None:
+    free = pf.load("five_bar").without_limits()
+    height = np.sqrt(110.0**2 - (145.0 - 50.0) ** 2)  # of the elbows, 145 mm to the left and right of the tip
+    session = Session(free)
+    seen = []
+    for above in (60.0, 20.0, 1e-4, -20.0):
+        session.go_to(pf.pose((0, 0, height + above)))
+        assert session.solution.status == pf.Status.REACHED
+        seen.append((session.nearness[1].share, session.is_across))
+    shares, across = zip(*seen, strict=True)
+    assert shares[0] > shares[1] > shares[2]
+    assert shares[2] == pytest.approx(0.0, abs=0.01)
+    assert across == (False, False, False, True)
+    assert "passed a parallel singularity" in singular_html(session)
+    session.show(session.home)
+    session.drive(np.radians([60.0, -60.0]))  # both outward: the forearms are too short
+    assert session.solution.status == pf.Status.PROJECTED
+    assert session.solution.pose[2, 3] == pytest.approx(height, abs=0.1)
+    assert not session.is_across
+
+
+def test_the_leg_that_is_nearest_to_its_dead_point_is_named() -> None:
+    free = pf.load("five_bar").without_limits()
+    session = Session(free)
+    reach = 254.9  # of 255 mm, with the left leg stretched
+    session.go_to(pf.pose((0, -50 + reach * np.sin(0.5), reach * np.cos(0.5))))
+    serial, _ = session.nearness
+    assert serial.leg == "p1"
+    assert serial.share < 0.1
+    assert "serial: p1" in singular_html(session)
+
+
 # Shapes.
 
 
@@ -240,14 +301,65 @@ def test_modes_are_listed_and_taken(shown: Callable[..., pf.Viewer]) -> None:
 
 def test_the_border_of_the_workspace_is_shown_on_request(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("five_bar")
-    viewer._stage.panel._workspace.value = True
-    viewer._searches.show_workspace(True)
-    until(lambda: "mm²" in viewer._stage.panel._note.content)
-    told = viewer._stage.panel._border.content
+    panel, borders = viewer._stage.panel, viewer._stage.scene._borders
+    panel._borders["workspace"].value = True
+    viewer._searches.show_border("workspace", True)
+    until(lambda: "mm²" in panel._note.content)
+    told = panel._legend.content
     assert "p1 max, actuated: 13%" in told and "p2 max: 11%" in told, told  # as in the picture
-    assert viewer._stage.scene._border
-    viewer._searches.show_workspace(False)
-    assert not viewer._stage.scene._border
+    assert borders["workspace"]
+    viewer._searches.show_border("workspace", False)
+    assert not borders["workspace"]
+
+
+def test_singularities_are_shown_where_they_are_and_limits_are_let_go(shown: Callable[..., pf.Viewer]) -> None:
+    viewer = shown("five_bar")
+    machine = viewer.mechanism
+    viewer._keep_limits(False)
+    until(lambda: viewer.mechanism == machine.without_limits())
+    assert viewer.solution.pose == pytest.approx(machine.home_pose)
+    viewer._stage.panel._borders["locus"].value = True
+    viewer._searches.show_border("locus", True)
+    until(lambda: viewer._stage._borders.get("locus"))
+    (locus,) = viewer._stage._borders["locus"]
+    there = pf.solve_ik(viewer.mechanism, locus.corners[::16, 0], start=viewer.solution)
+    assert np.asarray(pf.singularity(there).parallel) == pytest.approx(0.0, abs=0.05)
+    viewer.show(pf.solve_ik(machine, (0, 0, 190)))
+    assert viewer.mechanism == machine
+
+
+def test_sliders_are_those_of_the_freedoms_and_their_numbers_fit(shown: Callable[..., pf.Viewer]) -> None:
+    assert list(shown("five_bar")._stage.panel._target) == ["y", "z"]
+    assert list(shown("rrr")._stage.panel._target) == ["x", "y", "yaw"]
+    viewer = shown("reachy_mini")
+    assert list(viewer._stage.panel._target) == ["x", "y", "z", "roll", "pitch", "yaw"]
+    viewer._change_target("z", 0.1834567891)
+    until(lambda: viewer.target[2, 3] == 0.1834567891)
+    until(lambda: viewer._stage.panel._target["z"].value == pytest.approx(0.1834567891, abs=1e-5))
+    for slider in (*viewer._stage.panel._target.values(), *viewer._stage.panel._actuators):
+        assert len(f"{slider.value:g}") <= 7, slider.label
+
+
+def test_what_is_done_is_undone(shown: Callable[..., pf.Viewer]) -> None:
+    viewer = shown("stewart")
+    home = viewer.mechanism.home_pose
+    viewer._drag(pf.pose((0, 0, 200)))
+    until(lambda: viewer.target[2, 3] == 200.0)
+    viewer._change_actuator(0, 200.0)
+    until(lambda: viewer.solution.actuators[0] == pytest.approx(200.0))
+    viewer._undo()
+    until(lambda: viewer.solution.pose == pytest.approx(pf.pose((0, 0, 200))))
+    viewer._undo()
+    until(lambda: viewer.solution.pose == pytest.approx(home))
+
+
+def test_views_look_at_the_machine_from_where_they_say() -> None:
+    for name, front in (("stewart", (0, -1, 0)), ("five_bar", (1, 0, 0))):
+        eyes = {view: eye_of(pf.load(name), view) for view in VIEWS}
+        assert all(abs(direction @ up) < 0.9 for direction, up in eyes.values())
+        assert abs(eyes["front"][0] @ front) == pytest.approx(1.0)
+        assert eyes["top"][0] == pytest.approx(eyes["front"][1])
+        assert np.cross(eyes["front"][1], eyes["front"][0]) == pytest.approx(eyes["side"][0])
 
 
 def test_a_track_is_played_step_by_step(shown: Callable[..., pf.Viewer]) -> None:
@@ -331,10 +443,12 @@ def test_a_panel_does_not_jump_while_values_change() -> None:
     heights, rows = set(), set()
     for target in ((0, 0, 190), (0, 0, 400), (60, 40, 260), (-90, 20, 100)):
         session.go_to(pf.pose(target))
-        heights.add(re.findall(r"height:[0-9.]+em;overflow:auto", panel.status_html(session))[0])
-        rows.add(panel.margins_html(session).count("white-space:nowrap"))
+        heights.add(re.findall(r"height:[0-9.]+em;overflow:auto", status_html(session))[0])
+        rows.add(
+            (margins_html(session).count(NAME), singular_html(session).count(NAME), NOTE in singular_html(session))
+        )
     assert len(heights) == 1
-    assert rows == {panel.BARS}
+    assert rows == {(BARS, 2, True)}
 
 
 def test_a_camera_moves_back_until_the_target_is_in_view() -> None:
@@ -376,12 +490,6 @@ def test_a_taken_port_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> 
     assert f"localhost:{served} " in told.output or f"127.0.0.1:{served} " in told.output
 
 
-def test_the_page_says_when_the_program_is_gone() -> None:
-    text = panel.watch_html()
-    assert "has ended" in text and "/pfabrik-alive" in text
-    assert "//" not in text  # it asks the server of the page alone
-
-
 def test_thick_links_move_with_the_machine(shown: Callable[..., pf.Viewer]) -> None:
     stewart = pf.load("stewart")
     struts = [
@@ -391,6 +499,14 @@ def test_thick_links_move_with_the_machine(shown: Callable[..., pf.Viewer]) -> N
     viewer = shown(thick)
     solids = viewer._stage.scene._solids
     assert len(solids) == 5
+    line, words = viewer._stage.scene._distance
+    ends = line.points[0].astype(float) * thick.characteristic_length
+    apart = pf.clearance(viewer.solution)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(apart.distance, abs=1e-3)
+    assert words.text == f"{apart.distance:.3g} mm"
+    viewer._show_solids(False)
+    assert not any(node.visible for node in (*solids, *viewer._stage.scene._distance))
+    viewer._show_solids(True)
     before = solids[-1].vertices.mean(axis=0).copy()
     viewer.show(pf.solve_ik(thick, (0, 0, 210)))
     moved = solids[-1].vertices.mean(axis=0) - before

@@ -20,6 +20,7 @@ pytest.importorskip("viser", reason="needs the extra view")
 pytestmark = MARKS
 SIZE = {"width": 640, "height": 320}  # few pixels: they are drawn without a graphics card
 WITHOUT_NOTICES = "[class*=Notification] { display: none !important }"
+POINTS = np.array([[0.0, -116.0, 88.0], [0.0, 116.0, 88.0], [0.0, 0.0, 175.0]])  # of a 5-bar: elbows, tip
 UPWARD = 0.3  # where on the upright arrow the mouse takes hold, in the scene's units from its foot
 
 
@@ -29,8 +30,8 @@ def browser() -> Iterator[Any]:
 
 
 def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
-    """A page at an address, and the hosts of everything it asks for from then on."""
-    context = browser.new_context(viewport=SIZE, **options)
+    """A page at an address, and everything it asks for from then on."""
+    context = browser.new_context(**({"viewport": SIZE} | options))
     page, asked = context.new_page(), []
     page.set_default_timeout(PATIENCE)
     page.on("request", lambda request: asked.append(request.url))
@@ -96,14 +97,32 @@ def test_a_target_dragged_beyond_a_stroke_names_the_limit_and_nothing_leaves_thi
 
 def test_a_page_says_when_the_program_behind_it_has_ended(browser: Any) -> None:
     viewer = pf.view(pf.load("stewart"), port=18182)
-    page, _ = opened(browser, viewer.url)
+    page, asked = opened(browser, viewer.url)
     gone = page.locator("[data-pfabrik=gone]")
     gone.wait_for(state="attached")
+    before = list(asked)
+    page.wait_for_timeout(3000)
     assert not gone.is_visible()
+    assert asked == before  # nothing is asked again and again
     viewer.close()
     gone.wait_for(state="visible")
     assert "has ended" in gone.inner_text()
     page.context.close()
+
+
+def test_a_phone_shows_the_machine_first_and_a_dark_system_a_dark_page(browser: Any) -> None:
+    with pf.view("five_bar", port=18184) as viewer:
+        phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+        page, _ = opened(browser, viewer.url, color_scheme="dark", **phone)
+        status = page.locator("[data-pfabrik=status]")
+        page.wait_for_function("document.documentElement.dataset.mantineColorScheme === 'dark'")
+        status.wait_for(state="hidden")
+        page.get_by_text(viewer.mechanism.name).click()
+        status.wait_for(state="visible")
+        (client,) = viewer._server.get_clients().values()
+        ends = np.array([on_screen(viewer, point / viewer.mechanism.characteristic_length) for point in POINTS])
+        assert (ends > 0.0).all() and (ends < [client.camera.image_width, client.camera.image_height]).all()
+        page.context.close()
 
 
 def test_a_saved_page_shows_the_machine_without_a_network(browser: Any, tmp_path: Path) -> None:

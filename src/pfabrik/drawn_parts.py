@@ -11,7 +11,10 @@ import numpy as np
 from .arrays import Floats
 from .common_centre import common_centre, is_around
 from .description.mechanism import Joint, Mechanism
+from .description.plane import plane_of
 from .description.sketch import Places, joint_places, joints_on, middle
+from .description.task import task_of
+from .motion.fitting_task import tilt_axis
 
 Role: TypeAlias = Literal["base", "platform", "link"]
 Kind: TypeAlias = Literal["bar", "arc", "barrel", "plate", "rail", "carriage", "ball"]
@@ -74,6 +77,16 @@ def hangs(mechanism: Mechanism) -> bool:
     """True if the end effector hangs below the base."""
     heights = [place[2] for place in _home_places(mechanism).values()]
     return bool(mechanism.home_pose[2, 3] < min(heights) + HANGS * np.ptp(heights)) and "z" in mechanism.task
+
+
+def free_axes(mechanism: Mechanism) -> tuple[list[int], list[int]]:
+    """Axes of the base along and about which one moves the end effector: those of the task, of a plane those in it."""
+    task, plane, only = task_of(mechanism), plane_of(mechanism), tilt_axis(mechanism)
+    if only is not None:
+        return [k for k in range(3) if task.axes[k]], [int(np.argmax(np.abs(only)))]
+    is_flat = np.zeros(3, bool) if plane is None else np.abs(np.cross(*plane)) > ACROSS
+    slides = [k for k in range(3) if task.axes[k] and not is_flat[k]]
+    return slides, [k for k in range(3) if task.turns[k] and (plane is None or is_flat[k])]
 
 
 def size_of(mechanism: Mechanism) -> float:

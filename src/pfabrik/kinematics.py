@@ -10,6 +10,7 @@ Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
 Motion        home_coordinates, displacements, end_effector_pose, joint_centres; joint_path, JointPath; tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
+              parallel_signs
 """
 
 from .closure.configurations import Configurations
@@ -36,6 +37,7 @@ from .motion.fitting_task import tilt_axis
 from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
 from .motion.mobility import generic_of, internal_rates
+from .motion.singularities import parallel_signs
 
 __all__ = [
     "Configurations",
@@ -58,6 +60,7 @@ __all__ = [
     "joint_path",
     "links_of",
     "model_of",
+    "parallel_signs",
     "passive_series",
     "plane_of",
     "rate_units",

@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays import Floats
 from ..checks import require_ending
 from ..description.mechanism import Mechanism
+from ..drawn_parts import free_axes
 from ..errors import InvalidArgument
 from ..kernels.platform import tables as T
 from ..kernels.platform.evaluate import new_evaluation_scratch
@@ -99,7 +100,8 @@ def machine_data(model: Model) -> dict[str, Any]:
     mechanism, legs, tables = model.mechanism, model.legs, tables_of(model, Options())
     box = _box(model)
     drawing = drawing_of(model, box)
-    slides, turns, only = _freedoms(model, drawing["normal"])
+    (slides, turns), axis = free_axes(mechanism), tilt_axis(mechanism)
+    only = None if axis is None else axis.tolist()
     image = image_of(_records(model))
     return {
         "name": mechanism.name,
@@ -109,7 +111,12 @@ def machine_data(model: Model) -> dict[str, Any]:
         "box": box.tolist(),
         "columns": len(mechanism.coordinates),
         "branches": (np.sign(legs.home_sides[0]) if legs.has_sides else 0.0 * legs.home_sides[0]).tolist(),
-        "task": {"slides": slides, "turns": turns, "rotations": int(model.task.rotations), "only": only},
+        "task": {
+            "slides": slides,
+            "turns": turns,
+            "rotations": int(model.task.rotations),
+            "only": None if only is None else only.tolist(),
+        },
         "actuators": [_actuator(drive) for drive in mechanism.drives],
         "others": len(tables.others.poses),
         "limits": _limits(model),
@@ -199,17 +206,6 @@ def _box(model: Model) -> Floats:
     """Lowest and highest positions of the end effector among configurations all over its workspace [length]."""
     places = np.concatenate([seeds_of(model).poses[:, :3, 3] * model.length, model.mechanism.home_pose[None, :3, 3]])
     return np.array([places.min(axis=0), places.max(axis=0)])
-
-
-def _freedoms(model: Model, normal: list[float] | None) -> tuple[list[int], list[int], list[float] | None]:
-    """Axes along and about which the end effector is moved, and the only axis that it tilts about, if it has one."""
-    task, only = model.task, tilt_axis(model.mechanism)
-    is_flat = [normal is not None and abs(normal[k]) > 0.5 for k in range(3)]
-    slides = [k for k in range(3) if task.axes[k] and not is_flat[k]]
-    turns = [k for k in range(3) if task.turns[k] and (normal is None or is_flat[k])]
-    if only is not None:
-        turns = [int(np.argmax(np.abs(only)))]
-    return slides, turns, None if only is None else only.tolist()
 
 
 def _actuator(drive: Any) -> dict[str, Any]:

@@ -12,12 +12,13 @@ from ...answers.status import Status
 from ...answers.tracked import Track
 from ...arrays import Floats
 from ...description.mechanism import Mechanism
-from ...kinematics import plane_of, task_of
+from ...drawn_parts import free_axes
+from ...kinematics import plane_of
 from ...rotations import from_quaternion
 from ...skeleton import checked_shown, skeleton_of
 from ..plot_track import checked_track
-from .panel import Actions, Panel
-from .scene import MACHINE, Scene, quaternion
+from .panel import VIEWS, Actions, Panel
+from .scene import MACHINE, Patch, Scene, quaternion
 from .session import Session
 from .workers import due_after
 
@@ -37,6 +38,9 @@ FAR = 1e6
 DISTANCE = 2.1
 """Distance of the camera from the middle of the machine, in radii of the machine."""
 
+ASPECT = 1.4
+"""Height per width of a picture from which the camera stands farther off, as widths do not fit any more."""
+
 IN_VIEW = 0.8
 """Share of the camera's angle within which the target is kept: its handles need room around it."""
 
@@ -51,17 +55,25 @@ class LiveMachine:
     session : its target and its answer.
     track : the path that can be played, or None.
     modes : those that were found last.
+    asked : the number of questions of the user so far.
     wanted, actuators, joints : targets of the user, which run ahead of the answers: a pose (4, 4) [length], and values
         of actuators, and of joints in series (k,) [length or rad].
     """
 
     def __init__(
-        self, server: viser.ViserServer, shown: Shown, drag: Callable[[Floats], None], actions: Actions
+        self,
+        server: viser.ViserServer,
+        shown: Shown,
+        drag: Callable[[Floats], None],
+        actions: Actions,
+        limits: bool | None,
     ) -> None:
         mechanism, first, self.track = shown
         skeleton = skeleton_of(mechanism if first is None else first)
-        self._server, self.session = server, Session(mechanism, first)
+        self._server, self.session, self._points = server, Session(mechanism, first), skeleton.points
         self.modes: tuple[Solution, ...] = ()
+        self.asked = 0
+        self._borders: dict[str, list[Patch]] = {}
         server.gui.reset()
         server.scene.reset()
         server.scene.configure_default_lights(cast_shadow=False)
@@ -73,17 +85,18 @@ class LiveMachine:
             self.scene.show_path(self.track)
         self._handles = Handles(server, mechanism, drag)
         steps = 0 if self.track is None else len(self.track)
-        self.panel = Panel(server.gui, mechanism, self.session, actions, steps)
-        aim_camera(server, mechanism, skeleton.points)
+        self.panel = Panel(server.gui, mechanism, self.session, actions, steps, limits)
+        self.look_from(server.initial_camera, VIEWS[0], 1.0)
         self.refresh()
 
-    def refresh(self) -> None:
-        """Show the answer of the session."""
+    def refresh(self, *, is_newest: bool = True) -> None:
+        """Show the answer of the session; where it is not to the newest question, what the user wants runs ahead."""
         session = self.session
-        self.wanted, self.actuators, self.joints = session.target.copy(), session.actuators.copy(), session.joints
+        if is_newest:
+            self.wanted, self.actuators, self.joints = session.target.copy(), session.actuators.copy(), session.joints
         with self._server.atomic():
             if session.solution.status < Status.INVALID:
-                self.scene.show(skeleton_of(session.solution), session.solution.pose)
+                self.scene.show(session.solution)
             self._handles.show(session.target)
             self.panel.show(session)
         self._server.flush()
@@ -93,6 +106,24 @@ class LiveMachine:
         self._handles.release()
         self.panel.release()
 
+    def show_border(self, name: str, patches: list[Patch]) -> None:
+        """Show a border in place of the one of that name before, and what its colours stand for."""
+        self._borders[name] = patches
+        self.scene.show_border(name, patches)
+        self.panel.list_patches(patch for border in self._borders.values() for patch in border)
+
+    def look_from(self, camera: Any, view: str, aspect: float) -> None:
+        """Place a camera so that the machine is in view, from one of the panel's `VIEWS`.
+
+        Of a planar machine, the front is its plane. `aspect` is the width of the picture per height.
+        """
+        seen = self._points / self.session.mechanism.characteristic_length
+        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+        radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))
+        direction, camera_up = eye_of(self.session.mechanism, view)
+        away = DISTANCE * radius / min(1.0, aspect * ASPECT)
+        place_camera(camera, middle + away * direction, middle, camera_up)
+
     def page(self) -> str:
         """The scene as a page of its own, HTML: the machine as it is, or moving along its path."""
         self._handles.show_all(False)
@@ -100,9 +131,9 @@ class LiveMachine:
         if self.track is not None:
             for step in self.track:
                 if np.isfinite(step.pose).all():
-                    self.scene.show(skeleton_of(step), step.pose)
+                    self.scene.show(step)
                     serializer.insert_sleep(due_after(self.track))
-            self.scene.show(skeleton_of(self.session.solution), self.session.solution.pose)
+            self.scene.show(self.session.solution)
         page = str(serializer.as_html())
         self._handles.show_all(True)
         return page
@@ -126,16 +157,16 @@ class Handles:
 
     def __init__(self, server: viser.ViserServer, mechanism: Mechanism, drag: Callable[[Floats], None]) -> None:
         self._length, self._drag = mechanism.characteristic_length, drag
-        task = task_of(mechanism)
+        slides, turns = free_axes(mechanism)
         self._all: list[Any] = []
         self._held: Any = None
         limits = ((-FAR, FAR),) * 3
         common: dict[str, Any] = {"scale": GIZMO, "depth_test": False, "translation_limits": limits}
-        if any(task.axes):
-            self._add(server, "move", active_axes=task.axes, disable_rotations=True, **common)
-        if task.rotations:
+        if slides:
+            self._add(server, "move", active_axes=_active(slides), disable_rotations=True, **common)
+        if turns:
             still = {"disable_axes": True, "disable_sliders": True}
-            self._add(server, "turn", active_axes=task.turns, **still, **common)
+            self._add(server, "turn", active_axes=_active(turns), **still, **common)
 
     def show(self, target: Floats) -> None:
         """Bring the handles to a target, but for the one in the user's hand."""
@@ -170,6 +201,10 @@ class Handles:
         return pose
 
 
+def _active(axes: list[int]) -> tuple[bool, bool, bool]:
+    return 0 in axes, 1 in axes, 2 in axes
+
+
 def keep_in_view(server: viser.ViserServer, point: Floats) -> None:
     """Move the camera of each page back, if need be, until a point (3,) of the scene is in view, its handles too."""
     for client in server.get_clients().values():
@@ -190,13 +225,20 @@ def backed_off(position: Floats, middle: Floats, angle: float, point: Floats) ->
     return np.asarray(position - max(missing, 0.0) * along)
 
 
-def aim_camera(server: viser.ViserServer, mechanism: Mechanism, points: Floats) -> None:
-    """Place the camera so that points (n, 3) [length] are in view; a planar machine is viewed from the front."""
-    seen = points / mechanism.characteristic_length
-    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))
+def eye_of(mechanism: Mechanism, view: str) -> tuple[Floats, Floats]:
+    """The direction that a view is seen from, and what is up in it, unit vectors (3,)."""
     plane = plane_of(mechanism)
-    direction = SEEN_FROM if plane is None else np.cross(*plane)
-    camera = server.initial_camera
-    camera.position, camera.look_at = middle + DISTANCE * radius * direction, middle
-    camera.up = (0.0, 0.0, 1.0) if plane is None else plane[1]
+    right, up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) if plane is None else plane
+    front = np.cross(right, up)
+    if view == "iso" and plane is None:
+        return SEEN_FROM, up
+    return {"top": (up, -front), "side": (right, up)}.get(view, (front, up))
+
+
+def place_camera(camera: Any, position: Floats, middle: Floats, up: Floats) -> None:
+    """Place a camera of a page, or the one that pages begin with."""
+    if hasattr(camera, "up_direction"):
+        camera.up_direction = up
+    else:
+        camera.up = up
+    camera.position, camera.look_at = position, middle

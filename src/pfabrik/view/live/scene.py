@@ -12,13 +12,16 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ...answers.solution import Solution
 from ...answers.tracked import Track
 from ...arrays import Floats
+from ...clearance.clearance import clearance
 from ...clearance.solid_meshes import SolidMesh
 from ...description.mechanism import Mechanism
-from ...drawn_parts import Part
+from ...drawn_parts import Part, role_of
+from ...kinematics import links_of
 from ...rotations import shortest_turns, to_quaternion, to_rotvec
-from ...skeleton import Mark, Skeleton
+from ...skeleton import Mark, Skeleton, skeleton_of
 from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, of_a_body, rgb
 
 if TYPE_CHECKING:
@@ -39,6 +42,9 @@ JOINT = 0.034
 FRAME = 0.12
 """Length of the axes at the reference point [L]."""
 
+SINGULAR = "#aa3377"
+"""Colour of singularities."""
+
 NO_SHADOW: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
 PLAIN: dict[str, Any] = {"lod": "off", **NO_SHADOW}
 """Settings of many small meshes that save the time of computers without a graphics card."""
@@ -51,16 +57,19 @@ SIDES = 16
 
 @dataclass(frozen=True)
 class Patch:
-    """A part of the border of a workspace that has one colour.
+    """A part of a border that has one colour: of a workspace, or between its parts.
 
     Attributes
     ----------
-    corners : of its triangles, (k, 3, 3), or both ends of its segments, (k, 2, 3), in the base frame [length].
-    name, share : the limits that form it, and their share of the border.
+    words : str
+        What it is.
+    colour : str
+        As "#d55e00".
+    corners : array (k, 3, 3) or (k, 2, 3)
+        Of its triangles, or both ends of its segments, in the base frame [length].
     """
 
-    name: str
-    share: float
+    words: str
     colour: str
     corners: Floats
 
@@ -74,7 +83,9 @@ class Scene:
     def __init__(self, server: viser.ViserServer, mechanism: Mechanism, skeleton: Skeleton) -> None:
         self._scene, self._length = server.scene, mechanism.characteristic_length
         self._labels: dict[str, Any] = {}
-        self._border: list[Any] = []
+        self._borders: dict[str, list[Any]] = {}
+        self._distance: tuple[Any, ...] = ()
+        self._shows_solids = True
         self._lines = self._add_many("lines", cylinder(), **self._cylinders(skeleton))
         self._faces = [
             self._add_mesh(
@@ -84,32 +95,42 @@ class Scene:
             if line.part.kind == "plate"
         ]
         self._solids = [
-            self._add_mesh(f"solids/{place}", self._triangles(solid), _colour_of_solid(solid), 0.5, side="front")
+            self._add_mesh(
+                f"solids/{place}", self._triangles(solid), _colour_of_solid(mechanism, solid), 0.4, side="front"
+            )
             for place, solid in enumerate(skeleton.solids)
         ]
         kinds = sorted({mark.joint.type for mark in skeleton.marks})
         self._joints = {kind: self._add_joints(kind, skeleton) for kind in kinds}
         if len(skeleton.rails):
             rails = (skeleton.rails / self._length).astype(np.float32)
-            self._scene.add_line_segments(f"{MACHINE}/rails", rails, rgb(EDGE), thickness=1.5)
+            self._add_lines("rails", rails, EDGE, 1.5)
         self._frame = self._scene.add_frame(
             f"{MACHINE}/reference", axes_length=FRAME, axes_radius=0.05 * FRAME, origin_radius=0.08 * FRAME
         )
 
-    def show(self, skeleton: Skeleton, pose: Floats) -> None:
+    def show(self, solution: Solution) -> None:
         """Move everything to a configuration."""
+        skeleton, pose = skeleton_of(solution), solution.pose
         for name, values in self._cylinders(skeleton).items():
             setattr(self._lines, name, values)
         corners = (line.corners for line in skeleton.parts if line.part.kind == "plate")
         for face, face_corners in zip(self._faces, corners, strict=True):
             face.vertices = fan(face_corners / self._length)[0]
         for mesh, solid in zip(self._solids, skeleton.solids, strict=True):
-            mesh.vertices, mesh.color = self._triangles(solid)[0], _colour_of_solid(solid)
+            mesh.vertices, mesh.color = self._triangles(solid)[0], _colour_of_solid(skeleton.mechanism, solid)
         for kind, joints in self._joints.items():
             marks = _of_kind(skeleton, kind)
             joints.batched_positions, joints.batched_colors = self._places(marks), _colours(marks)
         self._frame.position, self._frame.wxyz = pose[:3, 3] / self._length, quaternion(pose[:3, :3])
         self._name(skeleton)
+        self._show_distance(solution)
+
+    def show_solids(self, visible: bool) -> None:
+        """Show the shapes of bodies and the least distance between them, or hide them."""
+        self._shows_solids = visible
+        for node in (*self._solids, *self._distance):
+            node.visible = visible
 
     def show_path(self, track: Track) -> None:
         """Show the target path and the achieved path."""
@@ -117,26 +138,42 @@ class Scene:
             places = (poses[:, :3, 3] / self._length).astype(np.float32)
             places = places[np.isfinite(places).all(axis=1)]
             if len(places) > 1:
-                segments = np.stack([places[:-1], places[1:]], axis=1)
-                self._scene.add_line_segments(f"{MACHINE}/path/{name}", segments, rgb(colour), thickness=2.0)
+                self._add_lines(f"path/{name}", np.stack([places[:-1], places[1:]], axis=1), colour, 2.0)
 
-    def show_border(self, patches: Sequence[Patch]) -> None:
-        """Show the border of a workspace, in place of the one before."""
-        self.hide_border()
-        for place, patch in enumerate(patches):
-            name, corners = f"{MACHINE}/workspace/{place}", (patch.corners / self._length).astype(np.float32)
-            if corners.shape[1] == 2:
-                self._border.append(self._scene.add_line_segments(name, corners, rgb(patch.colour), thickness=3.0))
-                continue
-            mesh = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
-            name = f"workspace/{place}"
-            self._border.append(self._add_mesh(name, mesh, rgb(patch.colour), 0.4, flat_shading=True))
-
-    def hide_border(self) -> None:
-        """Hide the border."""
-        for part in self._border:
+    def show_border(self, name: str, patches: Sequence[Patch]) -> None:
+        """Show a border in place of the one of that name before; none without patches."""
+        for part in self._borders.pop(name, []):
             part.remove()
-        self._border = []
+        self._borders[name] = [
+            self._add_patch(f"{name}/{place}", patch) for place, patch in enumerate(patches) if len(patch.corners)
+        ]
+
+    def _add_patch(self, name: str, patch: Patch) -> Any:
+        corners = (patch.corners / self._length).astype(np.float32)
+        if corners.shape[1] == 2:
+            return self._add_lines(name, corners, patch.colour, 3.0)
+        mesh = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+        return self._add_mesh(name, mesh, rgb(patch.colour), 0.4, flat_shading=True)
+
+    def _add_lines(self, name: str, ends: Any, colour: str, width: float) -> Any:
+        """Segments (k, 2, 3) in the scene, so wide [pixels]."""
+        style: dict[str, Any] = {"thickness": width, "thickness_units": "screen"}
+        return self._scene.add_line_segments(f"{MACHINE}/{name}", ends, rgb(colour), **style)
+
+    def _show_distance(self, solution: Solution) -> None:
+        """A line between the two links that are nearest to each other, and how far apart these are."""
+        for node in self._distance:
+            node.remove()
+        self._distance = ()
+        if not self._solids or not len(links_of(solution.mechanism).pairs):
+            return
+        found = clearance(solution)
+        ends = np.asarray(found.points) / self._length
+        words = f"{float(found.distance):.3g} {solution.mechanism.length_unit}"
+        label = self._scene.add_label(f"{MACHINE}/distance/words", words, position=cast(Any, ends.mean(axis=0)))
+        colour = HELD if found.distance <= (solution.mechanism.clearance or 0.0) else ACTUATED
+        self._distance = (self._add_lines("distance/line", ends[None].astype(np.float32), colour, 4.0), label)
+        self.show_solids(self._shows_solids)
 
     def _add_mesh(self, name: str, mesh: tuple[Any, Any], colour: Colour, opacity: float, **style: Any) -> Any:
         style = {"color": colour, "opacity": opacity, "side": "double", **NO_SHADOW, **style}
@@ -199,9 +236,10 @@ def _colour_of(part: Part) -> Colour:
     return rgb(BASE if part.role == "base" else of_a_body(part.role))
 
 
-def _colour_of_solid(solid: SolidMesh) -> Colour:
-    """Dark for the two links that are nearest to each other, orange where they stop it or overlap, light elsewhere."""
-    return rgb(HELD if solid.is_stopped else ACTUATED if solid.is_nearest else BASE)
+def _colour_of_solid(mechanism: Mechanism, solid: SolidMesh) -> Colour:
+    """Dark for the two links that are nearest to each other, orange where they stop it or overlap, else of its body."""
+    of_body = of_a_body(role_of(mechanism, solid.body))
+    return rgb(HELD if solid.is_stopped else ACTUATED if solid.is_nearest else of_body)
 
 
 def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:

@@ -1,19 +1,26 @@
-"""Searches that take longer than a motion of the mouse: for modes, and for the border of the workspace."""
+"""Searches that take longer than a motion of the mouse: for modes, the border of the workspace, and singularities."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...answers.solution import Solution
 from ...answers.words import by_bound, exceeded
+from ...arrays import Floats, Ints
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
+from ...telling import OnProgress
 from .live_machine import LiveMachine
-from .scene import Patch
+from .panel import LOCUS, WORKSPACE, Panel
+from .scene import SINGULAR, Patch
 from .workers import Newest
+
+if TYPE_CHECKING:
+    from ...workspace.result import Workspace
 
 POSITIONS = ("x", "y", "z")
 
@@ -54,29 +61,36 @@ class Searches:
 
         self._newest.post(search)
 
-    def show_workspace(self, wanted: bool) -> None:
-        """Show the border of the workspace at this orientation, or hide it."""
+    def show_border(self, name: str, wanted: bool) -> None:
+        """Show the border of the workspace at this orientation, or the singularities in it, or hide them."""
         machine = self._shown()
-        scene, panel, start = machine.scene, machine.panel, machine.session.start
-        if not wanted:
-            self._newest.post(lambda: None)
-            scene.hide_border()
-            panel.tell_border([])
+        if wanted:
+            start = machine.session.start
+            machine.panel.tell("looking for the workspace …")
+            self._newest.post(lambda: self._find_borders(machine, start))
             return
-        panel.tell("looking for the workspace …")
+        with self._lock:
+            machine.show_border(name, [])
+            machine.panel.tell("")
 
-        def progress(done: int, total: int) -> None:
-            panel.tell(f"looking for the workspace: {100 * done // max(total, 1)} %")
+    def _find_borders(self, machine: LiveMachine, start: Solution) -> None:
+        """Find the borders that are wanted, one after the other: singularities are looked for in a workspace."""
+        from ...workspace.ask import workspace
+        from ...workspace.workspace_table import in_words
 
-        def search() -> None:
-            patches, size = border_of(start, progress)
+        panel = machine.panel
+        space = workspace(start.mechanism, start=start, on_progress=_progress(panel, "the workspace"))
+        notes = [in_words(space)]
+        for name, find in ((WORKSPACE, border_of), (LOCUS, locus_of)):
+            if not panel.wants(name):
+                continue
+            patches, note = find(space, start, _progress(panel, "singularities"))
             with self._lock:
-                if self._shown() is machine and panel.wants_workspace:
-                    scene.show_border(patches)
-                    panel.tell_border(patches)
-                    panel.tell(size)
-
-        self._newest.post(search)
+                if self._shown() is machine and panel.wants(name):
+                    machine.show_border(name, patches)
+                    notes.append(note)
+        if self._shown() is machine:
+            panel.tell("\n".join(filter(None, notes)))
 
     def end(self) -> None:
         """Let the thread end."""
@@ -89,24 +103,44 @@ def _kept(mode: Solution) -> str:
     return f"beyond {beyond}" if beyond else "within limits"
 
 
-def border_of(start: Solution, on_progress: Callable[[int, int], None]) -> tuple[list[Patch], str]:
-    """The border of the workspace at a configuration's orientation, in its working mode, and its size in words.
+def _progress(panel: Panel, what: str) -> Callable[[int, int], None]:
+    """A callback that shows how much of a search is done."""
+    return lambda done, total: panel.tell(f"looking for {what}: {100 * done // max(total, 1)} %")
 
-    Each face has the colour of the limit that forms it. Other coordinates are as in that configuration. A workspace
-    over angles has no patches.
+
+def border_of(space: Workspace, start: Solution, _: object) -> tuple[list[Patch], str]:
+    """The border of a workspace, each face in the colour of the limit that forms it, and a remark.
+
+    Coordinates that it does not span are as at the start. One over angles has no place in the scene.
     """
-    from ...workspace.ask import workspace
     from ...workspace.border import groups_of
-    from ...workspace.workspace_table import in_words
 
-    space = workspace(start.mechanism, start=start, on_progress=on_progress)
-    size = in_words(space)
-    if not set(space.names) <= set(POSITIONS):
-        return [], f"workspace over {', '.join(space.names)}: {size}; it has no place in the scene"
-    vertices = np.repeat(start.pose[None, :3, 3], len(space.vertices), axis=0)
-    vertices[:, [POSITIONS.index(name) for name in space.names]] = space.vertices
-    corners, limits = np.asarray(vertices[space.faces]), np.asarray(space.face_limit)
+    corners, limits = _in_the_scene(space, start, space.vertices, space.faces), np.asarray(space.face_limit)
+    if corners is None:
+        return [], f"it is one over {', '.join(space.names)}: it has no place in the scene"
     return [
-        Patch(group.label, group.share, group.colour, corners[np.isin(limits, group.limits)])
+        Patch(f"{group.label}: {group.share:.0%}", group.colour, corners[np.isin(limits, group.limits)])
         for group in groups_of(space)
-    ], size
+    ], ""
+
+
+def locus_of(space: Workspace, start: Solution, on_progress: OnProgress) -> tuple[list[Patch], str]:
+    """Where the parallel measure changes its sign in a workspace, and a remark."""
+    from ...workspace.singular import singularity_map
+
+    if not set(space.names) <= set(POSITIONS):
+        return [], f"singularities over {', '.join(space.names)} have no place in the scene"
+    found = singularity_map(space.mechanism, space, on_progress=on_progress)
+    corners = _in_the_scene(space, start, found.locus_vertices, found.locus_faces)
+    if corners is None or not len(corners):
+        return [], "no parallel singularity in it"
+    return [Patch("parallel singularities", SINGULAR, corners)], ""
+
+
+def _in_the_scene(space: Workspace, start: Solution, vertices: Floats, faces: Ints) -> Floats | None:
+    """Corners (k, d, 3) of a mesh in a workspace over positions, [length]; None over angles."""
+    if not set(space.names) <= set(POSITIONS):
+        return None
+    points = np.repeat(start.pose[None, :3, 3], len(vertices), axis=0)
+    points[:, [POSITIONS.index(name) for name in space.names]] = vertices
+    return np.asarray(points[faces])

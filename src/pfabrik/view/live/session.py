@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections import deque
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,12 +18,33 @@ from ...ik import solve_ik
 from ...kinematics import JointPath, home_coordinates, joint_path, passive_series
 from ...poses import pose
 from ...rotations import to_rpy
+from .distances import Nearness, nearness, side_of
 
 DIGITS = 9
 """Digits after the point that are shown: further ones are rounding; no -0.0 is shown."""
 
 
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+MOST_STEPS = 200
+"""Steps that can be undone."""
+
+SINGULAR = 1e-3
+"""Measure below which an answer is too near to a singularity for the sides of parallel ones to have a sign."""
+
+Asked: TypeAlias = Literal["pose", "actuators", "configuration"]
+
+
+class _Step(NamedTuple):
+    """A state of a session, to go back to."""
+
+    solution: Solution
+    start: Solution
+    asked: Asked
+    target: Floats
+    actuators: Floats
+    side: float
 
 
 class Session:
@@ -38,14 +60,16 @@ class Session:
     start : the last feasible answer, which the next one starts from.
     asked : what was given last: a "pose", "actuators", or a "configuration".
     path : the passive joints in series that carry the end effector, whose coordinates can be given too; None without.
+    home : the configuration at home.
     """
 
     def __init__(self, mechanism: Mechanism, solution: Solution | None = None) -> None:
         self.mechanism, series = mechanism, passive_series(mechanism)
         self.path: JointPath | None = joint_path(mechanism, series) if series else None
         home = configuration(mechanism, home_coordinates(mechanism))
-        self.solution = home
-        self.start = home
+        self.solution = self.start = self.home = home
+        self._past: deque[_Step] = deque(maxlen=MOST_STEPS)
+        self._gesture: object = None
         self.show(home if solution is None else solution)
 
     def go_to(self, target: Floats) -> None:
@@ -60,13 +84,47 @@ class Session:
 
     def show(self, solution: Solution) -> None:
         """Take a configuration as it is: a working mode, a step of a track."""
+        self._side = np.nan
         self._answer(solution, "configuration")
 
-    def _answer(self, solution: Solution, asked: Literal["pose", "actuators", "configuration"]) -> None:
+    def remember(self, gesture: object) -> None:
+        """Keep the present state as a step that can be undone, unless it is in the midst of the same gesture."""
+        if gesture != self._gesture:
+            self._gesture = gesture
+            self._past.append(_Step(self.solution, self.start, self.asked, self.target, self.actuators, self._side))
+
+    @property
+    def can_undo(self) -> bool:
+        """True if there is a step that can be undone."""
+        return bool(self._past)
+
+    def undo(self) -> None:
+        """Go back to before the last gesture, if there was one."""
+        if self._past:
+            self.solution, self.start, self.asked, self.target, self.actuators, self._side = self._past.pop()
+            self._gesture = None
+
+    def _answer(self, solution: Solution, asked: Asked) -> None:
         self.solution, self.asked = solution, asked
         self.target, self.actuators = np.array(solution.pose), np.array(solution.actuators)
         if solution.status <= Status.PROJECTED:
             self.start = solution
+        serial, _ = self.nearness
+        if serial.measure < SINGULAR:
+            self._side = np.nan
+        elif np.isnan(self._side):
+            self._side = side_of(solution)
+
+    @property
+    def nearness(self) -> tuple[Nearness, Nearness]:
+        """Distances of the answer from serial and from parallel singularities."""
+        return nearness(self.solution, self.home)
+
+    @property
+    def is_across(self) -> bool:
+        """True if a parallel singularity was passed since a configuration was shown, or a leg was at a dead point."""
+        _, parallel = self.nearness
+        return bool(parallel.measure >= SINGULAR and side_of(self.solution) * self._side < 0.0)
 
     @property
     def joints(self) -> Floats:

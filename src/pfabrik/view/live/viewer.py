@@ -7,16 +7,19 @@ import contextlib
 import io
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import rich
 
 from ...answers.solution import Solution, checked_solution
 from ...arrays import Floats
 from ...checks import require_count, require_ending
+from ...configuration import configuration
 from ...description.mechanism import Mechanism
 from ...errors import InvalidArgument, PfabrikError
 from ...extras import require
@@ -24,15 +27,18 @@ from ...files import load
 from ...first_answers import prepare
 from ...whole_files import whole_path
 from .live_machine import LiveMachine, Shown, checked, keep_in_view
-from .panel import Actions
+from .panel import VIEWS, Actions
 from .searching import Searches
-from .session import Session, moved
+from .session import moved
 from .workers import Newest, Player, Watch
 
 if TYPE_CHECKING:
     import viser
 
 LOOPBACK, PORT = "127.0.0.1", 8080
+
+PAUSE = 1.0
+"""Time without motion after which a further motion of the same handle or slider is a step of its own [s]."""
 
 
 def view(shown: Mechanism | Solution | str | os.PathLike[str], *, port: int = PORT, host: str = LOOPBACK) -> Viewer:
@@ -85,10 +91,13 @@ class Viewer:
         self._searches = Searches(lambda: self._stage, self._lock, self._complain)
         self._player: Player | None = None
         self._ready: Mechanism | None = None
+        self._gesture, self._asked_by, self._asked_at = 0, "", 0.0
+        undo = self._server.gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl")
+        undo.on_trigger(lambda _: self._undo())
         self._watch: Watch | None = None
         try:
             self._build(what)
-            self._server.on_client_connect(lambda _: self._newest.post(self._prepare))
+            self._server.on_client_connect(self._greet)
             self._server.on_client_disconnect(lambda _: self._stage.release())
             atexit.register(self.close)
             self._watch = Watch(path, self._changed) if path is not None and path.is_file() else None
@@ -115,9 +124,11 @@ class Viewer:
 
     def show(self, solution: Solution) -> None:
         """Show a configuration of this machine."""
-        if checked_solution(solution).mechanism != self.mechanism or solution.shape != ():
+        if checked_solution(solution).mechanism == self._described != self.mechanism:
+            self._build(checked(self._described))
+        if solution.mechanism != self.mechanism or solution.shape != ():
             raise InvalidArgument("solution", repr(solution), f"one Solution of '{self.mechanism.name}'")
-        self._answer(lambda stage: stage.session.show(solution))
+        self._answer(lambda stage: stage.session.show(solution), self._next_gesture("program"))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as a page of its own, which opens without this program and without a network.
@@ -168,39 +179,43 @@ class Viewer:
     def _drag(self, target: Floats) -> None:
         self._stage.panel.release()
         self._stage.wanted = target
-        self._ask(lambda stage: stage.session.go_to(target))
+        self._ask("drag", lambda stage: stage.session.go_to(target))
 
     def _change_target(self, name: str, value: float) -> None:
         self._stage.wanted = target = moved(self._stage.wanted, name, value)
         keep_in_view(self._server, target[:3, 3] / self.mechanism.characteristic_length)
-        self._ask(lambda stage: stage.session.go_to(target))
+        self._ask(name, lambda stage: stage.session.go_to(target))
 
     def _change_actuator(self, place: int, value: float) -> None:
         self._stage.actuators[place] = value
         values = self._stage.actuators.copy()
-        self._ask(lambda stage: stage.session.drive(values))
+        self._ask(f"actuator {place}", lambda stage: stage.session.drive(values))
 
     def _change_joint(self, place: int, value: float) -> None:
         stage = self._stage
         stage.joints[place] = value
         assert stage.session.path is not None
         stage.wanted = target = stage.session.path.poses(stage.joints[None])[0]
-        self._ask(lambda stage: stage.session.go_to(target))
+        self._ask(f"joint {place}", lambda stage: stage.session.go_to(target))
 
     def _go_home(self) -> None:
         self._stage.panel.release()
-        home = Session(self.mechanism).solution
-        self._ask(lambda stage: stage.session.show(home))
+        self._ask("home", lambda stage: stage.session.show(stage.session.home))
+
+    def _undo(self) -> None:
+        self._stage.panel.release()
+        self._asked_by = ""
+        self._post(lambda stage: stage.session.undo())
 
     def _take_mode(self, place: int) -> None:
         modes = self._stage.modes
         if place < len(modes):
-            self._ask(lambda stage: stage.session.show(modes[place]))
+            self._ask(f"mode {place}", lambda stage: stage.session.show(modes[place]))
 
     def _take_step(self, step: int) -> None:
         track = self._stage.track
         if track is not None:
-            self._ask(lambda stage: stage.session.show(track[step - 1]))
+            self._ask("path", lambda stage: stage.session.show(track[step - 1]))
 
     def _play(self, playing: bool) -> None:
         self._stage.panel.release()
@@ -213,37 +228,90 @@ class Viewer:
         self._take_step(step)
         self._stage.panel.show_step(step)
 
-    def _ask(self, question: Callable[[LiveMachine], None]) -> None:
-        stage = self._stage
-        self._newest.post(lambda: self._answer(question) if self._stage is stage else None)
+    def _look_from(self, client: Any, view: str) -> None:
+        if client is not None:
+            self._stage.look_from(client.camera, view, client.camera.aspect)
 
-    def _answer(self, question: Callable[[LiveMachine], None]) -> None:
+    def _show_solids(self, visible: bool) -> None:
         with self._lock:
+            self._stage.scene.show_solids(visible)
+
+    def _keep_limits(self, kept: bool) -> None:
+        """Go on from the same configuration with the limits of the machine, or without."""
+        self._newest.post(lambda: self._build_from(self._described if kept else self._described.without_limits()))
+
+    def _build_from(self, mechanism: Mechanism) -> None:
+        with self._lock:
+            q, described = self._stage.session.solution.q, self._described
+            self._build((mechanism, configuration(mechanism, q), self._stage.track), described)
+
+    def _ask(self, by: str, question: Callable[[LiveMachine], None]) -> None:
+        """Post what the user asks for, by a handle or a slider: as a step of its own after a pause."""
+        gesture = self._next_gesture(by)
+        self._post(question, gesture)
+
+    def _next_gesture(self, by: str) -> int:
+        """The number of a gesture: the same as before where the same element goes on without a pause."""
+        now = time.monotonic()
+        if by != self._asked_by or now - self._asked_at > PAUSE:
+            self._gesture += 1
+        self._asked_by, self._asked_at = by, now
+        return self._gesture
+
+    def _post(self, question: Callable[[LiveMachine], None], gesture: int | None = None) -> None:
+        stage = self._stage
+        stage.asked += 1
+        number = stage.asked
+        self._newest.post(lambda: self._answer(question, gesture, number) if self._stage is stage else None)
+
+    def _answer(
+        self, question: Callable[[LiveMachine], None], gesture: int | None = None, number: int | None = None
+    ) -> None:
+        with self._lock:
+            if gesture is not None:
+                self._stage.session.remember(gesture)
             question(self._stage)
-            self._stage.refresh()
+            self._stage.refresh(is_newest=number is None or number == self._stage.asked)
 
     # The machine, and its file.
 
-    def _build(self, shown: Shown) -> None:
-        """Show a machine in place of the one shown before."""
+    def _build(self, shown: Shown, described: Mechanism | None = None) -> None:
+        """Show a machine in place of the one shown before; `described` is the one with its limits."""
+        mechanism = shown[0]
+        self._described = described or mechanism
+        has_choice = shown[2] is None and self._described.without_limits() != self._described
         actions = Actions(
             change_target=self._change_target,
             change_actuator=self._change_actuator,
             change_joint=self._change_joint,
             go_home=self._go_home,
+            undo=self._undo,
             find_modes=self._searches.find_modes,
             take_mode=self._take_mode,
             take_step=self._take_step,
             play=self._play,
-            show_workspace=self._searches.show_workspace,
+            look_from=self._look_from,
+            show_border=self._searches.show_border,
+            show_solids=self._show_solids,
+            keep_limits=self._keep_limits,
             save=self._send,
         )
         with self._lock:
             if self._player is not None:
                 self._player.stop()
-            self._stage = LiveMachine(self._server, shown, self._drag, actions)
+            limits = mechanism == self._described if has_choice else None
+            self._stage = LiveMachine(self._server, shown, self._drag, actions, limits)
         if self._server.get_clients():
             self._prepare()
+
+    def _greet(self, client: Any) -> None:
+        """Prepare answers, and fit the machine into the page if it is narrow, once it has the first view."""
+        client.camera.on_update(self._fit)
+        self._newest.post(self._prepare)
+
+    def _fit(self, camera: Any) -> None:
+        if camera.aspect < 1.0 and np.allclose(camera.position, self._server.initial_camera.position):
+            self._look_from(camera.client, VIEWS[0])
 
     def _prepare(self) -> None:
         """Do ahead what first answers prepare, since that takes longer than a motion of the mouse."""
@@ -268,7 +336,8 @@ class Viewer:
     def _rebuild(self, mechanism: Mechanism) -> None:
         """Show another version of the machine, with the target that the user gave the one before."""
         before = self._stage.session
-        self._build(checked(mechanism))
+        keeps_limits = self.mechanism == self._described
+        self._build(checked(mechanism if keeps_limits else mechanism.without_limits()), mechanism)
         if before.asked == "pose":
             self._answer(lambda stage: stage.session.go_to(before.target))
 
