@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,11 +24,15 @@ public name, on the site that `make docs` builds in `site/`; in Python, `help(pf
 
 
 class Page(NamedTuple):
-    """A page: its title, its first sentences, and the names on it, without the `pf.` before them."""
+    """A page: its title, its first sentences, and the names on it, without the `pf.` before them.
+
+    `parts` are classes that only results have, by the files that they are in.
+    """
 
     title: str
     words: str
     names: str
+    parts: str = ""
 
 
 PAGES = {
@@ -36,6 +41,8 @@ PAGES = {
         "A machine is a `Mechanism`: joints between bodies, read from a file by `load`, or made of joints or legs "
         "in Python. It never changes; methods with `with_` in their names return another one.",
         "Mechanism Joint Cone Leg Shape load save catalog decompose SubChain",
+        "description.joint_coordinates.JointCoordinate decomposition.decompose.Split "
+        "decomposition.positions.Parallelogram",
     ),
     "solving": Page(
         "Solving",
@@ -43,24 +50,28 @@ PAGES = {
         "reached. The other names follow a path, repeat calls without allocation, or list all solutions.",
         "pose solve_ik solve_fk track Options Solver configuration feasibility Feasibility working_modes "
         "WorkingModes assembly_modes AssemblyModes search_log SearchLog",
+        "closure.attempts.Attempt",
     ),
     "answers": Page(
         "Answers",
         "An answer is a `Solution`, of one target or of a batch, with a `Status` for each. What stops it is an "
         "`ActiveLimit`, and `margins` says how far every limit is.",
         "Solution Status ActiveLimit Track margins closure_residual",
+        "answers.along.Extremes printed.ResultTable",
     ),
     "reach": Page(
         "Reach",
         "How far an end effector goes from where it is, what it can reach in all, and how near links come to each "
         "other. Each result names the limits that end it.",
         "travel Travel workspace Workspace Inscribed clearance Clearance",
+        "travel.Reach",
     ),
     "proofs": Page(
         "Proofs",
         "`certify` proves for every pose of a region that it is reached; `largest` finds the largest region of a "
         "shape for which it can. Both are for machines whose legs have closed forms.",
         "certify Certificate PoseRegion Enclosure largest Largest",
+        "certify.certificates.Refutation",
     ),
     "first-order": Page(
         "First order",
@@ -82,12 +93,15 @@ PAGES = {
         "result says which of them the measurements determine, and how well.",
         "parameters Parameters sensitivity Sensitivity Measurements read_measurements read_klipper calibrate "
         "Calibration plot_calibration",
+        "calibration.calibration.ParameterValue calibration.calibration.Suspect "
+        "calibration.printer_settings.KlipperDelta",
     ),
     "paths": Page(
         "Paths and time",
         "`read_path` makes targets of a table or of G-code, which `track` follows; `time_path` is how fast that "
         "may be. `platform_speed` is the highest speed at one configuration.",
         "read_path time_path Timed platform_speed PlatformSpeed",
+        "paths.path.Path timing.platform_speed.PlatformSpeeds",
     ),
     "controllers": Page(
         "Controllers and learning",
@@ -95,6 +109,8 @@ PAGES = {
         "this library no more: C for a controller, tensors for learning, a page for a browser.",
         "actuation Actuation export_c export_ros2_control export_web export_tensors export_numpy export_torch "
         "export_jax",
+        "actuation.named_values.Mapped actuation.actuation.Gains actuation.actuation.LimitMargin "
+        "actuation.drive_limits.HalfSpaces actuation.hull.Hull actuation.sample.Sample",
     ),
     "pictures": Page(
         "Pictures",
@@ -119,6 +135,7 @@ PAGES = {
         "MuJoCo and URDF",
         "Mechanisms from MuJoCo models, URDF and SDF, and back. `from_sdf` is `from_urdf` under another name.",
         " ".join(f"interop.{name}" for name in pf.interop.__all__ if name != "from_sdf"),
+        "interop.referee.Travelled",
     ),
 }
 
@@ -143,17 +160,22 @@ def names_of(page: Page) -> str:
     return ", ".join(f"`{name.rpartition('.')[2]}`" for name in page.names.split())
 
 
+def parts_of(page: Page) -> list[tuple[str, str]]:
+    """The classes that only results have: their names, and where they are."""
+    return [(place.rpartition(".")[2], f"pfabrik.{place}") for place in page.parts.split()]
+
+
 def text_of(page: Page) -> str:
     """The text of a page: its first sentences, a table of its names, and where each docstring goes."""
-    rows = "".join(f"| [pf.{name}][{place_of(name)}] | {first_line(name)} |\n" for name in page.names.split())
-    return f"# {page.title}\n\n{page.words}\n\n| name | |\n|---|---|\n{rows}" + "".join(
-        map(section, page.names.split())
-    )
+    public_names = [(f"pf.{name}", place_of(name)) for name in page.names.split()]
+    rows = [f"| [{name}][{place}] | {first_line(place)} |\n" for name, place in public_names]
+    head = f"# {page.title}\n\n{page.words}\n\n| name | |\n|---|---|\n"
+    return head + "".join(rows) + "".join(section(*each) for each in public_names + parts_of(page))
 
 
-def section(name: str) -> str:
+def section(heading: str, place: str) -> str:
     """Where the docstring of a name goes, below its own heading."""
-    return f"\n::: {place_of(name)}\n    options:\n      heading: pf.{name}\n      toc_label: pf.{name}\n"
+    return f"\n::: {place}\n    options:\n      heading: {heading}\n      toc_label: {heading}\n"
 
 
 def place_of(name: str) -> str:
@@ -164,9 +186,15 @@ def place_of(name: str) -> str:
     return f"pfabrik.{name}"
 
 
-def first_line(name: str) -> str:
-    """The first line of the docstring of a name."""
-    return (inspect.getdoc(public(name)) or "").partition("\n")[0]
+def first_line(place: str) -> str:
+    """The first line of the docstring of what is at a place."""
+    return (inspect.getdoc(at(place)) or "").partition("\n")[0]
+
+
+def at(place: str) -> object:
+    """What a module has under a name."""
+    module, _, name = place.rpartition(".")
+    return getattr(importlib.import_module(module), name)
 
 
 def public(name: str) -> object:

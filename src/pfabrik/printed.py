@@ -16,11 +16,18 @@ class ResultTable:
 
     Attributes
     ----------
-    title : a name, which notebooks show.
-    lines, remarks : text above the tables, and below them.
-    header, rows : of the table.
-    drawing : HTML beside it in notebooks.
-    more : tables below it, each with its own lines and remarks.
+    title : str
+        A name, which notebooks show.
+    lines, remarks : sequence of str
+        Text above the tables, and below them.
+    header : sequence of str
+        Names of the columns.
+    rows : sequence of sequence of str
+        Cells of the table.
+    drawing : str
+        HTML beside it in notebooks.
+    more : sequence of ResultTable
+        Tables below it, each with its own lines and remarks.
     """
 
     title: str

@@ -31,7 +31,15 @@ PURPOSE = "mapped between joints and actuators"
 
 
 class Gains(NamedTuple):
-    """Gains of joints as matrices, (..., k, k): torque by joint error, and by joint speed."""
+    """Gains of joints as matrices, (..., k, k): torque by joint error, and by joint speed.
+
+    Attributes
+    ----------
+    kp : array (..., k, k)
+        Torque by joint error.
+    kd : array (..., k, k)
+        Torque by joint speed.
+    """
 
     kp: Floats
     kd: Floats
@@ -42,10 +50,12 @@ class LimitMargin(NamedTuple):
 
     Attributes
     ----------
-    margin : as of `margins` a share of the range, (...,): 1 in the middle, 0 on a limit, negative beyond it or where
-        loops do not close. Near a dead point, how near it is, as of `Singularity.serial`. inf where nothing limits.
-    joint, bound : the limit, (...,): "min", "max", "cone"; "reach" or "closed" where a leg does not reach; "dead point"
-        of an actuator; "singularity", of no joint, where actuators lose their hold.
+    margin : float or array (...)
+        As in `margins` a share of the range: 1 in the middle, 0 on a limit, negative beyond it or where loops do not
+        close. Near a dead point, how near it is, as in `Singularity.serial`. inf where nothing limits.
+    joint, bound : str or array of str (...)
+        The limit: "min", "max", "cone"; "reach" or "closed" where a leg does not reach; "dead point" of an actuator;
+        "singularity", of no joint, where actuators lose their hold.
     """
 
     margin: float | Floats

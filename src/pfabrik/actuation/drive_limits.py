@@ -16,11 +16,15 @@ class HalfSpaces(NamedTuple):
 
     Attributes
     ----------
-    normals : unit vectors, (..., m, k), the second half the opposites of the first; zero where they say nothing.
-    offsets : (..., m).
-    box : half the sides of the inscribed box, (..., k): every v with |v| <= box is in the set. Each side has the same
-        share of what its coordinate has alone.
-    alone : the largest value of each coordinate while the others are zero, (..., k); inf where nothing limits it.
+    normals : array (..., m, k)
+        Unit vectors, the second half the opposites of the first; zero where they say nothing.
+    offsets : array (..., m)
+        Largest values along the normals.
+    box : array (..., k)
+        Half the sides of the inscribed box: every v with |v| <= box is in the set. Each side has the same share of what
+        its coordinate has alone.
+    alone : array (..., k)
+        The largest value of each coordinate while the others are zero; inf where nothing limits it.
     """
 
     normals: Floats
@@ -38,7 +42,8 @@ class HalfSpaces(NamedTuple):
 
         Raises
         ------
-        InvalidArgument : a batch, other than two coordinates, or a set without bounds.
+        InvalidArgument
+            A batch, other than two coordinates, or a set without bounds.
         """
         if self.normals.ndim != 2 or self.normals.shape[1] != 2 or not np.isfinite(self.alone).all():
             found = f"half-spaces of shape {self.normals.shape}"

@@ -34,11 +34,18 @@ class Hull(NamedTuple):
 
     Attributes
     ----------
-    normals, offsets : unit vectors (m, k), and (m,); the first 2 k are the box.
-    interior : the point in it from which it was cut: home, or the point with the largest margin, (k,).
-    share_lost : share of the box that is not feasible.
-    share_cut : share of the box that is outside the half-spaces: more, where what is feasible is not convex.
-    limits : (joint, bound) that the border of each half-space lies on, (m,); "" of the box where it is a range.
+    normals : array (m, k)
+        Unit vectors; the first 2 k are the box.
+    offsets : array (m,)
+        Largest values along the normals.
+    interior : array (k,)
+        The point in it from which it was cut: home, or the point with the largest margin.
+    share_lost : float
+        Share of the box that is not feasible.
+    share_cut : float
+        Share of the box that is outside the half-spaces: more, where what is feasible is not convex.
+    limits : tuple of tuple of str
+        Pairs (joint, bound) that the border of each half-space lies on, m of them; "" for the box where it is a range.
     """
 
     normals: Floats
@@ -57,7 +64,8 @@ class Hull(NamedTuple):
 
         Raises
         ------
-        InvalidArgument : there are not two coordinates.
+        InvalidArgument
+            There are not two coordinates.
         """
         if self.normals.shape[1] != 2:
             raise InvalidArgument("hull", f"{self.normals.shape[1]} coordinates", "two")

@@ -45,8 +45,10 @@ class Mapped:
 
     Attributes
     ----------
-    values : the coordinates, (..., n) [rad or length]. Of rows that are not REACHED, of the nearest feasible pose.
-    status : a `Status`; for a batch an integer array of them, (...,).
+    values : array (..., n)
+        The coordinates [rad or length]. Of rows that are not REACHED, those of the nearest feasible pose.
+    status : Status or array of int (...)
+        The `Status`; for a batch an integer array of them.
     """
 
     def __init__(self, values: Floats, status: Any, solve: Callable[[], Solution]) -> None:

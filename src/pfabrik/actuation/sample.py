@@ -24,9 +24,12 @@ class Sample(NamedTuple):
 
     Attributes
     ----------
-    q : the named coordinates, (n, k).
-    solution : the configurations, with actuators, poses and all joints.
-    model : of the robot whose states these are, as of `interop.qpos`; None for the model that `to_mjcf` writes.
+    q : array (n, k)
+        The named coordinates.
+    solution : Solution
+        The configurations, with actuators, poses and all joints.
+    model : object
+        The model of the robot whose states these are, as in `interop.qpos`; None for the model that `to_mjcf` writes.
     """
 
     q: Floats

@@ -16,7 +16,15 @@ from .solution import Solution
 
 
 class Extremes(NamedTuple):
-    """An extreme value in every row, (n,), and the names of what has it, n; NaN and "" where there is none."""
+    """An extreme value in every row, (n,), and the names of what has it, n; NaN and "" where there is none.
+
+    Attributes
+    ----------
+    values : array (n,)
+        The extreme values.
+    names : list of str
+        Names of what has them.
+    """
 
     values: Floats
     names: list[str]

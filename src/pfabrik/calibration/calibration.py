@@ -27,10 +27,18 @@ class ParameterValue(NamedTuple):
 
     Attributes
     ----------
-    value, described : calibrated, and of the machine as described, in `unit`.
-    deviation : standard deviation; infinite where the data leave it open, or nothing is left to estimate it by.
-    prior : what it was expected to be, or None.
-    determined : True if the measurements alone determine it.
+    name : str
+        Name of the parameter.
+    value, described : float
+        Calibrated, and of the machine as described, in `unit`.
+    deviation : float
+        Standard deviation; infinite where the data leave it open, or nothing is left to estimate it by.
+    prior : tuple of float or None
+        What it was expected to be, and the standard deviation of that.
+    determined : bool
+        True if the measurements alone determine it.
+    unit : str
+        Unit of the values.
     """
 
     name: str
@@ -47,9 +55,12 @@ class Suspect(NamedTuple):
 
     Attributes
     ----------
-    row : its row; of a distance, its number.
-    quantity : "row" or "distance".
-    residual : largest difference of the row, in standard deviations, from what the others predict.
+    row : int
+        Its row; of a distance, its number.
+    quantity : {"row", "distance"}
+        Kind of the measurement.
+    residual : float
+        Largest difference of the row, in standard deviations, from what the others predict.
     """
 
     row: int

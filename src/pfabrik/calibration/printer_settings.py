@@ -38,9 +38,11 @@ class KlipperDelta:
 
     Attributes
     ----------
-    mechanism : the machine, with Klipper's settings as dimensions: delta_radius, and for each tower angle_a,
-        arm_length_a and position_endstop_a.
-    measurements : what DELTA_CALIBRATE and DELTA_ANALYZE stored; None if nothing.
+    mechanism : Mechanism
+        The machine, with Klipper's settings as dimensions: delta_radius, and for each tower angle_a, arm_length_a and
+        position_endstop_a.
+    measurements : Measurements or None
+        What DELTA_CALIBRATE and DELTA_ANALYZE stored; None if nothing.
     """
 
     mechanism: Mechanism

@@ -40,10 +40,14 @@ class Refutation(NamedTuple):
 
     Attributes
     ----------
-    pose : (4, 4).
-    limit : (joint, bound), as of `Feasibility`.
-    margin : by how far the limit is broken, as of `margins`: negative.
-    answer : of `solve_ik`: PROJECTED, with its distances from the pose.
+    pose : array (4, 4)
+        The pose [length].
+    limit : tuple of str
+        The pair (joint, bound), as in `Feasibility`.
+    margin : float
+        By how far the limit is broken, as in `margins`: negative.
+    answer : Solution
+        Answer of `solve_ik`: PROJECTED, with its distances from the pose.
     """
 
     pose: Floats

@@ -21,11 +21,16 @@ class Attempt(NamedTuple):
 
     Attributes
     ----------
-    phase : what was tried: closed forms, other working modes, a search with a part of the target held, ...
-    start : the configuration that it started from.
-    steps : steps of the search; 0 for closed forms.
-    distance : of its end from the target, as projections measure it [length]; NaN where it has no end.
-    ending : what became of it.
+    phase : str
+        What was tried: closed forms, other working modes, a search with a part of the target held, ...
+    start : str
+        The configuration that it started from.
+    steps : int
+        Steps of the search; 0 for closed forms.
+    distance : float
+        Distance of its end from the target, as projections measure it [length]; NaN where it has no end.
+    ending : str
+        What became of it.
     """
 
     phase: str

@@ -22,8 +22,10 @@ class Split:
 
     Attributes
     ----------
-    ways : the parts of each path in order, from the base outward.
-    parallelogram : the one that the paths form, if they are two equal and parallel rods.
+    ways : tuple of tuple of Part
+        The parts of each path in order, from the base outward.
+    parallelogram : Parallelogram or None
+        The one that the paths form, if they are two equal and parallel rods.
     """
 
     ways: tuple[tuple[Part, ...], ...]

@@ -31,11 +31,15 @@ class Parallelogram:
 
     Attributes
     ----------
-    rods : names of the joints at the inner and the outer end of either rod.
-    length : of the rods [length].
-    width : between the joints of either body [length].
-    pinned : its joints are revolutes with parallel axes: it then moves in its plane alone, and its outer body
-        only shifts, along a circle whose radius is the rods' length. With ball joints the outer body may also turn.
+    rods : tuple of tuple of str
+        Names of the joints at the inner and the outer end of either rod.
+    length : float
+        Length of the rods [length].
+    width : float
+        Distance between the joints of either body [length].
+    pinned : bool
+        True if its joints are revolutes with parallel axes: it then moves in its plane alone, and its outer body only
+        shifts, along a circle whose radius is the rods' length. With ball joints the outer body may also turn.
     """
 
     rods: tuple[tuple[str, str], tuple[str, str]]

@@ -18,10 +18,16 @@ class JointCoordinate:
 
     Attributes
     ----------
-    name : that of its joint, with "[0]", "[1]" or "[2]" behind it where the joint has several.
-    joint, place : the joint, and which of its coordinates it is.
-    column : which of all coordinates it is, in the order of `q`.
-    home : its value in the home configuration [rad or length].
+    name : str
+        Name of its joint, with "[0]", "[1]" or "[2]" behind it where the joint has several.
+    joint : Joint
+        The joint.
+    place : int
+        Which of the joint's coordinates it is.
+    column : int
+        Which of all coordinates it is, in the order of `q`.
+    home : float
+        Its value in the home configuration [rad or length].
     """
 
     name: str

@@ -35,9 +35,12 @@ class Travelled(NamedTuple):
 
     Attributes
     ----------
-    drives : actuator -> the span of its values [rad or length].
-    shares : actuator -> the span as a share of its range, or of what was tried where that is less; 1 at most.
-    position, rotation : the farthest that the end effector was from home [length], [rad].
+    drives : dict of str to float
+        Actuator -> the span of its values [rad or length].
+    shares : dict of str to float
+        Actuator -> the span as a share of its range, or of what was tried where that is less; 1 at most.
+    position, rotation : float
+        The farthest that the end effector was from home [length], [rad].
     """
 
     drives: dict[str, float]

@@ -25,14 +25,22 @@ class Path(NamedTuple):
 
     Attributes
     ----------
-    targets : (n, 4, 4) [length].
-    times : of the targets, (n,) [s], as given or from the feeds; None unless every step has one.
-    feeds : speed of the reference point toward each target, (n,) [length/s], or of turning where it does not move
-        [deg/s]; infinite in rapid moves, NaN where not given.
-    lines : of the file that each comes from, (n,), counted from 1.
-    others : further columns by name, the cells as they were, n each.
-    angle_units : of roll, pitch and yaw, as the file has them.
-    passed : what a program has that moves nothing of the path as it is here, levelling and macros, and its first line.
+    targets : array (n, 4, 4)
+        The targets [length].
+    times : array (n,) or None
+        Times of the targets [s], as given or from the feeds; None unless every step has one.
+    feeds : array (n,)
+        Speed of the reference point toward each target [length/s], or of turning where it does not move [deg/s];
+        infinite in rapid moves, NaN where not given.
+    lines : list of int
+        Line of the file that each comes from, counted from 1.
+    others : mapping of str to sequence of str
+        Further columns by name, the cells as they were, n each.
+    angle_units : tuple of str
+        Units of roll, pitch and yaw, as the file has them.
+    passed : mapping of str to int
+        What a program has that moves nothing of the path as it is here, levelling and macros, and the line where it is
+        first.
     """
 
     targets: Floats

@@ -47,7 +47,13 @@ class PlatformSpeed(NamedTuple):
 
 
 class PlatformSpeeds(Printed, tuple[PlatformSpeed, ...]):
-    """The highest speeds in several directions, of one mechanism."""
+    """The highest speeds in several directions, of one mechanism.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        The machine.
+    """
 
     mechanism: Mechanism
 
