@@ -48,12 +48,15 @@ def export_web(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
 
     Parameters
     ----------
-    mechanism : whose chains are all legs in closed form, as all parallel machines of the catalogue are.
-    path : of the file, which ends in ".html" or ".htm".
+    mechanism : Mechanism
+        A machine whose chains are all legs in closed form, as all parallel machines of the catalogue are.
+    path : str or PathLike
+        The file, which ends in ".html" or ".htm".
 
     Raises
     ------
-    InvalidArgument : another ending, or a machine that a page cannot answer for; says why.
+    InvalidArgument
+        Another ending, or a machine that a page cannot answer for; says why.
     """
     require_ending(path, (".html", ".htm"))
     text = web_page(mechanism)

@@ -40,15 +40,23 @@ def export_ros2_control(
 
     Parameters
     ----------
-    folder : it is made where it is not there; files of the package in it are replaced, others are left alone.
-    joints : names of joints in series from the base to the end effector.
-    name : prefix of the package and of all names in it, lower-case letters, digits and underscores; the folder's,
-        without "_transmission", if it is left out.
+    mechanism : Mechanism
+        The machine.
+    folder : str or PathLike
+        Folder of the package. It is made where it is not there; files of the package in it are replaced, others are
+        left alone.
+    joints : str or sequence of str
+        Names of joints in series from the base to the end effector.
+    name : str, optional
+        Prefix of the package and of all names in it, lower-case letters, digits and underscores; the folder's, without
+        "_transmission", if it is left out.
 
     Raises
     ------
-    UnsupportedMechanism : some chain is no leg in closed form, or joints and actuators do not determine each other.
-    UnknownName, InvalidArgument : of the joints or the name.
+    UnsupportedMechanism
+        Some chain is no leg in closed form, or joints and actuators do not determine each other.
+    UnknownName or InvalidArgument
+        Joints that are none, or a name that is not allowed.
     """
     path = require_path("folder", folder)
     return write_package(path, ros2_control_texts(mechanism, path, joints=joints, name=name))

@@ -54,20 +54,30 @@ def animate(
 
     Parameters
     ----------
-    track : what `track` answered.
-    path : of the film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
-    seconds : how long it runs; default: as long as the path takes if the track has a `sample_time`, else a
-        twentieth of a second a step. There are 20 frames a second, each the step that is due.
-    view, theme : as of `plot`.
-    size : width and height of the film [inches].
-    dpi : pixels an inch; default: 100.
-    on_progress : called with (frames done, frames in all); default: a line on a terminal, if it takes more than two
-        seconds.
+    track : Track
+        What `track` answered.
+    path : str or PathLike
+        The film; it ends in ".gif" or ".mp4". The latter needs the program `ffmpeg`.
+    seconds : float, optional
+        How long it runs; default: as long as the path takes if the track has a `sample_time`, else a twentieth of a
+        second a step. There are 20 frames a second, each the step that is due.
+    view : str or (float, float), optional
+        As in `plot`.
+    size : (float, float), optional
+        Width and height of the film [inches].
+    dpi : float, optional
+        Pixels an inch; default: 100.
+    theme : {"light", "dark"}, optional
+        As in `plot`.
+    on_progress : callable, optional
+        Called with (frames done, frames in all); default: a line on a terminal, if it takes more than two seconds.
 
     Raises
     ------
-    InvalidArgument : no Track, another ending, no positive time, or no such view, size or theme.
-    MissingLibrary : matplotlib, or for ".mp4" `ffmpeg`, is not there.
+    InvalidArgument
+        No Track, another ending, no positive time, or no such view, size or theme.
+    MissingLibrary
+        Matplotlib, or for ".mp4" `ffmpeg`, is not there.
     """
     known = checked_track(track)
     suffix = require_ending(path, FILMS)

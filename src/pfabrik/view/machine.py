@@ -79,24 +79,34 @@ def plot(
 
     Parameters
     ----------
-    shown : a Mechanism, or one Solution.
-    ax : two-dimensional matplotlib axes to draw on. Default: those of a new figure, which is `ax.figure`; its `savefig`
+    shown : Mechanism or Solution
+        A Mechanism, or one Solution.
+    ax : Axes, optional
+        Two-dimensional Matplotlib axes to draw on. Default: those of a new figure, which is `ax.figure`; its `savefig`
         writes PNG, SVG and PDF.
-    names : joints whose names are written beside them, such as `mechanism.actuator_names`; True for all joints.
-    view : "top", "front", "side" or "iso", or elevation and azimuth [deg]; from -y at (0, -90), from x at (0, 0).
-        Default: where joints are seen best apart; of a planar machine its plane.
-    size : of a new figure, width and height [inches]. Default: the machine's shape.
-    theme : "light" or "dark".
+    names : sequence of str or bool, optional
+        Joints whose names are written beside them, such as `mechanism.actuator_names`; True for all joints.
+    view : str or (float, float), optional
+        "top", "front", "side" or "iso", or elevation and azimuth [deg]; from -y at (0, -90), from x at (0, 0). Default:
+        where joints are seen best apart; of a planar machine its plane.
+    size : (float, float), optional
+        Width and height of a new figure [inches]. Default: the machine's shape.
+    theme : {"light", "dark"}, optional
+        Colours for a light or a dark ground.
 
     Returns
     -------
-    Axes : what was drawn on; lengths in it are in the mechanism's unit.
+    Axes
+        What was drawn on; lengths in it are in the mechanism's unit.
 
     Raises
     ------
-    InvalidArgument : a batch, three-dimensional axes, or no such view, size or theme.
-    UnknownName : no joint of such a name.
-    MissingLibrary : matplotlib is not installed.
+    InvalidArgument
+        A batch, three-dimensional axes, or no such view, size or theme.
+    UnknownName
+        No joint of such a name.
+    MissingLibrary
+        Matplotlib is not installed.
     """
     mechanism, _ = checked_shown(shown)
     if isinstance(names, bool):

@@ -64,19 +64,28 @@ def plot_track(
 
     Parameters
     ----------
-    track : what `track` answered.
-    figure : matplotlib figure or subfigure to draw in; default: a new one. Its `savefig` writes PNG, SVG and PDF.
-    view, theme : as of `plot`.
-    size : of a new figure, width and height [inches].
+    track : Track
+        What `track` answered.
+    figure : Figure, optional
+        Matplotlib figure or subfigure to draw in; default: a new one. Its `savefig` writes PNG, SVG and PDF.
+    view : str or (float, float), optional
+        As in `plot`.
+    size : (float, float), optional
+        Width and height of a new figure [inches].
+    theme : {"light", "dark"}, optional
+        As in `plot`.
 
     Returns
     -------
-    dict : axes by what they show: "path", every actuator's name, and "margins" where the machine has limits.
+    dict of str to Axes
+        Axes by what they show: "path", every actuator's name, and "margins" where the machine has limits.
 
     Raises
     ------
-    InvalidArgument : what is no Track, or one without a step that has a configuration; no such view, size or theme.
-    MissingLibrary : matplotlib is not installed.
+    InvalidArgument
+        What is no Track, or one without a step that has a configuration; no such view, size or theme.
+    MissingLibrary
+        Matplotlib is not installed.
     """
     known, look = checked_track(track), look_of(theme)
     mechanism = track.mechanism

@@ -49,19 +49,26 @@ def plot_travel(
 
     Parameters
     ----------
-    found : what `travel` answered.
-    figure : matplotlib figure or subfigure to draw in; default: a new one.
-    size : of a new figure, width and height [inches].
-    theme : "light" or "dark".
+    found : Travel
+        What `travel` answered.
+    figure : Figure, optional
+        Matplotlib figure or subfigure to draw in; default: a new one.
+    size : (float, float), optional
+        Width and height of a new figure [inches].
+    theme : {"light", "dark"}, optional
+        As in `plot`.
 
     Returns
     -------
-    dict : axes by what they show: "along" [length] and "about" [deg], if there are such directions.
+    dict of str to Axes
+        Axes by what they show: "along" [length] and "about" [deg], if there are such directions.
 
     Raises
     ------
-    InvalidArgument : what is no Travel, or one without a direction; no such size or theme.
-    MissingLibrary : matplotlib is not installed.
+    InvalidArgument
+        What is no Travel, or one without a direction; no such size or theme.
+    MissingLibrary
+        Matplotlib is not installed.
     """
     if not isinstance(found, Travel) or not len(found):
         what = type(found).__name__ if not isinstance(found, Travel) else "no direction"

@@ -59,27 +59,39 @@ def workspace(
 
     Parameters
     ----------
-    over : two or three coordinates, of "x", "y", "z" (of the reference point, in the base frame) and
-        "tilt_x", "tilt_y", "yaw": R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held.
-    fixed : values of other coordinates [length or rad]; those in neither are as at the start.
-    orientation : R_0, a matrix (3, 3) or a SciPy Rotation, by default the start's; or "any": positions that are reached
-        with some orientation or other (the reachable workspace), without a start in any working mode; each from the
-        configurations of neighbouring ones, and what they do not lead to from the machine's seeds.
-    tilt : the largest angle by which the platform must be able to lean to every side [rad]: only positions count where
-        it can ("total" workspace up to a tilt).
-    within : coordinate -> (least, greatest), the range searched; default: as far as anything is within reach.
-    resolution : size of the smallest cells, at the border [length; rad where all coordinates are angles]; angles beside
-        lengths: that divided by L. Default: L/100 or 0.01 rad, L/50 with a tilt, L/25 where no closed
-        forms answer; halved where a workspace would be smaller than 24 cells.
-    start : a single Solution or joint vector q, which sets the working mode; the component that contains it is
-        `at_start`; default home.
-    certified : True to enclose the size between two proved bounds too, `Workspace.enclosure`, to 0.1 %; or the share to
-        which it is to be enclosed. For closed forms, in home's working mode.
-    executor : of `concurrent.futures`, or one like it, that measures points; default: here, on all cores. Without
+    mechanism : Mechanism
+        The machine.
+    over : sequence of str, optional
+        Two or three coordinates, of "x", "y", "z" (of the reference point, in the base frame) and "tilt_x", "tilt_y",
+        "yaw": R = from_rotvec([tilt_x, tilt_y, 0]) Rz(yaw) R_0, with R_0 the orientation held.
+    fixed : mapping of str to float, optional
+        Values of other coordinates [length or rad]; those in neither are as at the start.
+    orientation : array (3, 3) or Rotation or str, optional
+        R_0, by default the start's; or "any": positions that are reached with some orientation or other (the reachable
+        workspace), without a start in any working mode; each from the configurations of neighbouring ones, and what
+        they do not lead to from the machine's seeds.
+    tilt : float, optional
+        The largest angle by which the platform must be able to lean to every side [rad]: only positions count where it
+        can ("total" workspace up to a tilt).
+    within : mapping of str to tuple of float, optional
+        Coordinate -> (least, greatest), the range searched; default: as far as anything is within reach.
+    resolution : float, optional
+        Size of the smallest cells, at the border [length; rad where all coordinates are angles]; angles beside lengths:
+        that divided by L. Default: L/100 or 0.01 rad, L/50 with a tilt, L/25 where no closed forms answer; halved where
+        a workspace would be smaller than 24 cells.
+    start : Solution or array (nq,), optional
+        A single Solution or joint vector q, which sets the working mode; the component that contains it is `at_start`;
+        default home.
+    certified : bool or float, optional
+        True to enclose the size between two proved bounds too, `Workspace.enclosure`, to 0.1 %; or the share to which
+        it is to be enclosed. For closed forms, in home's working mode.
+    executor : Executor, optional
+        Executor of `concurrent.futures`, or one like it, that measures points; default: here, on all cores. Without
         closed forms, points are explored, each from one within reach; a separate component is found if one of 96
         samples, spread over the points not yet reached, is within it.
-    on_progress : called with (points done, points in all, about): their ratio is the share of the time, and never
-        falls. Default: a line on a terminal, if it takes more than two seconds.
+    on_progress : callable, optional
+        Called with (points done, points in all, about): their ratio is the share of the time, and never falls. Default:
+        a line on a terminal, if it takes more than two seconds.
 
     Returns
     -------
@@ -87,8 +99,10 @@ def workspace(
 
     Raises
     ------
-    InvalidArgument, UnknownName : coordinates or values that make no sense; a workspace that nothing ends.
-    UnsupportedMechanism : `certified`, of a machine without closed forms, or with a clearance.
+    InvalidArgument or UnknownName
+        Coordinates or values that make no sense; a workspace that nothing ends.
+    UnsupportedMechanism
+        `certified`, of a machine without closed forms, or with a clearance.
     """
     begin = _start(checked_mechanism(mechanism), start)
     pose = mechanism.home_pose if begin is None else begin.pose

@@ -47,10 +47,14 @@ class Inscribed(Printed):
 
     Attributes
     ----------
-    kind : "sphere" (in a plane: a circle), "box" or "cylinder"; of positions that are proved to be reached, "ball".
-    centre : (d,) [length or rad].
-    extents : length along each coordinate, (d,): the sides of a box, diameters, and a cylinder's height last.
-    names, units : of the coordinates, d each.
+    kind : {"sphere", "box", "cylinder", "ball"}
+        A sphere is a circle in a plane; a "ball" is one of positions that are proved to be reached.
+    centre : array (d,)
+        The centre [length or rad].
+    extents : array (d,)
+        Length along each coordinate: the sides of a box, diameters, and a cylinder's height last.
+    names, units : tuple of str
+        Names and units of the d coordinates.
     """
 
     kind: Kind | Literal["ball"]

@@ -35,10 +35,14 @@ class Largest(Inscribed):
 
     Attributes
     ----------
-    kind : "box", "cylinder" along z, or "ball".
-    centre : (3,) [length].
-    extents : length along x, y and z, (3,) [length]: sides of a box, diameters, height.
-    certificate : of its region; None if it was not asked for.
+    kind : {"box", "cylinder", "ball"}
+        A cylinder stands along z.
+    centre : array (3,)
+        The centre [length].
+    extents : array (3,)
+        Length along x, y and z [length]: sides of a box, diameters, height.
+    certificate : Certificate or None
+        Certificate of its region; None if it was not asked for.
     """
 
     certificate: Certificate | None
@@ -74,19 +78,34 @@ def largest(
 
     Parameters
     ----------
-    certified : False for the shape that is only sampled, at home's orientation, as of `Workspace.inscribed`.
-    centre : (3,) [length].
-    extents : proportions of its lengths along x, y and z, (3,); the first two of a cylinder, and all of a ball, are
-        equal.
-    rotation, tilt, yaw : the orientations at each position, as of `PoseRegion.box`.
-    accuracy : share of its size up to which it is found.
-    on_progress : called with (thousandths of proofs done, those in all, about); default: a line on a terminal, if it
-        takes more than two seconds.
+    mechanism : Mechanism
+        The machine.
+    kind : str
+        "box", "cylinder" along z, or "ball".
+    certified : bool, optional
+        False for the shape that is only sampled, at home's orientation, as in `Workspace.inscribed`.
+    centre : array (3,), optional
+        The centre [length].
+    extents : array (3,), optional
+        Proportions of its lengths along x, y and z; the first two of a cylinder, and all of a ball, are equal.
+    rotation : float or array (3,) or (2, 3), optional
+        The orientations at each position, as in `PoseRegion.box` [rad].
+    tilt : float, optional
+        As in `PoseRegion.box` [rad].
+    yaw : float or array (2,), optional
+        As in `PoseRegion.box` [rad].
+    accuracy : float, optional
+        Share of its size up to which it is found.
+    on_progress : callable, optional
+        Called with (thousandths of proofs done, those in all, about); default: a line on a terminal, if it takes more
+        than two seconds.
 
     Raises
     ------
-    UnsupportedMechanism : as of `certify`.
-    InvalidArgument : not even a hundredth of the shape is proved about the centre.
+    UnsupportedMechanism
+        As in `certify`.
+    InvalidArgument
+        Not even a hundredth of the shape is proved about the centre.
     """
     require_known("shape", [kind], ("box", "cylinder", "ball"))
     step = require_positive("accuracy", accuracy)

@@ -27,16 +27,26 @@ class Workspace(Printed, Region):
 
     Attributes
     ----------
-    names : of the d coordinates: of "x", "y", "z", "tilt_x", "tilt_y", "yaw", or "pivot[0]", "pivot[1]".
-    units : of each coordinate: that of lengths, or "rad".
-    resolution : size of the cells at the border, (d,) [length or rad].
-    vertices : points on the border, just inside, (v, d) [length or rad].
-    faces : places of vertices, (f, d): triangles, right-handed as seen from outside; in a plane, segments with the
-        inside on their left. They are closed.
-    limits : (joint, bound) of what may form the border, as of `Feasibility`; a coordinate and "min" or "max" where
+    names : tuple of str
+        Names of the d coordinates: of "x", "y", "z", "tilt_x", "tilt_y", "yaw", or "pivot[0]", "pivot[1]".
+    units : tuple of str
+        Unit of each coordinate: that of lengths, or "rad".
+    resolution : array (d,)
+        Size of the cells at the border [length or rad].
+    vertices : array (v, d)
+        Points on the border, just inside [length or rad].
+    faces : array of int (f, d)
+        Indices of vertices: triangles, right-handed as seen from outside; in a plane, segments with the inside on their
+        left. They are closed.
+    limits : tuple of tuple of str
+        Pairs (joint, bound) of what may form the border, as in `Feasibility`; a coordinate and "min" or "max" where
         `within` cut the workspace off.
-    enclosure : its size between two proved bounds, if it was asked for; else None.
-    face_limit, vertex_limit : which of `limits` forms each face, (f,), and the border at each vertex, (v,).
+    enclosure : Enclosure or None
+        Its size between two proved bounds, if it was asked for; else None.
+    face_limit : array of int (f,)
+        Index in `limits` of the limit that forms each face.
+    vertex_limit : array of int (v,)
+        Index in `limits` of the limit that forms the border at each vertex.
     """
 
     enclosure: Enclosure | None = None
@@ -71,8 +81,10 @@ class Workspace(Printed, Region):
 
         Parameters
         ----------
-        fixed : such as {"z": 200} [length or rad].
-        resolution : as of `workspace`; default: this one's.
+        fixed : mapping of str to float
+            Coordinates to fix, such as {"z": 200} [length or rad].
+        resolution : float, optional
+            As in `workspace`; default: this one's.
         """
         return Workspace(*sliced(self._question, fixed, self.resolution if resolution is None else resolution))
 
@@ -87,9 +99,13 @@ class Workspace(Printed, Region):
 
         Parameters
         ----------
-        centre : (d,); default: that of the largest shape that a search finds.
-        proportions : sides of the box, (d,), default all equal; diameter and height of the cylinder, which stands along
-            the last coordinate, default equal.
+        kind : str
+            "sphere", "box" or "cylinder".
+        centre : array (d,), optional
+            The centre; default: that of the largest shape that a search finds.
+        proportions : array, optional
+            Sides of the box, (d,), default all equal; diameter and height of the cylinder, which stands along the last
+            coordinate, default equal.
         """
         return inscribed(self, kind, centre, proportions)
 
@@ -98,12 +114,15 @@ class Workspace(Printed, Region):
 
         Parameters
         ----------
-        ax : matplotlib axes to draw on, three-dimensional ones for three coordinates. Default: those of a new figure.
+        ax : Axes, optional
+            Matplotlib axes to draw on, three-dimensional ones for three coordinates. Default: those of a new figure.
 
         Raises
         ------
-        InvalidArgument : two-dimensional axes for three coordinates.
-        MissingLibrary : matplotlib is not installed.
+        InvalidArgument
+            Two-dimensional axes for three coordinates.
+        MissingLibrary
+            Matplotlib is not installed.
         """
         from ..view.workspace_picture import plot_workspace
 

@@ -43,16 +43,24 @@ class SingularityMap(Printed):
 
     Attributes
     ----------
-    workspace : the workspace that it covers.
-    step : distance of the points along each coordinate, (d,) [length or rad].
-    points : those within reach, (n, d) [length or rad].
-    measures : as of `singularity`, (n,) each.
-    signs : the side of the parallel singularities that each point is on, 1 or -1; NaN where that has no meaning, as
-        with more actuators than freedoms.
-    parts : the part that each point is in, (n,): a motion within the workspace from one part to another passes a
-        parallel singularity, or a gap. 0 is the largest.
-    locus_vertices, locus_faces : the zero set of the signed parallel measure: points (v, d), and segments or triangles
-        between them, (f, d).
+    workspace : Workspace
+        The workspace that it covers.
+    step : array (d,)
+        Distance of the points along each coordinate [length or rad].
+    points : array (n, d)
+        Points within reach [length or rad].
+    measures : Singularity
+        As in `singularity`, (n,) each.
+    signs : array (n,)
+        The side of the parallel singularities that each point is on, 1 or -1; NaN where that has no meaning, as with
+        more actuators than freedoms.
+    parts : array of int (n,)
+        The part that each point is in: a motion within the workspace from one part to another passes a parallel
+        singularity, or a gap. 0 is the largest.
+    locus_vertices : array (v, d)
+        Points of the zero set of the signed parallel measure [length or rad].
+    locus_faces : array of int (f, d)
+        Segments or triangles between them.
     """
 
     workspace: Workspace
@@ -101,9 +109,12 @@ class SingularityTrack(Printed):
 
     Attributes
     ----------
-    measures : as of `singularity`, (n,) each.
-    signs : as of a `SingularityMap`, (n,).
-    crossings : rows before which the sign changes: the path leads through a parallel singularity on the way to them.
+    measures : Singularity
+        As in `singularity`, (n,) each.
+    signs : array (n,)
+        As in `SingularityMap`.
+    crossings : array of int
+        Rows before which the sign changes: the path leads through a parallel singularity on the way to them.
     """
 
     measures: Singularity
@@ -160,14 +171,20 @@ def singularity_map(
 
     Parameters
     ----------
-    over : a workspace, or a slice of one; or a path that was followed.
-    resolution : distance of the points, along lengths [length], or [rad] where all coordinates are angles; default: so
-        that there are some 20,000 of them. None for a path.
-    on_progress : as of `workspace`.
+    mechanism : Mechanism
+        The machine.
+    over : Workspace or Track
+        A workspace, or a slice of one; or a path that was followed.
+    resolution : float, optional
+        Distance of the points, along lengths [length], or [rad] where all coordinates are angles; default: so that
+        there are some 20,000 of them. None for a path.
+    on_progress : callable, optional
+        As in `workspace`.
 
     Raises
     ------
-    InvalidArgument : a workspace or path of another mechanism, or one of positions with any orientation or several.
+    InvalidArgument
+        A workspace or path of another mechanism, or one of positions with any orientation or several.
     """
     checked_mechanism(mechanism)
     given: object = over

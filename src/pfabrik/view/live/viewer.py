@@ -49,20 +49,26 @@ def view(shown: Mechanism | Solution | str | os.PathLike[str], *, port: int = PO
 
     Parameters
     ----------
-    shown : a Mechanism; one Solution; a Track, which can then be played; or the path of a file or a name of the
-        catalogue. A file is read again whenever it changes.
-    port : where the page is served; the next free one where it is taken.
-    host : address that is listened on; "0.0.0.0" lets other computers in, and whoever reaches the port move the
-        machine that is shown.
+    shown : Mechanism or Solution or str or PathLike
+        A Mechanism; one Solution; a Track, which can then be played; or the path of a file or a name of the catalogue.
+        A file is read again whenever it changes.
+    port : int, optional
+        Where the page is served; the next free one where it is taken.
+    host : str, optional
+        Address that is listened on; "0.0.0.0" lets other computers in, and whoever reaches the port move the machine
+        that is shown.
 
     Returns
     -------
-    Viewer : open `url`; in a notebook it shows itself. It ends with `close()`, or with the process.
+    Viewer
+        Open `url`; in a notebook it shows itself. It ends with `close()`, or with the process.
 
     Raises
     ------
-    InvalidArgument : a batch that is no Track, or no port.
-    MissingLibrary : viser is not installed.
+    InvalidArgument
+        A batch that is no Track, or no port.
+    MissingLibrary
+        Viser is not installed.
     """
     require("the viewer", "viser", "view")
     require_count("port", port, most=65535)
@@ -74,8 +80,10 @@ class Viewer:
 
     Attributes
     ----------
-    url : where it is.
-    port : where it is served: another than was asked for, if that one was taken.
+    url : str
+        Address of the page.
+    port : int
+        Port where it is served: another than was asked for, if that one was taken.
     """
 
     def __init__(self, shown: Mechanism | Solution | str | os.PathLike[str], port: int, host: str) -> None:
