@@ -282,7 +282,7 @@ class Calibration(Printed):
         ----------
         n : int
             Number of configurations.
-        criterion : {"deviation", "determinant"}, optional
+        criterion : str, optional
             "deviation" makes the worst deviation small, "determinant" the volume of the uncertainty.
         seed : int, optional
             Seed of the feasible configurations that are chosen from.

@@ -43,14 +43,21 @@ def export_ros2_node(mechanism: Mechanism, folder: str | PathLike[str], *, name:
 
     Parameters
     ----------
-    folder : it is made where it is not there; files of the package in it are replaced, others are left alone.
-    name : prefix of the package and of all names in it, lower-case letters, digits and underscores; the folder's,
-        without "_node", if it is left out.
+    mechanism : Mechanism
+        The machine.
+    folder : str or PathLike
+        Folder of the package. It is made where it is not there; files of the package in it are replaced, others are
+        left alone.
+    name : str, optional
+        Prefix of the package and of all names in it, lower-case letters, digits and underscores; the folder's, without
+        "_node", if it is left out.
 
     Raises
     ------
-    UnsupportedMechanism : no C can be exported of it, for the reason that `export_c` gives.
-    InvalidArgument : of the name, or a unit of length that is not known in metres.
+    UnsupportedMechanism
+        No C can be exported of it, for the reason that `export_c` gives.
+    InvalidArgument
+        A name that is not allowed, or a unit of length that is not known in metres.
     """
     path = require_path("folder", folder)
     return write_package(path, ros2_node_texts(mechanism, path, name=name))

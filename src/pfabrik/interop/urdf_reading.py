@@ -67,13 +67,15 @@ def from_urdf(
     actuated : iterable of str, optional
         Names of the joints that are driven, in the order of the actuators; a `velocity` that is not 0 is their highest
         speed. Default: those of `loops`, else those with a transmission.
-    fixed, leave_out : iterable of str, optional
+    fixed : iterable of str, optional
         As in `from_mjcf`.
     length_unit : str, optional
         As in `from_mjcf`.
     task : sequence of str, optional
         As in `from_mjcf`.
     within : float, optional
+        As in `from_mjcf`.
+    leave_out : iterable of str, optional
         As in `from_mjcf`.
 
     Returns

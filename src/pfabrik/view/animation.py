@@ -65,10 +65,10 @@ def animate(
         As in `plot`.
     size : (float, float), optional
         Width and height of the film [inches].
-    dpi : float, optional
-        Pixels an inch; default: 100.
     theme : {"light", "dark"}, optional
         As in `plot`.
+    dpi : int, optional
+        Pixels an inch; default: 100.
     on_progress : callable, optional
         Called with (frames done, frames in all); default: a line on a terminal, if it takes more than two seconds.
 
