@@ -139,8 +139,9 @@ def test_a_node_answers_as_the_library_does_in_reach_and_out_of_it(name: str) ->
         start, report = expected.q, answer["rig: target"]
         assert report["message"].partition(":")[0] == expected.status.name
         assert report["level"] == int(not expected)
-        at_limits = {" ".join(text.split()[:2]) for text in report["active limits"].split("; ")}
-        assert {f"{limit.joint} {limit.bound}" for limit in expected.active_limits} <= at_limits
+        for limit in expected.active_limits:  # where a leg is stretched, one of these alone is named
+            active = report["active limits"]
+            assert f"{limit.joint} {limit.bound} " in active or active.startswith("stretched: the leg of ")
         far = float(report["distance from target [m]"]), float(report["rotation from target [rad]"])
         expected_far = expected.position_error * metres, expected.rotation_error
         np.testing.assert_allclose(far, expected_far, rtol=1e-5, atol=1e-9 * size * metres)

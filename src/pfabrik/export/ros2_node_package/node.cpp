@@ -223,8 +223,10 @@ private:
         active += (active.empty() ? "" : "; ") + std::string(kLimitTable[i].name);
       }
     }
-    if (platform_.dead_point() != nullptr) {
-      active += (active.empty() ? "" : "; ") + std::string(platform_.dead_point());
+    if (platform_.dead_point() != 0) {
+      const std::string words(@NAME@_what(platform_.dead_point()));
+      const bool is_leg = platform_.dead_point() < 10 * @MACRO@_LEG;
+      active += (active.empty() ? "" : "; ") + (is_leg ? "stretched" + words.substr(words.find(':')) : words);
     }
     add(status, "active limits", active);
     add(status, "distance from target [m]", text(platform_.distance()));

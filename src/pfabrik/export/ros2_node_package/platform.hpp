@@ -121,8 +121,8 @@ public:
   double room(std::size_t limit) const { return slack_[limit] * kLimitTable[limit].unit; }
   // The limit with the least room, lengths over the characteristic length; kLimits: none.
   std::size_t nearest_limit() const { return nearest_; }
-  // The leg that is stretched, or links too near, in words; null if there is none.
-  const char * dead_point() const { return resting_ >= @MACRO@_LEG ? @NAME@_what(resting_) : nullptr; }
+  // The code of the leg that is stretched at the commanded pose, or of links that are too near; 0 if there is none.
+  int dead_point() const { return resting_ >= @MACRO@_LEG ? resting_ : 0; }
 
   // A target that is none, whatever is in it: the last command stays.
   Status refuse()
