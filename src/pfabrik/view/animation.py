@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..extras import require
 from ..skeleton import Skeleton, skeleton_of
 from ..telling import OnProgress, telling
 from ..whole_files import whole_path
-from .canvas import canvas_on, checked_size
+from .canvas import canvas_on, checked_size, letters_in, usual_size
 from .eye import View
 from .looks import HELD, Look, Theme, look_of
 from .machine import draw_machine, key_of, machine_eye
@@ -33,8 +34,11 @@ if TYPE_CHECKING:
 FRAMES_A_SECOND = 20
 MOST_FRAMES = 10_000
 
-SIZE, CAPTION, DPI = (6.0, 5.4), 0.45, 100
-"""Width and height of a film, the height of what is written above it [inches], and pixels an inch."""
+NARROWEST, CAPTION, DPI = 5.0, 0.45, 100
+"""Least width of a film, the height of what is written above it [inches], and pixels an inch."""
+
+COLOURS, SAMPLED = 64, 8
+"""Colours of a GIF: enough for smooth edges, and half of the file; frames that they are chosen from."""
 
 
 def animate(
@@ -64,7 +68,7 @@ def animate(
     view : str or (float, float), optional
         As in `plot`.
     size : (float, float), optional
-        Width and height of the film [inches].
+        Width and height of the film [inches]. Default: the shape of the machine.
     theme : {"light", "dark"}, optional
         As in `plot`.
     dpi : int, optional
@@ -85,7 +89,8 @@ def animate(
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)
     skeletons = {step: skeleton_of(track[step]) for step in np.unique(steps).tolist()}
-    film = _Film(track, skeletons, view, checked_size(size or SIZE), require_count("dpi", dpi or DPI), look_of(theme))
+    size = None if size is None else checked_size(size)
+    film = _Film(track, skeletons, view, size, require_count("dpi", dpi or DPI), look_of(theme))
     with (
         telling(f"drawing {os.fspath(path)}", on_progress) as tell,
         whole_path(path) as part,
@@ -113,7 +118,7 @@ def _writer(suffix: str) -> Any:
     from matplotlib import animation, rcParams
 
     if suffix == ".gif":
-        return animation.PillowWriter(fps=FRAMES_A_SECOND)
+        return _gif_writer()
     program = shutil.which(str(rcParams["animation.ffmpeg_path"])) or _own_ffmpeg()
     if program is None:
         command = "your system's packages (apt, brew, winget install ffmpeg), or pip install imageio-ffmpeg"
@@ -121,6 +126,26 @@ def _writer(suffix: str) -> Any:
     rcParams["animation.ffmpeg_path"] = program
     even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]  # what every player shows
     return animation.FFMpegWriter(fps=FRAMES_A_SECOND, codec="h264", extra_args=even)
+
+
+def _gif_writer() -> Any:
+    """A writer of films whose frames have one palette."""
+    from matplotlib.animation import PillowWriter
+    from PIL import Image
+
+    class OnePalette(PillowWriter):
+        def finish(self) -> None:
+            frames = [frame.convert("RGB") for frame in self._frames]  # type: ignore[has-type]
+            together = np.vstack([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)]])
+            palette = Image.fromarray(together).quantize(COLOURS)
+            colours = np.reshape(palette.getpalette(), (-1, 3))
+            ground = frames[0].getpixel((0, 0))  # as it is: most of the picture
+            colours[np.abs(colours - ground).sum(axis=1).argmin()] = ground
+            palette.putpalette(colours.ravel().tolist())
+            self._frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+            super().finish()
+
+    return OnePalette(fps=FRAMES_A_SECOND)
 
 
 def _own_ffmpeg() -> str | None:
@@ -141,7 +166,7 @@ class _Film:
         track: Track,
         skeletons: dict[int, Skeleton],
         view: View | None,
-        size: tuple[float, float],
+        size: tuple[float, float] | None,
         dpi: int,
         look: Look,
     ) -> None:
@@ -149,14 +174,15 @@ class _Film:
 
         self._track, self._skeletons = track, skeletons
         eye, is_plane = machine_eye(track.mechanism, view)
+        everything = np.vstack([places_along(track), *(skeleton.points for skeleton in skeletons.values())])
+        width, height = usual_size(everything, eye, is_plane=is_plane)
+        size = size or (max(width, NARROWEST), height + CAPTION)
         self.figure: Figure = Figure(figsize=size, dpi=dpi, layout="constrained", facecolor=look.paper)
-        high = size[1] - CAPTION
-        above, below = np.ravel(
-            self.figure.subfigures(2, 1, height_ratios=(CAPTION, high), squeeze=False, facecolor=look.paper)
-        )
+        heights = (CAPTION, max(size[1] - CAPTION, CAPTION))
+        parts = self.figure.subfigures(2, 1, height_ratios=heights, squeeze=False, facecolor=look.paper)
+        above, below = np.ravel(parts)
         self._caption = above.text(0.02, 0.9, " ", fontsize=SMALL + 1.0, va="top")
         self._canvas = canvas_on(below.add_subplot(), eye, look, is_plane=is_plane)
-        everything = np.vstack([places_along(track), *(skeleton.points for skeleton in skeletons.values())])
         told = next((each for each in skeletons.values() if each.held), next(iter(skeletons.values())))
         self._canvas.frame(everything, track.mechanism.length_unit, key_of(told, look))
         self.figure.draw_without_rendering()
@@ -178,11 +204,12 @@ class _Film:
             canvas.line(targets[step], marker="x", color=look.asked, markersize=6, zorder=22),
         ]
         colour = look.achieved if track.status[step] == Status.REACHED else HELD
-        self._caption.set(text=_caption(track[step], step, len(track)), color=colour)
+        self._caption.set(text=_caption(track[step], step, len(track), self.figure.get_figwidth()), color=colour)
 
 
-def _caption(solution: Solution, step: int, steps: int) -> str:
-    """Which step it is, what became of it, and what holds it back."""
+def _caption(solution: Solution, step: int, steps: int, width: float) -> str:
+    """Which step it is, and below what became of it and what holds it back, as far as there is room [inches]."""
     held = short_names(solution._limits[0])
     status = as_sentence(solution).partition(";")[0]
-    return f"{solution.mechanism.name}, step {step + 1} of {steps}: {status}\n{held or ' '}"
+    told = shorten(f"{status}; {held}" if held else status, letters_in(width, SMALL + 1.0), placeholder=" …")
+    return f"{solution.mechanism.name}, step {step + 1} of {steps}\n{told}"

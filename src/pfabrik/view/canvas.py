@@ -206,13 +206,9 @@ def new_canvas(
     InvalidArgument : a size that is not two positive numbers.
     MissingLibrary : matplotlib is not installed.
     """
+    width, height = usual_size(points, eye, is_plane=is_plane) if size is None else checked_size(size)
     if size is None:
-        spans = np.ptp(eye.seen(points)[:, :2], axis=0)
-        shape = np.maximum(spans / (float(spans.max()) or 1.0), LEAST) * SIDE
-        rest = NUMBERS if is_plane else (0.0, 2.0 * STRIP / 72.0)
-        width, height = (shape + rest + [2.0 * beside / 72.0, 0.0]).tolist()
-    else:
-        width, height = checked_size(size)
+        width += 2.0 * beside / 72.0
     figure = new_figure(width, height, layout="constrained" if is_plane else None)
     figure.set_facecolor(look.paper)
     title = wrapped(title, width)
@@ -227,9 +223,22 @@ def new_canvas(
     return canvas_on(axes, eye, look, is_plane=is_plane)
 
 
+def usual_size(points: Floats, eye: Eye, *, is_plane: bool) -> tuple[float, float]:
+    """Width and height of a figure in the shape of points (n, 3), with room for a key and a scale [inches]."""
+    spans = np.ptp(eye.seen(points)[:, :2], axis=0)
+    shape = np.maximum(spans / (float(spans.max()) or 1.0), LEAST) * SIDE
+    width, height = (shape + (NUMBERS if is_plane else (0.0, 2.0 * STRIP / 72.0))).tolist()
+    return width, height
+
+
 def wrapped(title: str, width: float, letters: float = TITLE) -> str:
     """A title in as many lines as its letters [points] need in a width [inches]."""
-    return "\n".join(wrap(title, max(int(width * 72.0 / (LETTER * letters)), 1)))
+    return "\n".join(wrap(title, letters_in(width, letters)))
+
+
+def letters_in(width: float, size: float) -> int:
+    """The number of letters of a size [points] that fit into a width [inches]."""
+    return max(int(width * 72.0 / (LETTER * size)), 4)
 
 
 STRIP = 30.0

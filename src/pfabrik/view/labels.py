@@ -13,13 +13,13 @@ from .canvas import Canvas
 DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 30))), np.sin(np.radians(range(0, 360, 30)))], axis=1)
 """Directions from its joint in which a name is tried, to the right first."""
 
-DISTANCES = (8.0, 15.0)
+DISTANCES = (9.0, 16.0)
 """Distances at which it is tried, one after the other [points]."""
 
 OFF = 6.0
 """Area [points²] that a name may rather cover than be a point farther from its joint."""
 
-JOINT, LINE = 4.5, 2.5
+JOINT, LINE = 6.0, 2.5
 """Half the sides of the squares kept free around a joint's marker, and around a dot of a line [points]."""
 
 DOTS = 32
