@@ -37,8 +37,9 @@ MOST_FRAMES = 10_000
 NARROWEST, CAPTION, DPI = 5.0, 0.45, 100
 """Least width of a film, the height of what is written above it [inches], and pixels an inch."""
 
-COLOURS, SAMPLED = 64, 8
-"""Colours of a GIF: enough for smooth edges, and half of the file; frames that they are chosen from."""
+COLOURS, SAMPLED, NEARLY = 64, 8, 6
+"""Colours of a GIF: enough for smooth edges, and half of the file; frames that they are chosen from; difference from
+the ground, of 255, up to which a colour is that of the ground."""
 
 
 def animate(
@@ -138,9 +139,9 @@ def _gif_writer() -> Any:
             frames = [frame.convert("RGB") for frame in self._frames]  # type: ignore[has-type]
             together = np.vstack([np.asarray(frame) for frame in frames[:: -(-len(frames) // SAMPLED)]])
             palette = Image.fromarray(together).quantize(COLOURS)
-            colours = np.reshape(palette.getpalette(), (-1, 3))
-            ground = frames[0].getpixel((0, 0))  # as it is: most of the picture
-            colours[np.abs(colours - ground).sum(axis=1).argmin()] = ground
+            colours = np.array(palette.getpalette()).reshape(-1, 3)
+            ground = np.array(frames[0].getpixel((0, 0)))
+            colours[np.abs(colours - ground).max(axis=1) <= NEARLY] = ground  # which is most of the picture
             palette.putpalette(colours.ravel().tolist())
             self._frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
             super().finish()
