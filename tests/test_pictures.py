@@ -419,6 +419,17 @@ def test_a_picture_is_the_same_file_every_time(tmp_path: Path) -> None:
         assert one.startswith(begins)
 
 
+def test_thick_links_that_overlap_are_orange() -> None:
+    rods = [f"rod{side}{number}" for side in "LR" for number in (1, 2, 3)]
+    hexaglide = pf.load("hexaglide").with_shapes([pf.Shape(rod, thickness=8) for rod in rods])
+    share = np.linspace(0, 1, 20)[:, None]
+    targets = pf.pose(hexaglide.reference_point + share * [-31.5, -7.1, 15.7], rotvec=share * [-0.142, 0.189, -0.378])
+    track = pf.track(hexaglide, targets)
+    for row, orange in ((0, 0), (-1, 2)):
+        links = [line for line in pf.plot(track[row]).lines if line.get_path_effects()]
+        assert sum(to_hex(line.get_color()) == HELD for line in links) == orange
+
+
 # A path.
 
 

@@ -157,9 +157,9 @@ class Stroke:
 
     outlines: tuple[Floats, ...]
     widths: tuple[float, ...]
-    role: str
+    filling: str
+    edge: str
     is_plate: bool = False
-    is_held: bool = False
 
 
 def draw_machine(canvas: Canvas, skeleton: Skeleton, *, zorder: float = 2.0) -> list[Artist]:
@@ -169,7 +169,7 @@ def draw_machine(canvas: Canvas, skeleton: Skeleton, *, zorder: float = 2.0) -> 
     """
     look, pen = canvas.look, pen_of(canvas, skeleton)
     artists = _draw_ground(canvas, skeleton, zorder, pen)
-    strokes = _strokes(skeleton)
+    strokes = _strokes(skeleton, look)
     order = far_to_near([canvas.eye.seen(each.outlines[0]) for each in strokes], [each.is_plate for each in strokes])
     for place, index in enumerate(order):
         at = zorder + 0.3 + 0.4 * place / len(order)
@@ -197,7 +197,7 @@ def _draw_ground(canvas: Canvas, skeleton: Skeleton, zorder: float, pen: float) 
     style: dict[str, Any] = {"facecolor": faces, "edgecolor": edges, "linewidth": GROUND_EDGE}
     artists: list[Artist] = [canvas.face(corners, zorder=zorder, **style) for corners in plates]
     for line in base if not plates else ():
-        artists += _draw_stroke(canvas, Stroke((line.outline,), (FRAME,), "base"), zorder, pen)
+        artists += _draw_stroke(canvas, Stroke((line.outline,), (FRAME,), faces, edges), zorder, pen)
     for rail in skeleton.rails:
         for colour, width in ((edges, RAIL), (look.paper, RAIL_FILLING)):
             style = {"color": colour, "linewidth": width * pen, "solid_capstyle": "round"}
@@ -228,9 +228,15 @@ def _turn(a: Floats, b: Floats, c: Floats) -> float:
     return float((b - a)[0] * (c - b)[1] - (b - a)[1] * (c - b)[0])
 
 
-def _strokes(skeleton: Skeleton) -> list[Stroke]:
-    """What is drawn in front of the ground: both parts of a strut together, and nothing that is a point."""
+def _strokes(skeleton: Skeleton, look: Look) -> list[Stroke]:
+    """What is drawn in front of the ground: both parts of a strut together, and nothing that is a point.
+
+    The links of a joint at its limit are orange, and thick ones that stop the machine or overlap; the two that are
+    nearest to each other are darker.
+    """
     strokes: list[Stroke] = []
+    nearest = {solid.body for solid in skeleton.solids if solid.is_nearest}
+    stopped = {solid.body for solid in skeleton.solids if solid.is_stopped}
     parts = [line for line in skeleton.parts if line.part.role != "base"]
     barrels: dict[tuple[str, ...], Line] = {line.part.joints: line for line in parts if line.part.kind == "barrel"}
     for line in parts:
@@ -239,26 +245,26 @@ def _strokes(skeleton: Skeleton) -> list[Stroke]:
             continue
         drawn = [line, *([barrels[part.joints]] if part.joints in barrels else [])]
         widths = tuple(float(np.sqrt(each.part.radius)) for each in drawn)
-        is_held = bool(skeleton.held & set(part.joints))
+        is_held = bool(skeleton.held & set(part.joints)) or part.body in stopped
+        filling = HELD if is_held else look.soft if part.body in nearest else look.faces[part.role]
         outlines = tuple(each.outline for each in drawn)
-        strokes.append(Stroke(outlines, widths, part.role, part.kind == "plate", is_held))
+        strokes.append(Stroke(outlines, widths, filling, look.edges[part.role], part.kind == "plate"))
     return strokes
 
 
 def _draw_stroke(canvas: Canvas, stroke: Stroke, zorder: float, pen: float) -> list[Artist]:
-    """A plate, or lines with a border and some ground around; those of a joint at its limit are orange."""
+    """A plate, or lines with a border and some ground around."""
     from matplotlib.patheffects import Normal
     from matplotlib.patheffects import Stroke as Around
 
-    look = canvas.look
-    filling, edge = HELD if stroke.is_held else look.faces[stroke.role], look.edges[stroke.role]
+    filling, edge = stroke.filling, stroke.edge
     if stroke.is_plate:
         style: dict[str, Any] = {"facecolor": filling, "edgecolor": edge, "linewidth": PLATE_EDGE * pen, "alpha": PLATE}
         return [canvas.face(stroke.outlines[0][:-1], zorder=zorder, **style)]
     artists = []
     for outline, width in zip(stroke.outlines, stroke.widths, strict=True):
         around: list[Any] = [
-            Around(linewidth=(INK * width + HALO) * pen, foreground=look.paper, capstyle="butt"),
+            Around(linewidth=(INK * width + HALO) * pen, foreground=canvas.look.paper, capstyle="butt"),
             Around(linewidth=INK * width * pen, foreground=edge),
             Normal(),
         ]
@@ -290,14 +296,17 @@ def marker_style(kind: JointType, actuated: bool, held: bool, look: Look, pen: f
 
 
 def key_of(skeleton: Skeleton, look: Look) -> list[Artist]:
-    """A marker and a word for each kind of joint that occurs, and for limits if there is one that holds."""
+    """A marker and a word for each kind of joint that occurs, for limits if there is one that holds, and for links."""
     from matplotlib.lines import Line2D
 
     kinds = sorted({(mark.joint.type, bool(mark.joint.actuated)) for mark in skeleton.marks})
     looks = [(kind + ", actuated" * actuated, marker_style(kind, actuated, False, look)) for kind, actuated in kinds]
     if skeleton.held:
         looks.append(("at a limit", marker_style("revolute", True, True, look)))
-    return [Line2D([], [], linestyle="", label=label, **style) for label, style in looks]
+    key: list[Artist] = [Line2D([], [], linestyle="", label=label, **style) for label, style in looks]
+    if any(solid.is_stopped for solid in skeleton.solids):
+        key.append(Line2D([], [], color=HELD, linewidth=INK, label="too near"))
+    return key
 
 
 def write_names(canvas: Canvas, skeleton: Skeleton, named: set[str]) -> None:
