@@ -39,8 +39,9 @@ STYLE = (
 )
 """Colours on light and on dark ground: links are dark, so that the ground of a dark page is not black."""
 
-ALIVE_EVERY, GONE_AFTER = 500, 4
-"""Time between two looks whether the page is connected [ms], and how often it is not before the page says so."""
+LOOKS_EVERY, FOLDED_LOOKS_EVERY, GONE_AFTER = 500, 5000, 4
+"""Time between two looks whether the page is connected [ms], with the panel open and folded to its title, where that
+takes a question to the server; and how many looks find it gone before the page says so."""
 
 GONE = "The program behind this page has ended: nothing moves any more. Start it again, and reload the page."
 
@@ -49,15 +50,15 @@ PHONE = "(max-width: 36em)"
 
 SCRIPT = (
     "window.pfabrikMark=this;if(!window.pfabrikWatch){"
-    # The page of a program that has ended says so. The panel of a page that is not connected takes no clicks; folded
-    # to its title, it has a sign of waiting there.
+    # The page of a program that has ended says so: the panel of a page that is not connected takes no clicks.
     "const b=document.createElement('div');b.dataset.pfabrik='gone';b.textContent=this.alt;"
     "b.style.cssText='display:none;position:fixed;left:0;right:0;top:0;z-index:9999;padding:0.6em;text-align:center;"
-    f"background:{HELD};color:white;font:1em sans-serif';document.body.append(b);let n=0;"
-    "window.pfabrikWatch=setInterval(()=>{const m=window.pfabrikMark,"
-    "gone=m.isConnected?getComputedStyle(m).pointerEvents==='none':document.querySelector('.mantine-Loader-root');"
-    "n=gone?n+1:0;"
-    f"b.style.display=n<{GONE_AFTER}?'none':'block'}},{ALIVE_EVERY});"
+    f"background:{HELD};color:white;font:1em sans-serif';document.body.append(b);"
+    "window.pfabrikWatch=(async()=>{for(let n=0;;){const open=window.pfabrikMark.isConnected;"
+    f"await new Promise(r=>setTimeout(r,open?{LOOKS_EVERY}:{FOLDED_LOOKS_EVERY}));const m=window.pfabrikMark;"
+    "const gone=m.isConnected?getComputedStyle(m).pointerEvents==='none':"
+    "await fetch('/',{cache:'no-store'}).then(r=>{r.body.cancel()},()=>true);"
+    f"n=gone?n+(open?1:{GONE_AFTER}):0;b.style.display=n<{GONE_AFTER}?'none':'block'}}}})();"
     # On a phone the panel is folded by a click on its title.
     f"if(matchMedia('{PHONE}').matches){{const p=this.closest('.mantine-Paper-root');"
     "[...(p?p.querySelectorAll('div'):[])].find(d=>d.style.cursor==='pointer')?.click()}"
@@ -67,7 +68,7 @@ SCRIPT = (
     "if(dark.matches)u.searchParams.set('darkMode','');else u.searchParams.delete('darkMode');location.replace(u)};"
     "if(dark.matches)follow();dark.addEventListener('change',follow)}"
 )
-"""Script of the page; it asks nothing of the server."""
+"""Script of the page."""
 
 COPY = (
     "const t=this.previousElementSibling;t.select();"
