@@ -262,7 +262,7 @@ def test_only_this_computer_is_let_in_unless_told(shown: Callable[..., pf.Viewer
 def test_motions_of_the_mouse_reach_the_answer(shown: Callable[..., pf.Viewer]) -> None:
     machine = pf.load("stewart")
     viewer = shown(machine)
-    viewer._drag(pf.pose((0, 0, 300)))
+    viewer._drag(pf.pose((0, 0, 300)), 1)
     until(lambda: viewer.solution.status == pf.Status.PROJECTED)
     until(lambda: "struts BL1, BL2" in viewer._stage.panel._status.content)
     viewer._change_target("z", 200.0)
@@ -343,7 +343,7 @@ def test_sliders_are_those_of_the_freedoms_and_their_numbers_fit(shown: Callable
 def test_what_is_done_is_undone(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("stewart")
     home = viewer.mechanism.home_pose
-    viewer._drag(pf.pose((0, 0, 200)))
+    viewer._drag(pf.pose((0, 0, 200)), 1)
     until(lambda: viewer.target[2, 3] == 200.0)
     viewer._change_actuator(0, 200.0)
     until(lambda: viewer.solution.actuators[0] == pytest.approx(200.0))

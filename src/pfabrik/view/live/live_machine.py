@@ -64,7 +64,7 @@ class LiveMachine:
         self,
         server: viser.ViserServer,
         shown: Shown,
-        drag: Callable[[Floats], None],
+        drag: Callable[[Floats, int], None],
         actions: Actions,
         limits: bool | None,
     ) -> None:
@@ -152,14 +152,16 @@ class Handles:
 
     Parameters
     ----------
-    drag : called with the pose (4, 4) that the user asks for, at every motion of the mouse.
+    drag : callable
+        Called with the pose (4, 4) that the user asks for at every motion of the mouse, and the number of the grasp.
     """
 
-    def __init__(self, server: viser.ViserServer, mechanism: Mechanism, drag: Callable[[Floats], None]) -> None:
+    def __init__(self, server: viser.ViserServer, mechanism: Mechanism, drag: Callable[[Floats, int], None]) -> None:
         self._length, self._drag = mechanism.characteristic_length, drag
         slides, turns = free_axes(mechanism)
         self._all: list[Any] = []
         self._held: Any = None
+        self._grasps = 0
         limits = ((-FAR, FAR),) * 3
         common: dict[str, Any] = {"scale": GIZMO, "depth_test": False, "translation_limits": limits}
         if slides:
@@ -188,8 +190,9 @@ class Handles:
 
         async def moved(event: Any) -> None:
             self._held = None if event.phase == "end" else event.target
+            self._grasps += event.phase == "start"
             if event.phase == "update":
-                self._drag(self._pose(event.target))
+                self._drag(self._pose(event.target), self._grasps)
 
         handle.on_update(moved)
         self._all.append(handle)

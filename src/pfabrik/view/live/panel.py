@@ -85,6 +85,7 @@ class Panel:
         self._singular = gui.add_html("")
         back = gui.add_button_group("Back", (UNDO, HOME), hint="Undo is also Ctrl Z")
         back.on_click(lambda event: actions.undo() if event.target.value == UNDO else actions.go_home())
+        gui.add_command(UNDO, hotkey="Z", modifier="cmd/ctrl").on_trigger(lambda _: actions.undo())
         views = gui.add_button_group("View", VIEWS)
         views.on_click(lambda event: actions.look_from(event.client, event.target.value))
         with gui.add_folder("Target"):

@@ -117,10 +117,11 @@ def _limit_bar(limit: Left) -> str:
 def singular_html(session: Session) -> str:
     """Distances from serial and parallel singularities as bars, and whether a parallel one was passed."""
     rows = "".join(_singular_bar(each) for each in session.nearness)
-    words = "passed a parallel singularity: the same actuator values have another pose" if session.is_across else ""
+    words = "passed a parallel singularity" if session.is_across else ""
+    hint = "The same actuator values have another pose on the side that it came from" if session.is_across else ""
     return (
         f'<div data-pfabrik="singular" style="{BOX}">{_heading("Singularities", "home = 100%")}{rows}'
-        f'<div data-pfabrik="across" style="{NOTE};color:var(--pf-singular)">{words}</div></div>'
+        f'<div data-pfabrik="across" title="{hint}" style="{NOTE};color:var(--pf-singular)">{words}</div></div>'
     )
 
 

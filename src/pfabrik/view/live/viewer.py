@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 LOOPBACK, PORT = "127.0.0.1", 8080
 
 PAUSE = 1.0
-"""Time without motion after which a further motion of the same handle or slider is a step of its own [s]."""
+"""Time without motion after which a further motion of the same slider is a step of its own [s]."""
 
 
 def view(shown: Mechanism | Solution | str | os.PathLike[str], *, port: int = PORT, host: str = LOOPBACK) -> Viewer:
@@ -99,9 +99,8 @@ class Viewer:
         self._searches = Searches(lambda: self._stage, self._lock, self._complain)
         self._player: Player | None = None
         self._ready: Mechanism | None = None
-        self._gesture, self._asked_by, self._asked_at = 0, "", 0.0
-        undo = self._server.gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl")
-        undo.on_trigger(lambda _: self._undo())
+        self._gesture, self._asked_at = 0, 0.0
+        self._asked_by: str | int = ""
         self._watch: Watch | None = None
         try:
             self._build(what)
@@ -184,10 +183,10 @@ class Viewer:
 
     # What the user does in the page. All of it only posts a job; jobs run one after the other.
 
-    def _drag(self, target: Floats) -> None:
+    def _drag(self, target: Floats, grasp: int) -> None:
         self._stage.panel.release()
         self._stage.wanted = target
-        self._ask("drag", lambda stage: stage.session.go_to(target))
+        self._ask(grasp, lambda stage: stage.session.go_to(target))
 
     def _change_target(self, name: str, value: float) -> None:
         self._stage.wanted = target = moved(self._stage.wanted, name, value)
@@ -253,15 +252,14 @@ class Viewer:
             q, described = self._stage.session.solution.q, self._described
             self._build((mechanism, configuration(mechanism, q), self._stage.track), described)
 
-    def _ask(self, by: str, question: Callable[[LiveMachine], None]) -> None:
-        """Post what the user asks for, by a handle or a slider: as a step of its own after a pause."""
-        gesture = self._next_gesture(by)
-        self._post(question, gesture)
+    def _ask(self, by: str | int, question: Callable[[LiveMachine], None]) -> None:
+        """Post what the user asks for by one grasp of a handle, or by a slider or a button of a name."""
+        self._post(question, self._next_gesture(by))
 
-    def _next_gesture(self, by: str) -> int:
-        """The number of a gesture: the same as before where the same element goes on without a pause."""
+    def _next_gesture(self, by: str | int) -> int:
+        """The number of a gesture: the same as before for the same grasp, or a slider that goes on without a pause."""
         now = time.monotonic()
-        if by != self._asked_by or now - self._asked_at > PAUSE:
+        if by != self._asked_by or (isinstance(by, str) and now - self._asked_at > PAUSE):
             self._gesture += 1
         self._asked_by, self._asked_at = by, now
         return self._gesture
