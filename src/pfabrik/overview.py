@@ -51,7 +51,7 @@ class Overview(Printed):
             **{name: getattr(mechanism, name) for name in names},
             "actuators": mechanism.actuator_names,
             "coordinates": mechanism.coordinate_names,
-            "mobility": None if counts is None else dataclasses.asdict(counts) | {"redundancy": counts.redundancy},
+            "mobility": None if counts is None else counts.to_dict(),
             "joints": [_joint_as_dict(joint, mechanism) for joint in mechanism.joints],
             "shapes": [
                 {name: value for name, value in dataclasses.asdict(shape).items() if value is not None}

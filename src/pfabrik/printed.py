@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 from .tolerances import TOLERANCES
 
@@ -62,6 +63,13 @@ class Printed:
         """The table to print."""
         raise NotImplementedError
 
+    def to_dict(self) -> dict[str, Any]:
+        """Its fields as plain numbers, lists and texts, ready for JSON."""
+        from .arrays import as_plain  # NumPy, which a text of help does without
+
+        plain: dict[str, Any] = as_plain(self)
+        return plain
+
     def __str__(self) -> str:
         return str(self.table())
 
@@ -107,6 +115,11 @@ def plain(value: float, smallest: float, form: str = ".6g") -> str:
     if math.isnan(value):
         return "-"
     return "0" if abs(value) <= smallest else format(value, form)
+
+
+def triple(values: Iterable[float], least: float) -> str:
+    """A direction or a point: ``(0, 0, 1)``; numbers up to `least` are 0."""
+    return f"({', '.join(plain(value, least, '.4g') for value in values)})"
 
 
 def spanned(values: Iterable[float], form: str = ".6g") -> str:

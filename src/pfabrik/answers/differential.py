@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+from itertools import compress
 from typing import cast
 
 import numpy as np
@@ -9,15 +11,20 @@ import numpy as np
 from ..arrays import Floats, shaped
 from ..chains.chain_jacobians import forward_of_chain, inverse_of_chain, is_driven_chain
 from ..closure.configurations import Configurations
-from ..closure.first_order import singularities
+from ..closure.first_order import JointRates, singularities
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..model import Model, model_of
 from ..motion.mobility import Mobility, NearlyFree, generic_of
 from ..motion.singularities import NUMBERS, Singularity
 from ..platform.jacobians import forward_map, inverse_map
+from ..printed import triple
+from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 
 __all__ = ["Mobility", "NearlyFree", "Singularity", "forward_jacobian", "inverse_jacobian", "mobility", "singularity"]
+
+SLIGHT = 0.01
+"""Turn of a translation [rad per L], or advance of a turn [L per rad], that words leave out: they name the motion."""
 
 
 def mobility(mechanism: Mechanism) -> Mobility:
@@ -88,7 +95,49 @@ def singularity(solution: Solution) -> Singularity:
     found = singularities(model, configurations.coordinates)
     numbers = {name: shaped(np.asarray(getattr(found, name)), solution.shape) for name in NUMBERS}
     kinds = cast(list[tuple[str, ...]], found.kinds)
-    return Singularity(**numbers, kinds=kinds[0] if solution.shape == () else kinds)
+    if solution.shape:
+        return Singularity(**numbers, kinds=kinds)
+    return Singularity(**numbers, kinds=kinds[0], _in_words=partial(_motions_in_words, solution))
+
+
+def _motions_in_words(solution: Solution, found: Singularity) -> list[str]:
+    """The motions of one answer that are nearest to being lost and gained, as translations, turns or screws."""
+    drives = () if "passive" in found.kinds and found.passive < found.serial else _drives_of(solution, found.lost)
+    moving = "all actuators" if len(drives) == len(solution.mechanism.actuator_names) > 1 else " and ".join(drives)
+    ends = {"lost": f", for which {moving} would move most" * bool(drives), "gained": ", with all actuators locked"}
+    words = {name: _twist_in_words(solution, getattr(found, name)) for name in ends}
+    return [f"nearest to being {name}: {twist}{ends[name]}" for name, twist in words.items() if twist]
+
+
+def _drives_of(solution: Solution, lost: Floats) -> list[str]:
+    """The actuators that move most in the motion whose twist is nearest to being lost.
+
+    Twists T = U S V' and actuator rates A of all motions: S vanishes in a singularity, where A V U' still says them.
+    """
+    model, configurations = _of(solution)
+    first, directions = JointRates(model, configurations.coordinates), generic_of(model.mechanism).directions
+    left, _, right = np.linalg.svd(
+        directions.T @ first.twists[0, : len(directions)] @ first.pairs[0], full_matrices=False
+    )
+    rates = np.abs(first.pairs[0][first.actuated] @ right.T @ (left.T @ (directions.T @ lost)))
+    is_most = rates > max(0.5 * rates.max(initial=0.0), TOLERANCES.alignment)
+    return list(compress(model.mechanism.actuator_names, is_most))
+
+
+def _twist_in_words(solution: Solution, twist: Floats) -> str:
+    """A unit twist, lengths in L, of the reference point of one answer; empty if it is unknown."""
+    mechanism, least = solution.mechanism, TOLERANCES.alignment
+    length, velocity, turning = mechanism.characteristic_length, twist[:3], twist[3:]
+    square = float(turning @ turning)
+    if np.isnan(twist).any():
+        return ""
+    if square <= SLIGHT**2:
+        return f"a translation along {triple(velocity / np.linalg.norm(velocity), least)}"
+    pitch = float(velocity @ turning) / square
+    centre = solution.pose[:3, 3] + length * np.cross(turning, velocity) / square
+    about = f"about {triple(turning / square**0.5, least)} through {triple(centre, least * length)}"
+    advance = f"{2.0 * np.pi * pitch * length:.4g} {mechanism.length_unit}"
+    return f"a turn {about}" if abs(pitch) <= SLIGHT else f"a screw of {advance} a turn {about}"
 
 
 def _of(solution: Solution) -> tuple[Model, Configurations]:

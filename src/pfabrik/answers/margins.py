@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..arrays import Floats, shaped
+from ..arrays import Floats, as_plain, shaped
 from ..closure.link_distances import pair_distances, pair_names
 from ..closure.placed_links import placed_at
 from ..description.task import Task
@@ -51,12 +53,20 @@ class Margins(Printed, FrozenMapping[tuple[str, str], float | Floats]):
 
     def table(self) -> ResultTable:
         """Every limit, the nearest first; of a batch, the least margin of each."""
-        least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
-        order = sorted(least, key=lambda limit: (np.isnan(least[limit]), least[limit]))
-        rows = [(*limit, plain(least[limit], TOLERANCES.active)) for limit in order]
+        rows = [(*limit, plain(least, TOLERANCES.active)) for limit, least in self.nearest_first()]
         is_one = all(np.ndim(margin) == 0 for margin in self.values())
         lines = [] if rows else ["no limits"]
         return ResultTable("Margins", lines, ("joint", "bound", "margin" if is_one else "least margin"), rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """A list of the limits, the nearest first, ready for JSON."""
+        limits = [limit for limit, _ in self.nearest_first()]
+        return {"margins": [{"joint": each[0], "bound": each[1], "margin": as_plain(self[each])} for each in limits]}
+
+    def nearest_first(self) -> list[tuple[tuple[str, str], float]]:
+        """Every limit with its margin; of a batch, with the least."""
+        least = {limit: _least(np.ravel(margin)) for limit, margin in self.items()}
+        return sorted(least.items(), key=lambda of_limit: (np.isnan(of_limit[1]), of_limit[1]))
 
 
 def _least(margins: Floats) -> float:
@@ -111,8 +121,7 @@ def margins(solution: Solution) -> Margins:
 
 def nearest_first(solution: Solution) -> list[tuple[str, str, float]]:
     """Joint, bound and margin of every limit of one answer, the nearest first."""
-    named = ((joint, bound, float(margin)) for (joint, bound), margin in margins(solution).items())
-    return sorted(named, key=lambda limit: limit[2])
+    return [(*limit, margin) for limit, margin in margins(solution).nearest_first()]
 
 
 def _shares(distances: Floats, half: Floats, tolerances: Floats) -> Floats:

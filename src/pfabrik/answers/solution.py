@@ -9,6 +9,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import as_plain
 from ..checks import require_type
 from ..kernels.rows import REACHED
 from ..printed import ResultTable
@@ -162,11 +163,3 @@ def _plain_status(status: Any) -> Any:
         if isinstance(status, Status)
         else np.vectorize(lambda s: Status(s).name, otypes=[object])(status).tolist()
     )
-
-
-def as_plain(value: Any) -> Any:
-    """An array as numbers and lists; numbers that are not finite become None."""
-    array = np.asarray(value)
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()
-    return array.tolist()

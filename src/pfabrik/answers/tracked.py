@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints, Mask
+from ..arrays import Floats, Ints, Mask, as_plain
 from ..closure.configurations import Configurations
 from ..closure.link_distances import least_on_the_way
 from ..description.mechanism import Mechanism
@@ -28,7 +28,7 @@ from .active_limits import ActiveLimit
 from .along import Extremes, largest_tilts, least_margins
 from .answer_fields import PoseRequest
 from .pace import Pace
-from .solution import Solution, as_plain
+from .solution import Solution
 from .status import Status
 
 SUSPICIOUS, LEAST = 4.0, 1e-6

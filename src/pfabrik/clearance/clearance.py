@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.solution import Solution, as_plain, checked_solution
-from ..arrays import Floats, Ints, shaped
+from ..answers.solution import Solution, checked_solution
+from ..arrays import Floats, Ints, as_plain, shaped
 from ..closure.link_distances import least_distances
 from ..closure.placed_links import PlacedLinks
 from ..errors import UnsupportedMechanism

@@ -137,6 +137,10 @@ class Mobility(Printed):
         """Actuators beyond the freedoms of the end effector; negative where there are too few."""
         return self.actuators - self.platform
 
+    def to_dict(self) -> dict[str, Any]:
+        """Its counts, the redundancy too, as plain numbers."""
+        return super().to_dict() | {"redundancy": self.redundancy}
+
     def table(self) -> ResultTable:
         """Every count with its meaning."""
         rows = [(name.replace("_", "-"), str(getattr(self, name)), words) for name, words in _IN_WORDS.items()]

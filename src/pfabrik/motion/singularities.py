@@ -10,8 +10,10 @@ sine (type 2) or a cosine (type 1) vanishes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import compress
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +70,18 @@ class Singularity(Printed):
     lost: Floats
     gained: Floats
     kinds: tuple[str, ...] | list[tuple[str, ...]]
+    _in_words: Callable[[Singularity], list[str]] | None = field(default=None, repr=False)
+
+    @property
+    def motions(self) -> list[str]:
+        """Of one answer, in words: the motion nearest to being lost, with the actuators that make it, and that nearest
+        to being gained. Of a batch, none.
+        """
+        return [] if self._in_words is None else self._in_words(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its fields and, of one answer, the motions in words: ready for JSON."""
+        return super().to_dict() | {"motions": self.motions}
 
     def table(self) -> ResultTable:
         """Every measure and whether it is singular; of a batch, the least, and the singular rows."""
@@ -81,7 +95,7 @@ class Singularity(Printed):
             rows.append((kind, least, ("yes" if count else "no") if is_one else str(count)))
         header = ("kind", "measure", "singular") if is_one else ("kind", "least measure", "singular rows")
         lines = [] if is_one else [f"batch of shape {np.shape(self.serial)}"]
-        return ResultTable("Singularity", lines, header, rows)
+        return ResultTable("Singularity", lines, header, rows, ["\n".join(self.motions)] if self.motions else [])
 
 
 def singularity_of(values: Floats, lost: Floats, gained: Floats) -> Singularity:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Literal, Protocol
 
@@ -60,12 +60,14 @@ class PoseAccuracy(Printed):
     covariance: Floats | None
     actuators: Floats | None
     reason: str | Reasons
+    _length_unit: str = field(repr=False)
 
     def table(self) -> ResultTable:
         """The errors of position and rotation; of a batch, their range."""
+        rotation = np.degrees(np.ravel(self.rotation))
         rows = [
-            ("position", spanned(np.ravel(self.position)), "length"),
-            ("rotation", spanned(np.degrees(np.ravel(self.rotation))), "deg"),
+            ("position", spanned(np.ravel(self.position)), self._length_unit),
+            ("rotation", spanned(np.where(rotation <= TOLERANCES.implied, 0.0, rotation)), "deg"),
         ]
         return ResultTable(
             "Accuracy", reasons_in_words(self.reason, "nothing known"), (f"{self.kind} error", "", "unit"), rows
@@ -147,7 +149,8 @@ def accuracy(
         array[is_unknown] = np.nan
     position, rotation, components, more = (shaped(array, shape) for array in found)
     covariance, actuators = (more, None) if kind == "rms" else (None, more)
-    return PoseAccuracy(kind, position, rotation, components, covariance, actuators, in_shape(reasons, shape))
+    reason, unit = in_shape(reasons, shape), mechanism.length_unit
+    return PoseAccuracy(kind, position, rotation, components, covariance, actuators, reason, unit)
 
 
 def _tolerances(

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..answers.solution import Solution, as_plain, checked_solution
-from ..arrays import Floats, Ints, Mask, shaped
+from ..answers.solution import Solution, checked_solution
+from ..arrays import Floats, Ints, Mask, as_plain, shaped
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..frozen import FrozenMapping
@@ -50,6 +50,45 @@ class _Question(NamedTuple):
     gravity: Floats
 
 
+class Reactions(Printed, FrozenMapping[str, Floats]):
+    """Joint -> what it transmits, as `Forces.reactions` gives it; printed with the forces along rods."""
+
+    def __init__(self, given: Mapping[str, Floats], forces: Forces) -> None:
+        super().__init__(given)
+        self._forces = forces
+
+    def table(self) -> ResultTable:
+        """Force and moment of every joint, and forces along rods; of a batch, the largest magnitude of each number."""
+        forces, mechanism = self._forces, self._forces._mechanism
+        units = ["force"] * 3 + [f"force {mechanism.length_unit}"] * 3
+        scales = np.repeat([1.0, mechanism.characteristic_length], 3)
+        wrenches = {name: _largest(np.reshape(wrench, (-1, 6))) for name, wrench in self.items()}
+        size = float(np.nanmax(np.abs([*wrenches.values()]) / scales, initial=0.0))
+        least = (TOLERANCES.rank * size * scales).tolist()
+        cells = [(name, *map(plain, wrench, least, [".5g"] * 6)) for name, wrench in wrenches.items()]
+        pulls = {name: _largest(np.reshape(pull, (-1, 1)))[0] for name, pull in forces.rods.items()}
+        rods = [(name, plain(pull, least[0], ".5g")) for name, pull in pulls.items()]
+        header = [f"{name} [{unit}]" for name, unit in zip(COMPONENTS, units, strict=True)]
+        more = [ResultTable("", (), ("rod", "pulled by [force]"), rods)] if rods else []
+        lines = reasons_in_words(forces.reason, "no forces")
+        remarks = [forces.undetermined] if forces.undetermined else []
+        return ResultTable("Reactions", lines, ("joint", *header), cells, remarks, more=more)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Joints and rods by name, and what equilibrium does not determine: ready for JSON."""
+        named = {"joints": self, "rods": self._forces.rods}
+        plain = {name: {key: as_plain(value) for key, value in of.items()} for name, of in named.items()}
+        return {**plain, "undetermined": self._forces.undetermined}
+
+
+def _largest(rows: Floats) -> list[float]:
+    """The largest of each column by magnitude, NaN where no row is known."""
+    padded = np.vstack([rows, np.full(rows.shape[1], np.nan)])
+    places = np.where(np.isnan(padded), -1.0, np.abs(padded)).argmax(axis=0)
+    largest: list[float] = padded[places, np.arange(rows.shape[1])].tolist()
+    return largest
+
+
 @dataclass(frozen=True, eq=False)
 class Forces(Printed):
     """Forces in static equilibrium, as `forces` returns them.
@@ -75,24 +114,19 @@ class Forces(Printed):
         """What each actuator exerts, or why no forces hold the load; of a batch, the largest of each."""
         mechanism, exerted = self._mechanism, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names)))
         lines = reasons_in_words(self.reason, "no forces")
-        known = exerted[~np.isnan(exerted).any(axis=1)]
-        if not len(known):
+        largest = _largest(exerted)
+        if np.isnan(largest).any():
             return ResultTable(mechanism.name, lines or ["no row"])
-        largest = known[np.abs(known).argmax(axis=0), np.arange(known.shape[1])]
-        least = 1e-9 * float(np.abs(largest).max(initial=0.0))
+        least = 1e-9 * max(map(abs, largest), default=0.0)
         units = ["force" if drive.kind == "length" else f"force {mechanism.length_unit}" for drive in mechanism.drives]
-        values = [plain(value, least) for value in largest.tolist()]
+        values = [plain(value, least) for value in largest]
         header = ("actuator", "exerts" if np.ndim(self.actuators) == 1 else "of largest magnitude", "unit")
         return ResultTable(
             mechanism.name, lines, header, list(zip(mechanism.actuator_names, values, units, strict=True))
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """What actuators exert, None where unknown, and why: ready for JSON."""
-        return {"actuators": as_plain(self.actuators), "reason": as_plain(self.reason)}
-
     @cached_property
-    def reactions(self) -> Mapping[str, Floats]:
+    def reactions(self) -> Reactions:
         """Joint -> force and moment that its first body exerts on its second, (..., 6), in the base frame.
 
         The moment is about the joint's centre; of a slide about that of the first joint of its `along`, or, without
@@ -100,7 +134,7 @@ class Forces(Printed):
         """
         wrenches = np.where(self._is_open, np.nan, self._transmitted)
         names = (joint.name for joint in self._mechanism.joints)
-        return FrozenMapping({name: self._shaped(wrenches[:, place]) for place, name in enumerate(names)})
+        return Reactions({name: self._shaped(wrenches[:, place]) for place, name in enumerate(names)}, self)
 
     @cached_property
     def undetermined(self) -> str:

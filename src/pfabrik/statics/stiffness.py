@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,10 +16,11 @@ from ..checks import require_known, require_names, require_positive
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..kinematics import actuator_units, generic_of, joint_centres
+from ..printed import Printed, ResultTable, spanned, triple
 from ..tolerances import TOLERANCES
 from .forces import Forces, along, rods_of
 from .joint_balance import pairs_of, responses_of
-from .loads import Reasons, add_reason, has_reason, in_shape, positive_values
+from .loads import Reasons, add_reason, has_reason, in_shape, positive_values, reasons_in_words
 from .transmission import Maps, is_redundantly_actuated, maps_of, twist_units
 
 SLACK = "slack cables leave a direction without stiffness"
@@ -27,7 +29,7 @@ OPEN_RODS = "equilibrium does not determine the forces along {}, for the loops a
 
 
 @dataclass(frozen=True, eq=False)
-class Stiffness:
+class Stiffness(Printed):
     """Stiffness of the end effector, as `stiffness` returns it; r is 6, or 3 for a joint end effector.
 
     Attributes
@@ -48,6 +50,28 @@ class Stiffness:
     compliance: Floats
     rigid: int | NDArray[np.int64]
     reason: str | Reasons
+    _mechanism: Mechanism = field(repr=False)
+
+    def table(self) -> ResultTable:
+        """The force or moment along each axis that displaces along it by one unit; of a batch, its range."""
+        gives, unit = np.diagonal(self.compliance, axis1=-2, axis2=-1), self._mechanism.length_unit
+        shares = gives / twist_units(self._mechanism) ** 2
+        is_rigid = shares <= TOLERANCES.rank * shares.max(axis=-1, initial=0.0, keepdims=True)
+        stiff = np.divide(1.0, gives, out=np.full(gives.shape, np.inf), where=~is_rigid)
+        units = [f"force/{unit}", f"force {unit}/rad"]
+        rows = [
+            (f"{way} {axis}", spanned(np.ravel(stiff[..., place])).replace("inf", "rigid"), units[place // 3])
+            for place, (way, axis) in enumerate(list(product(("along", "about"), "xyz"))[: gives.shape[-1]])
+        ]
+        remarks = [] if stiff.ndim > 1 or np.isnan(stiff).any() or is_rigid[:3].all() else [self._softest()]
+        lines = reasons_in_words(self.reason, "nothing known")
+        return ResultTable("Stiffness", lines, ("", "stiffness", "unit"), rows, remarks)
+
+    def _softest(self) -> str:
+        sizes, directions = np.linalg.eigh(self.compliance[:3, :3])
+        softest = directions[:, -1] * np.sign(directions[np.argmax(np.abs(directions[:, -1])), -1])
+        along = triple(softest, TOLERANCES.alignment)
+        return f"gives most to a force along {along}: {1.0 / sizes[-1]:.6g} force/{self._mechanism.length_unit}"
 
 
 def stiffness(
@@ -113,6 +137,7 @@ def stiffness(
         shaped(compliance * units, solution.shape),
         shaped(rigid, solution.shape),
         in_shape(reasons, solution.shape),
+        mechanism,
     )
 
 

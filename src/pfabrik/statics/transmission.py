@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -130,6 +130,7 @@ class Transmission(Printed):
     translation: Factors
     rotation: Factors
     reason: str | Reasons
+    _units: tuple[str, str] = field(repr=False)
 
     def table(self) -> ResultTable:
         """The factors of each direction; of a batch, their range."""
@@ -137,14 +138,16 @@ class Transmission(Printed):
             (
                 f"{name} {place}",
                 spanned(np.ravel(factors.velocity[..., place])),
+                unit,
                 spanned(np.ravel(factors.force[..., place])),
             )
-            for name, factors in (("translation", self.translation), ("rotation", self.rotation))
+            for name, factors, unit in zip(
+                ("translation", "rotation"), (self.translation, self.rotation), self._units, strict=True
+            )
             for place in range(factors.velocity.shape[-1])
         ]
-        return ResultTable(
-            "Transmission", reasons_in_words(self.reason, "no factors"), ("direction", "velocity", "force"), rows
-        )
+        header = ("direction", "velocity", "per actuator", "force")
+        return ResultTable("Transmission", reasons_in_words(self.reason, "no factors"), header, rows)
 
 
 def transmission(solution: Solution, joint: str | None = None) -> Transmission:
@@ -181,7 +184,15 @@ def transmission(solution: Solution, joint: str | None = None) -> Transmission:
         _factors(rates[:, ~turns], most[0], shape),
         _factors(rates[:, turns], most[1], shape),
         in_shape(reasons, shape),
+        _units(mechanism),
     )
+
+
+def _units(mechanism: Mechanism) -> tuple[str, str]:
+    """Units of translation and rotation per actuator rate: of lengths, of angles, or of whichever it is."""
+    kinds = {drive.kind for drive in mechanism.drives}
+    per = "rate" if len(kinds) > 1 else mechanism.length_unit if kinds == {"length"} else "rad"
+    return f"{mechanism.length_unit}/{per}", f"rad/{per}"
 
 
 def _of_joint(solution: Solution, maps: Maps, joint: str) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import reprlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from ..answers.differential import forward_jacobian, singularity
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, as_plain
 from ..checks import require_positive
 from ..description.mechanism import Mechanism, checked_mechanism, told_apart
 from ..errors import InvalidArgument, counted
 from ..ik import solve_ik
 from ..motion.singularities import KINDS, NUMBERS, Singularity, parallel_signs
 from ..options import Options
-from ..printed import Printed, ResultTable
+from ..printed import Printed, ResultTable, plain
 from ..telling import OnProgress, telling
 from .lattice_points import Numbering, codes
 from .locus import drawn_to_border, locus
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 
 POINTS = 20_000
 """Approximate number of points of a map by default."""
+
+NEAR = 0.1
+"""Measure below which a point counts as near to a singularity: what one side does there is tenfold at the other [-]."""
+MEASURED = ("measure", "least", f"below {NEAR:g}")
 
 ROWS_A_BLOCK = 512
 
@@ -88,19 +92,38 @@ class SingularityMap(Printed):
         return plot_singular_map(self, ax)
 
     def table(self) -> ResultTable:
-        """The parts between parallel singularities, and the least of each measure."""
-        sizes = [size for size in self.sizes.tolist() if size > LEAST_SHARE]
-        lines = [counted(len(self.points), "point")]
-        lines += [] if len(self.locus_faces) else ["no parallel singularity"]
-        rows = [(f"part {place}", f"{size:.1%} of the points") for place, size in enumerate(sizes)]
-        rows += least_measures(self.measures)
-        return ResultTable(self.workspace.mechanism.name, lines, ("singularities", ""), rows)
+        """The parts between parallel singularities, the least of each measure, and the share of points near to 0."""
+        if not len(self.points):
+            return ResultTable(self.workspace.mechanism.name, ["nothing within reach"])
+        points, names = counted(len(self.points), "point"), " ".join(self.workspace.names)
+        lines = [f"{points} over {names}: {self._parts_in_words()}"]
+        return ResultTable(self.workspace.mechanism.name, lines, MEASURED, measured_rows(self.measures))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Number of points, shares of the parts, and of each measure the least and the share of points near to 0."""
+        least_and_near = {kind: least_and_share(getattr(self.measures, kind)) for kind in KINDS}
+        return {
+            "over": list(self.workspace.names),
+            "points": len(self.points),
+            "parts": self._sizes_that_count(),
+            "least": {kind: as_plain(least) for kind, (least, _) in least_and_near.items()},
+            "near": {kind: as_plain(share) for kind, (_, share) in least_and_near.items()},
+        }
 
     def __repr__(self) -> str:
         least = float(np.min(self.measures.parallel, initial=np.inf))
-        n = int((self.sizes > LEAST_SHARE).sum())
-        parts = f"{n} part{'s' * (n != 1)} between parallel singularities" if len(self.locus_faces) else "none parallel"
-        return f"<SingularityMap of {counted(len(self.points), 'point')}: {parts}, least parallel measure {least:.3g}>"
+        points = counted(len(self.points), "point")
+        return f"<SingularityMap of {points}: {self._parts_in_words()}, least parallel measure {least:.3g}>"
+
+    def _sizes_that_count(self) -> list[float]:
+        return [size for size in self.sizes.tolist() if size > LEAST_SHARE]
+
+    def _parts_in_words(self) -> str:
+        if not len(self.locus_faces):
+            return "no parallel singularity"
+        sizes = self._sizes_that_count()
+        shares = ", ".join(f"{size:.1%}" for size in sizes)
+        return f"{counted(len(sizes), 'part')} between parallel singularities ({shares})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +147,8 @@ class SingularityTrack(Printed):
     def table(self) -> ResultTable:
         """The rows before which the path leads through a singularity, and the least of each measure."""
         crossings = ", ".join(map(str, self.crossings.tolist())) or "none"
-        rows = [("crossings before rows", crossings), *least_measures(self.measures)]
-        return ResultTable("Singularities along a path", [counted(len(self.signs), "row")], ("singularities", ""), rows)
+        lines = [f"{counted(len(self.signs), 'row')}, crossings before rows: {crossings}"]
+        return ResultTable("Singularities along a path", lines, MEASURED, measured_rows(self.measures))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
@@ -134,14 +157,17 @@ class SingularityTrack(Printed):
         return plot_singular_track(self.measures, self.crossings, ax)
 
 
-def least_measures(measures: Singularity) -> list[tuple[str, str]]:
-    """The least of each measure, in words; "-" where there is none."""
-    rows = []
-    for kind in KINDS:
-        values = np.ravel(getattr(measures, kind))
-        known = values[~np.isnan(values)]
-        rows.append((f"least {kind} measure", f"{known.min():.3g}" if len(known) else "-"))
-    return rows
+def least_and_share(measure: float | Floats) -> tuple[float, float]:
+    """The least of a measure, and the share of the known values that are near to 0; NaN where none is known."""
+    values = np.ravel(measure)
+    known = values[~np.isnan(values)]
+    return (float(known.min()), float(np.mean(known < NEAR))) if len(known) else (np.nan, np.nan)
+
+
+def measured_rows(measures: Singularity) -> list[tuple[str, str, str]]:
+    """The least of each measure and the share of points near to 0, in words."""
+    found = {kind: least_and_share(getattr(measures, kind)) for kind in KINDS}
+    return [(kind, plain(least, 0.0, ".3g"), f"{share:.1%}") for kind, (least, share) in found.items()]
 
 
 @overload
@@ -288,7 +314,9 @@ def _measured(
 
 
 def _joined(blocks: list[Singularity]) -> Singularity:
-    numbers = {name: np.concatenate([np.asarray(getattr(block, name)) for block in blocks]) for name in NUMBERS}
+    numbers: dict[str, Any] = {
+        name: np.concatenate([np.asarray(getattr(block, name)) for block in blocks]) for name in NUMBERS
+    }
     return Singularity(
         **numbers, kinds=[kinds for block in blocks for kinds in cast(list[tuple[str, ...]], block.kinds)]
     )
