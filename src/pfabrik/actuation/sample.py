@@ -10,7 +10,7 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..arrays import Floats
 from ..checks import require_count
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, counted
 from ..interop.mjcf_qpos import qpos
 from .named_values import box_of
 from .placed import Placer
@@ -35,6 +35,9 @@ class Sample(NamedTuple):
     q: Floats
     solution: Solution
     model: object = None
+
+    def __repr__(self) -> str:
+        return f"<Sample: {counted(len(self.q), 'configuration')} of '{self.solution.mechanism.name}'>"
 
     @property
     def qpos(self) -> Floats:

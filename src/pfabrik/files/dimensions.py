@@ -118,7 +118,7 @@ def number_of(said: Any, values: Mapping[str, float], angle_unit: str, later: tu
             raise NoNumber(f"'{said}': {reason}") from None
         except (SyntaxError, RecursionError, MemoryError):
             raise NoNumber(f"'{said}'") from None
-        except (ArithmeticError, ValueError):  # a root of a negative number is a ValueError
+        except (ArithmeticError, ValueError):  # a fraction of 0; a power that is not real is a ValueError
             raise NoNumber(f"'{said}', which has no finite value") from None
     else:
         value = float(said) if abs(said) < 1e300 else math.inf
@@ -170,7 +170,10 @@ def _computed(
             n_arguments, function = functions[name]
             if len(args) != n_arguments:
                 raise NoNumber(f"{name} of {counted(len(args), 'argument')} in place of {n_arguments}")
-            return function(*map(compute, args))
+            numbers = [compute(each) for each in args]
+            if name == "sqrt" and numbers[0] < 0.0:
+                raise NoNumber(f"{ast.unparse(args[0])} is {numbers[0]:.6g}, which has no root")
+            return function(*numbers)
         case ast.Call(func=ast.Name(id=name)):
             raise NoNumber(f"no function '{name}'{near_miss(name, functions)}")
     raise NoNumber("more than an expression may have")
