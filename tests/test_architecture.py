@@ -32,6 +32,7 @@ MAY_NAME_MACHINES = {
     "files/__init__.py": "what a printer is",
     "calibration/printer_settings.py": "the kinematics of a firmware, by their names there",
     "cli/machines.py": "other names of kinds to start from",
+    "cli/examples.py": "what may be typed as it is",
     "cli/export.py": "the printers that a firmware knows",
 }
 """Beginnings of paths, and why names of the catalogue may stand there."""

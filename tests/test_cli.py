@@ -8,6 +8,7 @@ import json
 import math
 import os
 import re
+import shutil
 import subprocess
 import warnings
 from collections.abc import Callable
@@ -26,10 +27,12 @@ from machines import closure
 from pfabrik.answers.words import as_sentence
 from pfabrik.catalog import description, template, templates
 from pfabrik.cli import main
+from pfabrik.cli.examples import EXAMPLES
 from pfabrik.cli.printing import fitted
 from pfabrik.export.rod_lengths import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
+from pfabrik.view.live.viewer import Viewer
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -105,6 +108,27 @@ def fastest() -> pf.PlatformSpeed:
     return pf.platform_speed(pf.solve_ik(FIVE_BAR, (0, 10, 180)), speed=np.radians(30.0))
 
 
+def singular() -> dict[str, Any]:
+    found = pf.singularity(pf.solve_ik(FIVE_BAR, (0, 10, 180)))
+    assert len(found.motions) == 2
+    return found.to_dict() | {"mobility": pf.mobility(FIVE_BAR).to_dict()}
+
+
+def loaded() -> dict[str, Any]:
+    answer, wrench = pf.solve_ik(STEWART, [0, 5, 190]), [0, 0, -200, 0, 500, 0]
+    limits = dict.fromkeys(STEWART.actuator_names, 90.0) | {"BL1": (-5.0, 90.0)}
+    capacity = pf.wrench_capacity(answer, limits, wrench=wrench)
+    return pf.forces(answer, wrench).to_dict() | {"capacity": capacity.to_dict()}
+
+
+def carried() -> dict[str, Any]:
+    held = pf.forces(ankle(), loads={"foot": (3.0, (20, 10, 60))}, gravity=(0, 0, -9.8))
+    reactions = {name: wrench.tolist() for name, wrench in held.reactions.items()}
+    rods = {name: float(pull) for name, pull in held.rods.items()}
+    more = {"joints": reactions, "rods": rods, "undetermined": held.undetermined}
+    return held.to_dict() | {"reactions": more}
+
+
 ALONG = "--along 0 -1 -1 --along 1 0 0 --about 0 0 1 --pivot 5 5 0"
 JSON: dict[str, Callable[[], Any]] = {
     "catalog": lambda: {name: description(name) for name in pf.catalog()},
@@ -126,6 +150,19 @@ JSON: dict[str, Callable[[], Any]] = {
     "travel ankle_ups --joint pivot=5,10": lambda: pf.travel(ankle()),
     "speed five_bar --position 0 10 180 --speed 30": fastest,
     "workspace five_bar --resolution 16": lambda: pf.workspace(FIVE_BAR, resolution=16.0),
+    "singularities five_bar --position 0 10 180": singular,
+    "singularities five_bar --resolution 16": lambda: pf.singularity_map(
+        FIVE_BAR, pf.workspace(FIVE_BAR, resolution=16.0)
+    ),
+    "forces stewart --position 0 5 190 --force 0 0 -200 --moment 0 500 0 --limit 90 --limit BL1=-5:90": loaded,
+    "forces ankle_ups --joint pivot=5,10 --load foot=3,20,10,60 --gravity 0 0 -9.8 --reactions": carried,
+    "stiffness five_bar --position 0 10 180 --k 500 --k p1=100": lambda: pf.stiffness(
+        pf.solve_ik(FIVE_BAR, (0, 10, 180)), [100.0, 500.0]
+    ),
+    "accuracy five_bar --position 0 10 180 --error 0.5 --error p3=0.1 --rms": lambda: pf.accuracy(
+        pf.solve_ik(FIVE_BAR, (0, 10, 180)), dict.fromkeys(("p1", "p5"), math.radians(0.5)) | {"p3": 0.1}, "rms"
+    ),
+    "transmission five_bar --position 0 10 180": lambda: pf.transmission(pf.solve_ik(FIVE_BAR, (0, 10, 180))),
 }
 
 
@@ -137,14 +174,12 @@ def test_json_is_one_object_that_says_what_the_library_does(line: str) -> None:
     assert printed_json(line, code=int("900" in line)) == json.loads(json.dumps(plain))
 
 
-def test_json_of_margins_and_forces_is_what_the_library_says() -> None:
+def test_json_of_margins_is_what_the_library_says() -> None:
     answer = pf.solve_ik(STEWART, [0, 5, 190])
-    line = "ik stewart --position 0 5 190 --margins --force 0 0 -200 --moment 0 500 0"
-    found = printed_json(line)
+    found = printed_json("ik stewart --position 0 5 190 --margins")
     assert {(each["joint"], each["bound"]): each["margin"] for each in found["margins"]} == dict(pf.margins(answer))
     listed_margins = [each["margin"] for each in found["margins"]]
     assert listed_margins == sorted(listed_margins)
-    assert found["forces"]["actuators"] == pf.forces(answer, [0, 0, -200, 0, 500, 0]).actuators.tolist()
 
 
 def test_json_of_check_and_time_is_one_object() -> None:
@@ -368,14 +403,11 @@ REFUSED = [
     ("info ''", ""),
     ("info 'a\nb'", ""),
     # targets
-    ("ik stewart", "no target"),
+    ("ik stewart", "no target: give --position, --rpy or both, or --joint (for example: pfabrik ik stewart --position"),
     ("ik stewart --position nan 0 0", "'--position': found 'nan'; expected a finite number"),
     ("ik stewart --rpy 0 1e999 0", "'--rpy': found '1e999'; expected a finite number"),
     (f"{ONE_STEWART} --hold both", "orientation"),
     (f"{ONE_STEWART} --all --margins", "--margins is of one answer"),
-    (f"{ONE_STEWART} --all --force 0 0 1", "--force and --moment are of one answer"),
-    (f"{ONE_STEWART} --force 0 0 nan", "a number that is not finite"),
-    ("ik five_bar --position 0 0 190 --moment 0 0 1", "the end effector is a joint"),
     ("ik ankle_ups --joint pivot", "found 'pivot'; expected NAME=VALUE"),
     ("ik ankle_ups --joint pivot=5,nan", "expected NAME=VALUE[,VALUE...] with finite numbers"),
     ("ik ankle_ups --joint pivot=5", "found 1 value; expected 2"),
@@ -383,6 +415,21 @@ REFUSED = [
     ("ik ankle_ups --joint BL=100", "expected a pose, or those of joints in series"),
     ("ik ankle_ups --joint pivot=5,10 --joint pivot=5,10", "found 'pivot' twice"),
     ("ik ankle_ups --joint pivot=5,10 --rpy 0 0 0", "--joint says it all"),
+    # a machine at rest at a pose
+    ("forces stewart", "no load: give --force, --moment or --load"),
+    ("forces stewart --force 0 0 nan", "'--force': found 'nan'; expected a finite number"),
+    ("forces five_bar --position 0 0 190 --moment 0 0 1", "the end effector is a joint"),
+    ("forces stewart --load platform", "--load BODY=MASS,X,Y,Z: found 'platform'; expected 4 finite numbers"),
+    ("forces stewart --load platfrm=5,0,0,190", "did you mean 'platform'?"),
+    ("forces stewart --load platform=5,0,0,190 --limit 9", "--limit goes with --force and --moment"),
+    ("forces stewart --limit BL1=5", "--limit: found no value of BL2, BL3"),
+    ("forces stewart --limit 5:x", "found '5:x'; expected a positive number, or MIN:MAX"),
+    ("stiffness stewart", "Missing option '--k' (for example: pfabrik stiffness stewart --k 500; see"),
+    ("stiffness stewart --k 5 --rod 5", "--rod 5: no rod '' (known: none)"),
+    ("accuracy stewart --error BR9=5", "no actuator or joint 'BR9'; did you mean 'BR"),
+    ("clearance stewart", "no link has a thickness: give legs one, or add [[body]] tables"),
+    ("speed five_bar", "--speed: found 'Planar 5-bar' without max_speed; expected a limit of speed, given or in"),
+    ("singularities stewart --fix z=190 --position 0 0 190", "--position and --joint are of one pose"),
     # travel
     ("travel stewart --position 0 0 900", "cannot start there: projected"),
     ("travel stewart --along 0 0 0", "along"),
@@ -410,7 +457,8 @@ REFUSED = [
     ("track five_bar path.csv --sample-time 1 --speed 0", "found '0'; expected a positive number"),
     ("track five_bar path.csv --sample-time 1 --speed p1=-3", "found '-3'; expected a positive number"),
     ("track five_bar path.csv --sample-time 1 --speed p1=nan", "found 'nan'; expected a positive number"),
-    ("track five_bar path.csv --sample-time 0 -o a.csv", "sample_time"),
+    ("track five_bar path.csv --sample-time 0 -o a.csv", "--sample-time: found 0.0; expected a positive number"),
+    ("time five_bar path.csv", "--speed: found 'Planar 5-bar' without max_speed and max_acceleration; expected"),
     ("track five_bar path.csv --sample-time inf", "--sample-time"),
     ("track five_bar path.csv --animate a.png", "expected a name that ends in .gif or .mp4"),
     ("track five_bar path.csv --plot a.gif", "expected a name that ends in .png, .svg or .pdf"),
@@ -451,7 +499,7 @@ REFUSED = [
     ("new delta --fore", "did you mean '--force'?"),
     ("new delta --rod long", "--rod: found 'long'; expected a number"),
     ("new delta --rod", "--rod: found ''; expected a number"),
-    ("new delta --rod 100", "dimensions.height: found 'sqrt(rod**2 - across**2)', which has no finite value"),
+    ("new delta --rod 100", "dimensions.height: found 'sqrt(rod**2 - across**2)': rod ** 2 - across ** 2 is -"),
     ("new delta more", "unexpected extra argument (more)"),
     ("export stewart c --parts dynamics", "expected some of 'ik'"),
     ("export stewart mjcf --parts ik", "--parts is of c, c-float"),
@@ -480,10 +528,21 @@ def test_wrong_words_are_told_on_stderr_with_exit_code_2_and_write_nothing(line:
         ("ik serv", ["servo_hexapod"]),
         ("new 6-", ["6-PUS", "6-RUS", "6-UPS"]),
         ("new --from agi", ["agile_eye"]),
-        ("tra", ["track", "travel"]),
+        ("tra", ["track", "travel", "transmission"]),
+        ("new linear-delta --arm", ["--arm-length"]),
+        ("export stewart m", ["mjcf", "marlin"]),
+        ("workspace five_bar --fix ", ["y=", "z="]),
+        ("singularities stewart --over x,y,t", ["x,y,tilt_x", "x,y,tilt_y"]),
+        ("certify stewart --limits AL1,BL", ["AL1,BL1", "AL1,BL2", "AL1,BL3"]),
+        ("ik g1_ankle --joint ", ["pitch_joint=", "roll_joint="]),
+        ("plot g1_ankle --joints r", ["roll_joint"]),
+        ("speed five_bar --speed ", ["p1=", "p5="]),
+        ("stiffness delta --rod rodR", ["rodR1=", "rodR2=", "rodR3="]),
+        ("forces stewart --load p", ["platform="]),
+        ("workspace nowhere.toml --fix ", []),
     ],
 )
-def test_names_of_machines_and_kinds_are_completed(line: str, found: list[str]) -> None:
+def test_names_of_machines_and_of_what_they_have_are_completed(line: str, found: list[str]) -> None:
     *words, incomplete = line.split(" ")
     completions = BashComplete(main, {}, "pfabrik", "_PFABRIK_COMPLETE").get_completions(words, incomplete)
     assert [each.value for each in completions] == found
@@ -492,7 +551,7 @@ def test_names_of_machines_and_kinds_are_completed(line: str, found: list[str]) 
 def test_a_shell_asks_for_completions_by_the_name_that_the_page_gives() -> None:
     asked = {"_PFABRIK_COMPLETE": "bash_complete", "COMP_WORDS": "pfabrik tra", "COMP_CWORD": "1"}
     with in_process("", env=os.environ | asked, stdout=subprocess.PIPE) as process:
-        assert process.communicate(timeout=60)[0].split() == ["plain,track", "plain,travel"]
+        assert process.communicate(timeout=60)[0].split() == ["plain,track", "plain,travel", "plain,transmission"]
     page = Path(__file__).parents[1] / "docs" / "cli.md"
     assert "_PFABRIK_COMPLETE=bash_source" in page.read_text(encoding="utf-8")
 
@@ -515,6 +574,32 @@ def test_tables_fit_the_terminal(line: str, monkeypatch: pytest.MonkeyPatch) -> 
         assert all(row in narrow for row in free.splitlines() if len(row) <= columns)
 
 
+LINES = [line for name, lines in EXAMPLES.items() if name != "demo" for line in lines]  # whose tests run it just so
+
+
+@pytest.mark.slow
+def test_examples_of_the_help_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the order of the help, one after the other: what one writes another may read."""
+    for needed in ("matplotlib", "mujoco"):
+        pytest.importorskip(needed)
+    monkeypatch.setattr(Viewer, "wait", lambda _: None)
+    monkeypatch.setattr("webbrowser.open", lambda _: None)
+    shutil.copy(Path(__file__).parents[1] / "examples" / "data" / "printer.cfg", ".")
+    Path("robot.xml").write_text(pf.interop.to_mjcf(STEWART), encoding="utf-8")
+    Path("path.csv").write_text("x,y,z\n0,0,190\n5,0,195\n", encoding="utf-8")
+    Path("part.gcode").write_text("G1 X0 Y0 Z5 F3000\nG1 X5 Y0\nG1 X5 Y5 Z6\n", encoding="utf-8")
+    for line in LINES:
+        done = pfabrik(line)
+        assert done.exit_code in (0, 1) and done.output, (line, done.stderr)
+
+
+def test_help_ends_with_examples_of_its_command() -> None:
+    assert list(EXAMPLES) == list(main.subcommands)
+    for name, lines in EXAMPLES.items():
+        assert pfabrik(f"{name} --help").stdout.endswith("".join(f"\n    pfabrik {line}" for line in lines) + "\n")
+        assert all(line.split()[0] == name for line in lines)
+
+
 def test_text_that_goes_on_is_below_its_column() -> None:
     table = "name  what it is\na     short\nb     one two three four five six seven"
     assert fitted(table, 30) == "name  what it is\na     short\nb     one two three four five\n      six seven"
@@ -529,7 +614,7 @@ def test_every_command_and_option_that_is_named_exists() -> None:
     context = click.Context(main)
     commands = {name: main.get_command(context, name) for name in main.list_commands(context)}
     options = {option for each in commands.values() for param in each.params for option in param.opts}
-    known = options | {"--rod", "--arm", "--help"}  # the first two of a starting file
+    known = options | {"--arm", "--arm-length", "--delta-radius", "--help"}  # the first three of starting files
     named, called = re.compile(r"(?<![\w-])(?<!halcompile )--[a-z][a-z0-9-]*"), re.compile(r"`pfabrik ([a-z]+)")
     for path in (Path(pf.__file__).parent).rglob("*.py"):
         source = path.read_text(encoding="utf-8")

@@ -152,7 +152,10 @@ def test_every_task_has_a_page_with_a_picture_in_the_navigation() -> None:
 
 
 COMMAND = re.compile(r"^```\n\$ pfabrik ([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-SHOWING = [FORMAT, *(ROOT / "docs" / f"{name}.md" for name in ("adding-a-mechanism", "cli", "start"))]
+SHOWING = [
+    FORMAT,
+    *(ROOT / "docs" / f"{name}.md" for name in ("adding-a-mechanism", "cli", "forces", "singularities", "start")),
+]
 
 
 def files_of(page: Path) -> dict[str, str]:

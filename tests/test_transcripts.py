@@ -34,7 +34,8 @@ def transcript(text: str) -> str:
 @pytest.mark.filterwarnings("always::pfabrik.errors.MobilityWarning")
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
-    "name", ["check", "fk", "ik", "info", "speed", "track", "travel", pytest.param("modes", marks=pytest.mark.slow)]
+    "name",
+    ["check", "fk", "ik", "info", "speed", "statics", "track", "travel", pytest.param("modes", marks=pytest.mark.slow)],
 )
 def test_the_command_prints_this(name: str) -> None:
     write_files()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -16,7 +16,8 @@ from click.shell_completion import CompletionItem
 import pfabrik as pf
 
 from ..cells import is_finite
-from ..errors import counted
+from ..errors import counted, near_miss
+from ..tolerances import TOLERANCES
 from .printing import note
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 STANDARD_INPUT = "-"
 
 Triple: TypeAlias = tuple[float, float, float]
+Value = TypeVar("Value")
 
 
 class MechanismName(click.types.StringParamType):
@@ -39,6 +41,41 @@ class MechanismName(click.types.StringParamType):
 
 
 MECH = MechanismName()
+
+
+def completing(
+    names_of: Callable[[pf.Mechanism], Iterable[str]], ending: str = ""
+) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
+    """A completion to names that the machine MECH has, each after the last comma and before an ending."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        mech = ctx.params.get("mech") or next(iter(ctx.args), None)  # left over where the option still has no value
+        done, comma, begun = incomplete.rpartition(",")
+        try:
+            names = () if mech in (None, STANDARD_INPUT) else names_of(pf.load(mech))
+        except (pf.errors.PfabrikError, OSError):  # a file that is not finished has no names yet
+            return []
+        fitting = [name for name in names if name.startswith(begun) and name not in done.split(",")]
+        return [CompletionItem(f"{done}{comma}{name}{ending}") for name in fitting]
+
+    return complete
+
+
+def actuators(mechanism: pf.Mechanism) -> tuple[str, ...]:
+    """Names of the actuators."""
+    return mechanism.actuator_names
+
+
+def joints(mechanism: pf.Mechanism) -> list[str]:
+    """Names of all joints."""
+    return [joint.name for joint in mechanism.joints]
+
+
+def series(mechanism: pf.Mechanism) -> tuple[str, ...]:
+    """Names of the passive joints in series from base to end effector."""
+    from ..kinematics import passive_series
+
+    return passive_series(mechanism)
 
 
 def load(mech: str) -> pf.Mechanism:
@@ -101,6 +138,7 @@ def targeted(command: Callable[..., Any]) -> Callable[..., Any]:
         "--joint",
         multiple=True,
         metavar="NAME=VALUE[,VALUE...]",
+        shell_complete=completing(series, "="),
         help="Coordinates [deg or length] of each joint from base to end effector, in place of the others.",
     )
     @functools.wraps(command)
@@ -108,6 +146,65 @@ def targeted(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(target=TargetOptions(position, rpy, joint), **parameters)
 
     return with_target
+
+
+def at_a_pose(command: Callable[..., int | None]) -> Callable[..., int]:
+    """Add MECH and the options of a target, home by default; the command gets the answer as `solution`.
+
+    The exit code is 1 of a target out of reach, and where the command says so.
+    """
+
+    @click.argument("mech", type=MECH)
+    @targeted
+    @functools.wraps(command)
+    def with_solution(*, mech: str, target: TargetOptions, **parameters: Any) -> int:
+        solution = answered(load(mech), target)
+        code = None if solution is None else command(solution=solution, **parameters)
+        return code or int(not solution)
+
+    return with_solution
+
+
+def answered(mechanism: pf.Mechanism, options: TargetOptions) -> pf.Solution | None:
+    """The answer to a target; a note says why it is not reached, and None that no pose is feasible."""
+    solution = pf.solve_ik(mechanism, noted(mechanism, options))
+    if not solution:
+        from ..answers.words import as_sentence
+
+        note(as_sentence(solution))
+    return solution if solution.status <= pf.Status.PROJECTED else None
+
+
+def noted(mechanism: pf.Mechanism, options: TargetOptions) -> Target:
+    """The target that options give; notes say what of it the task, or an end effector that only tilts, leaves out."""
+    from ..kinematics import tilt_axis
+    from ..overview import vector
+    from ..poses import as_poses
+    from ..targets import as_targets
+
+    target = options.of(mechanism)
+    note_left_out(ignored(mechanism, options), mechanism)
+    axis = tilt_axis(mechanism)
+    if axis is not None and abs(as_targets(mechanism, target)[0] - as_poses(target)[0]).max() > TOLERANCES.alignment:
+        note(f"of the tilt only the angle about {vector(axis)} counts, about which alone the end effector tilts")
+    return target
+
+
+def ignored(mechanism: pf.Mechanism, target: TargetOptions) -> Iterator[str]:
+    """Options, or parts of them, that the task leaves out."""
+    task, position, rpy = set(mechanism.task), target.position, target.rpy
+    if position and not task & set("xyz"):
+        yield "--position"
+    elif position:
+        for axis, value, home in zip("xyz", position, mechanism.reference_point, strict=True):
+            if axis not in task and value != home:
+                yield f"{axis} of --position"
+    if rpy and not task & {"rotation", "tilt", "yaw"}:
+        yield "--rpy"
+    elif rpy and "yaw" in task and any(rpy[:2]):
+        yield "the tilt in --rpy"
+    elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
+        yield "the yaw of --rpy"
 
 
 def joint_target(mechanism: pf.Mechanism, options: tuple[str, ...]) -> dict[str, float | list[float]]:
@@ -146,6 +243,39 @@ def numbers_of(option: str, words: str, counts: Sequence[int], between: str = ",
             f"{option}: found '{words}'; expected {expected} finite numbers with '{between}' between"
         )
     return [float(value) for value in values]
+
+
+def positive(words: str) -> float:
+    """A positive number; a ValueError says what was expected."""
+    if not is_finite(words) or float(words) <= 0.0:
+        raise ValueError("a positive number")
+    return float(words)
+
+
+def by_name(
+    option: str,
+    words: Sequence[str],
+    kind: str,
+    known: Iterable[str],
+    read: Callable[[str], Value],
+    of_all: Iterable[str] | None = None,
+) -> dict[str, Value]:
+    """Name -> value, from words such as ``5`` or ``A1=5``; those with a name prevail.
+
+    Those without one are for all of the known names, or for `of_all`.
+    """
+    names, values = tuple(known), dict[str, Value]()
+    for word in sorted(words, key=lambda word: "=" in word):
+        name, equals, said = word.rpartition("=")
+        if not names or (equals and name not in names):
+            hint = near_miss(name, names) or f" (known: {', '.join(names) or 'none'})"
+            raise click.UsageError(f"{option} {word}: no {kind} '{name}'{hint}")
+        try:
+            value = read(said)
+        except ValueError as expected:
+            raise click.UsageError(f"{option} {word}: found '{said}'; expected {expected}") from None
+        values |= dict.fromkeys([name] if equals else (names if of_all is None else of_all), value)
+    return values
 
 
 def comma_separated(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:

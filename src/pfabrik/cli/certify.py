@@ -10,7 +10,7 @@ import click
 
 import pfabrik as pf
 
-from .arguments import FINITE, MECH, load, numbers_of
+from .arguments import FINITE, MECH, completing, joints, load, numbers_of
 from .outputs import check_outputs
 from .printing import json_option, print_result
 
@@ -24,7 +24,12 @@ from .printing import json_option, print_result
 @click.option("--rotation", metavar="DEG[,DEG,DEG]", help="Rotation vectors up to this to either side, by component.")
 @click.option("--tilt", type=FINITE, metavar="DEG", help="Lean so far to every side, instead.")
 @click.option("--yaw", metavar="MIN:MAX", help="With it, turns about z before the tilt [deg]. Default: 0.")
-@click.option("--limits", metavar="NAME[,NAME]", help="Joints whose limits count. Default: all.")
+@click.option(
+    "--limits",
+    metavar="NAME[,NAME]",
+    shell_complete=completing(joints),
+    help="Joints whose limits count. Default: all.",
+)
 @click.option(
     "--tolerance", type=FINITE, metavar="M", help="Prove the least margin up to this. Default: its sign only."
 )

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any, cast
 
 import click
+from click.shell_completion import CompletionItem
 
 import pfabrik as pf
 
-from .arguments import MECH, comma_separated, load, named_joints
+from .arguments import MECH, comma_separated, completing, load, named_joints, series
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import note
 
@@ -57,9 +58,14 @@ def text_of(
     return c_source(mechanism, precision=precision, parts=chosen, name=name, joints=joints, file=file)
 
 
+def complete_format(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The formats that begin so."""
+    return [CompletionItem(form) for form in FORMATS if form.startswith(incomplete)]
+
+
 @click.command()
 @click.argument("mech", type=MECH)
-@click.argument("words", metavar="[FORMAT]", nargs=-1)
+@click.argument("words", metavar="[FORMAT]", nargs=-1, shell_complete=complete_format)
 @click.option("-o", "--output", default="-", help="File to write a FORMAT to. Default: print it.", **OUTPUT)
 @click.option("--torch", help="Write a file of PyTorch tensors, with gradients.", **OUTPUT)
 @click.option("--jax", help="The same in JAX.", **OUTPUT)
@@ -83,6 +89,7 @@ def text_of(
     "--joints",
     metavar="NAME[,NAME]...",
     multiple=True,
+    shell_complete=completing(series),
     help="Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.",
 )
 @click.option(

@@ -14,9 +14,10 @@ from typing import Any, NoReturn
 
 import click
 
-from ..errors import PfabrikError, near_miss
+from ..errors import InvalidArgument, PfabrikError, near_miss
 from ..kernels import NoKernels
 from ..telling import lines_on_pipes
+from .examples import EXAMPLES
 from .printing import complain
 from .stops import Stops
 
@@ -52,6 +53,7 @@ class CommandGroup(click.Group):
         name = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
         module = importlib.import_module(f".{self._modules[cmd_name]}", __package__)
         command: click.Command = getattr(module, name)
+        command.epilog = "\n".join(["\b", "Examples:", *(f"  pfabrik {line}" for line in EXAMPLES[cmd_name])])
         return command
 
     def resolve_command(
@@ -64,14 +66,25 @@ class CommandGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """As click does, but errors in the options of a subcommand name that subcommand."""
+        """As click does, but errors in the options of a subcommand name it, and errors in arguments the option."""
         try:
             return super().invoke(ctx)
         except click.UsageError as error:
-            name = ctx.invoked_subcommand
-            if error.ctx is None and name in self.subcommands:
-                error.ctx = click.Context(click.Command(name), parent=ctx, info_name=name)
+            error.ctx = error.ctx or self._invoked(ctx)
             raise
+        except InvalidArgument as error:
+            called = self._invoked(ctx)
+            options = [each for each in called.command.params if isinstance(each, click.Option)]
+            named = {name: each.opts[0] for each in options for name in (each.name, each.opts[0][2:].replace("-", "_"))}
+            if error.argument not in named:
+                raise
+            words = str(error).removeprefix(error.argument)
+            raise click.UsageError(f"{named[error.argument]}{words}", called) from error
+
+    def _invoked(self, ctx: click.Context) -> click.Context:
+        """The context of the subcommand that ran, or the group's own if there is none."""
+        command = self.get_command(ctx, ctx.invoked_subcommand or "")
+        return ctx if command is None else click.Context(command, parent=ctx, info_name=command.name)
 
     def main(
         self,
@@ -123,7 +136,9 @@ def code_of(run: Callable[[], Any], stops: Stops) -> int:
         return result if isinstance(result, int) else 0
     except click.UsageError as error:
         place = error.ctx.command_path if error.ctx else "pfabrik"
-        complain(f"{error.format_message().rstrip('.')} (see '{place} --help')")
+        examples = EXAMPLES.get(place.rpartition(" ")[2], ())
+        example = f"for example: pfabrik {examples[0]}; " if examples else ""
+        complain(f"{error.format_message().rstrip('.')} ({example}see '{place} --help')")
     except click.ClickException as error:
         complain(error.format_message())
     except (PfabrikError, NoKernels) as error:

@@ -42,7 +42,20 @@ def complete_kind(ctx: click.Context, param: click.Parameter, incomplete: str) -
     return [CompletionItem(name) for name in templates() if name.lower().startswith(incomplete.lower())]
 
 
-@click.command(context_settings={"ignore_unknown_options": True, "allow_extra_args": True})
+class WithDimensions(click.Command):
+    """A command whose options are completed to the dimensions of KIND too."""
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """As click does, with the dimensions that begin so."""
+        try:
+            options = dimension_options(starting_file(ctx.params.get("kind") or ""))
+        except (click.UsageError, pf.errors.PfabrikError):
+            options = {}
+        found = [CompletionItem(option) for option in options if incomplete and option.startswith(incomplete)]
+        return found + super().shell_complete(ctx, incomplete)
+
+
+@click.command(cls=WithDimensions, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})
 @click.argument("kind", required=False, shell_complete=complete_kind)
 @click.option(
     "--from",
@@ -110,21 +123,25 @@ def file_of(machine: str) -> str:
     return dumps(load(machine))
 
 
+def dimension_options(text: str) -> dict[str, str]:
+    """Options of the dimensions of a starting file, each with its dimension: ``--arm-length``."""
+    return {f"--{name.replace('_', '-')}": name for name in tomllib.loads(text).get("dimensions", {})}
+
+
 def with_dimensions(text: str, options: Sequence[str]) -> str:
     """A starting file with other dimensions: options `--rod 250` or `--rod=250`, in order."""
     words = [word for option in options for word in (option.split("=", 1) if option.startswith("--") else [option])]
     if not words:
         return text
     names, numbers = words[::2], words[1::2]
-    known = tomllib.loads(text).get("dimensions", {})
+    known = dimension_options(text)
     for name, number in zip(names, [*numbers, ""], strict=False):
         if not name.startswith("--"):
             raise click.UsageError(f"Got unexpected extra argument ({name})")
-        dimension = name[2:].replace("-", "_")
-        if dimension not in known:
+        dimension = known.get(name.replace("_", "-"))
+        if dimension is None:
             options_of_all = ["--from", "--output", "--force", "--list", "--json"]
-            of_kind = [f"--{each.replace('_', '-')}" for each in known]
-            raise pf.errors.UnknownName("dimension or option", name, [*of_kind, *options_of_all])
+            raise pf.errors.UnknownName("dimension or option", name, [*known, *options_of_all])
         try:
             value = float(number)
         except ValueError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,25 +12,28 @@ import click
 import pfabrik as pf
 
 from ..cells import is_finite
-from ..errors import counted, near_miss
-from ..tolerances import TOLERANCES
+from ..errors import counted
 from .arguments import (
     FINITE,
     MECH,
     TargetOptions,
     Triple,
+    actuators,
+    at_a_pose,
+    by_name,
+    completing,
     load,
-    note_left_out,
     note_unused_projection,
+    noted,
+    positive,
     projecting,
     targeted,
 )
 from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured
-from .printing import complain, json_option, note, print_answer, print_result
+from .printing import complain, json_option, print_answer, print_result
 
 if TYPE_CHECKING:
     from ..arrays import Floats
-    from ..targets import Target
 
 
 @click.command()
@@ -38,8 +41,6 @@ if TYPE_CHECKING:
 @targeted
 @projecting
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
-@click.option("--force", "force", type=float, nargs=3, help="A force on the end effector: what do actuators exert?")
-@click.option("--moment", "moment", type=float, nargs=3, help="A moment beside it, in units of force times length.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
 @json_option()
 def ik(
@@ -47,8 +48,6 @@ def ik(
     target: TargetOptions,
     options: pf.Options,
     with_margins: bool,
-    force: Triple | None,
-    moment: Triple | None,
     list_all: bool,
     as_json: bool,
 ) -> int:
@@ -59,42 +58,31 @@ def ik(
     A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit. Where links have a
     thickness, a line says how far apart they are, and the clearance that is kept.
 
-    With --force, or --moment, it also says what the actuators exert to hold it: positive drives a coordinate up.
-
     With --all only what reaches the target is listed, and the exit code is 0 if some mode keeps all limits.
     """
     if list_all and with_margins:
         raise click.UsageError("--margins is of one answer: it does not go with --all")
-    if list_all and (force or moment):
-        raise click.UsageError("--force and --moment are of one answer: they do not go with --all")
     if not target.is_given:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
-    from ..answers.margins import nearest_first
     from ..description.links import has_pairs
 
     mechanism = load(mech)
-    pose = target.of(mechanism)
-    note_left_out(ignored(mechanism, target), mechanism)
-    note_only_tilt(mechanism, pose)
+    pose = noted(mechanism, target)
     if list_all:
         note_unused_projection("--all")
         return print_modes(lambda: pf.working_modes(mechanism, pose), as_json)
     solution = pf.solve_ik(mechanism, pose, options=options)
-    wrench = (force or (0.0, 0.0, 0.0)) + (moment or ()) if force or moment else None
-    held = None if wrench is None else pf.forces(solution, wrench)
     margins = pf.margins(solution) if with_margins else None
     apart = pf.clearance(solution) if with_margins and has_pairs(mechanism) else None
 
     def as_object() -> dict[str, object]:
         plain = solution.to_dict() | ({} if solution else {"reason": solution.reason})
-        plain |= {} if held is None else {"forces": held.to_dict()}
         plain |= {} if apart is None else {"clearance": apart.to_dict()}
-        nearest = [dict(zip(("joint", "bound", "margin"), limit, strict=True)) for limit in nearest_first(solution)]
-        return plain | ({} if margins is None else {"margins": nearest})
+        return plain | ({} if margins is None else margins.to_dict())
 
     def in_words() -> str:
-        parts: list[object] = [each for each in (solution.table(), held, margins) if each is not None]
-        return "\n\n".join(map(str, parts if apart is None else [*parts, apart.in_words]))
+        parts = (solution.table(), margins, None if apart is None else apart.in_words)
+        return "\n\n".join(str(each) for each in parts if each is not None)
 
     print_answer(as_json, as_object, in_words)
     return 0 if solution else 1
@@ -109,35 +97,6 @@ def print_modes(search: Callable[[], pf.WorkingModes | pf.AssemblyModes], as_jso
         return 1
     print_result(as_json, modes)
     return 0 if any(modes) else 1
-
-
-def note_only_tilt(mechanism: pf.Mechanism, target: Target) -> None:
-    """Note what does not count of a tilt where the end effector tilts about one axis alone."""
-    from ..kinematics import tilt_axis
-    from ..overview import vector
-    from ..poses import as_poses
-    from ..targets import as_targets
-
-    axis = tilt_axis(mechanism)
-    if axis is not None and abs(as_targets(mechanism, target)[0] - as_poses(target)[0]).max() > TOLERANCES.alignment:
-        note(f"of the tilt only the angle about {vector(axis)} counts, about which alone the end effector tilts")
-
-
-def ignored(mechanism: pf.Mechanism, target: TargetOptions) -> Iterator[str]:
-    """Options, or parts of them, that the task leaves out."""
-    task, position, rpy = set(mechanism.task), target.position, target.rpy
-    if position and not task & set("xyz"):
-        yield "--position"
-    elif position:
-        for axis, value, home in zip("xyz", position, mechanism.reference_point, strict=True):
-            if axis not in task and value != home:
-                yield f"{axis} of --position"
-    if rpy and not task & {"rotation", "tilt", "yaw"}:
-        yield "--rpy"
-    elif rpy and "yaw" in task and any(rpy[:2]):
-        yield "the tilt in --rpy"
-    elif rpy and "tilt" in task and any(rpy) and not any(rpy[:2]):
-        yield "the yaw of --rpy"
 
 
 def finite_numbers(context: click.Context, parameter: click.Parameter, words: tuple[str, ...]) -> tuple[float, ...]:
@@ -231,27 +190,21 @@ speed_option = click.option(
     "speeds",
     multiple=True,
     metavar="[NAME=]VALUE",
+    shell_complete=completing(actuators, "="),
     help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
 )
 
 
 @click.command()
-@click.argument("mech", type=MECH)
-@targeted
+@at_a_pose
 @speed_option
 @json_option()
-def speed(mech: str, target: TargetOptions, speeds: tuple[str, ...], as_json: bool) -> int:
+def speed(solution: pf.Solution, speeds: tuple[str, ...], as_json: bool) -> None:
     """Tell how fast the platform may move.
 
     Along and about each axis at a pose (default: home), and along the slowest direction of all.
     """
-    mechanism = load(mech)
-    solution = pf.solve_ik(mechanism, target.of(mechanism))
-    if not solution:
-        raise click.ClickException(f"not reached: {str(solution.status).lower()}; see `pfabrik ik`")
-    highest = pf.platform_speed(solution, speed=speed_limits(mechanism, speeds) or None)
-    print_result(as_json, highest)
-    return 0
+    print_result(as_json, pf.platform_speed(solution, speed=speed_limits(solution.mechanism, speeds) or None))
 
 
 def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "--speed") -> dict[str, float]:
@@ -259,15 +212,7 @@ def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "-
     from ..kinematics import readouts
 
     shown = {readout.name: readout for readout in readouts(mechanism)}
-    limits: dict[str, float] = {}
-    for word in sorted(words, key=lambda word: "=" in word):
-        name, equals, value = word.rpartition("=")
-        if equals and name not in shown:
-            hint = near_miss(name, tuple(shown)) or f" (known: {', '.join(shown)})"
-            raise click.UsageError(f"{option} {word}: no actuator '{name}'{hint}")
-        if not is_finite(value) or float(value) <= 0.0:
-            raise click.UsageError(f"{option} {word}: found '{value}'; expected a positive number")
-        limits |= dict.fromkeys([name] if equals else shown, float(value))
+    limits = by_name(option, words, "actuator", shown, positive)
     return {name: shown[name].coordinate(value) for name, value in limits.items()}
 
 

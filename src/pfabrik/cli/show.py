@@ -14,7 +14,7 @@ import click
 import pfabrik as pf
 
 from ..checks import require_ending
-from .arguments import FINITE, MECH, STANDARD_INPUT, TargetOptions, load, named_joints, targeted
+from .arguments import FINITE, MECH, STANDARD_INPUT, TargetOptions, completing, load, named_joints, series, targeted
 from .outputs import PictureOptions, check_outputs, picture, pictured
 from .printing import note
 
@@ -44,6 +44,7 @@ def torque_map_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "--joints",
         metavar="NAME[,NAME]...",
         multiple=True,
+        shell_complete=completing(series),
         help="The joints of --torque-map.  [default: the passive ones in series]",
     )
     @click.argument("words", metavar="", nargs=-1)

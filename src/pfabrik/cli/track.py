@@ -16,7 +16,7 @@ from ..checks import require_ending
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
-from .arguments import FINITE, MECH, load, note_left_out, projecting
+from .arguments import FINITE, MECH, actuators, completing, load, note_left_out, projecting
 from .outputs import (
     OUTPUT,
     STANDARD,
@@ -235,6 +235,7 @@ def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, 
     "accelerations",
     multiple=True,
     metavar="[NAME=]VALUE",
+    shell_complete=completing(actuators, "="),
     help="Highest acceleration, likewise [deg/s² or length/s²]. Default: the file's max_acceleration.",
 )
 @click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s].")

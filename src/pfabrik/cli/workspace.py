@@ -1,11 +1,13 @@
-"""``pfabrik workspace``: how far and how much the end effector can move, and what stops it."""
+"""``pfabrik workspace`` and ``singularities``: how far the end effector can move, and where it is not controlled."""
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,7 +17,7 @@ from ..cells import is_finite
 from ..checks import require_ending
 from ..extras import require
 from ..view.save_picture import PICTURES
-from .arguments import FINITE, MECH, Triple, load, numbers_of, rpy_option
+from .arguments import FINITE, MECH, TargetOptions, Triple, answered, completing, load, numbers_of, rpy_option, targeted
 from .outputs import check_outputs, picture
 from .printing import json_option, note, print_result
 
@@ -23,19 +25,87 @@ if TYPE_CHECKING:
     from ..workspace.inscribed import Kind
 
 
+@dataclass(frozen=True)
+class SpaceOptions:
+    """What is typed for ``--over``, ``--fix``, ``--within`` and ``--resolution``; None or empty where nothing is."""
+
+    over: str | None
+    fixed: tuple[str, ...]
+    within: tuple[str, ...]
+    resolution: float | None
+
+    @property
+    def is_given(self) -> bool:
+        """True if any of the options is given."""
+        return self != SpaceOptions(None, (), (), None)
+
+    def workspace(self, mechanism: pf.Mechanism, rpy: Triple | None, **others: Any) -> pf.Workspace:
+        """The workspace that the options ask for, about an orientation [deg] if one is given."""
+        names = None if self.over is None else self.over.split(",")
+        held = {name: value for name, (value,) in pairs("--fix", self.fixed, 1).items()}
+        within = {name: (low, high) for name, (low, high) in pairs("--within", self.within, 2).items()}
+        resolution = None if self.resolution is None else in_its_unit(mechanism, names, held, self.resolution)
+        if rpy is not None:
+            others["orientation"] = pf.pose([0, 0, 0], rpy=rpy, degrees=True)[:3, :3]
+        note_slow(mechanism)
+        return pf.workspace(
+            mechanism, over=names, fixed=held or None, within=within or None, resolution=resolution, **others
+        )
+
+
+def coordinates(mechanism: pf.Mechanism) -> dict[str, None]:
+    """Names of the coordinates that a workspace of a machine may have."""
+    from ..workspace.space import free_coordinates, space_of
+
+    usual = space_of(mechanism, None, None, None, mechanism.home_pose).names
+    return dict.fromkeys((*usual, *free_coordinates(mechanism)))
+
+
+def spanning(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--over``, ``--fix``, ``--within`` and ``--resolution``, which the command gets as one `space`."""
+
+    @click.option(
+        "--over",
+        metavar="NAME,NAME[,NAME]",
+        shell_complete=completing(coordinates),
+        help="Coordinates: of x, y, z, tilt_x, tilt_y, yaw. Default: x,y,z.",
+    )
+    @click.option(
+        "--fix",
+        "fixed",
+        multiple=True,
+        metavar="NAME=VALUE",
+        shell_complete=completing(coordinates, "="),
+        help="Hold a coordinate [length or deg]. May be repeated.",
+    )
+    @click.option(
+        "--within",
+        multiple=True,
+        metavar="NAME=MIN:MAX",
+        shell_complete=completing(coordinates, "="),
+        help="Where to look [length or deg]. May be repeated.",
+    )
+    @click.option("--resolution", type=FINITE, metavar="R", help="Cells at the border [length; deg if all are angles].")
+    @functools.wraps(command)
+    def with_space(
+        *,
+        over: str | None,
+        fixed: tuple[str, ...],
+        within: tuple[str, ...],
+        resolution: float | None,
+        **parameters: Any,
+    ) -> Any:
+        return command(space=SpaceOptions(over, fixed, within, resolution), **parameters)
+
+    return with_space
+
+
 @click.command()
 @click.argument("mech", type=MECH)
-@click.option(
-    "--over", metavar="NAME,NAME[,NAME]", help="Coordinates: of x, y, z, tilt_x, tilt_y, yaw. Default: x,y,z."
-)
-@click.option(
-    "--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Hold a coordinate [length or deg]. May be repeated."
-)
+@spanning
 @rpy_option
 @click.option("--any-orientation", is_flag=True, help="Positions that are reached with some orientation or other.")
 @click.option("--tilt", type=FINITE, metavar="DEG", help="Positions where it can lean so far to every side.")
-@click.option("--within", multiple=True, metavar="NAME=MIN:MAX", help="Where to look [length or deg]. May be repeated.")
-@click.option("--resolution", type=FINITE, metavar="R", help="Cells at the border [length; deg if all are angles].")
 @click.option("--certified", is_flag=True, help="Enclose the size between two bounds that are proved, too.")
 @click.option("--largest", type=click.Choice(["sphere", "box", "cylinder"]), help="The largest that fits in.")
 @click.option("--centre", metavar="V,V[,V]", help="Its centre [length or deg]. Default: where it is largest.")
@@ -50,13 +120,10 @@ if TYPE_CHECKING:
 @json_option()
 def workspace(
     mech: str,
-    over: str | None,
-    fixed: tuple[str, ...],
+    space: SpaceOptions,
     rpy: Triple | None,
     any_orientation: bool,
     tilt: float | None,
-    within: tuple[str, ...],
-    resolution: float | None,
     certified: bool,
     largest: Kind | None,
     centre: str | None,
@@ -82,26 +149,48 @@ def workspace(
         if path.suffix.lower() in PICTURES:
             require("pictures", "matplotlib", "plot")
     mechanism = load(mech)
-    orientation = None if rpy is None else pf.pose([0, 0, 0], rpy=rpy, degrees=True)[:3, :3]
-    held = {name: value for name, (value,) in pairs("--fix", fixed, 1).items()}
-    names = None if over is None else over.split(",")
-    note_slow(mechanism)
-    space = pf.workspace(
-        mechanism,
-        over=names,
-        fixed=held or None,
-        orientation="any" if any_orientation else orientation,
-        tilt=None if tilt is None else math.radians(tilt),
-        within={name: (low, high) for name, (low, high) in pairs("--within", within, 2).items()} or None,
-        resolution=None if resolution is None else in_its_unit(mechanism, names, held, resolution),
-        certified=certified,
-    )
-    middle = None if centre is None else point(space, centre)
-    shape = None if largest is None else space.inscribed(largest, middle)
+    others: dict[str, Any] = {"orientation": "any"} if any_orientation else {}
+    others["tilt"] = None if tilt is None else math.radians(tilt)
+    found = space.workspace(mechanism, rpy, certified=certified, **others)
+    middle = None if centre is None else point(found, centre)
+    shape = None if largest is None else found.inscribed(largest, middle)
     for path in outputs:
-        write(space, path)
-    print_result(as_json, space, {} if shape is None else {"largest": shape})
-    return 0 if len(space.faces) else 1
+        write(found, path)
+    print_result(as_json, found, {} if shape is None else {"largest": shape})
+    return 0 if len(found.faces) else 1
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@targeted
+@spanning
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Picture of the map: PNG, SVG or PDF.")
+@json_option()
+def singularities(mech: str, target: TargetOptions, space: SpaceOptions, output: Path | None, as_json: bool) -> int:
+    """Tell how near singularities are, at a pose or over a workspace.
+
+    At a pose, home by default: the measure of each kind, 0 at a singularity, the motion that is nearest to being lost,
+    with the actuators that make it, and the one nearest to being gained, which no actuator holds; and the mobility.
+
+    With --over, --fix, --within, --resolution or -o, over a workspace at one orientation, as `pfabrik workspace` has
+    it: the parts between parallel singularities, the least of each measure, and the share of points near to 0.
+    """
+    check_outputs([("-o", output)], [Path(mech)], as_json=as_json)
+    if not space.is_given and output is None:
+        solution = answered(load(mech), target)
+        if solution is not None:
+            print_result(as_json, pf.singularity(solution), {"mobility": pf.mobility(solution.mechanism)})
+        return 0 if solution else 1
+    if target.position or target.joints:
+        raise click.UsageError("--position and --joint are of one pose: over a workspace, --fix holds a coordinate")
+    mechanism = load(mech)
+    found = pf.singularity_map(mechanism, space.workspace(mechanism, target.rpy))
+    if output is not None:
+        with picture(output):
+            found.plot()
+        click.echo(f"wrote {output}", err=True)
+    print_result(as_json, found)
+    return 0 if len(found.points) else 1
 
 
 def note_slow(mechanism: pf.Mechanism) -> None:

@@ -116,7 +116,9 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
         raise InvalidArgument("solution", "an answer that is INVALID", "one with a configuration")
     limits = limits_of(mechanism, "speed", speed)
     if not np.isfinite(limits).any():
-        raise InvalidArgument("speed", f"'{mechanism.name}' without max_speed", "a limit: in the mechanism, or speed")
+        raise InvalidArgument(
+            "speed", f"'{mechanism.name}' without max_speed", "a limit of speed, given or in the mechanism"
+        )
     inverse, forward = inverse_jacobian(solution), forward_jacobian(solution)
     sizes = np.repeat([mechanism.characteristic_length, 1.0], 3)[: inverse.shape[1]]
     twists = _twists(solution)[:, : len(sizes)]

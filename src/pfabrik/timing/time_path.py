@@ -65,7 +65,9 @@ def time_path(
     every = 1.0 / require_positive("rate", rate)
     if not np.isfinite([*speeds, *accelerations, most_platform]).any():
         found = f"'{mechanism.name}' without max_speed and max_acceleration"
-        raise InvalidArgument("speed", found, "a limit: in the mechanism, or speed, acceleration or platform_speed")
+        raise InvalidArgument(
+            "speed", found, "a limit of speed, acceleration or platform speed, given or in the mechanism"
+        )
     if not len(track):
         raise InvalidArgument("track", "an empty path", "two steps or more that differ")
     refuse_leaps(track)

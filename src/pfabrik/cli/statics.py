@@ -1,0 +1,186 @@
+"""``pfabrik forces``, ``stiffness``, ``accuracy``, ``transmission`` and ``clearance``: of a machine at rest."""
+
+from __future__ import annotations
+
+import click
+
+import pfabrik as pf
+
+from ..cells import is_finite
+from .arguments import FINITE, Triple, actuators, at_a_pose, by_name, completing, joints, numbers_of, positive
+from .printing import Result, json_option, print_result
+
+
+def bodies(mechanism: pf.Mechanism) -> tuple[str, ...]:
+    """Names of the bodies that move."""
+    return tuple(name for name in mechanism.bodies if name != mechanism.base)
+
+
+@click.command()
+@at_a_pose
+@click.option("--force", type=FINITE, nargs=3, metavar="X Y Z", help="What acts on the end effector.")
+@click.option("--moment", type=FINITE, nargs=3, metavar="X Y Z", help="Beside it, or alone [force times length].")
+@click.option(
+    "--load",
+    "loads",
+    multiple=True,
+    metavar="BODY=MASS,X,Y,Z",
+    shell_complete=completing(bodies, "="),
+    help="A mass and its centre, at home.",
+)
+@click.option(
+    "--gravity", type=FINITE, nargs=3, default=(0, 0, -9.81), metavar="X Y Z", help="Of masses.  [default: 0 0 -9.81]"
+)
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="[NAME=]VALUE|MIN:MAX",
+    shell_complete=completing(actuators, "="),
+    help="Of an actuator, or of all.",
+)
+@click.option("--reactions", is_flag=True, help="List what every joint transmits, and forces along rods.")
+@json_option()
+def forces(
+    solution: pf.Solution,
+    force: Triple | None,
+    moment: Triple | None,
+    loads: tuple[str, ...],
+    gravity: Triple,
+    limits: tuple[str, ...],
+    reactions: bool,
+    as_json: bool,
+) -> int:
+    """Tell what the actuators exert to hold a load.
+
+    At a pose, home by default. Positive drives a coordinate up. Forces are in any unit, moments and torques in it times
+    the unit of length, and masses in the one that --gravity makes such forces of: kg, say, and N.
+
+    With --limit it says too how large a force may come on top of --force and --moment, in whichever direction.
+    """
+    if not (force or moment or loads or limits):
+        raise click.UsageError("no load: give --force, --moment or --load; or --limit, for what can be held")
+    if loads and limits:
+        raise click.UsageError("--limit goes with --force and --moment, not with --load")
+    wrench = (force or (0.0, 0.0, 0.0)) + (moment or ())
+    held = pf.forces(solution, wrench, loads=dict(map(load_of, loads)), gravity=gravity)
+    others: dict[str, Result] = {"reactions": held.reactions} if reactions else {}
+    if limits:
+        bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of)
+        others["capacity"] = pf.wrench_capacity(solution, bounds, wrench=wrench)
+    print_result(as_json, held, others)
+    return int(bool(held.reason))
+
+
+def load_of(words: str) -> tuple[str, tuple[float, list[float]]]:
+    """A body, and its mass and centre, from words such as ``platform=5,0,0,190``."""
+    body, _, numbers = words.rpartition("=")
+    mass, *centre = numbers_of("--load BODY=MASS,X,Y,Z", numbers, (4,))
+    return body, (mass, centre)
+
+
+def bounds_of(words: str) -> float | tuple[float, float]:
+    """A positive number, or a lowest and a highest; a ValueError says what was expected."""
+    low, colon, high = words.partition(":")
+    if not colon:
+        return positive(words)
+    if not (is_finite(low) and is_finite(high)):
+        raise ValueError("a positive number, or MIN:MAX")
+    return float(low), float(high)
+
+
+def rods(mechanism: pf.Mechanism) -> tuple[str, ...]:
+    """Names of the rods."""
+    from ..statics.forces import rods_of
+
+    return rods_of(mechanism).names
+
+
+@click.command()
+@at_a_pose
+@click.option(
+    "--k",
+    multiple=True,
+    required=True,
+    metavar="[NAME=]VALUE",
+    shell_complete=completing(actuators, "="),
+    help="Of an actuator, or all [force/length, torque/rad]",
+)
+@click.option(
+    "--rod",
+    "given",
+    multiple=True,
+    metavar="[NAME=]VALUE",
+    shell_complete=completing(rods, "="),
+    help="Of a rod, or all [force/length]. Default: rigid.",
+)
+@json_option()
+def stiffness(solution: pf.Solution, k: tuple[str, ...], given: tuple[str, ...], as_json: bool) -> int:
+    """Tell how stiff a machine is whose actuators and rods give.
+
+    At a pose, home by default: along and about each axis, the force or moment that moves the end effector by one unit
+    of length, or by one rad.
+    """
+    by_actuator = by_name("--k", k, "actuator", actuators(solution.mechanism), positive)
+    by_rod = by_name("--rod", given, "rod", rods(solution.mechanism), positive)
+    found = pf.stiffness(solution, by_actuator, rods=by_rod or None)
+    print_result(as_json, found)
+    return int(bool(found.reason))
+
+
+def error_names(mechanism: pf.Mechanism) -> dict[str, None]:
+    """Names of actuators, and of joints."""
+    return dict.fromkeys((*actuators(mechanism), *joints(mechanism)))
+
+
+@click.command()
+@at_a_pose
+@click.option(
+    "--error",
+    "errors",
+    multiple=True,
+    required=True,
+    metavar="[NAME=]VALUE",
+    shell_complete=completing(error_names, "="),
+    help="How far an actuator or all may be off [deg or length], or the play of a joint [length].",
+)
+@click.option("--rms", is_flag=True, help="Errors are standard deviations, not bounds.")
+@json_option()
+def accuracy(solution: pf.Solution, errors: tuple[str, ...], rms: bool, as_json: bool) -> int:
+    """Tell how far off a pose is if actuators are off and joints have play.
+
+    At a pose, home by default. The error of an actuator is half its resolution and half its backlash together; play of
+    a joint is half the clearance of its diameter.
+    """
+    from ..kinematics import readouts
+
+    drives = {readout.name: readout for readout in readouts(solution.mechanism)}
+    bounds = by_name("--error", errors, "actuator or joint", error_names(solution.mechanism), positive, drives)
+    by_unit = {name: drives[name].coordinate(value) if name in drives else value for name, value in bounds.items()}
+    found = pf.accuracy(solution, by_unit, "rms" if rms else "worst")
+    print_result(as_json, found)
+    return int(bool(found.reason))
+
+
+@click.command()
+@at_a_pose
+@json_option()
+def transmission(solution: pf.Solution, as_json: bool) -> int:
+    """Tell the velocity and force of the end effector per actuator.
+
+    At a pose, home by default: in directions square to each other, the fastest first.
+    """
+    found = pf.transmission(solution)
+    print_result(as_json, found)
+    return int(bool(found.reason))
+
+
+@click.command()
+@at_a_pose
+@json_option()
+def clearance(solution: pf.Solution, as_json: bool) -> None:
+    """Tell how far apart links are, and which two are nearest.
+
+    At a pose, home by default. Links have the thickness that the file gives legs, or the shapes of its [[body]] tables.
+    """
+    print_result(as_json, pf.clearance(solution))
