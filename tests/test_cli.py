@@ -430,6 +430,7 @@ REFUSED = [
     ("clearance stewart", "no link has a thickness: give legs one, or add [[body]] tables"),
     ("speed five_bar", "--speed: found 'Planar 5-bar' without max_speed; expected a limit of speed, given or in"),
     ("singularities stewart --fix z=190 --position 0 0 190", "--position and --joint are of one pose"),
+    ("singularities stewart -o map.stl", "'map.stl'; expected a name that ends in .png, .svg or .pdf"),
     # travel
     ("travel stewart --position 0 0 900", "cannot start there: projected"),
     ("travel stewart --along 0 0 0", "along"),

@@ -41,6 +41,50 @@ def test_forces_of_a_batch_show_the_largest_of_each_actuator() -> None:
     assert shown == pytest.approx(dict(zip(stewart.actuator_names, held.actuators.max(axis=0), strict=True)), rel=1e-5)
 
 
+def test_reactions_show_every_component_and_of_a_batch_the_largest() -> None:
+    five_bar = pf.load("five_bar")
+    many = pf.forces(pf.solve_ik(five_bar, [(0, 10, 180), (0, 10, 200)]), [0, 0, -20])
+    for held, places in (
+        (many, (..., [1, 2, 3])),
+        (pf.forces(pf.solve_ik(five_bar, (0, 10, 180)), [0, 0, -20]), [1, 2, 3]),
+    ):
+        table = held.reactions.table()
+        (shown,) = [[float(cell) for cell in row[2:5]] for row in table.rows if row[0] == "p1"]
+        assert np.abs(shown) == pytest.approx(
+            np.abs(np.reshape(held.reactions["p1"][places], (-1, 3))).max(axis=0), rel=1e-4
+        )
+        assert [row[1] for row in table.rows] == ["-"] * 5 and "p1 fx my mz" in str(table)
+        assert [float(pull) for _, pull in table.more[0].rows] == pytest.approx(
+            [np.ravel(pull)[np.abs(np.ravel(pull)).argmax()] for pull in held.rods.values()], rel=1e-4
+        )
+
+
+def test_what_no_load_moves_is_rigid() -> None:
+    rows = {
+        way: said for way, said, _ in pf.stiffness(pf.solve_ik(pf.load("delta"), (10, 5, -200)), 500.0).table().rows
+    }
+    assert [way for way, said in rows.items() if said == "rigid"] == ["about x", "about y", "about z"]
+
+
+def test_singular_motions_are_named_with_their_actuators() -> None:
+    """A crank of the 5-bar in line with its forearm, and a hexapod turned by a quarter, which gives in a screw."""
+    shoulder, reach = np.array([-50.0, 0.0]), np.hypot(66.0, 88.0) + np.hypot(116.0, 87.0)
+    along = np.array([0.3, np.sqrt(1.0 - 0.09)])
+    free, tip = pf.load("five_bar").without_limits(), shoulder + reach * along
+    path = np.linspace((0.0, 180.0), tip, 40) * (1.0, 1.0)
+    stretched = pf.track(free, np.column_stack([np.zeros(40), path]))[-1]
+    lost, _ = pf.singularity(stretched).motions
+    assert re.fullmatch(
+        r"nearest to being lost: a translation along \(0, 0.3\d*, 0.95\d*\), for which p1 would move most", lost
+    )
+    stewart = pf.load("stewart").without_limits()
+    turned = [pf.pose([0, 0, 195], rotvec=[0, 0, yaw]) for yaw in np.radians([0, 30, 60, 80, 90])]
+    found = pf.singularity(pf.track(stewart, np.stack(turned)))
+    assert found.motions == []
+    _, gained = pf.singularity(pf.track(stewart, np.stack(turned))[-1]).motions
+    assert re.search(r"gained: a screw of -154.7 mm a turn about \(0, 0, 1\) through \(0, 0, 195\), with all", gained)
+
+
 def test_forces_say_which_rows_have_none() -> None:
     stewart, given = pf.load("stewart"), np.full((3, 4, 4), np.nan)
     mark = pf.Options(on_invalid="mark")
@@ -58,9 +102,10 @@ def test_forces_say_which_rows_have_none() -> None:
     [
         (pf.transmission, lambda found: found.translation.velocity[..., 0]),
         (partial(pf.accuracy, errors=0.1), lambda found: found.position),
+        (partial(pf.stiffness, k=500.0), lambda found: 1.0 / found.compliance[..., 0, 0]),
         (partial(pf.wrench_capacity, limits=(-100.0, 100.0)), lambda found: found.radius),
     ],
-    ids=["transmission", "accuracy", "wrench capacity"],
+    ids=["transmission", "accuracy", "stiffness", "wrench capacity"],
 )
 def test_first_order_results_show_numbers_ranges_and_reasons(
     asked: Callable[..., Any], shown: Callable[..., Any]

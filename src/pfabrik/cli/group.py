@@ -76,7 +76,7 @@ class CommandGroup(click.Group):
             called = self._invoked(ctx)
             options = [each for each in called.command.params if isinstance(each, click.Option)]
             named = {name: each.opts[0] for each in options for name in (each.name, each.opts[0][2:].replace("-", "_"))}
-            if error.argument not in named:
+            if error.argument not in named or error.argument == "path":  # of whichever option: the name says it
                 raise
             words = str(error).removeprefix(error.argument)
             raise click.UsageError(f"{named[error.argument]}{words}", called) from error

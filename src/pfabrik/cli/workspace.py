@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -184,10 +185,11 @@ def singularities(mech: str, target: TargetOptions, space: SpaceOptions, output:
     if target.position or target.joints:
         raise click.UsageError("--position and --joint are of one pose: over a workspace, --fix holds a coordinate")
     mechanism = load(mech)
-    found = pf.singularity_map(mechanism, space.workspace(mechanism, target.rpy))
-    if output is not None:
-        with picture(output):
+    with nullcontext() if output is None else picture(output):
+        found = pf.singularity_map(mechanism, space.workspace(mechanism, target.rpy))
+        if output is not None:
             found.plot()
+    if output is not None:
         click.echo(f"wrote {output}", err=True)
     print_result(as_json, found)
     return 0 if len(found.points) else 1
