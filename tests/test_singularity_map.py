@@ -93,6 +93,14 @@ def test_parts_have_one_sign_each(free_five_bar: pf.Workspace) -> None:
         found.parts[np.linalg.norm(found.points - place, axis=1).argmin()] for place in ([0.0, 150.0], [0.0, 10.0])
     )
     assert above != between
+    table, plain = found.table(), found.to_dict()
+    shares = [f"{size:.1%}" for size in plain["parts"]]
+    assert table.lines == [
+        f"{len(found.points)} points over y z: {len(shares)} parts between parallel singularities ({', '.join(shares)})"
+    ]
+    parallel = np.asarray(found.measures.parallel)
+    assert plain["least"]["parallel"] == parallel.min() and plain["near"]["parallel"] == np.mean(parallel < 0.1)
+    assert table.rows[1] == ("parallel", f"{parallel.min():.3g}", f"{np.mean(parallel < 0.1):.1%}")
 
 
 def test_a_path_through_a_singularity_is_told_where_and_redundant_machines_have_no_sides() -> None:
