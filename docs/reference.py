@@ -107,8 +107,8 @@ PAGES = {
         "Controllers and learning",
         "`actuation` maps the joints of a serial model to motors, and back. The exports write kinematics that need "
         "this library no more: C for a controller, tensors for learning, a page for a browser.",
-        "actuation Actuation export_c export_ros2_control export_ros2_node export_web export_tensors export_numpy export_torch "
-        "export_jax",
+        "actuation Actuation export_c export_ros2_control export_ros2_node export_web export_tensors export_numpy "
+        "export_torch export_jax",
         "actuation.named_values.Mapped actuation.actuation.Gains actuation.actuation.LimitMargin "
         "actuation.drive_limits.HalfSpaces actuation.hull.Hull actuation.sample.Sample",
     ),

@@ -35,11 +35,15 @@ FIRMWARE = {
 """What the firmware of that printer identified: github.com/phnxdrgn536/FLSun-v400 @e0368ae (CC0-1.0)."""
 
 
+def klipper_settings() -> str:
+    """The settings of a printer, from the program of the page on calibration."""
+    (settings,) = re.findall(r'"printer\.cfg"\)\.write_text\("""\\\n(.*?)"""\)', PROGRAM.read_text("utf-8"), re.DOTALL)
+    return str(settings)
+
+
 @pytest.fixture
 def printer(tmp_path: Path) -> KlipperDelta:
-    """The printer of the page on calibration, whose settings are in the program of that page."""
-    (settings,) = re.findall(r'"printer\.cfg"\)\.write_text\("""\\\n(.*?)"""\)', PROGRAM.read_text("utf-8"), re.DOTALL)
-    (tmp_path / "printer.cfg").write_text(settings, encoding="utf-8")
+    (tmp_path / "printer.cfg").write_text(klipper_settings(), encoding="utf-8")
     return pf.read_klipper(tmp_path / "printer.cfg")
 
 

@@ -8,7 +8,6 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import warnings
 from collections.abc import Callable
@@ -33,6 +32,7 @@ from pfabrik.export.rod_lengths import uneven_rods
 from pfabrik.files import loads
 from pfabrik.rotations import to_rpy
 from pfabrik.view.live.viewer import Viewer
+from test_calibration import klipper_settings
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -585,7 +585,7 @@ def test_examples_of_the_help_answer(monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.importorskip(needed)
     monkeypatch.setattr(Viewer, "wait", lambda _: None)
     monkeypatch.setattr("webbrowser.open", lambda _: None)
-    shutil.copy(Path(__file__).parents[1] / "examples" / "data" / "printer.cfg", ".")
+    Path("printer.cfg").write_text(klipper_settings(), encoding="utf-8")
     Path("robot.xml").write_text(pf.interop.to_mjcf(STEWART), encoding="utf-8")
     Path("path.csv").write_text("x,y,z\n0,0,190\n5,0,195\n", encoding="utf-8")
     Path("part.gcode").write_text("G1 X0 Y0 Z5 F3000\nG1 X5 Y0\nG1 X5 Y5 Z6\n", encoding="utf-8")
@@ -616,6 +616,7 @@ def test_every_command_and_option_that_is_named_exists() -> None:
     commands = {name: main.get_command(context, name) for name in main.list_commands(context)}
     options = {option for each in commands.values() for param in each.params for option in param.opts}
     known = options | {"--arm", "--arm-length", "--delta-radius", "--help"}  # the first three of starting files
+    known |= {"--once", "--packages-select"}  # of the commands of ROS 2
     named, called = re.compile(r"(?<![\w-])(?<!halcompile )--[a-z][a-z0-9-]*"), re.compile(r"`pfabrik ([a-z]+)")
     for path in (Path(pf.__file__).parent).rglob("*.py"):
         source = path.read_text(encoding="utf-8")
