@@ -180,7 +180,8 @@ def canvas_on(ax: Any, eye: Eye, look: Look, *, is_plane: bool = False) -> Canva
         for axis in (ax.xaxis, ax.yaxis):
             axis.label.set_size(SMALL + 1.0)
     else:
-        ax.axis("off")
+        ax.set(xticks=[], yticks=[], facecolor=look.paper)
+        ax.spines[:].set_visible(False)
     return Canvas(ax, eye, look, is_plane)
 
 

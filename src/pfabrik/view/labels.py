@@ -13,7 +13,7 @@ from .canvas import Canvas
 DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 30))), np.sin(np.radians(range(0, 360, 30)))], axis=1)
 """Directions from its joint in which a name is tried, to the right first."""
 
-DISTANCES = (9.0, 16.0)
+DISTANCES = (9.0, 16.0, 27.0)
 """Distances at which it is tried, one after the other [points]."""
 
 OFF = 6.0
@@ -28,8 +28,8 @@ DOTS = 32
 APART = 1.0
 """Least distance between two names [points]."""
 
-OUTSIDE = 4.0
-"""What it counts for a name to be outside the axes, against covering something."""
+WORDS, OUTSIDE = 20.0, 4.0
+"""Weight of the area of other words, and of that beyond the axes, against an area of lines."""
 
 
 def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Floats) -> None:
@@ -50,9 +50,8 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
     squares = [(place, JOINT) for place in pixels(canvas.seen(joints))]
     squares += [(place, LINE) for place in pixels(canvas.seen(dots))]
     taken = [np.concatenate([place - half * point, place + half * point]) for place, half in squares]
-    legend = axes.get_legend()
-    taken += [] if legend is None else [legend.get_window_extent().extents]
-    taken += [each.get_window_extent().extents for each in axes.texts if each not in texts and each.get_text()]
+    others = [*([axes.get_legend()] if axes.get_legend() else []), *(text for text in axes.texts if text.get_text())]
+    words = [other.get_window_extent().extents for other in others if other not in texts]
     box = axes.get_window_extent().extents
     for text in texts:
         at = pixels(text.xy)
@@ -61,15 +60,16 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
         offsets = np.array([way * off * point + way * size / 2.0 for off in DISTANCES for way in DIRECTIONS])
         boxes = np.concatenate([at + offsets - size / 2.0, at + offsets + size / 2.0], axis=1)
         far = np.repeat(DISTANCES, len(DIRECTIONS)) * OFF * point**2
-        covered = _overlaps(boxes, np.array(taken), APART * point)
-        outside = np.prod(size) - _overlaps(boxes, box[None], 0.0)
+        covered = _overlaps(boxes, taken, APART * point) + WORDS * _overlaps(boxes, words, APART * point)
+        outside = np.prod(size) - _overlaps(boxes, [box], 0.0)
         best = int(np.argmin(covered + OUTSIDE * outside + far))
-        taken.append(boxes[best])
+        words.append(boxes[best])
         text.set_position(offsets[best] / point)
 
 
-def _overlaps(boxes: Floats, taken: Floats, apart: float) -> Floats:
+def _overlaps(boxes: Floats, taken: Sequence[Floats], apart: float) -> Floats:
     """The areas that boxes (n, 4: left, bottom, right, top), widened, share with others (k, 4), (n,) [pixels²]."""
-    low = np.maximum(boxes[:, None, :2] - apart, taken[:, :2])
-    high = np.minimum(boxes[:, None, 2:] + apart, taken[:, 2:])
+    others = np.reshape(taken, (-1, 4))
+    low = np.maximum(boxes[:, None, :2] - apart, others[:, :2])
+    high = np.minimum(boxes[:, None, 2:] + apart, others[:, 2:])
     return np.asarray(np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1))
