@@ -75,8 +75,7 @@ def section(name: str) -> str:
         f"\n## {name}\n",
         f"**{first}**\n",
         *[f"{' '.join(rest)}\n"] * bool(rest),
-        "".join(f"![{mechanism.name}]({PICTURES.name}/{picture(name, theme).name}#only-{theme})" for theme in LOOKS)
-        + "\n",
+        f"![{mechanism.name}]({PICTURES.name}/{name}.png)\n",
         "| | |\n|---|---|",
         *[f"| {key} | {fact} |" for key, fact in facts.items()],
     ]
@@ -135,10 +134,10 @@ def picture(name: str, theme: str = "light") -> Path:
 
 
 def draw_picture(path: Path, name: str, theme: Theme) -> None:
-    """Draw a machine at home in few colours, its ground left clear; the file names neither program nor time."""
+    """Draw a machine at home in few colours, for dark pages on no ground; the file names neither program nor time."""
     matplotlib.use("Agg")
     figure = pf.plot(pf.load(name), theme=theme).figure
-    for ground in (figure.patch, *(axes.patch for axes in figure.axes)):
+    for ground in (figure.patch, *(axes.patch for axes in figure.axes)) if theme == "dark" else ():
         ground.set_alpha(0.0)
     figure.set_dpi(DPI)
     figure.canvas.draw()
