@@ -1,4 +1,4 @@
-"""Take docs/figures/viewer.png and page.png: the viewer, and a page, in headless Chromium.
+"""Take docs/figures/viewer.png, viewer_singular.png and page.png: the viewer, and a page, in headless Chromium.
 
 Run it as `python docs/viewer.py`.
 """
@@ -27,8 +27,10 @@ def main() -> None:
     """Write the pictures."""
     with sync_playwright() as started:
         chromium = started.chromium.launch(executable_path=shutil.which("chromium"), args=SOFTWARE)
-        take_viewer(chromium, FIGURES / "viewer.png")
-        Image.open(FIGURES / "viewer.png").convert("RGB").quantize(COLOURS).save(FIGURES / "viewer.png", optimize=True)
+        machine, free = pf.load("stewart"), pf.load("five_bar").without_limits()
+        beyond = pf.solve_ik(machine, pf.pose((60, 30, 270), rpy=(0, 10, 0), degrees=True))
+        take_viewer(chromium, beyond, FIGURES / "viewer.png")
+        take_viewer(chromium, pf.solve_ik(free, (0, 0, 62)), FIGURES / "viewer_singular.png", "singularities")
         take_page(chromium, FIGURES / "page.png")
         Image.open(FIGURES / "page.png").convert("RGB").quantize(256, kmeans=3).save(
             FIGURES / "page.png", optimize=True
@@ -36,18 +38,21 @@ def main() -> None:
         chromium.close()
 
 
-def take_viewer(chromium: Browser, picture: Path) -> None:
-    """A target beyond a machine's strokes, in the viewer."""
-    machine = pf.load("stewart")
-    with pf.view(machine) as viewer:
+def take_viewer(chromium: Browser, solution: pf.Solution, picture: Path, *switches: str) -> None:
+    """An answer in the viewer, after home, with some switches on."""
+    with pf.view(solution.mechanism) as viewer:
         page = chromium.new_page(viewport=SIZE)
         page.goto(viewer.url)
         page.add_style_tag(content=WITHOUT_NOTICES)
         page.locator("[data-pfabrik=status]").wait_for()
         page.wait_for_timeout(SETTLED)
-        viewer.show(pf.solve_ik(machine, pf.pose((60, 30, 270), rpy=(0, 10, 0), degrees=True)))
+        for switch in switches:
+            page.get_by_label(switch, exact=True).click(force=True)
+        page.mouse.move(0, 0)
+        viewer.show(solution)
         page.wait_for_timeout(SETTLED)
         page.screenshot(path=picture, timeout=0)
+    Image.open(picture).convert("RGB").quantize(COLOURS).save(picture, optimize=True)
 
 
 def take_page(chromium: Browser, picture: Path) -> None:
