@@ -4,7 +4,7 @@ const fs = require("fs");
 const scripts = process.argv.slice(2).map((path) => fs.readFileSync(path, "utf-8"));
 const { kernels, machine, targets, path, values, link } = JSON.parse(fs.readFileSync(0, "utf-8"));
 
-const { Engine, Session } = new Function(`${scripts.join("\n")}; return { Engine, Session };`)();
+const { Engine, Session, singularityOf } = new Function(`${scripts.join("\n")}; return { Engine, Session, singularityOf };`)();
 const named = (limits) => limits.map(({ joint, bound }) => `${joint} ${bound}`);
 const plain = ({ status, pose, actuators, limits }) => ({ status, pose, actuators, limits: named(limits) });
 
@@ -15,7 +15,7 @@ async function main() {
   const followed = path.map((target) => {
     const answer = engine.ask(target, last);
     last = answer.actuators ? answer : last;
-    return plain(answer);
+    return answer;
   });
   const travel = engine.travel(home).map(({ distance, ...rest }) => ({ ...rest, distance: Number.isFinite(distance) ? distance : null }));
   const session = new Session(machine, engine);
@@ -31,9 +31,10 @@ async function main() {
   session.redo();
   const answers = {
     inverse: targets.map((target) => plain(engine.ask(target))),
-    followed,
+    followed: followed.map(plain),
     forward: values.map((each) => plain(engine.assemble(each))),
     travel,
+    singular: [home, ...followed.filter(({ status }) => status === 0)].map((from) => singularityOf(engine, from)),
     modes: engine.modes(home).map(plain),
     steps: { asked: steps[0], kept: kept.answer.pose, undone, redone: session.answer.pose },
   };

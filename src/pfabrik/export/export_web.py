@@ -34,7 +34,10 @@ FOLDER = Path(__file__).parent
 UNBOUNDED = 2**62
 """A number of steps that no search takes."""
 
-SCRIPTS = ("vectors", "meshes", "canvas", "scene", "gizmo", "engine", "session", "panel", "gestures", "page")
+SCRIPTS = (
+    *("vectors", "meshes", "canvas", "scene", "gizmo", "engine"),
+    *("singular", "session", "panel", "gestures", "page"),
+)
 """Files of `web`, in the order in which a page has them."""
 
 

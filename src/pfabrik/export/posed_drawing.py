@@ -150,7 +150,7 @@ class _Drawing:
                 ends = [self.indices[name] for name in joints]
                 out.append(common | {"kind": "bar", "radius": radius, "ends": ends})
             elif shape.body in self.bodies:
-                vertices = np.round(solid.vertices / self.length, 5).ravel().tolist()
+                vertices = np.round(solid.vertices / self.length, 4).ravel().tolist()
                 frame = self.bodies[shape.body]
                 mesh = {"kind": "mesh", "frame": frame, "vertices": vertices, "faces": solid.faces.ravel().tolist()}
                 out.append(common | mesh | {"radius": 1.0})

@@ -56,6 +56,7 @@ class Page {
     if (session.answer.actuators) {
       this.showSlice();
       panel.showTravel(session.engine.travel(session.answer));
+      panel.showSingular(singularityOf(session.engine, session.answer));
       panel.showModes(session.engine.modes(session.answer));
     }
     this.later = null;

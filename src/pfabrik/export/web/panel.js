@@ -7,6 +7,10 @@ function made(tag, properties = {}, ...inside) {
 }
 const chip = (text, className = "") => made("span", { className: `chip ${className}`, textContent: text });
 const MOST_CHIPS = 5;
+const MEANINGS = {
+  serial: "platform speed per actuator speed, at least; 0 at a dead point of a leg",
+  parallel: "actuator speed per platform speed, at least; 0 where locked actuators hold nothing",
+};
 
 /** Numbers as the panel shows them: small machines in metres are shown in millimetres. */
 class Wording {
@@ -200,6 +204,24 @@ class Panel {
     button.disabled = isZero || !Number.isFinite(distance);
     button.onclick = () => this.session.ask(pose);
     return button;
+  }
+
+  /** Bars of the measures as shares of those at home, purple where they are small. */
+  showSingular(measures) {
+    this.atHome ??= singularityOf(this.session.engine, this.session.engine.home) ?? {};
+    const rows = ["serial", "parallel"].map((kind) => {
+      const share = measures ? measures[kind] / this.atHome[kind] : NaN;
+      const percent = clamp(Math.round(100 * share), 0, 100);
+      const fill = made("i");
+      fill.style.width = `${percent}%`;
+      fill.style.background = `color-mix(in srgb, var(--blue) ${percent}%, var(--singular))`;
+      const leg = kind === "serial" && measures?.leg && share < 0.5 ? `: ${measures.leg}` : "";
+      const title = `${MEANINGS[kind]}: ${measures?.[kind].toPrecision(3)}, at home ${this.atHome[kind]?.toPrecision(3)}`;
+      const [name, value] = [made("span", { textContent: kind + leg }), made("output", { textContent: `${(100 * share).toFixed(0)} %` })];
+      return made("div", { className: "row", title }, name, made("span", { className: "bar" }, fill), value);
+    });
+    document.querySelectorAll(".near").forEach((each) => (each.hidden = !(this.atHome.serial > 1e-6 && measures)));
+    $("div.near").replaceChildren(...rows);
   }
 
   showModes(modes) {
