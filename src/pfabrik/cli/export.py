@@ -93,7 +93,9 @@ def complete_format(ctx: click.Context, param: click.Parameter, incomplete: str)
     help="Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.",
 )
 @click.option(
-    "--name", metavar="NAME", help="Of c, c-float, --ros2-...: what names begin with.  [default: pfk, or FOLDER's]"
+    "--name",
+    metavar="NAME",
+    help="Of c, c-float and packages of ROS 2: what names begin with.  [default: pfk, or FOLDER's]",
 )
 @click.option(
     "--parts",
