@@ -617,7 +617,7 @@ def test_every_command_and_option_that_is_named_exists() -> None:
     options = {option for each in commands.values() for param in each.params for option in param.opts}
     known = options | {"--arm", "--arm-length", "--delta-radius", "--help"}  # the first three of starting files
     known |= {"--once", "--packages-select"}  # of the commands of ROS 2
-    named, called = re.compile(r"(?<![\w-])(?<!halcompile )--[a-z][a-z0-9-]*"), re.compile(r"`pfabrik ([a-z]+)")
+    named, called = re.compile(r"(?<![\w-])(?<!halcompile )--(?!pf-)[a-z][a-z0-9-]*"), re.compile(r"`pfabrik ([a-z]+)")
     for path in (Path(pf.__file__).parent).rglob("*.py"):
         source = path.read_text(encoding="utf-8")
         assert set(called.findall(source)) <= set(commands), path
