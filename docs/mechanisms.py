@@ -136,14 +136,19 @@ def picture(name: str, theme: str = "light") -> Path:
 def draw_picture(path: Path, name: str, theme: Theme) -> None:
     """Draw a machine at home in few colours, for dark pages on no ground; the file names neither program nor time."""
     matplotlib.use("Agg")
+    is_clear = theme == "dark"
     figure = pf.plot(pf.load(name), theme=theme).figure
-    for ground in (figure.patch, *(axes.patch for axes in figure.axes)) if theme == "dark" else ():
+    for ground in (figure.patch, *(axes.patch for axes in figure.axes)) if is_clear else ():
         ground.set_alpha(0.0)
     figure.set_dpi(DPI)
     figure.canvas.draw()
     image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba()))
     pyplot.close(figure)
-    image.quantize(COLOURS, method=Image.Quantize.FASTOCTREE).save(path, optimize=True)
+    if is_clear:
+        few = image.quantize(COLOURS, method=Image.Quantize.FASTOCTREE)  # the only way that knows what is clear
+    else:
+        few = image.convert("RGB").quantize(COLOURS)
+    few.save(path, optimize=True)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from ..skeleton import Line, Mark, Skeleton, checked_shown, skeleton_of
 from ..tolerances import TOLERANCES
 from .canvas import LETTER, ON_TOP, Canvas, canvas_on, new_canvas
 from .crossings import far_to_near
-from .eye import Eye, View, eye_for, eye_of, eye_on
+from .eye import SAME, Eye, View, eye_for, eye_of, eye_on
 from .labels import place_names
 from .looks import HELD, MARKERS, Look, Theme, look_of
 
@@ -47,7 +47,7 @@ place [points]."""
 MARKS_APART = 24.0
 """Distance between neighbouring joints from which on lines and markers have their usual size [points]."""
 
-PENS = (0.5, 1.25)
+PENS = (0.65, 1.25)
 """Least and greatest size of lines and markers, against the usual."""
 
 PLATE = 0.93
@@ -238,10 +238,14 @@ def _strokes(skeleton: Skeleton, look: Look) -> list[Stroke]:
     nearest = {solid.body for solid in skeleton.solids if solid.is_nearest}
     stopped = {solid.body for solid in skeleton.solids if solid.is_stopped}
     parts = [line for line in skeleton.parts if line.part.role != "base"]
+    corners = np.vstack([np.zeros((0, 3)), *(line.corners for line in parts if line.part.kind == "plate")])
+    off = np.abs(corners - skeleton.reference).max(axis=1)
+    is_at_corner = bool((off <= SAME * _extent(skeleton.points)).any())
     barrels: dict[tuple[str, ...], Line] = {line.part.joints: line for line in parts if line.part.kind == "barrel"}
     for line in parts:
         part = line.part
-        if part.kind == "barrel" or float(np.ptp(line.outline, axis=0).max()) == 0.0:
+        is_stem = () in part.ends  # which a corner at the reference point makes needless
+        if part.kind == "barrel" or _extent(line.outline) == 0.0 or (is_stem and is_at_corner):
             continue
         drawn = [line, *([barrels[part.joints]] if part.joints in barrels else [])]
         widths = tuple(float(np.sqrt(each.part.radius)) for each in drawn)
@@ -250,6 +254,11 @@ def _strokes(skeleton: Skeleton, look: Look) -> list[Stroke]:
         outlines = tuple(each.outline for each in drawn)
         strokes.append(Stroke(outlines, widths, filling, look.edges[part.role], part.kind == "plate"))
     return strokes
+
+
+def _extent(points: Floats) -> float:
+    """The longest side of the box around points (n, 3) [length]."""
+    return float(np.ptp(points, axis=0).max())
 
 
 def _draw_stroke(canvas: Canvas, stroke: Stroke, zorder: float, pen: float) -> list[Artist]:
@@ -277,7 +286,7 @@ def pen_of(canvas: Canvas, skeleton: Skeleton) -> float:
     """The thickness of lines and size of markers: less where joints are so close together that markers would meet."""
     places = np.array([mark.place for mark in skeleton.marks])
     apart = np.linalg.norm(places[:, None] - places, axis=2) * canvas.points_per_length
-    same = TOLERANCES.alignment * float(np.ptp(skeleton.points, axis=0).max()) * canvas.points_per_length
+    same = TOLERANCES.alignment * _extent(skeleton.points) * canvas.points_per_length
     nearest = np.where(apart > same, apart, np.inf).min(axis=1)
     nearest = nearest[np.isfinite(nearest)]
     return float(np.clip(np.median(nearest) / MARKS_APART, *PENS)) if len(nearest) else 1.0
