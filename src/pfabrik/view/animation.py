@@ -24,7 +24,8 @@ from ..whole_files import whole_path
 from .canvas import canvas_on, checked_size, letters_in, usual_size
 from .eye import View
 from .looks import HELD, Look, Theme, look_of
-from .machine import draw_machine, key_of, machine_eye
+from .machine import key_of, machine_eye
+from .painter import draw_machine
 from .plot_track import checked_track, places_along
 from .save_picture import FILMS
 

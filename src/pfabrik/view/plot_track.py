@@ -20,7 +20,8 @@ from ..skeleton import skeleton_of
 from .canvas import Canvas, canvas_on, checked_size, wrapped
 from .eye import View
 from .looks import HELD, Look, Theme, dress, look_of
-from .machine import draw_machine, key_of, machine_eye
+from .machine import key_of, machine_eye
+from .painter import draw_machine
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
