@@ -82,7 +82,7 @@ def draw_machine(canvas: Canvas, skeleton: Skeleton, *, zorder: float = 2.0) -> 
         at = zorder + (0.75 if is_carriage else 0.8)
         artists.append(canvas.line(mark.place, linestyle="", zorder=at, **style))
     for colour, more in ((look.paper, 1.4), (look.ink, 0.0)):
-        cross = {"marker": "+", "markersize": CROSS + more, "markeredgewidth": CROSS_WIDTH + more}
+        cross = {"marker": "+", "markersize": CROSS * min(pen, 1.0) + more, "markeredgewidth": CROSS_WIDTH + more}
         artists.append(canvas.line(skeleton.reference, color=colour, linestyle="", zorder=zorder + 0.9, **cross))
     return artists
 
