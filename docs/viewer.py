@@ -48,6 +48,7 @@ def take_viewer(chromium: Browser, solution: pf.Solution, picture: Path, *switch
         page.wait_for_timeout(SETTLED)
         for switch in switches:
             page.get_by_label(switch, exact=True).click(force=True)
+        page.locator("[data-pfabrik=status]").scroll_into_view_if_needed()
         page.mouse.move(0, 0)
         viewer.show(solution)
         page.wait_for_timeout(SETTLED)
