@@ -18,14 +18,15 @@ import yaml
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+import machines
 import pfabrik as pf
 from checks import actuator_units
 from exported import KEEP, STRICT, home_of
-from machines import machine
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.export.source import targets_around_home
 from pfabrik.files.units import metres_of
+from test_export_clearance import hexapod
 
 Array = np.ndarray
 DATA = Path(__file__).parent / "data"
@@ -38,9 +39,16 @@ SURE = "steps=200", "starts=24"
 MACHINES = ("stewart", "linear_delta", "five_bar")
 """Struts between U and S; carriages with rods between balls, whose orientation is not set; a tip that is a joint."""
 
-OFTEN = [*MACHINES, *(pytest.param(name, marks=pytest.mark.campaign) for name in ("delta", "prs", "serial_arm", "ucu"))]
+MORE = "delta", "serial_arm", "thick", "ucu"
+OFTEN = [*MACHINES, *(pytest.param(name, marks=pytest.mark.campaign) for name in MORE)]
 
 _FOLDER = TemporaryDirectory()
+
+
+@cache
+def machine(name: str) -> pf.Mechanism:
+    """A machine of the tables, or a hexapod whose struts are kept apart."""
+    return hexapod() if name == "thick" else machines.machine(name)
 
 
 def package(name: str) -> Path:

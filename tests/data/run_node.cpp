@@ -65,7 +65,7 @@ void tell()
       std::cout << ", \"frame\": \"" << told->header.frame_id << "\"";
     }
   }
-  if (const auto * joints = heard<sensor_msgs::msg::JointState>("joint_states")) {
+  if (const auto * joints = heard<sensor_msgs::msg::JointState>("~/joint_states")) {
     std::cout << ", \"names\": " << names(joints->name) << ", \"joints\": " << numbers(joints->position);
   }
   if (const auto * message = heard<tf2_msgs::msg::TFMessage>("/tf")) {

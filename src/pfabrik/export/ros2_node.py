@@ -16,7 +16,7 @@ from .export_c import Part, c_source
 from .machine_data import Machine
 from .ros2_description import PlatformDescription, ShownJoint
 from .ros2_texts import filled, in_xml, package_name, plain, write_package
-from .source import features
+from .source import ACTIVE, features
 from .static_data import comment, literal, quoted
 
 FILES = {
@@ -135,6 +135,10 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "ANSWER": nearest if "nearest" in parts else f"{name}_ik(&wanted, &pose, actuators)",
         "FORWARD": f"{name}_fk(actuators, &pose, nullptr)" if "fk" in parts else f"{name.upper()}_NO_ACTUATORS",
         "COUNT_TURNS": f"{name}_count_turns(before, actuators);" if "TURNS" in has else "",
+        "MEASURE_LINKS": f"{name}_clearance(&commanded_.pose, &between_, &pair_);" if "CLEARANCE" in has else "",
+        "PAIR": f"{name.upper()}_PAIR + platform_.pair()" if "CLEARANCE" in has else "0",
+        "CLEARANCE": literal((mechanism.clearance or 0.0) * metres),
+        "ROUNDING": literal(ACTIVE["double"] * size),
         "IS_MEASURED": f"code == 0{too_near}",
         "N_JOINTS": str(len(description.joints)),
         "ACTUATOR_TABLE": _table(actuators),

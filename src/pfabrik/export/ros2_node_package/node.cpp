@@ -71,7 +71,7 @@ public:
         "~/actuator_states", rclcpp::SensorDataQoS(), [this](const JointState & state) { on_actuators(state); });
     }
     if (show_ != "nothing") {
-      joint_publisher_ = create_publisher<JointState>("joint_states", 10);
+      joint_publisher_ = create_publisher<JointState>("~/joint_states", 10);
       transform_publisher_ = create_publisher<tf2_msgs::msg::TFMessage>("/tf", 100);
       const std::chrono::nanoseconds period(static_cast<std::int64_t>(1e9 / rate));
       show_timer_ = create_wall_timer(period, [this]() { show(); });
@@ -227,6 +227,15 @@ private:
       const std::string words(@NAME@_what(platform_.dead_point()));
       const bool is_leg = platform_.dead_point() < 10 * @MACRO@_LEG;
       active += (active.empty() ? "" : "; ") + (is_leg ? "stretched" + words.substr(words.find(':')) : words);
+    }
+    if (platform_.pair() != 0) {
+      std::string words(@NAME@_what(@PAIR@));
+      words.erase(0, words.find(": ") + 2);
+      add(status, "nearest links", words);
+      add(status, "between them [m]", text(platform_.between_links()));
+      if (platform_.between_links() <= kClearance + kRounding) {
+        active += (active.empty() ? "" : "; ") + words + " min " + text(kClearance) + " m";
+      }
     }
     add(status, "active limits", active);
     add(status, "distance from target [m]", text(platform_.distance()));

@@ -22,6 +22,7 @@ namespace @NAME@_node
 constexpr std::size_t kActuators = @MACRO@_ACTUATORS, kLimits = @MACRO@_LIMITS, kBodies = @MACRO@_BODIES;
 constexpr std::size_t kJoints = @N_JOINTS@;
 constexpr double kMetres = @METRES@;  // the machine's unit of length
+constexpr double kClearance = @CLEARANCE@, kRounding = @ROUNDING@;  // that links keep, and within which they are at it [m]
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
 constexpr bool kHasNearest = @HAS_NEAREST@, kHasForward = @HAS_FORWARD@;
 constexpr bool kAxes[3] = {@AXES@};  // that the task sets
@@ -132,6 +133,10 @@ public:
     jump_ = kActuators;
     return status_ = Status::kRefused;
   }
+
+  // The pair of links that are nearest to each other, and their distance [m]; 0 of a machine without a clearance.
+  int pair() const { return pair_; }
+  double between_links() const { return between_ * kMetres; }
 
   // Command a target from the last command: the same working mode, and the nearest feasible pose out of reach.
   Status target(const Pose & target)
@@ -256,6 +261,7 @@ private:
   {
     std::fill(slack_.begin(), slack_.end(), kNaN);
     resting_ = @NAME@_limits(&commanded_.pose, slack_.data());
+    @MEASURE_LINKS@
     nearest_ = kLimits;
     double least = kInfinity;
     for (std::size_t i = 0; i < kLimits; ++i) {
@@ -347,10 +353,10 @@ private:
 
   Settings settings_;
   Status status_ = Status::kWaiting;
-  int code_ = 0, resting_ = 0;
+  int code_ = 0, resting_ = 0, pair_ = 0;
   std::size_t jump_ = kActuators, nearest_ = kLimits;
   Configuration commanded_{}, measured_{};
-  double distance_ = 0.0, angle_ = 0.0;
+  double distance_ = 0.0, angle_ = 0.0, between_ = 0.0;
   std::array<char, kLimits + 1> holding_{};
   std::array<double, kLimits + 1> slack_{};
   std::array<@NAME@_pose, kBodies> bodies_{};
