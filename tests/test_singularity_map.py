@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 import pfabrik as pf
 from oracles.annuli import within
 from pfabrik.errors import InvalidArgument
-from pfabrik.view.singular_picture import Field, slices_of
+from pfabrik.view.singular_picture import on_grid, without_specks
+from pfabrik.view.slices import cut_mesh, loops_of, plane_across
 from pfabrik.workspace.locus import locus
 from test_pictures import faults
 
@@ -121,23 +122,36 @@ def lattice(n: int) -> Array:
     return np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def test_slices_cut_the_locus_where_it_is_and_stand_across_it() -> None:
-    """The unit sphere at height h is a circle of radius sqrt(1 - h^2); a plane square to z is cut across x or y."""
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0)])
+def test_a_plane_cuts_a_mesh_where_it_is_with_the_inside_on_the_left(order: tuple[int, int, int]) -> None:
+    """The unit sphere at height h is a circle of radius sqrt(1 - h^2)."""
+    places, step = lattice(12), 0.1
+    vertices, faces = locus(places, places * step, 1.0 - np.linalg.norm(places * step, axis=1))
+    for axis in range(3):
+        plane = plane_across(axis, 0.6, order)
+        cut = cut_mesh(vertices, faces, plane)
+        assert np.linalg.norm(cut.points, axis=1) == pytest.approx(0.8, abs=0.02)
+        (loop,) = loops_of(cut.segments)
+        x, y = cut.points[loop].T
+        area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+        assert area == pytest.approx(0.64 * np.pi, rel=0.02)
+
+
+def test_specks_of_a_locus_are_dropped_and_a_measure_goes_on_beyond_the_border() -> None:
     places, step = lattice(12), np.full(3, 0.1)
-    values = np.linalg.norm(places * step, axis=1) - 1.0
-    slices = slices_of(Field(places * step, step, np.abs(values)), *locus(places, places * step, values))
-    assert len(slices) == 4
-    for each in slices:
-        radius = np.sqrt(1.0 - each.level**2)
-        assert np.linalg.norm(each.locus, axis=2) == pytest.approx(radius, abs=0.02)
-        lengths = np.linalg.norm(each.locus[:, 1] - each.locus[:, 0], axis=1)
-        assert lengths.sum() == pytest.approx(2.0 * np.pi * radius, rel=0.02)
-        assert each.grid.shape == (25, 25) and each.grid[12, 12] == pytest.approx(1.0 - abs(each.level))
-    places = lattice(5)
-    field = Field(places.astype(float), np.ones(3), np.ones(len(places)))
-    slices = slices_of(field, *locus(places, places, places[:, 2] - 0.5))
-    assert {each.axis for each in slices} == {1}
-    assert all(each.locus[..., 1] == pytest.approx(0.5) for each in slices)
+    values = np.linalg.norm(places * step, axis=1)
+    sheet = locus(places, places * step, values - 1.0)
+    speck = locus(places, places * step, values - 0.06)
+    both = np.concatenate([sheet[0], speck[0]]), np.concatenate([sheet[1], speck[1] + len(sheet[0])])
+    vertices, faces = without_specks(*both, step)
+    assert faces.tolist() == sheet[1].tolist()
+    np.testing.assert_array_equal(vertices[faces], sheet[0][sheet[1]])  # closed: it has no rim
+    flat = lattice(3)[:, :2]
+    grid, low = on_grid(flat, flat @ [2.0, -1.0] + 0.5)
+    at = np.stack(np.meshgrid(*map(np.arange, grid.shape), indexing="ij"), axis=-1) + low
+    known = np.isfinite(grid)
+    assert known.sum() > 1.5 * 7**2
+    np.testing.assert_allclose(grid[known], (at @ [2.0, -1.0] + 0.5)[known], atol=1e-12)
 
 
 def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Workspace) -> None:
@@ -156,11 +170,14 @@ def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure(monkeypatch: 
     ends = {"x": (-40.0, 40.0), "y": (-40.0, 40.0), "z": (-60.0, 60.0)}
     found = pf.singularity_map(machine, pf.workspace(machine, within=ends, resolution=20.0))
     axes = found.plot()
-    panels = [each for each in axes.figure.axes if each.images]
+    panels = [each for each in axes.figure.axes if " = " in each.get_title()]
     assert len(panels) == 4
     assert all(panel.get_title().startswith("y = ") for panel in panels)
     assert faults(axes.figure, monkeypatch) == []
-    assert found.plot(pyplot.figure().add_subplot(projection="3d")).get_zlabel() == "z [mm]"
+    own = pyplot.figure().add_subplot()
+    assert found.plot(own, view="iso") is own
+    with pytest.raises(InvalidArgument, match="three-dimensional axes"):
+        found.plot(pyplot.figure().add_subplot(projection="3d"))
 
 
 def test_the_locus_of_a_pointing_machine_is_where_its_axis_is_let_go_of() -> None:

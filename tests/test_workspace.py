@@ -25,6 +25,7 @@ from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument
 from pfabrik.view.border_parts import patches_of
+from pfabrik.view.looks import look_of
 from pfabrik.workspace.border import LINK_COLOURS, MOTOR_COLOURS, group_of_limits, groups_of
 from pfabrik.workspace.verdicts import MapQuestion
 
@@ -450,16 +451,15 @@ def test_what_is_saved_can_be_read_again(tmp_path: Path) -> None:
 
 
 def test_a_picture_has_every_limit_of_the_border_and_the_machine() -> None:
-    """Stops of motors and of elbows differ in colour, and are named where they are."""
+    """Stops of motors and of elbows differ in colour, copies do not, and all are named where they are."""
     pyplot = pytest.importorskip("matplotlib.pyplot")
     tip = pf.solve_ik(pf.load("five_bar"), (0.0, 40.0, 160.0))
     found = pf.workspace(tip.mechanism, start=tip)
     assert set(found.shares) == {(joint, bound) for joint in ("p1", "p2", "p4", "p5") for bound in ("min", "max")}
     groups = groups_of(found)
-    assert len({group.colour for group in groups}) == len(found.shares)
-    motors = {f"{joint} {bound}, actuated" for joint in ("p1", "p5") for bound in ("min", "max")}
-    elbows = {f"{joint} {bound}" for joint in ("p2", "p4") for bound in ("min", "max")}
-    assert {group.label for group in groups} == motors | elbows
+    motors = {f"p1, 5 {bound}, actuated" for bound in ("min", "max")}
+    assert {group.label for group in groups} == motors | {f"p2, 4 {bound}" for bound in ("min", "max")}
+    assert len({group.colour for group in groups}) == len(groups)
     assert {group.label for group in groups if group.is_motors} == motors
     assert {group.label for group in groups if group.colour in MOTOR_COLOURS} == motors
     axes = found.plot()
@@ -467,26 +467,21 @@ def test_a_picture_has_every_limit_of_the_border_and_the_machine() -> None:
     for text in axes.texts:
         nearest = np.argmin(np.linalg.norm(found.vertices - text.xy, axis=1))
         assert " ".join(found.limits[found.vertex_limit[nearest]]) == text.get_text()
-    ends = np.concatenate([line.get_xydata() for line in axes.lines if line.get_color() == "#404040"])
+    soft = look_of("light").soft
+    ends = np.concatenate([line.get_xydata() for line in axes.lines if line.get_color() == soft])
     assert all(np.linalg.norm(ends - point[1:], axis=1).min() < 1e-9 for point in tip.points.values())
     assert found.plot(axes) is axes
-    solid = pf.workspace(pf.load("stewart"), resolution=30.0)
-    words = " ".join(text.get_text() for text in solid.plot().get_legend().get_texts())
-    assert all(bound in words for _, bound in solid.shares)
-    with pytest.raises(InvalidArgument, match="two-dimensional axes for a workspace of three"):
-        solid.plot(pyplot.figure().add_subplot())
-    with pytest.raises(InvalidArgument, match="three-dimensional axes for a workspace of two"):
+    with pytest.raises(InvalidArgument, match="three-dimensional axes"):
         found.plot(pyplot.figure().add_subplot(projection="3d"))
     turns = space("ankle_ups").plot()  # which has no place for the machine
-    assert not [line for line in turns.lines if line.get_color() == "#404040"]
+    assert not [line for line in turns.lines if line.get_color() == soft]
 
 
-def test_motors_and_elbows_share_no_colour_where_there_are_too_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    border = sys.modules["pfabrik.workspace.border"]
-    monkeypatch.setattr(border, "MOTOR_COLOURS", ("#0072b2", "#56b4e9"))
-    monkeypatch.setattr(border, "JOINT_COLOURS", ("#e69f00", "#cc79a7"))
-    shared = {"p1, 5 min, actuated", "p1, 5 max, actuated", "p2, 4 min", "p2, 4 max"}
-    assert {group.label for group in groups_of(space("five_bar"))} == shared
+def test_groups_beyond_the_colours_are_one_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert {group.name for group in groups_of(space("delta"))} >= {"A1…3 min", "A1…3 max", "BL1…3 cone"}
+    monkeypatch.setattr(sys.modules["pfabrik.workspace.border"], "MOTOR_COLOURS", ("#0072b2",))
+    names = [group.name for group in groups_of(space("five_bar"))]
+    assert names[-1] == "2 other limits" and len(names) == 4
 
 
 def test_limits_that_are_met_together_do_not_alternate() -> None:
@@ -522,11 +517,13 @@ def test_the_border_is_divided_where_one_motor_takes_over_from_another() -> None
     groups = groups_of(found)
     place = group_of_limits(found, groups)
     patches = patches_of(found, found.vertices, found.faces, place[found.vertex_limit], place)
-    assert len(patches.faces) == len(found.faces) + len(groups)  # each stretch has one end that divides a face
-    new = patches.vertices[len(found.vertices) : len(found.vertices) + len(groups)]
+    ends = place[found.vertex_limit[found.faces]]
+    is_divided = ends[:, 0] != ends[:, 1]
+    assert len(patches.faces) == len(found.faces) + is_divided.sum() > len(found.faces)
+    new = patches.vertices[len(found.vertices) : len(found.vertices) + is_divided.sum()]
     margins = pf.margins(pf.solve_ik(found.mechanism, found.poses(new)))
     second = np.sort(np.stack([np.abs(values) for values in margins.values()]), axis=0)[1]
-    changing = np.unique(found.faces[(found.vertex_limit[found.faces[:, 0]] != found.vertex_limit[found.faces[:, 1]])])
+    changing = np.unique(found.faces[is_divided])
     beside = pf.margins(pf.solve_ik(found.mechanism, found.poses(found.vertices[changing])))
     assert second.max() < 0.5 * np.sort(np.stack(list(beside.values())), axis=0)[1].max()
 

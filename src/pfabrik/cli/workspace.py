@@ -19,11 +19,11 @@ from ..checks import require_ending
 from ..extras import require
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, TargetOptions, Triple, answered, completing, load, numbers_of, rpy_option, targeted
-from .outputs import check_outputs, picture
+from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured
 from .printing import json_option, note, print_result
 
 if TYPE_CHECKING:
-    from ..workspace.inscribed import Kind
+    from ..workspace.inscribed import Inscribed, Kind
 
 
 @dataclass(frozen=True)
@@ -118,6 +118,7 @@ def spanning(command: Callable[..., Any]) -> Callable[..., Any]:
     type=click.Path(path_type=Path),
     help="File to write: .npz, .stl, .ply, .csv, or a picture: .png, .svg, .pdf. May be repeated.",
 )
+@pictured()
 @json_option()
 def workspace(
     mech: str,
@@ -129,12 +130,14 @@ def workspace(
     largest: Kind | None,
     centre: str | None,
     outputs: tuple[Path, ...],
+    drawn: PictureOptions,
     as_json: bool,
 ) -> int:
     """Tell how big the workspace is, and which limits form its border.
 
     By default over the positions at home's orientation; with `--fix z=200` a slice; with x, y and z fixed, the
-    orientations there. Machines that hardly move but tilt are looked at over their angles.
+    orientations there. Machines that hardly move but tilt are looked at over their angles. A picture shows the largest
+    shape too; where nothing is within reach it says so, and the exit code is 1.
     """
     if any_orientation and rpy is not None:
         raise click.UsageError("--rpy and --any-orientation: give one of them")
@@ -149,6 +152,8 @@ def workspace(
         require_ending(path, (*ENDINGS, *PICTURES))
         if path.suffix.lower() in PICTURES:
             require("pictures", "matplotlib", "plot")
+    if not any(path.suffix.lower() in PICTURES for path in outputs):
+        note_no_picture("a picture")
     mechanism = load(mech)
     others: dict[str, Any] = {"orientation": "any"} if any_orientation else {}
     others["tilt"] = None if tilt is None else math.radians(tilt)
@@ -156,7 +161,7 @@ def workspace(
     middle = None if centre is None else point(found, centre)
     shape = None if largest is None else found.inscribed(largest, middle)
     for path in outputs:
-        write(found, path)
+        write(found, path, shape, drawn)
     print_result(as_json, found, {} if shape is None else {"largest": shape})
     return 0 if len(found.faces) else 1
 
@@ -166,8 +171,11 @@ def workspace(
 @targeted
 @spanning
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Picture of the map: PNG, SVG or PDF.")
+@pictured()
 @json_option()
-def singularities(mech: str, target: TargetOptions, space: SpaceOptions, output: Path | None, as_json: bool) -> int:
+def singularities(
+    mech: str, target: TargetOptions, space: SpaceOptions, output: Path | None, drawn: PictureOptions, as_json: bool
+) -> int:
     """Tell how near singularities are, at a pose or over a workspace.
 
     At a pose, home by default: the measure of each kind, 0 at a singularity, the motion that is nearest to being lost,
@@ -177,6 +185,8 @@ def singularities(mech: str, target: TargetOptions, space: SpaceOptions, output:
     it: the parts between parallel singularities, the least of each measure, and the share of points near to 0.
     """
     check_outputs([("-o", output)], [Path(mech)], as_json=as_json)
+    if output is None:
+        note_no_picture("-o")
     if not space.is_given and output is None:
         solution = answered(load(mech), target)
         if solution is not None:
@@ -185,10 +195,10 @@ def singularities(mech: str, target: TargetOptions, space: SpaceOptions, output:
     if target.position or target.joints:
         raise click.UsageError("--position and --joint are of one pose: over a workspace, --fix holds a coordinate")
     mechanism = load(mech)
-    with nullcontext() if output is None else picture(output):
+    with nullcontext() if output is None else picture(output, drawn):
         found = pf.singularity_map(mechanism, space.workspace(mechanism, target.rpy))
         if output is not None:
-            found.plot()
+            found.plot(**drawn.in_space)
     if output is not None:
         click.echo(f"wrote {output}", err=True)
     print_result(as_json, found)
@@ -234,11 +244,11 @@ def point(space: pf.Workspace, words: str) -> list[float]:
     return [math.radians(number) if unit == "rad" else number for number, unit in numbers]
 
 
-def write(space: pf.Workspace, path: Path) -> None:
+def write(space: pf.Workspace, path: Path, shape: Inscribed | None, drawn: PictureOptions) -> None:
     """Write a mesh, or a picture, whole or not at all."""
     if path.suffix.lower() in PICTURES:
-        with picture(path):
-            space.plot()
+        with picture(path, drawn):
+            space.plot(shape=shape, **drawn.in_space)
     else:
         space.save(path)
     click.echo(f"wrote {path}", err=True)

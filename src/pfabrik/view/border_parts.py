@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .surfaces import vertex_normals
 
 if TYPE_CHECKING:
     from ..workspace.region import Region
@@ -110,3 +109,17 @@ def _changes(
         rows = rows[is_first | is_last]  # a third limit may form the border between them
         shares[rows] = 0.5 * (low + high)[rows]
     return shares
+
+
+def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
+    """Sums of the outward normals of the faces around each vertex, (v, d)."""
+    corners = vertices[faces]
+    if faces.shape[1] == 2:
+        along = corners[:, 1] - corners[:, 0]
+        of_faces = np.column_stack([along[:, 1], -along[:, 0]])
+    else:
+        of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    around = np.zeros_like(vertices)
+    for corner in faces.T:
+        np.add.at(around, corner, of_faces)
+    return around

@@ -2,84 +2,87 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..drawing import SMALL, keep_apart, new_figure
+from ..drawing import SMALL, new_figure
 from ..motion.singularities import Singularity
+from ..workspace.parts import connected
 from ..workspace.region import Region
-from ..workspace.workspace_table import for_people, labels, shown
-from .surfaces import AZIMUTH, ELEVATION, add_surface, axes_for, frame_solid, thinned
+from ..workspace.singular import signed_at
+from ..workspace.workspace_table import for_people, labels
+from .canvas import checked_size
+from .eye import Eye, View, eye_of, upright
+from .frame import axes_for, box_of, draw_box, fit
+from .looks import Look, Theme, look_of
+from .raster import lines_between, rasterised
+from .slices import area_of, cut_mesh, draw_slice, loops_of, plane_across
+from .solid import best_eye, corner_normals, in_the_light, sample_of, scale_of, seen_solid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..workspace.singular import SingularityMap
 
-MARK = 9.0
 LINES = {
     "serial": ("#0072b2", "-"),
     "parallel": ("#e69f00", "--"),
     "constraint": ("#009e73", "-."),
     "passive": ("#cc79a7", ":"),
 }
-"""Colour and dashes of each measure along a path; size of the points of a map."""
+"""Colour and dashes of each measure along a path."""
 
-LOCUS = "#d55e00"
-"""Colour of singularities."""
+LOCUS, RIM, WIDTH = "#aa3377", "#4a1033", 2.0
+"""Colours of singularities and of their rims, orange being that of limits, and the width of their lines [points]."""
 
-MAP, MEASURE = "cividis", "parallel measure"
-"""Colours of the measure, and its name."""
+MAP, MEASURE, LEVELS = "cividis", "parallel measure", 10
+"""Colours of the measure, its name, and in how many steps it is drawn."""
 
-SIZE = (9.6, 4.8)
-"""Of a figure with slices [inches]."""
+HIGHEST = 0.98
+"""Share of the points whose measure has a colour of its own; above, all have the last one."""
 
-ZOOM = 0.76
-"""Size of the box in space: its names need room, and no layout knows of it."""
+PLANE_SIZE, SIZE = (6.4, 4.8), (9.6, 4.8)
+"""Of a figure in a plane, and of one in space with slices [inches]."""
 
-SLICES = (0.14, 0.38, 0.62, 0.86)
-"""Where slices are, as shares of the points from the lowest to the highest."""
+SPACE, BAR = (0.0, 0.01, 0.49, 0.91), (0.93, 0.2, 0.012, 0.56)
+SLICES_IN = {"left": 0.55, "right": 0.9, "top": 0.86, "bottom": 0.11, "hspace": 0.25, "wspace": 0.12}
+"""Places of what is in space, of the bar of colours and of slices in a figure."""
 
-HULL = "#9aa5b1"
-"""Colour of the workspace around the locus."""
+SLICES = (0.10, 0.37, 0.63, 0.90)
+"""Where slices are, as shares of the locus from its lowest to its highest point."""
 
+ACROSS = 44
+"""Points of a slice along its longer side: each is solved for."""
 
-@dataclass(frozen=True)
-class Field:
-    """A measure on a lattice: points (n, 3) at distances `step`, (3,), and values (n,)."""
+LAYERS, REFINED = 3, 5
+"""Layers of points that a measure is carried beyond the border, and times that their distance is divided."""
 
-    points: Floats
-    step: Floats
-    values: Floats
+SMALLEST, SHORTEST = 6.0, 2.0
+"""Area of a sheet in space and length of a curve in a plane below which it is a speck [cells² and cells]."""
 
+RIM_ROUNDS, NORMAL_ROUNDS = 20, 4
+"""How often the rim of a sheet is moved towards the middle of its neighbours along it, and normals are averaged."""
 
-@dataclass(frozen=True)
-class Slice:
-    """A slice across one coordinate.
+PIXELS, HULL_PIXELS, JUMP = 800, 450, 2.0
+"""Pixels across the locus and across the workspace; least difference in depth where a sheet hides another [cells]."""
 
-    Attributes
-    ----------
-    level : the value of this coordinate [length or rad].
-    axis, across : the coordinate, and the other two.
-    grid : the measure, (n, m), NaN beyond reach: rows along the second of the other two.
-    low : the point (2,) in the middle of the grid's first cell.
-    locus : segments (k, 2, 2) where it cuts the locus.
-    """
-
-    level: float
-    axis: int
-    across: list[int]
-    grid: Floats
-    low: Floats
-    locus: Floats
+HULL, HULL_LINE = 0.10, 0.6
+"""How opaque the workspace around a locus is, and the width of its lines [points]."""
 
 
-def plot_singular_track(measures: Singularity, crossings: Ints, ax: Axes | None = None) -> Axes:
+def plot_singular_track(
+    measures: Singularity,
+    crossings: Ints,
+    ax: Axes | None = None,
+    *,
+    size: tuple[float, float] | None = None,
+    theme: Theme = "light",
+) -> Axes:
     """Draw the measures along a path, one line each, and where it leads through parallel singularities."""
-    axes = axes_for(ax, 2)
+    look = look_of(theme)
+    axes = axes_for(ax, size or PLANE_SIZE, look)
     for name, (colour, dashes) in LINES.items():
         values = np.asarray(getattr(measures, name))
         if np.isfinite(values).any():
@@ -88,173 +91,269 @@ def plot_singular_track(measures: Singularity, crossings: Ints, ax: Axes | None 
         label = "" if count else "parallel singularity"
         axes.axvline(row + 0.5, color=LOCUS, linewidth=1.2, label=label)
     axes.set(xlabel="target", ylabel="measure of singularity", ylim=(0.0, None))
-    axes.legend(frameon=False, fontsize=SMALL)
+    axes.legend(frameon=False, fontsize=SMALL, labelcolor=look.ink)
     return axes
 
 
-def plot_singular_map(found: SingularityMap, ax: Axes | None = None) -> Axes:
-    """Draw the parallel measure at the points of a plane, or in slices of space, and the locus."""
-    space, vertices, faces = found.workspace, found.locus_vertices, found.locus_faces
-    parallel = np.asarray(found.measures.parallel)
-    title = f"{space.mechanism.name}: {'parallel singularities' if len(faces) else 'no parallel singularity'}"
-    if len(space.names) == 3:
-        return _plot_in_space(space, Field(found.points, found.step, parallel), vertices, faces, title, ax)
-    axes = axes_for(ax, 2)
+def plot_singular_map(
+    found: SingularityMap,
+    ax: Axes | None = None,
+    *,
+    view: View | None = None,
+    size: tuple[float, float] | None = None,
+    theme: Theme = "light",
+) -> Axes:
+    """Draw the parallel measure in a plane, or the locus in space with slices of the measure across it.
+
+    Parameters
+    ----------
+    view : direction that space is seen from; default: the one that shows most of the locus.
+    size : of a new figure, width and height [inches].
+    """
+    look, region = look_of(theme), found.workspace
+    vertices, faces = without_specks(found.locus_vertices, found.locus_faces, found.step)
+    what = "parallel singularities" if len(faces) else "no parallel singularity"
+    title = f"{region.mechanism.name}: {what} within reach"
+    if len(region.names) == 3 and len(region.faces):
+        return _plot_in_space(found, vertices, faces, ax, (view, size), look, title)
+    axes: Any = axes_for(ax, size or PLANE_SIZE, look)
+    axes.set_title(title, fontsize=SMALL + 1, color=look.ink)
+    if not len(found.points):
+        axes.axis("off")
+        return axes  # type: ignore[no-any-return]
+    start = region._question.space.start
+    places = np.round((found.points - start) / found.step).astype(np.int64)
+    grid, low = on_grid(places, found._signed)
+    factors = np.array(for_people(region.units)[0])
+    points = region.vertices * factors
+    area = area_of([points[loop] for loop in loops_of(region.faces)])
+    highest = _highest(np.abs(found._signed))
+    first, step = (low * found.step + start) * factors, found.step * factors
+    drawn = draw_measure(axes, grid, first, step, highest, area)
+    _draw_curves(axes, (vertices * factors)[faces], area)
+    axes.add_patch(_outline(area, look))
+    axes.autoscale_view()
+    axes.margins(0.03)
+    if len(set(region.units)) == 1:
+        axes.set_aspect("equal")
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
+    _dress_bar(axes.figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.03), look)
+    return axes  # type: ignore[no-any-return]
+
+
+def _outline(area: Any, look: Look) -> Any:
+    from matplotlib.patches import PathPatch
+
+    return PathPatch(area, facecolor="none", edgecolor=look.soft, linewidth=0.8, zorder=3)
+
+
+def _dress_bar(bar: Any, look: Look) -> None:
+    bar.set_label(MEASURE, fontsize=SMALL, color=look.ink)
+    bar.ax.tick_params(labelsize=SMALL - 1.0, colors=look.ink)
+    bar.outline.set_edgecolor(look.soft)
+
+
+def _highest(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, HIGHEST)) or 1.0 if len(known) else 1.0
+
+
+def without_specks(vertices: Floats, faces: Ints, step: Floats) -> tuple[Floats, Ints]:
+    """The faces of sheets that are larger than a few cells; in space their rims are smoothed.
+
+    Parameters
+    ----------
+    vertices, faces : of triangles in space, or segments in a plane.
+    step : size of a cell, (d,).
+    """
+    if not len(faces):
+        return vertices, faces
+    d = faces.shape[1]
+    pairs = np.concatenate([faces[:, (k, (k + 1) % d)] for k in range(d if d == 3 else 1)])
+    _, sheet = np.unique(connected(len(vertices), pairs), return_inverse=True)
+    corners = (vertices / step)[faces]
+    if d == 3:
+        sizes = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    else:
+        sizes = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    of_faces = sheet[faces[:, 0]]
+    kept = faces[np.bincount(of_faces, sizes)[of_faces] >= (SMALLEST if d == 3 else SHORTEST)]
+    return (_with_smooth_rim(vertices, kept) if d == 3 else vertices), kept
+
+
+def _with_smooth_rim(vertices: Floats, faces: Ints) -> Floats:
+    """Vertices (v, 3) with those on the rim of sheets moved towards the middle of both neighbours along it."""
+    sides = np.sort(np.concatenate([faces[:, (k, (k + 1) % 3)] for k in range(3)]), axis=1)
+    edges, counts = np.unique(sides, axis=0, return_counts=True)
+    rim = edges[counts == 1]
+    number = np.bincount(rim.ravel(), minlength=len(vertices))
+    moved = number == 2
+    for _ in range(RIM_ROUNDS):
+        total = np.zeros(vertices.shape)
+        np.add.at(total, rim[:, 0], vertices[rim[:, 1]])
+        np.add.at(total, rim[:, 1], vertices[rim[:, 0]])
+        vertices = np.where(moved[:, None], 0.5 * vertices + 0.25 * total, vertices)
+    return vertices
+
+
+def on_grid(places: Ints, values: Floats) -> tuple[Floats, Ints]:
+    """Values at lattice places of a plane as a grid (n, m), carried a few layers beyond, and its first place (2,)."""
+    low = places.min(axis=0) - LAYERS
+    grid = np.full(places.max(axis=0) - low + LAYERS + 1, np.nan)
+    grid[tuple((places - low).T)] = values
+    for _ in range(LAYERS):
+        guesses = []
+        for axis in (0, 1):
+            for way in (1, -1):
+                one, two = np.roll(grid, way, axis), np.roll(grid, 2 * way, axis)
+                guesses.append(np.where(np.isnan(two), one, 2.0 * one - two))
+        known = np.isfinite(guesses)
+        mean = np.where(known, guesses, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        grid = np.where(np.isnan(grid) & known.any(axis=0), mean, grid)
+    return grid, low
+
+
+def draw_measure(axes: Any, grid: Floats, low: Floats, step: Floats, highest: float, area: Any) -> Any:
+    """Draw the magnitude of a signed measure on a grid (n, m) of a plane, within an area."""
+    from matplotlib.ticker import MaxNLocator
+
+    fine = _refined(_refined(grid).T).T
+    ticks = [low[k] + step[k] / REFINED * np.arange(n) for k, n in enumerate(fine.shape)]
+    levels = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, highest)
+    drawn = axes.contourf(*ticks, np.abs(fine).T, levels, cmap=MAP, extend="max", zorder=1)
+    if area is not None:
+        drawn.set_clip_path(area, axes.transData)
+    return drawn
+
+
+def _refined(grid: Floats) -> Floats:
+    """Values between the rows of a grid, by straight lines; NaN beside NaN."""
+    at = np.arange(REFINED * (len(grid) - 1) + 1) / REFINED
+    low = np.minimum(at.astype(np.int64), len(grid) - 2)
+    share = (at - low)[:, None]
+    return np.asarray(np.where(share > 0.0, grid[low] + share * (grid[low + 1] - grid[low]), grid[low]))
+
+
+def _draw_curves(axes: Any, segments: Floats, area: Any) -> None:
+    """Draw where the locus is in a plane, within an area."""
     from matplotlib.collections import LineCollection
 
-    points = shown(space, found.points)
-    drawn = axes.scatter(points[:, 0], points[:, 1], c=parallel, s=MARK, marker="s", linewidths=0, cmap=MAP, vmin=0.0)
-    axes.add_collection(LineCollection(list(shown(space, vertices)[faces]), colors=LOCUS, linewidths=2.0))
-    if len(set(space.units)) == 1:
-        axes.set_aspect("equal")
-    axes.figure.colorbar(drawn, ax=axes, label=MEASURE, shrink=0.8, pad=0.03)
-    axes.set(**dict(zip(("xlabel", "ylabel"), labels(space), strict=True)))
-    axes.set_title(title, fontsize=SMALL + 1)
-    return axes
+    style: dict[str, Any] = {"colors": LOCUS, "linewidths": WIDTH, "capstyle": "round", "zorder": 4}
+    curves = axes.add_collection(LineCollection(list(segments), **style), autolim=False)
+    if area is not None:
+        curves.set_clip_path(area, axes.transData)
 
 
 def _plot_in_space(
-    space: Region, field: Field, vertices: Floats, faces: Ints, title: str, ax: Axes | None = None
+    found: SingularityMap,
+    vertices: Floats,
+    faces: Ints,
+    ax: Axes | None,
+    asked: tuple[View | None, tuple[float, float] | None],
+    look: Look,
+    title: str,
 ) -> Axes:
-    """Draw the locus, vertices (v, 3) and faces (f, 3), and slices across it: beside it, or on axes that are given."""
-    slices = slices_of(field, vertices, faces)
-    highest = float(np.max(field.values[np.isfinite(field.values)], initial=0.0)) or 1.0
-    if ax is not None:
-        axes: Any = axes_for(ax, 3)
-        panels: list[Any] = []
+    """Draw the locus in the workspace, and slices beside it; on axes that are given, without slices."""
+    region, (view, size) = found.workspace, asked
+    scale, order = scale_of(region), upright(region.names)
+    points = vertices * scale
+    if view is not None:
+        eye = eye_of(view, order)
+    elif len(faces):
+        both_sides = np.concatenate([faces, faces[:, ::-1]])
+        corners = points[both_sides]
+        slopes = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).argmax(axis=1)
+        eye = best_eye(sample_of(points, both_sides, slopes), order)
     else:
-        figure = new_figure(*SIZE)
-        grid = figure.add_gridspec(2, 4)
-        eye: dict[str, Any] = {"projection": "3d", "elev": ELEVATION, "azim": AZIMUTH}
-        axes = axes_for(figure.add_subplot(grid[:, :2], **eye), 3)
-        panels = [figure.add_subplot(grid[place // 2, 2 + place % 2]) for place in range(len(slices))]
-    _draw_locus(axes, space, vertices, faces)
-    if not panels or not len(faces):
-        for each in slices:
-            _draw_in_space(axes, space, each, field.step, highest)
-    axes.set_title(title, fontsize=SMALL + 1)
-    for panel, each in zip(panels, slices, strict=False):
-        _draw_slice(panel, space, each, field.step, highest)
+        eye = best_eye(sample_of(region.vertices * scale, region.faces, region.face_limit), order)
+    if ax is not None:
+        axes: Any = axes_for(ax, SIZE, look)
+        _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
+        axes.set_title(title, fontsize=SMALL + 1, color=look.ink)
+        return axes  # type: ignore[no-any-return]
+    figure = new_figure(*checked_size(size or SIZE), layout=None)
+    figure.set_facecolor(look.paper)
+    grid = figure.add_gridspec(2, 2, **SLICES_IN)
+    axes = figure.add_axes(SPACE)
+    _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
+    panels = [figure.add_subplot(grid[place // 2, place % 2]) for place in range(len(SLICES))]
+    drawn = _draw_slices(panels, found, vertices, faces, order, look)
+    if drawn is not None:
+        _dress_bar(figure.colorbar(drawn, cax=figure.add_axes(BAR)), look)
+    figure.text(0.0125, 0.97, title, fontsize=SMALL + 2, color=look.ink, ha="left", va="top")
+    return axes  # type: ignore[no-any-return]
+
+
+def _draw_locus(axes: Any, region: Region, points: Floats, faces: Ints, step: Floats, eye: Eye, look: Look) -> None:
+    """The locus in the light, in the workspace as a pale solid."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import to_rgb
+
+    box = box_of(region, scale_of(region))
+    fit(axes, eye.seen(box.corners)[:, :2])
+    ends = axes.get_xlim(), axes.get_ylim()
+    hull = seen_solid(region, eye, HULL_PIXELS)
+    pale = np.zeros((*hull.limit.shape, 4))
+    pale[..., :3], pale[..., 3] = to_rgb(look.soft), HULL * (hull.limit >= 0)
+    axes.imshow(pale, origin="lower", extent=hull.raster.extent, interpolation="antialiased", zorder=2)
+    style: dict[str, Any] = {"colors": look.soft, "linewidths": HULL_LINE, "alpha": 0.8, "capstyle": "round"}
+    axes.add_collection(LineCollection(hull.lines, zorder=5, **style), autolim=False)
+    if len(faces):
+        raster = rasterised(eye.seen(points), faces, PIXELS, both_sides=True)
+        normal = (raster.weights[..., None] * corner_normals(points, faces, rounds=NORMAL_ROUNDS)[raster.face]).sum(
+            axis=2
+        )
+        normal *= np.where(normal @ eye.axes[2] < 0.0, -1.0, 1.0)[..., None]
+        image = np.dstack([in_the_light(normal, eye, np.array(to_rgb(LOCUS))), 1.0 * (raster.face >= 0)])
+        axes.imshow(image, origin="lower", extent=raster.extent, interpolation="antialiased", zorder=3)
+        rims = lines_between(np.minimum(raster.face, 0), raster, JUMP * float(step.max()))
+        axes.add_collection(LineCollection(rims, colors=RIM, linewidths=0.8, zorder=4), autolim=False)
+    axes.set(xlim=ends[0], ylim=ends[1], aspect="equal")
+    draw_box(axes, eye, box, look, [])
+
+
+def _draw_slices(
+    panels: list[Any], found: SingularityMap, vertices: Floats, faces: Ints, order: tuple[int, int, int], look: Look
+) -> Any:
+    """Draw the measure in planes across the locus; what a colour bar is of, or None."""
+    region = found.workspace
+    factors = np.array(for_people(region.units)[0])
+    axis = _axis_across(vertices / found.step, faces, order[2])
+    heights = vertices[np.unique(faces), axis] if len(faces) else region.vertices[:, axis]
+    planes = [plane_across(axis, float(level), order) for level in np.quantile(heights, SLICES)]
+    highest, drawn = _highest(np.abs(found._signed)), None
+    for panel, plane in zip(panels, planes, strict=True):
+        area = draw_slice(panel, region, plane, look)
+        scale = scale_of(region)
+        step = float((np.ptp(region.bounds, axis=0) * scale)[plane.across].max()) / ACROSS / scale[plane.across]
+        low, high = region.bounds[:, plane.across]
+        counts = np.maximum(np.ceil((high - low) / step).astype(np.int64), 1) + 1
+        places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 2)
+        points = np.full((len(places), 3), plane.level)
+        points[:, plane.across] = low + places * step
+        signed = signed_at(region, points)
+        known = np.isfinite(signed)
+        if known.any():
+            grid, first = on_grid(places[known], signed[known])
+            corner = (low + first * step) * factors[plane.across]
+            drawn = draw_measure(panel, grid, corner, step * factors[plane.across], highest, area)
+        cut = cut_mesh(vertices, faces, plane)
+        _draw_curves(panel, (cut.points * factors[plane.across])[cut.segments], area)
     for place, panel in enumerate(panels):  # all have the same axes
         if place % 2:
             panel.set_ylabel("")
             panel.tick_params(labelleft=False)
-        if place + 2 < len(slices):
+        if place < 2:
             panel.set_xlabel("")
             panel.tick_params(labelbottom=False)
-    _add_scale(axes, panels, highest)
-    keep_apart(axes)
-    return axes  # type: ignore[no-any-return]
+    return drawn
 
 
-def slices_of(field: Field, vertices: Floats, faces: Ints) -> list[Slice]:
-    """Slices across the coordinate that the locus is least square to; across the last one without a locus."""
-    if not len(field.points):
-        return []
-    axis = _axis_across(vertices / field.step, faces)
-    across = [k for k in range(3) if k != axis]
-    low = field.points.min(axis=0)
-    places = np.round((field.points - low) / field.step).astype(np.int64)
-    levels = np.unique(np.quantile(places[:, axis], SLICES, method="nearest"))
-    shape = places[:, across].max(axis=0) + 1
-    slices = []
-    for level in levels.tolist():
-        rows = places[:, axis] == level
-        grid = np.full(shape[::-1], np.nan)
-        grid[places[rows, across[1]], places[rows, across[0]]] = field.values[rows]
-        value = float(low[axis] + level * field.step[axis])
-        slices.append(Slice(value, axis, across, grid, low[across], _cut(vertices, faces, axis, value, field.step)))
-    return slices
-
-
-def _axis_across(vertices: Floats, faces: Ints) -> int:
-    """The coordinate along which the normals of a mesh have the least component; the last of equal ones."""
+def _axis_across(vertices: Floats, faces: Ints, usual: int) -> int:
+    """The coordinate along which the normals of a mesh have the least component; of nearly equal ones the usual one."""
     if not len(faces):
-        return 2
+        return usual
     corners = vertices[faces]
     normals = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).sum(axis=0)
-    return int(2 - np.argmin(np.round(normals / normals.max(), 1)[::-1]))
-
-
-def _cut(vertices: Floats, faces: Ints, axis: int, level: float, step: Floats) -> Floats:
-    """Segments (k, 2, 2) in which the plane at a level of one coordinate cuts a mesh."""
-    if not len(faces):
-        return np.zeros((0, 2, 2))
-    across = [k for k in range(3) if k != axis]
-    corners = vertices[faces]
-    height = corners[:, :, axis] - level - 1e-6 * step[axis]  # no corner of the lattice is in the plane
-    crossed = (height > 0.0).any(axis=1) & (height <= 0.0).any(axis=1)
-    corners, height = corners[crossed], height[crossed]
-    alone = np.where((height > 0.0).sum(axis=1) == 1, np.argmax(height, axis=1), np.argmin(height, axis=1))
-    rows = np.arange(len(corners))
-    ends = []
-    for turn in (1, 2):
-        other = (alone + turn) % 3
-        share = height[rows, alone] / (height[rows, alone] - height[rows, other])
-        ends.append(corners[rows, alone] + share[:, None] * (corners[rows, other] - corners[rows, alone]))
-    return np.stack(ends, axis=1)[:, :, across]
-
-
-def _draw_locus(axes: Any, space: Region, vertices: Floats, faces: Ints) -> None:
-    """The locus in the light, in the workspace as a faint hull."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    hull, sides, _ = thinned(space.vertices, space.faces, space.vertex_limit)
-    if len(sides):
-        axes.computed_zorder = False
-        style: dict[str, Any] = {"facecolors": HULL, "edgecolors": "none", "alpha": 0.07, "zorder": 4}
-        axes.add_collection3d(Poly3DCollection(shown(space, hull)[sides], **style))
-    if len(faces):
-        colours = np.full(len(faces), LOCUS)
-        add_surface(axes, shown(space, vertices), faces, colours, see_through=False)
-    frame_solid(axes, space, [shown(space, space.vertices), shown(space, vertices)], zoom=ZOOM)
-
-
-def _draw_in_space(axes: Any, space: Region, each: Slice, step: Floats, highest: float) -> None:
-    """A slice where it is, each point as a square in the colour of its measure."""
-    from matplotlib import colormaps
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    rows, columns = np.nonzero(np.isfinite(each.grid))
-    middles = each.low + np.stack([columns, rows], axis=1) * step[each.across]
-    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) * step[each.across]
-    corners = np.full((len(middles), 4, 3), each.level)
-    corners[:, :, each.across] = middles[:, None] + square
-    colours = colormaps[MAP](np.clip(each.grid[rows, columns] / highest, 0.0, 1.0))
-    style: dict[str, Any] = {"facecolors": colours, "edgecolors": "none", "alpha": 0.85, "zorder": 2}
-    axes.add_collection3d(Poly3DCollection(shown(space, corners), **style))
-
-
-def _draw_slice(panel: Any, space: Region, each: Slice, step: Floats, highest: float) -> None:
-    """A slice in its plane, with the curve in which it cuts the locus."""
-    from matplotlib.collections import LineCollection
-
-    factors = np.array(for_people(space.units)[0])
-    first, second = each.across
-    rows, columns = each.grid.shape
-    low = (each.low - 0.5 * step[each.across]) * factors[each.across]
-    high = low + np.array([columns, rows]) * step[each.across] * factors[each.across]
-    extent = (low[0], high[0], low[1], high[1])
-    alike = space.units[first] == space.units[second]
-    style: dict[str, Any] = {"cmap": MAP, "vmin": 0.0, "vmax": highest, "aspect": "equal" if alike else "auto"}
-    panel.imshow(each.grid, origin="lower", extent=extent, **style)
-    panel.add_collection(LineCollection(list(each.locus * factors[each.across]), colors=LOCUS, linewidths=2.0))
-    names = labels(space)
-    panel.set_xlabel(names[first], fontsize=SMALL)
-    panel.set_ylabel(names[second], fontsize=SMALL)
-    panel.tick_params(labelsize=SMALL)
-    panel.locator_params(nbins=4)
-    unit = names[each.axis].rpartition(" ")[2].strip("[]")
-    panel.set_title(f"{space.names[each.axis]} = {each.level * factors[each.axis]:.4g} {unit}", fontsize=SMALL)
-
-
-def _add_scale(axes: Any, panels: list[Any], highest: float) -> None:
-    """The scale of the measure beside the slices."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    scale = ScalarMappable(Normalize(0.0, highest), MAP)
-    beside: dict[str, Any] = {"shrink": 0.8, "pad": 0.03} if panels else {"shrink": 0.8, "pad": 0.12}
-    bar = axes.figure.colorbar(scale, ax=panels or axes, **beside)
-    bar.set_label(MEASURE, fontsize=SMALL)
-    bar.ax.tick_params(labelsize=SMALL)
+    shares = np.round(normals / normals.max(), 1)
+    return usual if shares[usual] == shares.min() else int(2 - shares[::-1].argmin())

@@ -12,11 +12,14 @@ from ..arrays import Ints
 if TYPE_CHECKING:
     from .region import Region
 
-MOTOR_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#332288", "#7fbf3f")
+MOTOR_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#332288")
 """Cold colours: stops of motors. These and the warm ones are distinct for colour-blind people (Okabe and Ito; Tol)."""
 
-JOINT_COLOURS = ("#e69f00", "#cc79a7", "#882255", "#f0e442", "#a6761d")
+JOINT_COLOURS = ("#e69f00", "#cc79a7", "#882255", "#f0e442")
 """Warm colours: limits of passive joints, ends of reach and of the map."""
+
+MANY = 3
+"""Numbers in a row from which on a span of them is named by its ends: "BL1…3 max"."""
 
 LINK_COLOURS = ("#d55e00", "#7a1f00", "#f4a582")
 """Reds: links that are too near to each other."""
@@ -50,29 +53,34 @@ class Group(NamedTuple):
 
 
 def groups_of(region: Region) -> list[Group]:
-    """Limits grouped by colour: each has its own if there are colours enough; else joints that are copies share one.
+    """Limits grouped by colour: joints that are copies share the one of each bound, in the order of their shares.
 
     Motors have cold colours, links that are too near reds, all else warm colours: these stops are changed in other
-    ways.
+    ways. Where there are more groups than colours, the last ones are one group.
     """
     groups: list[Group] = []
     others: list[tuple[str, str]] = []
     for is_motors, colours in ((True, MOTOR_COLOURS), (False, JOINT_COLOURS)):
-        limits = [
-            limit for limit in region.shares if limit[1] != "clearance" and is_actuated(region, limit[0]) == is_motors
-        ]
-        together: dict[tuple[str, str], list[tuple[str, str]]] = {}
-        for joint, bound in limits:
-            stem = joint if len(limits) <= len(colours) else joint.rstrip("0123456789")
-            together.setdefault((stem, bound), []).append((joint, bound))
-        order = sorted(together.items(), key=lambda item: -sum(region.shares[limit] for limit in item[1]))
+        copies: dict[tuple[str, str], list[tuple[str, str]]] = {}
+        for joint, bound in region.shares:
+            if bound != "clearance" and is_actuated(region, joint) == is_motors:
+                copies.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
+        order = sorted(copies.items(), key=lambda item: -sum(region.shares[limit] for limit in item[1]))
         for colour, ((stem, bound), alike) in zip(colours, order, strict=False):
-            copies = sorted(joint[len(stem) :] for joint, _ in alike)
-            groups.append(_group(region, f"{stem}{', '.join(copies)} {bound}".strip(), colour, alike, is_motors))
+            name = f"{stem}{_span([joint[len(stem) :] for joint, _ in alike])} {bound}".strip()
+            groups.append(_group(region, name, colour, alike, is_motors))
         others += [limit for _, alike in order[len(colours) :] for limit in alike]
     groups += _groups_of_links(region)
     groups.sort(key=lambda group: -group.share)
     return [*groups, _group(region, f"{len(others)} other limits", REST, others, False)] if others else groups
+
+
+def _span(numbers: list[str]) -> str:
+    """The numbers of joints in their order; by their ends where none is left out: "1…3"."""
+    numbers = sorted(numbers, key=lambda number: (len(number), number))
+    if len(numbers) >= MANY and all(numbers) and int(numbers[-1]) - int(numbers[0]) == len(numbers) - 1:
+        return f"{numbers[0]}…{numbers[-1]}"
+    return ", ".join(numbers)
 
 
 def _groups_of_links(region: Region) -> list[Group]:

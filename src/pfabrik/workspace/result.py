@@ -21,6 +21,9 @@ from .workspace_table import LEAST_SHARE, in_words, workspace_table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from ..view.eye import View
+    from ..view.looks import Theme
+
 
 class Workspace(Printed, Region):
     """The workspace of a mechanism over two or three coordinates.
@@ -109,24 +112,44 @@ class Workspace(Printed, Region):
         """
         return inscribed(self, kind, centre, proportions)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        shape: Inscribed | None = None,
+        view: View | None = None,
+        size: tuple[float, float] | None = None,
+        theme: Theme = "light",
+    ) -> Axes:
         """Draw the border, each face in the colour of the limit that forms it, and return the axes.
+
+        A workspace in space stands in a box, with the machine where it starts: dotted in the solid and behind it.
+        Beside it are slices through the start, and the solid from below where that shows more limits.
 
         Parameters
         ----------
         ax : Axes, optional
-            Matplotlib axes to draw on, three-dimensional ones for three coordinates. Default: those of a new figure.
+            Two-dimensional Matplotlib axes to draw on, without slices. Default: those of a new figure.
+        shape : Inscribed, optional
+            One that fits in, as of `inscribed`, whose edges are drawn too; then slices are through its centre.
+        view : str or (float, float), optional
+            Of a workspace in space: "top", "front", "side" or "iso", or elevation and azimuth [deg]. Default: where
+            most limits are seen.
+        size : (float, float), optional
+            Width and height of a new figure [inches].
+        theme : {"light", "dark"}, optional
+            Colours for a light or a dark ground.
 
         Raises
         ------
         InvalidArgument
-            Two-dimensional axes for three coordinates.
+            Three-dimensional axes, or no such view, size or theme.
         MissingLibrary
             Matplotlib is not installed.
         """
         from ..view.workspace_picture import plot_workspace
 
-        return plot_workspace(self, ax)
+        return plot_workspace(self, ax, shape=shape, view=view, size=size, theme=theme)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write .npz (all arrays), .stl or .ply (the mesh; .ply with limits), or .csv (points of the border)."""

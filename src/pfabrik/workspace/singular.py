@@ -26,10 +26,12 @@ from .lattice_points import Numbering, codes
 from .locus import drawn_to_border, locus
 from .parts import connected
 from .result import Workspace
-from .workspace_table import LEAST_SHARE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from ..view.eye import View
+    from ..view.looks import Theme
 
 POINTS = 20_000
 """Approximate number of points of a map by default."""
@@ -37,6 +39,9 @@ POINTS = 20_000
 NEAR = 0.1
 """Measure below which a point counts as near to a singularity: what one side does there is tenfold at the other [-]."""
 MEASURED = ("measure", "least", f"below {NEAR:g}")
+
+SPECK = 6
+"""Points up to which a part is a speck, beside a locus that runs along the border: it is not counted in words."""
 
 ROWS_A_BLOCK = 512
 
@@ -81,15 +86,30 @@ class SingularityMap(Printed):
         """The share of the points that each part has, the largest first."""
         return np.bincount(self.parts) / max(len(self.parts), 1)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        view: View | None = None,
+        size: tuple[float, float] | None = None,
+        theme: Theme = "light",
+    ) -> Axes:
         """Draw the parallel measure and the locus of parallel singularities. Needs the extra `plot`.
 
-        Over three coordinates, the locus in space stands beside slices that show the measure and where they cut the
-        locus; on axes that are given, the slices are drawn in space too.
+        Over three coordinates, the locus in space stands beside slices that show the measure and where they cut it. On
+        axes that are given, which are two-dimensional, there are no slices.
+
+        Parameters
+        ----------
+        view, size, theme : as of `Workspace.plot`; by default most of the locus is seen.
         """
         from ..view.singular_picture import plot_singular_map
 
-        return plot_singular_map(self, ax)
+        return plot_singular_map(self, ax, view=view, size=size, theme=theme)
+
+    @property
+    def _signed(self) -> Floats:
+        return signed_of(self.measures, self.signs)
 
     def table(self) -> ResultTable:
         """The parts between parallel singularities, the least of each measure, and the share of points near to 0."""
@@ -116,7 +136,9 @@ class SingularityMap(Printed):
         return f"<SingularityMap of {points}: {self._parts_in_words()}, least parallel measure {least:.3g}>"
 
     def _sizes_that_count(self) -> list[float]:
-        return [size for size in self.sizes.tolist() if size > LEAST_SHARE]
+        """The sizes of the parts that are no specks."""
+        n_parts = int((np.bincount(self.parts) > SPECK).sum())
+        return [float(size) for size in self.sizes[:n_parts]]
 
     def _parts_in_words(self) -> str:
         if not len(self.locus_faces):
@@ -150,11 +172,11 @@ class SingularityTrack(Printed):
         lines = [f"{counted(len(self.signs), 'row')}, crossings before rows: {crossings}"]
         return ResultTable("Singularities along a path", lines, MEASURED, measured_rows(self.measures))
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the measures along the path, crossings marked. Needs the extra `plot`."""
+    def plot(self, ax: Axes | None = None, *, size: tuple[float, float] | None = None, theme: Theme = "light") -> Axes:
+        """Draw the measures along the path, crossings marked; `size` and `theme` as of `Workspace.plot`."""
         from ..view.singular_picture import plot_singular_track
 
-        return plot_singular_track(self.measures, self.crossings, ax)
+        return plot_singular_track(self.measures, self.crossings, ax, size=size, theme=theme)
 
 
 def least_and_share(measure: float | Floats) -> tuple[float, float]:
@@ -233,11 +255,11 @@ def singularity_map(
         places = places[reached]
         outer, border = drawn_to_border(over, places, step)
         at_border, measures_there, signs_there = _measured(over, border, tell, n, n + len(border))
-    points, signed = places * step + question.space.start, _signed(measures, signs)
+    points, signed = places * step + question.space.start, signed_of(measures, signs)
     vertices, faces = locus(
         np.concatenate([places, outer[at_border]]),
         np.concatenate([points, border[at_border]]),
-        np.concatenate([signed, _signed(measures_there, signs_there)]),
+        np.concatenate([signed, signed_of(measures_there, signs_there)]),
     )
     return SingularityMap(
         workspace=over,
@@ -264,9 +286,17 @@ def _of(answers: Solution) -> tuple[Singularity, Floats]:
     return singularity(answers), signs
 
 
-def _signed(measures: Singularity, signs: Floats) -> Floats:
+def signed_of(measures: Singularity, signs: Floats) -> Floats:
     """The parallel measure, signed where signs have a meaning."""
     return np.asarray(np.where(np.isnan(signs), 1.0, signs) * np.asarray(measures.parallel))
+
+
+def signed_at(over: Workspace, points: Floats) -> Floats:
+    """The signed parallel measure at points (n, d) of a workspace, (n,); NaN beyond reach."""
+    signed, within = np.full(len(points), np.nan), np.flatnonzero(over.contains(points))
+    rows, measures, signs = _measured(over, points[within], None)
+    signed[within[rows]] = signed_of(measures, signs)
+    return signed
 
 
 def _step(over: Workspace, resolution: float | None) -> Floats:
@@ -295,7 +325,7 @@ def _places(over: Workspace, step: Floats) -> Ints:
 
 
 def _measured(
-    over: Workspace, points: Floats, tell: OnProgress | None, done: int, total: int
+    over: Workspace, points: Floats, tell: OnProgress | None, done: int = 0, total: int = 0
 ) -> tuple[Ints, Singularity, Floats]:
     """Rows of the points that are reached in the question's working mode, and their measures and signs."""
     question, options = over._question, Options(working_mode="keep", on_invalid="mark")

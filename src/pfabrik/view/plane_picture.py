@@ -1,0 +1,145 @@
+"""Pictures of workspaces in a plane: the border named beside it, the machine, and the limits in a key."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..answers.words import limit_name
+from ..arrays import Floats
+from ..drawing import SMALL
+from ..skeleton import Skeleton
+from ..workspace.border import Group, group_of_limits, groups_of
+from ..workspace.space import POSITIONS
+from ..workspace.workspace_table import labels, shown
+from .border_parts import patches_of
+from .frame import machine_of, title_of
+from .looks import Look
+from .slices import DASHED, area_of, loops_of, outline_of, stretches_of
+
+if TYPE_CHECKING:
+    from ..workspace.inscribed import Inscribed
+    from ..workspace.region import Region
+
+SHORTEST_NAMED = 0.08
+"""Shortest stretch of a border that its limit is written beside, as a share of the picture's diagonal."""
+
+DASHES = (0, (3.0, 0.7))
+"""Of a border in a plane that no motor's stop forms."""
+
+BORDER, MACHINE = 2.2, 1.1
+"""Width of a border in a plane, and of the lines of the machine [points]."""
+
+MOST_WIDENINGS, EDGE_FREE = 12, 12.0
+"""How often axes are widened for names, at most, and the distance of names from their edge [pixels]."""
+
+OFF, SIDEWAYS = 5.0, 0.2
+"""Distance of a name from the border [points]; component of a direction from which on it stands to that side."""
+
+
+def plot_plane(region: Region, axes: Any, shape: Inscribed | None, look: Look) -> None:
+    """Draw a workspace in a plane on axes."""
+    groups = groups_of(region)
+    _draw_plane(axes, region, groups, look)
+    if shape is not None:
+        axes.plot(*shown(region, outline_of(shape)).T, color=look.ink, **DASHED)
+    _draw_key(axes, groups, look)
+    axes.set_title(title_of(region), fontsize=SMALL + 1, color=look.ink)
+    _make_room(axes)
+
+
+def _draw_key(axes: Any, groups: list[Group], look: Look) -> None:
+    """The limits beside the axes: stops of motors, links that are too near, then all else, each with its line."""
+    from matplotlib.lines import Line2D
+
+    handles: list[Line2D] = []
+    kinds = ((True, False, "stops of motors"), (False, True, "links"), (False, False, "passive joints, reach"))
+    for is_motors, is_links, title in kinds:
+        of_kind = [group for group in groups if (group.is_motors, group.is_links) == (is_motors, is_links)]
+        if of_kind:
+            handles.append(Line2D([], [], linestyle="", label=title))
+        for group in of_kind:
+            style: Any = "-" if is_motors else DASHES
+            handles.append(Line2D([], [], color=group.colour, linewidth=4, linestyle=style, label=group.name))
+    letters: dict[str, Any] = {"fontsize": SMALL, "title_fontsize": SMALL, "labelcolor": look.ink}
+    legend = axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False, **letters)
+    legend.set_title("border formed by")
+    legend.get_title().set_color(look.ink)
+
+
+def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> None:
+    from matplotlib.patches import PathPatch
+
+    place = group_of_limits(region, groups)
+    patches = patches_of(region, region.vertices, region.faces, place[region.vertex_limit], place)
+    points = shown(region, patches.vertices)
+    group_of = dict(zip(map(tuple, patches.faces.tolist()), patches.groups.tolist(), strict=True))
+    for loop in loops_of(patches.faces):
+        for group, corners in stretches_of(loop, group_of):
+            drawn = groups[group]
+            style: Any = "-" if drawn.is_motors else DASHES
+            axes.plot(*points[corners].T, color=drawn.colour, linewidth=BORDER, linestyle=style, zorder=4)
+    loops, places = loops_of(region.faces), shown(region, region.vertices)
+    skeleton = machine_of(region)
+    if skeleton is not None:
+        _draw_machine(axes, skeleton, [POSITIONS.index(name) for name in region.names], look)
+    for loop in loops:
+        _name_stretches(axes, region, places, loop, look)
+    area = area_of([places[loop] for loop in loops])
+    axes.add_patch(PathPatch(area, facecolor=look.within, edgecolor="none", zorder=0))
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
+    axes.autoscale_view()
+    axes.margins(0.05)
+    if skeleton is not None or len(set(region.units)) == 1:
+        axes.set_aspect("equal")
+
+
+def _make_room(axes: Any) -> None:
+    """Widen the ends of axes in a plane until the names beside the border are within them."""
+    root = axes.get_figure(root=True)
+    for _ in range(MOST_WIDENINGS):
+        root.draw_without_rendering()
+        box = axes.get_window_extent()
+        names = np.array([text.get_window_extent().extents for text in axes.texts]).reshape(-1, 4)
+        over = np.array([*(box.extents[:2] - names[:, :2].min(axis=0, initial=np.inf)),
+                         *(names[:, 2:].max(axis=0, initial=-np.inf) - box.extents[2:])])  # fmt: skip
+        over = np.maximum(np.where(np.isfinite(over), over, 0.0) + EDGE_FREE, 0.0)
+        if (over <= 0.5 * EDGE_FREE).all():
+            return
+        for name, size, low, high in (("x", box.width, over[0], over[2]), ("y", box.height, over[1], over[3])):
+            start, end = getattr(axes, f"get_{name}lim")()
+            unit = (end - start) / size
+            axes.set(**{f"{name}lim": (start - unit * low, end + unit * high)})
+
+
+def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], look: Look) -> None:
+    """Write the limit that forms each stretch of a border beside its middle, outside; short stretches have no room."""
+    limit_of = dict(zip(map(tuple, region.faces.tolist()), region.face_limit.tolist(), strict=True))
+    for limit, corners in stretches_of(loop, limit_of):
+        steps = np.diff(points[corners], axis=0)
+        along = np.cumsum(np.linalg.norm(steps, axis=1))
+        if along[-1] < SHORTEST_NAMED * np.linalg.norm(np.ptp(points, axis=0)):
+            continue
+        middle = int(np.searchsorted(along, 0.5 * along[-1]))
+        outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(np.linalg.norm(steps[middle]), 1e-300)
+        axes.annotate(
+            limit_name(*region.limits[limit]),
+            points[corners[middle]] + 0.5 * steps[middle],
+            xytext=OFF * outward,
+            textcoords="offset points",
+            ha="left" if outward[0] > SIDEWAYS else "right" if outward[0] < -SIDEWAYS else "center",
+            va="bottom" if outward[1] > SIDEWAYS else "top" if outward[1] < -SIDEWAYS else "center",
+            fontsize=SMALL,
+            color=look.ink,
+            zorder=5,
+        )
+
+
+def _draw_machine(axes: Any, skeleton: Skeleton, columns: list[int], look: Look) -> None:
+    """Draw a machine in a plane in thin lines."""
+    for line in [*(line.outline for line in skeleton.parts), *skeleton.rails]:
+        axes.plot(*line[:, columns].T, color=look.soft, linewidth=MACHINE, solid_capstyle="round", zorder=2)
+    places = np.array([mark.place for mark in skeleton.marks])[:, columns]
+    axes.plot(*places.T, color=look.soft, linestyle="", marker="o", markersize=2.2, zorder=2)
+    axes.plot(*skeleton.reference[columns][:, None], color=look.soft, marker="+", markersize=8, zorder=2)

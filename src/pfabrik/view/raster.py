@@ -1,0 +1,251 @@
+"""A z-buffer: meshes as images of their faces, seen by an orthographic eye, and lines along the sides of pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints, Mask
+
+AT_ONCE = 2_000_000
+"""Pixels that faces are tried at, at once: more would need much memory."""
+
+TALLEST = 1.5
+"""Most pixels from below to above, as a multiple of those across."""
+
+FLAT = 1e-12
+"""Area below which a face is seen on its edge [pixels²]."""
+
+STEEPER = 4.0
+"""Factor by which a jump in depth exceeds the steps beside it, at least: else it is a slope."""
+
+SMOOTHINGS, SPECK = 30, 7
+"""Times that corners of a line are moved towards their neighbours; sides of a loop below which it is a speck."""
+
+Node: TypeAlias = tuple[int, int]
+
+
+class Raster(NamedTuple):
+    """The nearest face in each pixel. Row 0 is the lowest.
+
+    Attributes
+    ----------
+    face : (rows, columns); -1 where there is none.
+    depth : towards the eye, (rows, columns); -inf where there is no face.
+    weights : of the corners of the face, (rows, columns, 3).
+    low : the centre of the first pixel, (2,).
+    pixel : the distance of centres.
+    """
+
+    face: Ints
+    depth: Floats
+    weights: Floats
+    low: Floats
+    pixel: float
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, lower and upper edge."""
+        low = self.low - 0.5 * self.pixel
+        rows, columns = self.face.shape
+        high = low + self.pixel * np.array([columns, rows])
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+    def centres(self, rows: Ints) -> Floats:
+        """The centres of pixels, (n, 2), by their places in a flat image."""
+        row, column = np.divmod(rows, self.face.shape[1])
+        return self.low + self.pixel * np.stack([column, row], axis=1)
+
+    def pixels(self, seen: Floats) -> tuple[tuple[Ints, Ints], Mask]:
+        """Rows and columns of points (n, 2 or more), and the mask of those within the image; others are moved to it."""
+        column, row = np.round((seen[:, :2] - self.low) / self.pixel).astype(np.int64).T
+        rows, columns = self.face.shape
+        within = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        return (np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)), within
+
+    def mask_of(self, seen: Floats) -> Mask:
+        """The mask of the pixels that points (n, 2 or more) are in; those that are NaN are in none."""
+        mask = np.zeros(self.face.shape, bool)
+        pixels, is_within = self.pixels(seen[np.isfinite(seen[:, 0])])
+        mask[pixels[0][is_within], pixels[1][is_within]] = True
+        return mask
+
+
+def rasterised(seen: Floats, faces: Ints, width: int, margin: int = 2, *, both_sides: bool = False) -> Raster:
+    """Draw triangles, as an eye sees them, into an image.
+
+    Parameters
+    ----------
+    seen : vertices to the right, up, and towards the eye, (v, 3).
+    faces : places of vertices, (f, 3), right-handed as seen from outside.
+    width : pixels across.
+    margin : free pixels around all faces.
+    both_sides : True to draw faces that turn away from the eye too: those of a mesh that is not closed.
+    """
+    used = seen[np.unique(faces), :2]
+    low, span = used.min(axis=0), np.ptp(used, axis=0)
+    pixel = float(max(span[0], span[1] / TALLEST)) / max(width - 2 * margin - 1, 1)
+    columns, rows = (np.ceil(span / pixel).astype(np.int64) + 2 * margin + 1).tolist()
+    low = low - margin * pixel
+    placed = np.concatenate([(seen[:, :2] - low) / pixel, seen[:, 2:]], axis=1)
+    area = _area(placed, faces)
+    drawn = np.flatnonzero((np.abs(area) if both_sides else area) > FLAT)
+    corners, area = placed[faces[drawn]], area[drawn]
+    first = np.ceil(corners[:, :, :2].min(axis=1)).astype(np.int64)
+    last = np.floor(corners[:, :, :2].max(axis=1)).astype(np.int64)
+    is_seen = (last >= first).all(axis=1)
+    sides = 1 << np.ceil(np.log2(np.maximum((last - first + 1).max(axis=1), 1))).astype(np.int64)
+    depth, face = np.full(rows * columns, -np.inf), np.full(rows * columns, -1)
+    for side in np.unique(sides[is_seen]).tolist():
+        offsets = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
+        members = np.flatnonzero(is_seen & (sides == side))
+        for block in np.split(members, range(AT_ONCE // side**2 + 1, len(members), AT_ONCE // side**2 + 1)):
+            at = first[block, None] + offsets
+            weights = _weights(corners[block, None], area[block, None], at)
+            row, place = np.nonzero((weights >= -1e-9).all(axis=-1))
+            pixels = at[row, place] @ [1, columns]
+            nearness = (weights[row, place] * corners[block[row], :, 2]).sum(axis=1)
+            np.maximum.at(depth, pixels, nearness)
+            is_nearest = nearness == depth[pixels]
+            face[pixels[is_nearest]] = block[row[is_nearest]]
+    weights, filled = np.zeros((rows * columns, 3)), np.flatnonzero(face >= 0)
+    at = np.stack(np.divmod(filled, columns)[::-1], axis=1)
+    weights[filled] = _weights(corners[face[filled]], area[face[filled]], at)
+    face[filled] = drawn[face[filled]]
+    shape = (rows, columns)
+    return Raster(face.reshape(shape), depth.reshape(shape), weights.reshape(*shape, 3), low, pixel)
+
+
+def _area(points: Floats, faces: Ints) -> Floats:
+    """Twice the area of faces (f, 3) on the screen; negative where they turn away."""
+    a, b, c = points[faces[:, 0], :2], points[faces[:, 1], :2], points[faces[:, 2], :2]
+    return _cross(b - a, c - a)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _weights(corners: Floats, area: Floats, at: NDArray[Any]) -> Floats:
+    """Barycentric coordinates (..., 3) of pixels (..., 2) in triangles (..., 3, 3) of an area (...)."""
+    away = at - corners[..., 0, :2]
+    second = _cross(away, corners[..., 2, :2] - corners[..., 0, :2]) / area
+    third = _cross(corners[..., 1, :2] - corners[..., 0, :2], away) / area
+    return np.stack([1.0 - second - third, second, third], axis=-1)
+
+
+def counted_around(mask: Mask, wide: int, tall: int | None = None) -> Ints:
+    """The number of pixels of a mask within so many columns and rows of each."""
+    total = mask.astype(np.int64)
+    for axis, reach in ((0, wide if tall is None else tall), (1, wide)):
+        padding = [(reach + 1, reach) if k == axis else (0, 0) for k in (0, 1)]
+        total = np.cumsum(np.pad(total, padding), axis=axis)
+        places, window = np.arange(mask.shape[axis]), 2 * reach + 1
+        total = np.take(total, places + window, axis) - np.take(total, places, axis)
+    return total
+
+
+def near_changes(labels: Ints, wide: int) -> Mask:
+    """Mask of the pixels within so many columns and rows of another label."""
+    is_edge = np.zeros(labels.shape, bool)
+    is_edge[:, 1:] |= labels[:, 1:] != labels[:, :-1]
+    is_edge[1:] |= labels[1:] != labels[:-1]
+    return np.asarray(counted_around(is_edge, wide) > 0)
+
+
+def most_around(labels: Ints, wide: int) -> Ints:
+    """The label that most pixels around each have, of pixels that have one."""
+    best, most = labels, np.zeros(labels.shape, np.int64)
+    for label in np.unique(labels[labels >= 0]).tolist():
+        count = counted_around(labels == label, wide)
+        best, most = np.where(count > most, label, best), np.maximum(count, most)
+    return np.where(labels >= 0, best, labels)
+
+
+def spread(depth: Floats, wide: int, block: int = 1) -> Floats:
+    """Depths, carried to so many pixels around that have none (-inf): of the greatest around, in blocks of pixels."""
+    shape = -(-np.array(depth.shape) // block)
+    padded = np.pad(depth, [(0, block * n - size) for n, size in zip(shape, depth.shape, strict=True)], "edge")
+    coarse = padded.reshape(shape[0], block, shape[1], block).max(axis=(1, 3))
+    for _ in range(-(-wide // block)):
+        around = np.pad(coarse, 1, constant_values=-np.inf)
+        nearest = np.max([around[1:-1, 2:], around[1:-1, :-2], around[2:, 1:-1], around[:-2, 1:-1]], axis=0)
+        coarse = np.where(np.isfinite(coarse), coarse, nearest)
+    fine = np.repeat(np.repeat(coarse, block, axis=0), block, axis=1)[: depth.shape[0], : depth.shape[1]]
+    return np.where(np.isfinite(depth), depth, fine)
+
+
+def greatest_around(depth: Floats, wide: int) -> Floats:
+    """The greatest depth within so many columns and rows of each pixel."""
+    for axis in (0, 1):
+        n, reach, size = depth.shape[axis], 1, 2 * wide + 1
+        padding = [(wide, wide) if k == axis else (0, 0) for k in (0, 1)]
+        windows = np.moveaxis(np.pad(depth, padding, constant_values=-np.inf), axis, 0)
+        while 2 * reach <= size:
+            windows = np.maximum(windows[:-reach], windows[reach:])
+            reach *= 2
+        depth = np.moveaxis(np.maximum(windows[:n], windows[size - reach : size - reach + n]), 0, axis)
+    return depth
+
+
+def lines_between(labels: Ints, raster: Raster, jump: float, depth: Floats | None = None) -> list[Floats]:
+    """Smooth lines (n, 2) where labels differ, and where one part hides another that is farther away.
+
+    Parameters
+    ----------
+    labels : (rows, columns); -1 where there is nothing.
+    jump : least difference of depths where one part hides another.
+    depth : default: that of the raster.
+    """
+    far = np.where(labels >= 0, raster.depth if depth is None else depth, 0.0)
+    upright = (labels[:, 1:] != labels[:, :-1]) | _is_jump(far, jump)
+    level = (labels[1:] != labels[:-1]) | _is_jump(far.T, jump).T
+    around: dict[Node, list[Node]] = {}
+    for sides, down, right in ((upright, 1, 0), (level, 0, 1)):
+        for row, column in (np.argwhere(sides) + [right, down]).tolist():
+            first, second = (row, column), (row + down, column + right)
+            around.setdefault(first, []).append(second)
+            around.setdefault(second, []).append(first)
+    lines = [_smoothed(chain, len(around[chain[0]]) == 2) for chain in _chains(around)]
+    return [raster.low + raster.pixel * (line[:, ::-1] - 0.5) for line in lines if len(line)]
+
+
+def _is_jump(depth: Floats, jump: float) -> Mask:
+    """Mask (rows, columns - 1) of steps along rows that are no slopes: far greater than both steps beside them."""
+    steps = np.abs(np.diff(depth, axis=1))
+    beside = np.pad(steps, [(0, 0), (1, 1)])
+    return np.asarray((steps > jump) & (steps > STEEPER * np.maximum(beside[:, :-2], beside[:, 2:])))
+
+
+def _chains(around: dict[Node, list[Node]]) -> Iterator[list[Node]]:
+    """The lines of a graph from junction to junction, then its loops."""
+    used: set[frozenset[Node]] = set()
+    junctions = [node for node, beside in around.items() if len(beside) != 2]
+    for start in (*junctions, *around):
+        for after in around[start]:
+            if frozenset((start, after)) in used:
+                continue
+            chain = [start, after]
+            used.add(frozenset(chain))
+            while len(around[chain[-1]]) == 2 and chain[-1] != start:
+                ahead = next(node for node in around[chain[-1]] if node != chain[-2])
+                used.add(frozenset((chain[-1], ahead)))
+                chain.append(ahead)
+            yield chain
+
+
+def _smoothed(chain: list[Node], is_loop: bool) -> Floats:
+    """The corners (n, 2) of a line with each moved towards its neighbours; its ends stay. A speck has none."""
+    line = np.array(chain, float)
+    if chain[0] == chain[-1] and len(chain) < SPECK:
+        return np.zeros((0, 2))
+    for _ in range(SMOOTHINGS):
+        if is_loop:
+            line[:-1] = 0.25 * np.roll(line[:-1], 1, axis=0) + 0.5 * line[:-1] + 0.25 * np.roll(line[:-1], -1, axis=0)
+            line[-1] = line[0]
+        elif len(line) > 2:
+            line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
+    return line

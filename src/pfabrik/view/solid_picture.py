@@ -1,0 +1,337 @@
+"""Pictures of workspaces in space: the solid in its box, from below where that shows more, and three slices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..answers.words import limit_name
+from ..arrays import Floats, Ints, Mask
+from ..drawing import SMALL, new_figure
+from ..workspace.border import Group, group_of_limits, groups_of
+from ..workspace.workspace_table import for_people
+from .canvas import checked_size, draw_triad
+from .eye import Eye, View, eye_of, upright
+from .frame import PADS, axes_for, box_of, dense, draw_box, fit, machine_of, title_of
+from .looks import Look
+from .raster import counted_around
+from .slices import DASHED, draw_slice, edges_of, outline_of, plane_across
+from .solid import Sample, SeenSolid, best_eye, in_the_light, is_told_apart, sample_of, scale_of, seen_solid
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..workspace.inscribed import Inscribed
+    from ..workspace.region import Region
+
+ACROSS = 900
+"""Pixels across a solid."""
+
+TITLE, KEY_ROW, GAP, EDGE = 0.62, 0.19, 0.2, 0.12
+"""Height of the title, and of a row of the key; free between and around panels [inches]."""
+
+WIDEST, SHORTEST, TALLEST, SECOND, SLICE = 4.3, 3.3, 4.1, 2.8, 1.9
+"""Width of a solid in its box, at most, its least and greatest height, and widths of the second solid and of slices, at
+most [inches]."""
+
+SLICE_GAP, SLICE_BELOW, SLICE_LEFT = 0.62, 0.3, 0.55
+"""Room for words between slices, below the last one and on their left [inches]."""
+
+KEYS = 4
+"""Groups in a row of the key."""
+
+LEAST = 0.005
+"""Share of the border from which on a group is in the key."""
+
+FROM_BELOW = -28.0
+"""Elevation of the second solid [deg]."""
+
+HIDDEN, SHOWN = 0.01, 0.02
+"""Shares of the picture: below the first a group is not seen, and from the second on it is worth a second solid."""
+
+EDGE_COLOUR, EDGE_WIDTH = "#101010", 0.8
+MACHINE_WIDTH, HALO, DOTTED = 1.3, 1.7, (0, (1.2, 1.5))
+"""Lines of the solid, of the machine and of the paper around it [points]; dashes of what is in the solid or behind."""
+
+BRIGHT = 0.5
+"""Brightness of a colour from which on letters on it are dark."""
+
+LETTERS = SMALL - 0.5
+"""Size of names on faces [points]."""
+
+
+class Colours(NamedTuple):
+    """What each limit looks like: the groups, the place of each limit's group, and their colours (n, 3)."""
+
+    groups: list[Group]
+    place: Ints
+    rgb: Floats
+
+
+def plot_solid(
+    region: Region,
+    ax: Axes | None,
+    shape: Inscribed | None,
+    view: View | None,
+    size: tuple[float, float] | None,
+    look: Look,
+) -> Axes:
+    """Draw a workspace in space on axes that are given, or on those of a new figure, with slices beside it."""
+    from matplotlib.colors import to_rgb
+
+    groups = groups_of(region)
+    colours = Colours(groups, group_of_limits(region, groups), np.array([to_rgb(group.colour) for group in groups]))
+    sample = sample_of(region.vertices * scale_of(region), region.faces, region.face_limit)
+    eye = best_eye(sample, upright(region.names)) if view is None else eye_of(view, upright(region.names))
+    first = seen_solid(region, eye, ACROSS)
+    if ax is not None:
+        axes: Any = axes_for(ax, (0.0, 0.0), look)
+        _draw_solid(axes, first, colours, shape, look)
+        axes.set_title(title_of(region), fontsize=SMALL + 1, color=look.ink)
+        key = _key(region, groups, look)
+        while key["ncols"] > 1 and _legend(axes, key).get_window_extent().width > axes.get_window_extent().width:
+            key["ncols"] -= 1
+        _legend(axes, key)
+        return axes  # type: ignore[no-any-return]
+    below = _eye_below(sample, eye, colours.place) if view is None else None
+    second = None if below is None else seen_solid(region, below, ACROSS)
+    figure, axes, beside, slices = _panels(first, second, size, groups, look)
+    _draw_solid(axes, first, colours, shape, look)
+    if second is not None:
+        _draw_second(beside, second, colours, look)
+    _draw_slices(slices, first, colours, shape, look)
+    left = EDGE / figure.get_size_inches()[0]
+    top = 1.0 - 0.16 / figure.get_size_inches()[1]
+    figure.text(left, top, title_of(region), fontsize=SMALL + 2, color=look.ink, ha="left", va="top")
+    started = "home" if region._question.start is None else "the start"
+    which = "the limit that ends it there" if is_told_apart(region) else "one of the limits that bind there"
+    words = f"each face in the colour of {which}; + is {started}"
+    under = top - 0.2 / figure.get_size_inches()[1]
+    figure.text(left, under, words, fontsize=SMALL, color=look.soft, ha="left", va="top")
+    figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), **_key(region, groups, look))
+    return axes  # type: ignore[no-any-return]
+
+
+def _legend(axes: Any, key: dict[str, Any]) -> Any:
+    return axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), **key)
+
+
+def _key(region: Region, groups: list[Group], look: Look) -> dict[str, Any]:
+    """Settings of a key: stops of motors, then passive joints, then links, the rest last, each with its share."""
+    from matplotlib.patches import Patch
+
+    order = sorted(
+        groups, key=lambda group: (not group.is_motors, group.is_links, group.name[0].isdigit(), -group.share)
+    )
+    shown = [group for group in order if group.share >= LEAST]
+    handles = [
+        Patch(
+            facecolor=group.colour, edgecolor=look.ink, linewidth=0.5, label=f"{group.name}  {100 * group.share:.0f} %"
+        )
+        for group in shown
+    ]
+    return {
+        "handles": handles, "ncols": min(len(handles), KEYS), "frameon": False, "fontsize": SMALL,
+        "handlelength": 1.2, "columnspacing": 1.4, "labelcolor": look.ink,
+    }  # fmt: skip
+
+
+def _eye_below(sample: Sample, eye: Eye, place: Ints) -> Eye | None:
+    """An eye from below, if it sees groups that the first does not."""
+    eyes = [Eye(FROM_BELOW, eye.azimuth + turn, eye.order) for turn in (0.0, 180.0)]
+    best = max(eyes, key=lambda below: float(np.sqrt(sample.shares(below, place)).sum()))
+    is_new = (sample.shares(eye, place) < HIDDEN) & (sample.shares(best, place) > SHOWN)
+    return best if is_new.any() else None
+
+
+def _panels(
+    first: SeenSolid, second: SeenSolid | None, size: tuple[float, float] | None, groups: list[Group], look: Look
+) -> tuple[Any, Any, Any, list[Any]]:
+    """A new figure, axes of its solids, and those of slices, as wide as what they show, one below the other."""
+    rows = -(-sum(group.share >= LEAST for group in groups) // KEYS)
+    bottom = KEY_ROW * rows + 0.16
+    content, pads = np.ptp(_content(first), axis=0), np.array([PADS[0] + PADS[1], PADS[2] + PADS[3]]) / 72.0
+    tall = float(np.clip((WIDEST - pads[0]) * content[1] / content[0] + pads[1], SHORTEST, TALLEST))
+    wide = min(float(content[0] / content[1]) * (tall - pads[1]) + pads[0], WIDEST)
+    wider = 0.0 if second is None else min(_aspect(second) * tall, SECOND)
+    spans = np.ptp(first.region.bounds * first.scale, axis=0)[list(first.eye.order)]
+    shapes = np.array([spans[1] / spans[0], spans[2] / spans[0], spans[2] / spans[1]])  # all at one scale
+    breadths = np.array([spans[0], spans[0], spans[1]]) / max(spans[0], spans[1])
+    slice_wide = min((tall - 2.0 * SLICE_GAP - SLICE_BELOW) / float(shapes @ breadths), SLICE)
+    lefts = np.cumsum([EDGE, wide + (GAP if wider else 0.0), wider + SLICE_LEFT])
+    width, height = float(lefts[-1]) + slice_wide + 2.0 * EDGE, tall + bottom + TITLE
+    figure = new_figure(*checked_size(size or (width, height)), layout=None)
+    figure.set_facecolor(look.paper)
+
+    def panel(left: float, below: float, across: float, high: float) -> Any:
+        return figure.add_axes((left / width, below / height, across / width, high / height), facecolor=look.paper)
+
+    main = panel(lefts[0], bottom, wide, tall)
+    beside = panel(lefts[1], bottom, wider, tall) if second is not None else None
+    talls = slice_wide * shapes * breadths
+    spare = (tall - SLICE_BELOW - float(talls.sum())) / 2.0
+    lows = bottom + tall - np.cumsum(talls) - spare * np.arange(3)
+    slices = [
+        panel(lefts[2], low, slice_wide * breadth, high)
+        for low, breadth, high in zip(lows, breadths, talls, strict=True)
+    ]
+    return figure, main, beside, slices
+
+
+def _aspect(solid: SeenSolid) -> float:
+    rows, columns = solid.limit.shape
+    return float(columns / rows)
+
+
+def _content(solid: SeenSolid) -> Floats:
+    """Points (n, 2) of the picture: the box, and the machine."""
+    corners = box_of(solid.region, solid.scale).corners
+    lines = [line for line, _ in _machine_lines(solid.region)]
+    return solid.eye.seen(np.concatenate([corners, *lines]))[:, :2]
+
+
+def _machine_lines(region: Region) -> list[tuple[Floats, float]]:
+    """Lines (n, 3) of the machine, and the width of each [points]."""
+    skeleton = machine_of(region)
+    if skeleton is None:
+        return []
+    return [
+        (line, MACHINE_WIDTH) for line in [*(line.outline for line in skeleton.parts), *skeleton.rails] if len(line) > 1
+    ]
+
+
+def draw_image(axes: Any, solid: SeenSolid, rgb: Floats, alpha: float = 1.0) -> None:
+    """Draw what each pixel shows, in the light: colours (n, 3) by limit."""
+    image = np.dstack([in_the_light(solid.normal, solid.eye, rgb[solid.limit]), alpha * (solid.limit >= 0)])
+    axes.imshow(image, origin="lower", extent=solid.raster.extent, interpolation="antialiased", zorder=2)
+
+
+def _draw_solid(axes: Any, solid: SeenSolid, colours: Colours, shape: Inscribed | None, look: Look) -> None:
+    """Draw a solid in its box, with the machine, a shape that fits in, and the names of its faces."""
+    from matplotlib.collections import LineCollection
+
+    region, eye = solid.region, solid.eye
+    lines = _machine_lines(region)
+    fit(axes, _content(solid))
+    limits = axes.get_xlim(), axes.get_ylim()
+    draw_image(axes, solid, colours.rgb[colours.place])
+    axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
+    style: dict[str, Any] = {"colors": EDGE_COLOUR, "linewidths": EDGE_WIDTH, "capstyle": "round", "zorder": 3}
+    axes.add_collection(LineCollection(solid.lines, **style), autolim=False)
+    before, hidden = _draw_lines(axes, solid, lines, look)
+    for edge in [] if shape is None else edges_of(shape):
+        hidden |= _draw_hidden(axes, solid, dense(edge * solid.scale))
+    home = region._question.space.start * solid.scale
+    if ((home >= region.bounds[0] * solid.scale) & (home <= region.bounds[1] * solid.scale)).all():
+        _mark(axes, eye.seen(home)[:2])
+        hidden |= solid.raster.mask_of(eye.seen(home[None]))
+    draw_box(axes, eye, box_of(region, solid.scale), look, [eye.seen(dense(line))[:, :2] for line, _ in lines])
+    _name_faces(axes, solid, colours, before, hidden)
+
+
+def _mark(axes: Any, place: Floats) -> None:
+    """The start, as a cross that is seen on every colour."""
+    for colour, size, width, order in (("white", 11.0, 3.0, 6.0), ("black", 9.0, 1.2, 7.0)):
+        axes.plot(*place, "+", color=colour, markersize=size, markeredgewidth=width, zorder=order)
+
+
+def _draw_lines(axes: Any, solid: SeenSolid, lines: list[tuple[Floats, float]], look: Look) -> tuple[Mask, Mask]:
+    """Draw lines of space whole before the solid, dotted in it and behind; masks of the pixels of both."""
+    before, hidden = np.zeros((2, *solid.limit.shape), bool)
+    for line, width in lines:
+        points = dense(line)
+        is_hidden = solid.hides(points)
+        seen = np.where(is_hidden[:, None], np.nan, solid.eye.seen(points)[:, :2])
+        axes.plot(*seen.T, color=look.paper, linewidth=width + HALO, zorder=3.5, solid_capstyle="butt")
+        axes.plot(*seen.T, color=look.soft, linewidth=width, zorder=4, solid_capstyle="round")
+        before |= solid.raster.mask_of(seen)
+        hidden |= _draw_hidden(axes, solid, np.where(is_hidden[:, None], points, np.nan))
+    return before, hidden
+
+
+def _draw_hidden(axes: Any, solid: SeenSolid, points: Floats) -> Mask:
+    """Draw a line (n, 3) in the solid or behind it, dotted, with gaps at NaN; the mask of its pixels."""
+    seen = solid.eye.seen(points)[:, :2]
+    axes.plot(*seen.T, color="white", linewidth=EDGE_WIDTH, linestyle=DOTTED, alpha=0.9, zorder=4)
+    return solid.raster.mask_of(seen)
+
+
+def _name_faces(axes: Any, solid: SeenSolid, colours: Colours, before: Mask, hidden: Mask) -> None:
+    """Write the name of its limit on each face that has room, off lines before it, and off hidden ones if it can."""
+    if is_told_apart(solid.region):
+        labels, names = solid.limit, [limit_name(*limit) for limit in solid.region.limits]
+        tints = colours.rgb[colours.place]
+    else:
+        labels = np.where(solid.limit >= 0, colours.place[solid.limit], -1)
+        names, tints = [group.name for group in colours.groups], colours.rgb
+    pixel = float(np.ptp(axes.transData.transform([[0.0, 0.0], [solid.raster.pixel, 0.0]])[:, 0]))
+    free, covered = counted_around(before, 2) == 0, counted_around(hidden, 1) > 0
+    for label in np.unique(labels[labels >= 0]).tolist():
+        colour = "white" if tints[label] @ [0.3, 0.59, 0.11] < BRIGHT else "black"
+        style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 5, "color": colour}
+        text = axes.text(*solid.raster.low, names[label], fontsize=LETTERS, **style)
+        box = text.get_window_extent()
+        half = [int(0.5 * side / pixel + 4.0 / pixel) + 1 for side in (box.width, box.height)]
+        place = _room((labels == label) & free, covered, half[0], half[1])
+        if place is None:
+            text.remove()
+        else:
+            text.set_position(solid.raster.low + solid.raster.pixel * place)
+
+
+def _room(mask: Mask, covered: Mask, wide: int, tall: int) -> Floats | None:
+    """Column and row of the middle of a rectangle within a mask: of those that cover least, the most central one."""
+    used = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    if not all(map(len, used)):
+        return None
+    part = np.s_[used[0][0] : used[0][-1] + 1, used[1][0] : used[1][-1] + 1]
+    fits = counted_around(mask[part], wide, tall) == (2 * wide + 1) * (2 * tall + 1)
+    if not fits.any():
+        return None
+    cost = counted_around(covered[part], wide, tall)
+    fits &= cost == cost[fits].min()
+    while (inner := counted_around(fits, 2) == 25).any():
+        fits = inner
+    places = np.argwhere(fits)
+    row, column = places[np.linalg.norm(places - places.mean(axis=0), axis=1).argmin()]
+    return np.array([used[1][0] + column, used[0][0] + row], float)
+
+
+def _draw_second(axes: Any, solid: SeenSolid, colours: Colours, look: Look) -> None:
+    """Draw the solid from below, with the directions of its coordinates."""
+    from matplotlib.collections import LineCollection
+
+    left, right, low, high = solid.raster.extent
+    fit(axes, np.array([[left, low], [right, high]]), (4.0, 4.0, 46.0, 4.0))
+    limits = axes.get_xlim(), axes.get_ylim()
+    draw_image(axes, solid, colours.rgb[colours.place])
+    axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
+    style: dict[str, Any] = {"colors": EDGE_COLOUR, "linewidths": EDGE_WIDTH, "capstyle": "round", "zorder": 3}
+    axes.add_collection(LineCollection(solid.lines, **style), autolim=False)
+    nothing = np.zeros(solid.limit.shape, bool)
+    _name_faces(axes, solid, colours, nothing, nothing)
+    below: dict[str, Any] = {"textcoords": "offset points", "annotation_clip": False, "ha": "center", "va": "top"}
+    axes.annotate(
+        "from below", (0.5 * (left + right), low), xytext=(0.0, -6.0), fontsize=SMALL, color=look.soft, **below
+    )
+    unit = float(axes.transData.inverted().get_matrix()[0, 0]) * axes.get_figure(root=True).dpi / 72.0
+    corner = np.array([left, low]) + unit * np.array([24.0, -24.0])
+    draw_triad(axes, solid.eye, look, corner, solid.region.names)
+
+
+def _draw_slices(panels: list[Any], solid: SeenSolid, colours: Colours, shape: Inscribed | None, look: Look) -> None:
+    """Draw slices through the start, or through the middle of a shape."""
+    region, order = solid.region, solid.eye.order
+    start, (low, high) = region._question.space.start, region.bounds
+    at = start if shape is None else shape.centre
+    at = np.where((at >= low) & (at <= high), at, 0.5 * (low + high))
+    factors = np.array(for_people(region.units)[0])
+    for panel, axis in zip(panels, reversed(order), strict=True):
+        plane = plane_across(axis, float(at[axis]), order)
+        draw_slice(panel, region, plane, look, colours.place, colours.rgb)
+        panel.set_anchor("W")
+        if abs(start[axis] - at[axis]) < region.resolution[axis]:
+            panel.plot(*(start * factors)[plane.across], "+", color=look.ink, markersize=7.0, zorder=5)
+        if shape is not None:
+            panel.plot(*(outline_of(shape, plane) * factors[plane.across]).T, color=look.ink, **DASHED)

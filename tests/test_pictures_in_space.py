@@ -1,0 +1,123 @@
+"""Pictures of workspaces in space show the border that margins have, and say which limit forms it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument
+from test_pictures import faults
+
+pytest.importorskip("matplotlib")
+from matplotlib.figure import Figure
+
+from pfabrik.view.eye import Eye, upright
+from pfabrik.view.raster import lines_between, rasterised
+from pfabrik.view.solid import SeenSolid, best_eye, sample_of, scale_of, seen_solid
+
+OVER = {"rps": ["z", "tilt_x", "tilt_y"]}
+CELLS = 30.0
+
+
+def space_of(name: str) -> pf.Workspace:
+    """A workspace of a catalogue machine in space, with few cells."""
+    machine = pf.load(name)
+    return pf.workspace(machine, over=OVER.get(name), resolution=machine.characteristic_length / CELLS)
+
+
+def seen(region: pf.Workspace) -> SeenSolid:
+    sample = sample_of(region.vertices * scale_of(region), region.faces, region.face_limit)
+    return seen_solid(region, best_eye(sample, upright(region.names)), 240)
+
+
+@pytest.mark.parametrize("eye", [Eye(30.0, -60.0), Eye(-20.0, 110.0, (1, 2, 0))])
+def test_each_pixel_shows_the_nearest_face(eye: Eye) -> None:
+    """Of a box: a ray leaves it where it leaves the first of three slabs."""
+    ends = np.array([[-1.0, -0.7, -0.4], [1.0, 0.7, 0.4]])
+    square = np.array([[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]])
+    square = np.concatenate([square, [[2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5]]])
+    corners = np.array([ends[list(pick), range(3)] for pick in np.ndindex(2, 2, 2)])
+    volume = np.linalg.det(corners[square]).sum() / 6.0
+    faces = square if volume > 0.0 else square[:, ::-1]
+    for both_sides in (False, True):
+        raster = rasterised(eye.seen(corners), faces, 120, both_sides=both_sides)
+        pixels = np.arange(raster.face.size)
+        start = raster.centres(pixels) @ eye.axes[:2]
+        hits = (ends[:, None] - start) / eye.axes[2]
+        leaves, enters = hits.max(axis=0).min(axis=1), hits.min(axis=0).max(axis=1)
+        depth, is_clear = raster.depth.ravel(), np.abs(leaves - enters) > 1e-9  # else it meets an edge
+        assert (np.isfinite(depth) == (leaves > enters))[is_clear].all()
+        drawn = np.isfinite(depth) & is_clear
+        np.testing.assert_allclose(depth[drawn], leaves[drawn], atol=1e-9)
+        assert len(lines_between(np.minimum(raster.face, 0), raster, 1.0)) == 1
+
+
+@pytest.mark.parametrize("name", ["stewart", "linear_delta", "rps"])
+def test_a_pixel_has_the_limit_that_is_exceeded_just_outside(name: str) -> None:
+    solid = seen(space_of(name))
+    towards, pixels = solid.eye.axes[2], np.flatnonzero(solid.limit >= 0)
+    pixels = pixels[np.random.default_rng(0).permutation(len(pixels))[:1000]]
+    at = solid.raster.centres(pixels) @ solid.eye.axes[:2] + solid.depth.ravel()[pixels, None] * towards
+    outside = pf.feasibility(
+        solid.region.mechanism, solid.region.poses((at + 0.2 * solid.step * towards) / solid.scale)
+    )
+    assert (outside.margin < 0.0).mean() > 0.99  # a ray may graze the border
+    named = np.array([" ".join(limit) for limit in solid.region.limits])[solid.limit.ravel()[pixels]]
+    told = np.array([" ".join(limit) for limit in outside.limits])[outside.binding]
+    assert (named == told)[outside.margin < 0.0].mean() > 0.98
+    inside = pf.feasibility(solid.region.mechanism, solid.region.poses((at - 0.2 * solid.step * towards) / solid.scale))
+    assert (inside.margin >= 0.0).mean() > 0.98
+
+
+def test_no_face_is_folded() -> None:
+    """Slopes of neighbouring pixels on one face differ little: the mesh is drawn as it is."""
+    solid = seen(space_of("linear_delta"))
+    is_one = (solid.limit[:, 1:] == solid.limit[:, :-1]) & (solid.limit[:, 1:] >= 0)
+    is_one &= np.abs(np.diff(np.where(solid.limit >= 0, solid.depth, 0.0), axis=1)) < solid.step
+    cosines = (solid.normal[:, 1:] * solid.normal[:, :-1]).sum(axis=2)[is_one]
+    assert np.mean(cosines > 0.9) > 0.995
+    facing = (solid.normal @ solid.eye.axes[2])[solid.limit >= 0]
+    assert np.mean(facing > 0.0) > 0.99
+
+
+CASES: list[tuple[str, Callable[[], pf.Workspace]]] = [
+    ("Stewart", lambda: space_of("stewart")),
+    ("3-RPS", lambda: space_of("rps")),
+    ("nothing within reach", lambda: pf.workspace(pf.load("stewart"), fixed={"z": 5000.0})),
+]
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of few pixels, which are drawn quickly."""
+    monkeypatch.setattr(import_module("pfabrik.view.solid_picture"), "ACROSS", 120)
+
+
+@pytest.mark.usefixtures("coarse")
+@pytest.mark.parametrize(("word", "make"), CASES, ids=[word for word, _ in CASES])
+def test_names_and_numbers_hide_nothing(
+    word: str, make: Callable[[], pf.Workspace], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    region = make()
+    axes = region.plot(theme="dark")
+    assert faults(axes.figure, monkeypatch) == []
+    assert any(word in text.get_text() for text in (*axes.figure.texts, axes.title))
+    if len(region.faces):
+        key = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+        assert 97 <= sum(int(entry.split()[-2]) for entry in key) <= 103
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_solid_goes_on_axes_of_ones_own_with_a_shape_that_fits_in() -> None:
+    region = space_of("linear_delta")
+    own = Figure(figsize=(4.0, 4.0)).add_subplot()
+    assert region.plot(own, view="top", shape=region.inscribed("box")) is own
+    assert own.figure.axes == [own]
+    with pytest.raises(InvalidArgument, match="three-dimensional axes"):
+        region.plot(Figure().add_subplot(projection="3d"))
+    with pytest.raises(InvalidArgument, match="view"):
+        region.plot(view="left")  # type: ignore[arg-type]
