@@ -101,7 +101,14 @@ class SingularityMap(Printed):
 
         Parameters
         ----------
-        view, size, theme : as of `Workspace.plot`; by default most of the locus is seen.
+        ax : Axes, optional
+            Two-dimensional Matplotlib axes to draw on, without slices. Default: those of a new figure.
+        view : str or (float, float), optional
+            As in `Workspace.plot`; by default most of the locus is seen.
+        size : (float, float), optional
+            Width and height of a new figure [inches].
+        theme : {"light", "dark"}, optional
+            Colours for a light or a dark ground.
         """
         from ..view.singular_picture import plot_singular_map
 
@@ -173,7 +180,17 @@ class SingularityTrack(Printed):
         return ResultTable("Singularities along a path", lines, MEASURED, measured_rows(self.measures))
 
     def plot(self, ax: Axes | None = None, *, size: tuple[float, float] | None = None, theme: Theme = "light") -> Axes:
-        """Draw the measures along the path, crossings marked; `size` and `theme` as of `Workspace.plot`."""
+        """Draw the measures along the path, crossings marked.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Matplotlib axes to draw on. Default: those of a new figure.
+        size : (float, float), optional
+            Width and height of a new figure [inches].
+        theme : {"light", "dark"}, optional
+            Colours for a light or a dark ground.
+        """
         from ..view.singular_picture import plot_singular_track
 
         return plot_singular_track(self.measures, self.crossings, ax, size=size, theme=theme)
