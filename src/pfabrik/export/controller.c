@@ -156,6 +156,8 @@ static void pfk_close(const pfk_real at[16], pfk_pose *pose)
     }
 }
 
+#endif
+#if IK || FK || JOINTS
 /* Numbers as kernels take them; those of the caller are only read where they are constants. */
 static pfk_Floats1 pfk_opened_row(const pfk_real *values, int n)
 {

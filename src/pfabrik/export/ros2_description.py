@@ -114,9 +114,11 @@ class PlatformDescription(UrdfTree):
         at = self.origins[self._links[parent]] if each.joint.at is None else motion.point * self.metres
         element = self.join(each.name, kind_of_joint(each), self._links[parent], self._links[number], at)
         self.move(element, each, motion.sign, from_home=False)
-        values = np.array([each.home, *each.limits]) * (1.0 if motion.kind == TURNS else self.metres)
+        home, lo, hi = np.array([each.home, *each.limits]) * (1.0 if motion.kind == TURNS else self.metres)
         axis = motion.axis * motion.sign
-        self.joints.append(ShownJoint(each.name, motion.kind, parent, number, axis, np.zeros(3), *values, each.column))
+        self.joints.append(
+            ShownJoint(each.name, motion.kind, parent, number, axis, UNTURNED, home, lo, hi, each.column)
+        )
 
     def _add_rod(self, parent: int, number: int, motion: Motion) -> None:
         """Two hinges that aim a rod between balls: it does not turn about its line."""
@@ -165,7 +167,7 @@ class PlatformDescription(UrdfTree):
         if not along.any():
             return
         turned = np.array([0.0, np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)])
-        self._see(part, 0.5 * (start + end), "cylinder", turned, radius=radius, length=np.linalg.norm(along))
+        self._see(part, 0.5 * (start + end), "cylinder", turned, radius=radius, length=float(np.linalg.norm(along)))
 
     def _see(self, part: Part, at: Floats, kind: str, rpy: Floats = UNTURNED, **sizes: float | Floats) -> None:
         """Add a solid to the link of a part's body; lengths in the mechanism's unit."""

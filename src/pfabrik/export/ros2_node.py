@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from .machine_data import Machine
 from .ros2_description import PlatformDescription, ShownJoint
 from .ros2_texts import filled, in_xml, package_name, plain, write_package
 from .source import ACTIVE, features
-from .static_data import comment, literal, quoted
+from .static_data import literal, quoted
 
 FILES = {
     "CMakeLists.txt": "CMakeLists.txt",
@@ -82,19 +83,19 @@ def ros2_node_texts(mechanism: Mechanism, folder: Path, *, name: str | None = No
 def commands(mechanism: Mechanism, folder: Path, name: str | None = None) -> list[str]:
     """The commands that build a package, launch its node, and send it home."""
     name = package_name(folder, name, "_node")
-    target = _example_target(mechanism, metres_of(mechanism.length_unit))
+    target = quote(_example_target(mechanism, metres_of(mechanism.length_unit)))
     return [
         f"colcon build --packages-select {name}_node && source install/setup.bash",
         f"ros2 launch {name}_node {name}.launch.py",
-        f'ros2 topic pub --once /{name}/target geometry_msgs/msg/PoseStamped "{target}"',
+        f"ros2 topic pub --once /{name}/target geometry_msgs/msg/PoseStamped {target}",
     ]
 
 
 def _example_target(mechanism: Mechanism, metres: float) -> str:
     """A message of the pose at home, as `ros2 topic pub` takes it."""
     x, y, z = (float(f"{value:.6g}") for value in mechanism.home_pose[:3, 3] * metres)
-    frame = comment(json.dumps(mechanism.base))
-    return f"{{header: {{frame_id: {frame}}}, pose: {{position: {{x: {x}, y: {y}, z: {z}}}}}}}".replace('"', "'")
+    position = f"{{x: {x}, y: {y}, z: {z}}}"
+    return f"{{header: {{frame_id: {_exact(mechanism.base)}}}, pose: {{position: {position}}}}}"
 
 
 def _words(machine: Machine, description: PlatformDescription, parts: list[Part], name: str) -> dict[str, str]:
