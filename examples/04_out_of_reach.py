@@ -13,7 +13,7 @@ centroid = pf.passes.solve(mechanism, target, pf.passes.Options.centroid())
 print(f"{nearest.status}, {nearest.held} held: {nearest.position_error:.2f} mm from the target")
 print(f"where the chains' ends agree: {centroid.position_error:.2f} mm and {centroid.rotation_error:.2f} rad")
 
-# The limits that hold it back, the hardest first: a cone that was wider by a radian would bring it so many mm nearer.
+# The limits that hold it back, the most restrictive first: a cone wider by a radian would bring it so many mm nearer.
 for limit in nearest.active_limits:
     print(f"  {limit.joint} at its {limit.bound}: {limit.multiplier:.3g} mm per rad")
 

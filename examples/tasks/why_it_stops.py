@@ -26,8 +26,8 @@ pf.plot(answer).figure.savefig("held.png", dpi=110)
 # In a sentence:
 print(answer.reason)
 
-# One by one: `active_limits` lists the limits that stop it, the hardest first. The multiplier is what giving way would
-# bring: here a strut that is 1 mm longer brings the answer about 1 mm nearer.
+# One by one: `active_limits` lists the limits that stop it, the most restrictive first. The multiplier is what giving
+# way would bring: here a strut that is 1 mm longer brings the answer about 1 mm nearer.
 for limit in answer.active_limits:
     print(f"{limit.joint} at its {limit.bound}, {limit.value:.1f} mm: {limit.multiplier:.2f} mm per mm")
 

@@ -298,7 +298,7 @@ def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
         type=click.Choice(["orientation", "position", "none"]),
         default="orientation",
         show_default=True,
-        help="What an answer to a target out of reach keeps exactly, if any pose does.",
+        help="Of a target out of reach: what to keep exactly, where that is possible.",
     )
     @functools.wraps(command)
     def with_options(*, hold: Literal["orientation", "position", "none"], **parameters: Any) -> Any:

@@ -24,7 +24,7 @@ from .printing import json_option, note, print_result
     metavar="NAME",
     help="What may vary: dimensions, points, axes, lengths, offsets, frame, tool, scale, or a name. May be repeated.",
 )
-@click.option("--tied", is_flag=True, help="Let copies of a joint vary as one.")
+@click.option("--tied", is_flag=True, help="Correct all copies of a joint alike: fewer unknowns.")
 @click.option("--sigma", type=float, help="Standard deviation of a measurement [length or rad]. Default: estimated.")
 @click.option("-o", "--output", help="Mechanism file to write, with the calibrated values.", **OUTPUT)
 @click.option("--klipper", help="File to write with the settings for Klipper.", **OUTPUT)

@@ -53,7 +53,8 @@ def ik(
 ) -> int:
     """Solve for one target.
 
-    A target out of reach gets the feasible answer nearest to it, with the limits that hold it back, the hardest first.
+    A target out of reach gets the feasible answer nearest to it, with the limits that hold it back,
+    the most restrictive first.
 
     A margin is a share of the room there is: 1 in the middle of a range, 0 on the limit. Where links have a
     thickness, a line says how far apart they are, and the clearance that is kept.

@@ -107,7 +107,7 @@ def spanning(command: Callable[..., Any]) -> Callable[..., Any]:
 @rpy_option
 @click.option("--any-orientation", is_flag=True, help="Positions that are reached with some orientation or other.")
 @click.option("--tilt", type=FINITE, metavar="DEG", help="Positions where it can lean so far to every side.")
-@click.option("--certified", is_flag=True, help="Enclose the size between two bounds that are proved, too.")
+@click.option("--certified", is_flag=True, help="Also prove two bounds that the size lies between.")
 @click.option("--largest", type=click.Choice(["sphere", "box", "cylinder"]), help="The largest that fits in.")
 @click.option("--centre", metavar="V,V[,V]", help="Its centre [length or deg]. Default: where it is largest.")
 @click.option(
