@@ -102,3 +102,24 @@ def test_a_finger_drags_on_a_phone(browser: Any, pages: Path) -> None:
     assert np.abs(target(page) - before).max() > 1.0
     assert not page.evaluate("document.documentElement.scrollWidth > innerWidth")
     assert not faults
+
+
+def test_within_another_page_it_takes_that_page_s_theme_and_leaves_it_the_wheel(browser: Any, pages: Path) -> None:
+    """Until it was clicked on: then the wheel zooms."""
+    (pages / "around.html").write_text('<!doctype html><iframe src="five_bar.html" width="800" height="400"></iframe>')
+    around = browser.new_page(viewport=SIZE)
+    around.goto((pages / "around.html").as_uri())
+    (frame,) = around.frames[1:]
+    frame.wait_for_function("window.page?.shown")
+    for theme in ("dark", "light"):
+        around.evaluate("(theme) => frames[0].postMessage({ theme }, '*')", theme)
+        frame.wait_for_function("(theme) => document.documentElement.dataset.theme === theme", arg=theme)
+    asked, answered = "page.scene.camera.distance", "(before) => page.scene.camera.distance !== before"
+    before = frame.evaluate(asked)
+    around.mouse.move(60, 250)
+    around.mouse.wheel(0, 50)
+    around.wait_for_timeout(200)
+    assert frame.evaluate(asked) == before
+    around.mouse.click(60, 250)
+    around.mouse.wheel(0, 50)
+    frame.wait_for_function(answered, arg=before)

@@ -84,7 +84,9 @@ class Gestures {
     this.page.redraw();
   }
 
+  /** Zoom; within another page, which scrolls by the wheel, only after a click. */
   wheel(event) {
+    if (self !== top && document.activeElement !== this.canvas) return;
     event.preventDefault();
     this.page.scene.camera.zoom(Math.exp(clamp(event.deltaY, -60, 60) * 0.003));
     this.page.redraw();

@@ -148,6 +148,9 @@ class Page {
     dark.addEventListener("change", () => this.light(dark.matches));
     $("#theme").onclick = () => this.light(!this.isDark);
     this.light(dark.matches);
+    // A page around this one has its name, and may say which theme it has.
+    document.documentElement.classList.toggle("within", self !== top);
+    addEventListener("message", ({ data }) => data?.theme && this.light(data.theme === "dark"));
     addEventListener("hashchange", () => location.hash !== session.link && session.open(location.hash));
     addEventListener("keydown", (event) => {
       if (!(event.ctrlKey || event.metaKey) || !"zy".includes(event.key.toLowerCase())) return;
