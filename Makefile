@@ -25,9 +25,11 @@ demo: $(READY) $(MODULE)
 reproduce: $(STAMP) $(MODULE)
 	@$(BIN)/python -m paper
 
-# The documentation as a site, in site/; no page needs the network. It stops at a link that leads nowhere.
-docs: $(STAMP)
-	@$(PIP) --no-build-isolation --editable '.[docs]'
+# The documentation as a site, in site/; no page needs the network. Machines are exported and notebooks run for it; it
+# stops at a link that leads nowhere.
+docs: $(STAMP) $(MODULE)
+	@$(PIP) --no-warn-conflicts --no-build-isolation --editable '.[docs]'
+	@$(BIN)/python docs/build_site.py
 	@$(BIN)/zensical build --clean --strict
 
 # In parallel.
@@ -71,7 +73,7 @@ bench: $(STAMP) $(MODULE)
 	@$(BIN)/python benchmarks/run.py
 
 clean:
-	rm -rf .venv out site build dist htmlcov .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv .cache out site build dist htmlcov .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	rm -f src/pfabrik/kernels/_compiled.*
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

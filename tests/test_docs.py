@@ -22,6 +22,7 @@ PAGES = sorted(
 )
 EXAMPLES = sorted(ROOT.glob("examples/*.py"))
 FORMAT = ROOT / "docs" / "describing-a-mechanism.md"
+MAP = ROOT / "docs" / "map.md"
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 ROUNDING = re.compile(r"(?<!< )\b\d(\.\d+)?e-1[2-9]")
 """A number that is rounding, whose digits differ between processors; ``< 1e-12`` is none."""
@@ -75,10 +76,10 @@ def test_files_of_the_package_that_a_page_names_are_there(page: str) -> None:
 
 @pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=page_id)
 def test_every_page_is_on_the_map(page: Path) -> None:
-    """Linked from the map, or from the map of its own folder."""
-    indices = [ROOT / "docs" / "index.md", *ROOT.glob("docs/*/index.md")]
+    """Linked from the map, or from the list of its own folder."""
+    indices = [MAP, *ROOT.glob("docs/*/index.md")]
     linked = set().union(*map(linked_from, indices))
-    assert page == indices[0] or page.resolve() in linked
+    assert page == MAP or page.resolve() in linked
 
 
 ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2")
@@ -212,10 +213,9 @@ def linked_from(page: Path) -> set[Path]:
 
 def test_the_readme_leads_to_every_page() -> None:
     """By a link of its own, or by the map that it has a link to."""
-    index = ROOT / "docs" / "index.md"
     linked = linked_from(ROOT / "README.md")
-    assert index in linked
-    linked |= linked_from(index)
+    assert MAP in linked
+    linked |= linked_from(MAP)
     assert [page.name for page in ROOT.glob("docs/*.md") if page.resolve() not in linked] == []
 
 
@@ -251,11 +251,16 @@ def test_the_first_program_of_the_readme_prints_what_it_shows(capsys: pytest.Cap
     assert capsys.readouterr().out == shown
 
 
-def test_the_package_is_installed_from_its_folder_for_it_is_on_no_index() -> None:
-    pages = [page for page in PAGES if "pip install" in page.read_text(encoding="utf-8")]
-    assert pages
-    for page in pages:
-        assert not re.search(r"pip install ['\"]?pfabrik", page.read_text(encoding="utf-8")), page
+def test_the_package_is_installed_from_its_folder_until_it_is_on_an_index() -> None:
+    lines = [line for page in PAGES for line in page.read_text(encoding="utf-8").splitlines() if "pip install" in line]
+    assert lines
+    by_name = [line for line in lines if re.search(r"pip install ['\"]?pfabrik", line)]
+    assert all("# from the first release on" in line for line in by_name)
+
+
+def test_pages_say_alike_how_long_an_installation_compiles() -> None:
+    for name in ("README.md", "docs/start.md", "docs/install.md", "CONTRIBUTING.md"):
+        assert "half a minute" in (ROOT / name).read_text(encoding="utf-8"), name
 
 
 def test_the_citation_is_of_this_version_and_of_the_paper_that_the_pages_name() -> None:

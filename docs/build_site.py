@@ -1,0 +1,117 @@
+"""Write the pages of the site into build/docs, from which `make docs` makes site/: `python docs/build_site.py`.
+
+The pages of this folder, as they are; the home, which is the first screen of the README; the gallery, with a page for
+each machine; and the notebooks, with what their cells show. What needs no hand is made here, so that nothing is stale.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import cards
+import gallery
+
+import notebooks
+
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
+SITE = ROOT / "build" / "docs"
+IS_NO_PAGE = shutil.ignore_patterns("*.py", "__pycache__")
+UNSEARCHED = ("decisions",)
+"""Folders for developers, whose pages the search leaves out: they use every word that users look for."""
+FOR_DEVELOPERS = ("CONTRIBUTING.md", "SECURITY.md")
+OUTSIDE = re.compile(r"\]\(((?:\.\./)+)(notebooks/\w+\.ipynb|CONTRIBUTING\.md)\)")
+HOME_ENDS = "\n## What it does not do yet"
+PICTURE = re.compile(r"!\[[^\]]*\]\((?!\w+:)([^)#\s]+\.(?:png|gif))\)(?!\{)")
+
+
+def main() -> None:
+    """Write all pages anew."""
+    shutil.rmtree(SITE, ignore_errors=True)
+    shutil.copytree(DOCS, SITE, ignore=IS_NO_PAGE)
+    for folder in UNSEARCHED:
+        for page in (SITE / folder).glob("*.md"):
+            page.write_text(f"---\nsearch:\n  exclude: true\n---\n{page.read_text('utf-8')}", encoding="utf-8")
+    (SITE / "index.md").write_text(home((ROOT / "README.md").read_text(encoding="utf-8")), encoding="utf-8")
+    gallery.write(SITE)
+    notebooks.write(SITE)
+    for name in FOR_DEVELOPERS:
+        text = (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](").replace("](SECURITY", "](security")
+        (SITE / name.lower()).write_text(text, encoding="utf-8")
+    for page in SITE.rglob("*.md"):
+        page.write_text(OUTSIDE.sub(_inside, marked(page)), encoding="utf-8")
+
+
+def home(readme: str) -> str:
+    """The first screen of the README as the home of the site: its text in one column, its film beside it."""
+    screen = readme.partition(HOME_ENDS)[0].replace("](docs/", "](").replace("[`examples/`](examples)", "`examples/`")
+    first, install, lines, wishes = re.split(r"\n## .*\n", screen)
+    title, sentence, film, caption = (part.strip() for part in first.strip().split("\n\n"))
+    film = re.sub(
+        r"(!\[.*?\])\((.*?)\.webp\)",
+        r"\1(\2.webp#only-light){ loading=lazy } \1(\2-dark.webp#only-dark){ loading=lazy }",
+        film,
+    )
+    code, shown = re.findall(r"^```.*?^```$", lines, re.DOTALL | re.MULTILINE)
+    after = lines.rpartition("```")[2].strip()
+    return f"""---
+title: pfabrik
+hide: [navigation, toc]
+---
+<div class="hero" markdown>
+<div markdown>
+{title}
+
+{sentence}
+{{ .lead }}
+
+[Start: five minutes](start.md){{ .md-button .md-button--primary }}
+[Drag a machine](gallery.md){{ .md-button }}
+
+{install.strip()}
+</div>
+<figure markdown>
+{film}
+<figcaption markdown>{caption.strip("*")}</figcaption>
+</figure>
+</div>
+
+## Six lines
+
+{code}
+
+{shown}
+
+{after}
+
+## What do you have?
+
+<div class="wishes" markdown>
+{cards.grid(wishes.strip(), SITE)}
+</div>
+"""
+
+
+def _inside(found: re.Match[str]) -> str:
+    """A link out of the folder of pages, to a notebook or a page for developers, as one to its page of the site."""
+    up, name = found[1].removeprefix("../"), found[2]
+    return f"]({up}{name.removesuffix('.ipynb') + '.md' if name.endswith('.ipynb') else name.lower()})"
+
+
+def marked(page: Path) -> str:
+    """A page whose pictures on white ground say so: dark pages show them in the dark."""
+
+    def mark(found: re.Match[str]) -> str:
+        path = page.parent / found[1]
+        is_on_white = path.exists() and cards.is_on_white(path)
+        return found[0] + "{ .on-white loading=lazy }" * is_on_white
+
+    return PICTURE.sub(mark, page.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main()
+    sys.stderr.write(f"{sum(1 for _ in SITE.rglob('*.md'))} pages in {SITE.relative_to(ROOT)}\n")
