@@ -25,7 +25,9 @@ UNSEARCHED = ("decisions",)
 FOR_DEVELOPERS = ("CONTRIBUTING.md", "SECURITY.md")
 OUTSIDE = re.compile(r"\]\(((?:\.\./)+)(notebooks/\w+\.ipynb|CONTRIBUTING\.md)\)")
 HOME_ENDS = "\n## What it does not do yet"
-PICTURE = re.compile(r"!\[[^\]]*\]\((?!\w+:)([^)#\s]+\.(?:png|gif))\)(?!\{)")
+PICTURE = re.compile(r"(!\[[^\]]*\])\((?!\w+:)([^)#\s]+\.(?:png|gif|webp))\)(?!\{)")
+LIVE = re.compile(r"^<!-- live: (\w+) -->$", re.MULTILINE)
+"""Where a page has a machine of the gallery on the site."""
 
 
 def main() -> None:
@@ -50,11 +52,6 @@ def home(readme: str) -> str:
     screen = readme.partition(HOME_ENDS)[0].replace("](docs/", "](").replace("[`examples/`](examples)", "`examples/`")
     first, install, lines, wishes = re.split(r"\n## .*\n", screen)
     title, sentence, film, caption = (part.strip() for part in first.strip().split("\n\n"))
-    film = re.sub(
-        r"(!\[.*?\])\((.*?)\.webp\)",
-        r"\1(\2.webp#only-light){ loading=lazy } \1(\2-dark.webp#only-dark){ loading=lazy }",
-        film,
-    )
     code, shown = re.findall(r"^```.*?^```$", lines, re.DOTALL | re.MULTILINE)
     after = lines.rpartition("```")[2].strip()
     return f"""---
@@ -102,14 +99,21 @@ def _inside(found: re.Match[str]) -> str:
 
 
 def marked(page: Path) -> str:
-    """A page whose pictures on white ground say so: dark pages show them in the dark."""
+    """A page whose pictures suit light and dark pages: by a second one, or a note that they are on white."""
 
     def mark(found: re.Match[str]) -> str:
-        path = page.parent / found[1]
-        is_on_white = path.exists() and cards.is_on_white(path)
-        return found[0] + "{ .on-white loading=lazy }" * is_on_white
+        path, text = page.parent / found[2], found[1]
+        if not path.exists():
+            return found[0]
+        dark = path.with_name(f"{path.stem}-dark{path.suffix}")
+        if dark.exists():
+            name = f"{found[2].removesuffix(path.suffix)}-dark{path.suffix}"
+            return f"{text}({found[2]}#only-light){{ loading=lazy }}{text}({name}#only-dark){{ loading=lazy }}"
+        return found[0] + "{ .on-white loading=lazy }" * cards.is_on_white(path)
 
-    return PICTURE.sub(mark, page.read_text(encoding="utf-8"))
+    text = PICTURE.sub(mark, page.read_text(encoding="utf-8"))
+    up = "../" * (len(page.relative_to(SITE).parts) - 1)
+    return LIVE.sub(lambda found: gallery.frame(found[1], f"{up}gallery/"), text)
 
 
 if __name__ == "__main__":

@@ -164,11 +164,17 @@ pip install ".[view]"
 pfabrik view {name}
 ```"""
     size = round(file.stat().st_size / 1000)
-    return f"""<iframe class="live" src="live/{name}.html" title="{title(name)}, live" loading="lazy"></iframe>
+    return f"""{frame(name)}
 
 [The machine alone](live/{name}.html): one file of {size} kB, which works without a network. Made by
 `pfabrik export {name} --web {name}.html`.
 {{ .under }}"""
+
+
+def frame(name: str, gallery: str = "") -> str:
+    """A machine, live, in a page that the folder of the gallery is named relative to."""
+    source = f"{gallery}live/{name}.html"
+    return f'<iframe class="live" src="{source}" title="{title(name)}, live" loading="lazy"></iframe>'
 
 
 def six_lines(name: str) -> str:
