@@ -11,11 +11,14 @@ import numpy as np
 from ...answers.solution import Solution
 from ...answers.words import by_bound, exceeded
 from ...arrays import Floats, Ints
+from ...description.mechanism import Mechanism
+from ...drawn_parts import free_axes
+from ...kinematics import plane_of
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
 from ...telling import OnProgress
 from .live_machine import LiveMachine
-from .panel import LOCUS, WORKSPACE, Panel
+from .panel import FAR, LOCUS, WORKSPACE, Panel
 from .scene import SINGULAR, Patch
 from .workers import Newest
 
@@ -41,6 +44,8 @@ class Searches:
         on_error: Callable[[Exception], None],
     ) -> None:
         self._shown, self._lock, self._newest = shown, lock, Newest(on_error)
+        self._space: tuple[Solution, Workspace] | None = None
+        self._found: dict[str, tuple[list[Patch], str]] = {}
 
     def find_modes(self, kind: str) -> None:
         """List the "working" modes of the pose, or the "assembly" modes of the actuator values."""
@@ -79,12 +84,20 @@ class Searches:
         from ...workspace.workspace_table import in_words
 
         panel = machine.panel
-        space = workspace(start.mechanism, start=start, on_progress=_progress(panel, "the workspace"))
-        notes = [in_words(space)]
+        if not panel.wants(WORKSPACE) and not panel.wants(LOCUS):
+            return
+        if self._space is None or self._space[0] is not start:
+            progress = _progress(panel, "the workspace")
+            space = workspace(start.mechanism, start=start, within=_ends(start.mechanism), on_progress=progress)
+            self._space, self._found = (start, space), {}
+        _, space = self._space
+        notes = [f"workspace: {in_words(space)}"]
         for name, find in ((WORKSPACE, border_of), (LOCUS, locus_of)):
             if not panel.wants(name):
                 continue
-            patches, note = find(space, start, _progress(panel, "singularities"))
+            if name not in self._found:
+                self._found[name] = find(space, start, _progress(panel, "singularities"))
+            patches, note = self._found[name]
             with self._lock:
                 if self._shown() is machine and panel.wants(name):
                     machine.show_border(name, patches)
@@ -108,6 +121,14 @@ def _progress(panel: Panel, what: str) -> Callable[[int, int], None]:
     return lambda done, total: panel.tell(f"looking for {what}: {100 * done // max(total, 1)} %")
 
 
+def _ends(mechanism: Mechanism) -> dict[str, tuple[float, float]] | None:
+    """Ends of positions for a machine in space without limits, whose workspace may have none: those of its sliders."""
+    if plane_of(mechanism) is not None or mechanism.without_limits() != mechanism:
+        return None
+    far, home = FAR * mechanism.characteristic_length, mechanism.home_pose[:3, 3].tolist()
+    return {POSITIONS[k]: (home[k] - far, home[k] + far) for k in free_axes(mechanism)[0]}
+
+
 def border_of(space: Workspace, start: Solution, _: object) -> tuple[list[Patch], str]:
     """The border of a workspace, each face in the colour of the limit that forms it, and a remark.
 
@@ -117,7 +138,7 @@ def border_of(space: Workspace, start: Solution, _: object) -> tuple[list[Patch]
 
     corners, limits = _in_the_scene(space, start, space.vertices, space.faces), np.asarray(space.face_limit)
     if corners is None:
-        return [], f"it is one over {', '.join(space.names)}: it has no place in the scene"
+        return [], f"over {', '.join(space.names)}: it has no place in the scene"
     return [
         Patch(f"{group.label}: {group.share:.0%}", group.colour, corners[np.isin(limits, group.limits)])
         for group in groups_of(space)
