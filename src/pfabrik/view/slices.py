@@ -24,6 +24,9 @@ BORDER, ROUND = 1.8, 96
 ACROSS, UP = 23.0, 12.0
 """Room that each number needs on a level and on an upright axis [points]."""
 
+AROUND = 6
+"""Segments before and after each of a border that decide on its group."""
+
 DASHED: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (4.0, 2.0)), "zorder": 4}
 """Looks of a shape that fits in."""
 
@@ -134,13 +137,26 @@ def draw_slice(
     groups = np.zeros(len(cut.faces), np.int64) if place is None else place[region.face_limit[cut.faces]]
     group_of = dict(zip(map(tuple, cut.segments.tolist()), groups.tolist(), strict=True))
     for loop in loops:
-        for group, corners in stretches_of(loop, group_of):
+        for group, corners in stretches_of(loop, group_of | _steadied(loop, group_of, points)):
             style = {"color": look.soft, "linewidth": 0.8} if place is None else {"color": colours[group]}
             panel.plot(*points[corners].T, **({"linewidth": BORDER, "solid_capstyle": "round", "zorder": 3} | style))
     if area is not None:
         panel.add_patch(PathPatch(area, facecolor=look.within, edgecolor="none", zorder=0))
     _dress_panel(panel, region, plane, look)
     return area
+
+
+def _steadied(loop: list[int], group_of: dict[tuple[int, ...], int], points: Floats) -> dict[tuple[int, ...], int]:
+    """The groups of the segments of a loop, each that of most of those around it: along a seam, faces alternate."""
+    pairs = list(zip(loop, [*loop[1:], loop[0]], strict=True))
+    groups = np.array([group_of[pair] for pair in pairs])
+    lengths = np.linalg.norm(points[[end for _, end in pairs]] - points[loop], axis=1)
+    best, most = groups, np.zeros(len(loop))
+    for group in np.unique(groups).tolist():
+        of_group = lengths * (groups == group)
+        around = np.sum([np.roll(of_group, shift) for shift in range(-AROUND, AROUND + 1)], axis=0)
+        best, most = np.where(around > most, group, best), np.maximum(around, most)
+    return dict(zip(pairs, best.tolist(), strict=True))
 
 
 def _dress_panel(panel: Any, region: Region, plane: Plane, look: Look) -> None:

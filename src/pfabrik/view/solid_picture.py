@@ -54,8 +54,8 @@ EDGE_COLOUR, EDGE_WIDTH = "#101010", 0.8
 MACHINE_WIDTH, HALO, DOTTED = 1.3, 1.7, (0, (1.2, 1.5))
 """Lines of the solid, of the machine and of the paper around it [points]; dashes of what is in the solid or behind."""
 
-BRIGHT = 0.5
-"""Brightness of a colour from which on letters on it are dark."""
+LIGHTNESS, BRIGHT = np.array([0.3, 0.59, 0.11]), 0.5
+"""Shares of red, green and blue in the lightness of a colour, and the one from which on letters on it are dark."""
 
 LETTERS = SMALL - 0.5
 """Size of names on faces [points]."""
@@ -268,19 +268,21 @@ def _name_faces(axes: Any, solid: SeenSolid, colours: Colours, before: Mask, hid
     pixel = float(np.ptp(axes.transData.transform([[0.0, 0.0], [solid.raster.pixel, 0.0]])[:, 0]))
     free, covered = counted_around(before, 2) == 0, counted_around(hidden, 1) > 0
     for label in np.unique(labels[labels >= 0]).tolist():
-        colour = "white" if tints[label] @ [0.3, 0.59, 0.11] < BRIGHT else "black"
-        style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 5, "color": colour}
+        style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 5}
         text = axes.text(*solid.raster.low, names[label], fontsize=LETTERS, **style)
         box = text.get_window_extent()
         half = [int(0.5 * side / pixel + 4.0 / pixel) + 1 for side in (box.width, box.height)]
         place = _room((labels == label) & free, covered, half[0], half[1])
         if place is None:
             text.remove()
-        else:
-            text.set_position(solid.raster.low + solid.raster.pixel * place)
+            continue
+        column, row = place
+        shade = in_the_light(solid.normal[row, column], solid.eye, tints[label])
+        text.set_color("white" if shade @ LIGHTNESS < BRIGHT else "black")
+        text.set_position(solid.raster.low + solid.raster.pixel * place)
 
 
-def _room(mask: Mask, covered: Mask, wide: int, tall: int) -> Floats | None:
+def _room(mask: Mask, covered: Mask, wide: int, tall: int) -> Ints | None:
     """Column and row of the middle of a rectangle within a mask: of those that cover least, the most central one."""
     used = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
     if not all(map(len, used)):
@@ -295,7 +297,7 @@ def _room(mask: Mask, covered: Mask, wide: int, tall: int) -> Floats | None:
         fits = inner
     places = np.argwhere(fits)
     row, column = places[np.linalg.norm(places - places.mean(axis=0), axis=1).argmin()]
-    return np.array([used[1][0] + column, used[0][0] + row], float)
+    return np.array([used[1][0] + column, used[0][0] + row])
 
 
 def _draw_second(axes: Any, solid: SeenSolid, colours: Colours, look: Look) -> None:
