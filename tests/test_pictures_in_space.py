@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from pfabrik.view.eye import Eye, upright
 from pfabrik.view.raster import lines_between, rasterised
-from pfabrik.view.solid import SeenSolid, best_eye, sample_of, scale_of, seen_solid
+from pfabrik.view.solid import SeenSolid, best_eye, picked_faces, scale_of, seen_solid
 
 OVER = {"rps": ["z", "tilt_x", "tilt_y"]}
 CELLS = 30.0
@@ -30,7 +30,7 @@ def space_of(name: str) -> pf.Workspace:
 
 
 def seen(region: pf.Workspace) -> SeenSolid:
-    sample = sample_of(region.vertices * scale_of(region), region.faces, region.face_limit)
+    sample = picked_faces(region.vertices * scale_of(region), region.faces, region.face_limit)
     return seen_solid(region, best_eye(sample, upright(region.names)), 240)
 
 

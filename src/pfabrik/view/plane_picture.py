@@ -31,6 +31,9 @@ DASHES = (0, (3.0, 0.7))
 BORDER, MACHINE = 2.2, 1.1
 """Width of a border in a plane, and of the lines of the machine [points]."""
 
+WINDOW = 0.75
+"""How much is shown around a workspace at most, as a share of its size: a machine may be far larger."""
+
 MOST_WIDENINGS, EDGE_FREE = 12, 12.0
 """How often axes are widened for names, at most, and the distance of names from their edge [pixels]."""
 
@@ -91,6 +94,11 @@ def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> N
     axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
     axes.autoscale_view()
     axes.margins(0.05)
+    low, high = places.min(axis=0), places.max(axis=0)
+    around = WINDOW * (high - low if len(set(region.units)) > 1 else np.full(2, (high - low).max()))
+    for k, name in enumerate("xy"):
+        start, end = getattr(axes, f"get_{name}lim")()
+        axes.set(**{f"{name}lim": (max(start, low[k] - around[k]), min(end, high[k] + around[k]))})
     if skeleton is not None or len(set(region.units)) == 1:
         axes.set_aspect("equal")
 
@@ -115,6 +123,8 @@ def _make_room(axes: Any) -> None:
 
 def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], look: Look) -> None:
     """Write the limit that forms each stretch of a border beside its middle, outside; short stretches have no room."""
+    from matplotlib.patheffects import withStroke
+
     limit_of = dict(zip(map(tuple, region.faces.tolist()), region.face_limit.tolist(), strict=True))
     for limit, corners in stretches_of(loop, limit_of):
         steps = np.diff(points[corners], axis=0)
@@ -133,6 +143,7 @@ def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], 
             fontsize=SMALL,
             color=look.ink,
             zorder=5,
+            path_effects=[withStroke(linewidth=2.0, foreground=look.paper)],
         )
 
 

@@ -19,7 +19,7 @@ from .frame import axes_for, box_of, draw_box, fit
 from .looks import Look, Theme, look_of
 from .raster import lines_between, rasterised
 from .slices import area_of, cut_mesh, draw_slice, loops_of, plane_across
-from .solid import best_eye, corner_normals, in_the_light, sample_of, scale_of, seen_solid
+from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_of, seen_solid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,8 +37,8 @@ LINES = {
 LOCUS, RIM, WIDTH = "#aa3377", "#4a1033", 2.0
 """Colours of singularities and of their rims, orange being that of limits, and the width of their lines [points]."""
 
-MAP, MEASURE, LEVELS = "cividis", "parallel measure", 10
-"""Colours of the measure, its name, and in how many steps it is drawn."""
+MAP, MEASURE, LEVELS = "cividis", "parallel measure", 14
+"""Colours of the measure, its name, and in how many steps it is drawn at most."""
 
 HIGHEST = 0.98
 """Share of the points whose measure has a colour of its own; above, all have the last one."""
@@ -56,7 +56,7 @@ SLICES = (0.10, 0.37, 0.63, 0.90)
 ACROSS = 44
 """Points of a slice along its longer side: each is solved for."""
 
-LAYERS, REFINED = 3, 5
+LAYERS, REFINED = 3, 3
 """Layers of points that a measure is carried beyond the border, and times that their distance is divided."""
 
 SMALLEST, SHORTEST = 6.0, 2.0
@@ -263,9 +263,9 @@ def _plot_in_space(
         both_sides = np.concatenate([faces, faces[:, ::-1]])
         corners = points[both_sides]
         slopes = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).argmax(axis=1)
-        eye = best_eye(sample_of(points, both_sides, slopes), order)
+        eye = best_eye(picked_faces(points, both_sides, slopes), order)
     else:
-        eye = best_eye(sample_of(region.vertices * scale, region.faces, region.face_limit), order)
+        eye = best_eye(picked_faces(region.vertices * scale, region.faces, region.face_limit), order)
     if ax is not None:
         axes: Any = axes_for(ax, SIZE, look)
         _draw_locus(axes, region, points, faces, found.step * scale, eye, look)

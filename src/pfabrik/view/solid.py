@@ -288,7 +288,7 @@ def in_the_light(normal: Floats, eye: Eye, colours: Floats) -> Floats:
     return np.asarray(np.clip(shaded + (1.0 - shaded) * 0.22 * bright**2, 0.0, 1.0))
 
 
-class Sample(NamedTuple):
+class PickedFaces(NamedTuple):
     """Some faces of a solid: their middles (n, 3), normals (n, 3), and labels (n,)."""
 
     middles: Floats
@@ -310,15 +310,15 @@ class Sample(NamedTuple):
         return np.bincount(groups, minlength=place.max() + 1) / max(len(groups), 1)
 
 
-def sample_of(points: Floats, faces: Ints, labels: Ints) -> Sample:
+def picked_faces(points: Floats, faces: Ints, labels: Ints) -> PickedFaces:
     """Faces picked at random, that directions are judged by."""
     chosen = np.random.default_rng(0).permutation(len(faces))[:JUDGED]
     corners = points[faces[chosen]]
     normals = _units(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return Sample(corners.mean(axis=1), normals, labels[chosen])
+    return PickedFaces(corners.mean(axis=1), normals, labels[chosen])
 
 
-def best_eye(sample: Sample, order: tuple[int, int, int]) -> Eye:
+def best_eye(sample: PickedFaces, order: tuple[int, int, int]) -> Eye:
     """The eye that shows most of a solid: of each label, and of different slopes, not far from the usual direction.
 
     None looks along an axis, where another one is a point.
@@ -328,7 +328,7 @@ def best_eye(sample: Sample, order: tuple[int, int, int]) -> Eye:
     return max(eyes, key=lambda eye: round(_score(eye, sample), 9))
 
 
-def _score(eye: Eye, sample: Sample) -> float:
+def _score(eye: Eye, sample: PickedFaces) -> float:
     seen = sample.seen(eye)
     if not len(seen):
         return -np.inf

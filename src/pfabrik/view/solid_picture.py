@@ -17,7 +17,7 @@ from .frame import PADS, axes_for, box_of, dense, draw_box, fit, machine_of, tit
 from .looks import Look
 from .raster import counted_around
 from .slices import DASHED, draw_slice, edges_of, outline_of, plane_across
-from .solid import Sample, SeenSolid, best_eye, in_the_light, is_told_apart, sample_of, scale_of, seen_solid
+from .solid import PickedFaces, SeenSolid, best_eye, in_the_light, is_told_apart, picked_faces, scale_of, seen_solid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,7 +82,7 @@ def plot_solid(
 
     groups = groups_of(region)
     colours = Colours(groups, group_of_limits(region, groups), np.array([to_rgb(group.colour) for group in groups]))
-    sample = sample_of(region.vertices * scale_of(region), region.faces, region.face_limit)
+    sample = picked_faces(region.vertices * scale_of(region), region.faces, region.face_limit)
     eye = best_eye(sample, upright(region.names)) if view is None else eye_of(view, upright(region.names))
     first = seen_solid(region, eye, ACROSS)
     if ax is not None:
@@ -137,7 +137,7 @@ def _key(region: Region, groups: list[Group], look: Look) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _eye_below(sample: Sample, eye: Eye, place: Ints) -> Eye | None:
+def _eye_below(sample: PickedFaces, eye: Eye, place: Ints) -> Eye | None:
     """An eye from below, if it sees groups that the first does not."""
     eyes = [Eye(FROM_BELOW, eye.azimuth + turn, eye.order) for turn in (0.0, 180.0)]
     best = max(eyes, key=lambda below: float(np.sqrt(sample.shares(below, place)).sum()))

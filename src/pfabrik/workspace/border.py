@@ -65,7 +65,8 @@ def groups_of(region: Region) -> list[Group]:
         for joint, bound in region.shares:
             if bound != "clearance" and is_actuated(region, joint) == is_motors:
                 copies.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
-        order = sorted(copies.items(), key=lambda item: -sum(region.shares[limit] for limit in item[1]))
+        shares = {key: sum(region.shares[limit] for limit in alike) for key, alike in copies.items()}
+        order = sorted(copies.items(), key=lambda item: (-round(shares[item[0]], 2), item[0]))
         for colour, ((stem, bound), alike) in zip(colours, order, strict=False):
             name = f"{stem}{_span([joint[len(stem) :] for joint, _ in alike])} {bound}".strip()
             groups.append(_group(region, name, colour, alike, is_motors))
