@@ -13,6 +13,9 @@ ACTUATED, PASSIVE = "#1a1a1a", "#ffffff"
 HELD = "#d55e00"
 """Colour of what is at a limit or not on its target, and of nothing else."""
 
+SINGULAR = "#aa3377"
+"""Colour of singularities, and of nothing else."""
+
 ASKED, ACHIEVED, SHADE = "#8c8c8c", "#00204d", "#ececec"
 
 MARKERS: dict[JointType, str] = {

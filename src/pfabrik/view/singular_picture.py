@@ -16,7 +16,7 @@ from ..workspace.workspace_table import for_people, labels
 from .canvas import checked_size
 from .eye import Eye, View, eye_of, upright
 from .frame import axes_for, box_of, draw_box, fit
-from .looks import Look, Theme, look_of
+from .looks import SINGULAR, Look, Theme, look_of
 from .raster import lines_between, rasterised
 from .slices import area_of, cut_mesh, draw_slice, loops_of, plane_across
 from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_of, seen_solid
@@ -34,8 +34,8 @@ LINES = {
 }
 """Colour and dashes of each measure along a path."""
 
-LOCUS, RIM, WIDTH = "#aa3377", "#4a1033", 2.0
-"""Colours of singularities and of their rims, orange being that of limits, and the width of their lines [points]."""
+RIM, WIDTH = "#4a1033", 2.0
+"""Colour of the rims of singularities, and the width of their lines [points]."""
 
 MAP, MEASURE, LEVELS = "cividis", "parallel measure", 14
 """Colours of the measure, its name, and in how many steps it is drawn at most."""
@@ -89,7 +89,7 @@ def plot_singular_track(
             axes.plot(np.arange(1, len(values) + 1), values, color=colour, linestyle=dashes, label=name)
     for count, row in enumerate(crossings.tolist()):
         label = "" if count else "parallel singularity"
-        axes.axvline(row + 0.5, color=LOCUS, linewidth=1.2, label=label)
+        axes.axvline(row + 0.5, color=SINGULAR, linewidth=1.2, label=label)
     axes.set(xlabel="target", ylabel="measure of singularity", ylim=(0.0, None))
     axes.legend(frameon=False, fontsize=SMALL, labelcolor=look.ink)
     return axes
@@ -238,7 +238,7 @@ def _draw_curves(axes: Any, segments: Floats, area: Any) -> None:
     """Draw where the locus is in a plane, within an area."""
     from matplotlib.collections import LineCollection
 
-    style: dict[str, Any] = {"colors": LOCUS, "linewidths": WIDTH, "capstyle": "round", "zorder": 4}
+    style: dict[str, Any] = {"colors": SINGULAR, "linewidths": WIDTH, "capstyle": "round", "zorder": 4}
     curves = axes.add_collection(LineCollection(list(segments), **style), autolim=False)
     if area is not None:
         curves.set_clip_path(area, axes.transData)
@@ -304,7 +304,7 @@ def _draw_locus(axes: Any, region: Region, points: Floats, faces: Ints, step: Fl
             axis=2
         )
         normal *= np.where(normal @ eye.axes[2] < 0.0, -1.0, 1.0)[..., None]
-        image = np.dstack([in_the_light(normal, eye, np.array(to_rgb(LOCUS))), 1.0 * (raster.face >= 0)])
+        image = np.dstack([in_the_light(normal, eye, np.array(to_rgb(SINGULAR))), 1.0 * (raster.face >= 0)])
         axes.imshow(image, origin="lower", extent=raster.extent, interpolation="antialiased", zorder=3)
         rims = lines_between(np.minimum(raster.face, 0), raster, JUMP * float(step.max()))
         axes.add_collection(LineCollection(rims, colors=RIM, linewidths=0.8, zorder=4), autolim=False)

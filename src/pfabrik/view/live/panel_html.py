@@ -8,9 +8,8 @@ import numpy as np
 
 from ...answers.status import Status
 from ...tolerances import TOLERANCES
-from ..looks import ACHIEVED, HELD
+from ..looks import ACHIEVED, HELD, SINGULAR
 from .distances import Left, Nearness, limits_left
-from .scene import SINGULAR
 from .session import Session
 
 BARS = 6

@@ -42,9 +42,6 @@ JOINT = 0.034
 FRAME = 0.12
 """Length of the axes at the reference point [L]."""
 
-SINGULAR = "#aa3377"
-"""Colour of singularities."""
-
 NO_SHADOW: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
 PLAIN: dict[str, Any] = {"lod": "off", **NO_SHADOW}
 """Settings of many small meshes that save the time of computers without a graphics card."""

@@ -17,9 +17,10 @@ from ...kinematics import plane_of
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
 from ...telling import OnProgress
+from ..looks import SINGULAR
 from .live_machine import LiveMachine
 from .panel import FAR, LOCUS, WORKSPACE, Panel
-from .scene import SINGULAR, Patch
+from .scene import Patch
 from .workers import Newest
 
 if TYPE_CHECKING:
