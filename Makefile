@@ -28,7 +28,7 @@ reproduce: $(STAMP) $(MODULE)
 # The documentation as a site, in site/; no page needs the network. Machines are exported and notebooks run for it; it
 # stops at a link that leads nowhere.
 docs: $(STAMP) $(MODULE)
-	@$(PIP) --no-warn-conflicts --no-build-isolation --editable '.[docs]'
+	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@$(BIN)/python docs/build_site.py
 	@$(BIN)/zensical build --clean --strict
 

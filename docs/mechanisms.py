@@ -24,7 +24,8 @@ COLOURS = 64  # of a picture: enough for smooth edges, and a third of the file
 DPI = 110
 HEAD = """# Mechanisms of the catalogue
 
-Each is loaded by its name, as in `pf.load("stewart")`. The pictures show home, the base grey and the end effector blue:
+Each is loaded by its name, as in `pf.load("stewart")`; in the [gallery](gallery.md) they are to be dragged. The
+pictures show home, the base grey and the end effector blue:
 actuated joints are filled, pale bars are rails, a cross marks the reference point. In the sub-chains, `*` marks the
 actuated joint and `Pa` a parallelogram of pins; [How it works](how-it-works.md) has more on them, and tells the engines
 apart. [Adding a mechanism](adding-a-mechanism.md) says how to bring your own.

@@ -36,6 +36,7 @@ last digits, which far poses at flat optima show a thousandfold."""
 NEAR_RATIO = 1e-4
 """Relative difference of measures of singularity: a page takes differences of answers."""
 
+NO_ICON = '<link rel="icon" href="data:,">'
 LARGEST = 240_000
 """Of a page [bytes]."""
 
@@ -145,8 +146,11 @@ def test_a_page_answers_as_the_library_does(name: str) -> None:
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_a_page_is_small_and_asks_for_nothing(name: str) -> None:
+    """Not for an icon either, for it says that it has an empty one."""
     text = web_page(pf.load(name))
     assert len(text.encode()) <= LARGEST
+    assert text.count(NO_ICON) == 1
+    text = text.replace(NO_ICON, "")
     assert not re.search(r"https?://|\bfetch\(|XMLHttpRequest|\bimport\(|<link|@import|\bsrc=", text)
 
 
