@@ -40,7 +40,7 @@ SPAN = 100.0
 NEAR = 1.5
 """Distance from a line within which pixels ask for their limit: marching cubes cuts edges by up to a cell [cells]."""
 
-REACH, POINTS, HALVINGS = 1.6, 7, 5
+REACH, POINTS, HALVINGS = 1.6, 7, 4
 """Of the ray of a pixel: how far before and behind the mesh points are asked [cells], how many, and how often the step
 that the border is in is halved."""
 
@@ -51,7 +51,7 @@ in the stretch that is left, as a share of it."""
 SLOPE = 0.1
 """Step in which slopes are measured [cells]."""
 
-STRIDES = 4
+STRIDES = 2
 """Pixels that are asked first, to the width in which any are: those between four of one limit are filled."""
 
 FEW, VOTES, ROUNDS = 2, 3, 8
@@ -104,8 +104,8 @@ class SeenSolid:
 
 
 def is_told_apart(region: Region) -> bool:
-    """False if several limits bind at once on the border, of which one is named: with any orientation."""
-    return region._question.hold == "orientation"
+    """False if several limits bind at once on the border, of which one is named: with any orientation, or several."""
+    return region._question.hold == "orientation" and len(region._question.turns) == 1
 
 
 def scale_of(region: Region) -> Floats:
@@ -250,7 +250,9 @@ def _find(solid: SeenSolid, pixels: Ints, guess: Floats) -> Ints:
 
 def _grazed(solid: SeenSolid, base: Floats, margins: Floats, shares: Floats) -> tuple[Floats, Floats, Ints, Mask]:
     """Look on rays without a point within for one between the points: inside, before it, the limit there, the mask."""
-    rows, best = np.arange(len(base)), np.clip(margins.argmax(axis=1), 1, POINTS - 2)
+    best = margins.argmax(axis=1)
+    rows = np.flatnonzero((best > 0) & (best < POINTS - 1))  # else the ray is still on its way
+    best = np.clip(best, 1, POINTS - 2)
     near, far = shares[best - 1], shares[best + 1]
     before, limit = near.copy(), np.full(len(base), -1)
     inside, is_hit = np.full(len(base), np.nan), np.zeros(len(base), bool)

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from ..workspace.inscribed import Inscribed
     from ..workspace.region import Region
 
-ACROSS = 900
-"""Pixels across a solid."""
+ACROSS, ACROSS_BELOW = 760, 560
+"""Pixels across a solid, and across the one from below: as many as 300 an inch on paper."""
 
 TITLE, KEY_ROW, GAP, EDGE = 0.62, 0.19, 0.2, 0.12
 """Height of the title, and of a row of the key; free between and around panels [inches]."""
@@ -95,7 +95,7 @@ def plot_solid(
         _legend(axes, key)
         return axes  # type: ignore[no-any-return]
     below = _eye_below(sample, eye, colours.place) if view is None else None
-    second = None if below is None else seen_solid(region, below, ACROSS)
+    second = None if below is None else seen_solid(region, below, ACROSS_BELOW)
     figure, axes, beside, slices = _panels(first, second, size, groups, look)
     _draw_solid(axes, first, colours, shape, look)
     if second is not None:
