@@ -262,7 +262,10 @@ def test_pictures_are_written_and_told_of(line: str, code: int, name: str, begin
 SHOWN = "--view 20,-60 --size 6x4 --dpi 50 --theme dark"
 
 
-@pytest.mark.parametrize("line", ["plot stewart -o a.png", "track five_bar path.csv --plot a.png"])
+@pytest.mark.parametrize(
+    "line",
+    ["plot stewart -o a.png", "track five_bar path.csv --plot a.png", "workspace stewart --resolution 40 -o a.png"],
+)
 def test_a_picture_has_the_size_and_the_ground_that_it_is_asked_for(line: str) -> None:
     pytest.importorskip("matplotlib")
     from PIL import Image
