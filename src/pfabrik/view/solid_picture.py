@@ -35,6 +35,13 @@ WIDEST, SHORTEST, TALLEST, SECOND, SLICE = 4.3, 3.3, 4.1, 2.8, 1.9
 """Width of a solid in its box, at most, its least and greatest height, and widths of the second solid and of slices, at
 most [inches]."""
 
+ROOMY, ROOMY_FOR_TWO = (5.5, 4.0), 8.0
+"""Width and height of a figure below which it has no slices, and the width from which on it may have a second solid
+[inches]."""
+
+ALONE = (0.0, 0.16, 1.0, 0.74)
+"""Place of a solid without slices in a figure, between its title and its key."""
+
 SLICE_GAP, SLICE_BELOW, SLICE_LEFT = 0.62, 0.3, 0.55
 """Room for words between slices, below the last one and on their left [inches]."""
 
@@ -85,16 +92,21 @@ def plot_solid(
     sample = picked_faces(region.vertices * scale_of(region), region.faces, region.face_limit)
     eye = best_eye(sample, upright(region.names)) if view is None else eye_of(view, upright(region.names))
     first = seen_solid(region, eye, ACROSS)
+    if ax is None and size is not None and (size[0] < ROOMY[0] or size[1] < ROOMY[1]):
+        figure = new_figure(*checked_size(size), layout=None)
+        figure.set_facecolor(look.paper)
+        ax = figure.add_axes(ALONE)
     if ax is not None:
         axes: Any = axes_for(ax, (0.0, 0.0), look)
         _draw_solid(axes, first, colours, shape, look)
         axes.set_title(title_of(region), fontsize=SMALL + 1, color=look.ink)
-        key = _key(region, groups, look)
+        key = _key(groups, look)
         while key["ncols"] > 1 and _legend(axes, key).get_window_extent().width > axes.get_window_extent().width:
             key["ncols"] -= 1
         _legend(axes, key)
         return axes  # type: ignore[no-any-return]
-    below = _eye_below(sample, eye, colours.place) if view is None else None
+    has_room = view is None and (size is None or size[0] >= ROOMY_FOR_TWO)
+    below = _eye_below(sample, eye, colours.place) if has_room else None
     second = None if below is None else seen_solid(region, below, ACROSS_BELOW)
     figure, axes, beside, slices = _panels(first, second, size, groups, look)
     _draw_solid(axes, first, colours, shape, look)
@@ -109,7 +121,7 @@ def plot_solid(
     words = f"each face in the colour of {which}; + is {started}"
     under = top - 0.2 / figure.get_size_inches()[1]
     figure.text(left, under, words, fontsize=SMALL, color=look.soft, ha="left", va="top")
-    figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), **_key(region, groups, look))
+    figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), **_key(groups, look))
     return axes  # type: ignore[no-any-return]
 
 
@@ -117,7 +129,7 @@ def _legend(axes: Any, key: dict[str, Any]) -> Any:
     return axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), **key)
 
 
-def _key(region: Region, groups: list[Group], look: Look) -> dict[str, Any]:
+def _key(groups: list[Group], look: Look) -> dict[str, Any]:
     """Settings of a key: stops of motors, then passive joints, then links, the rest last, each with its share."""
     from matplotlib.patches import Patch
 

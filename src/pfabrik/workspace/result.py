@@ -136,7 +136,7 @@ class Workspace(Printed, Region):
             Of a workspace in space: "top", "front", "side" or "iso", or elevation and azimuth [deg]. Default: where
             most limits are seen.
         size : (float, float), optional
-            Width and height of a new figure [inches].
+            Width and height of a new figure [inches]; a small one has no slices.
         theme : {"light", "dark"}, optional
             Colours for a light or a dark ground.
 
