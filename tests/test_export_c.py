@@ -314,8 +314,8 @@ def test_a_program_in_cpp_calls_the_file_compiled_as_c_which_needs_mathematics_a
 
 # --- parts -----------------------------------------------------------------------------------------------------------
 
-FUNCTIONS = dict(zip(PARTS, ("ik", "limits", "fk", "jacobian", "nearest"), strict=True))
-CHOICES: list[Any] = [("prs", ("ik",)), ("delta with a shaft", ("limits", "fk"))]
+FUNCTIONS = dict(zip(PARTS, ("ik", "limits", "fk", "jacobian", "nearest", "bodies"), strict=True))
+CHOICES: list[Any] = [("prs", ("ik",)), ("delta with a shaft", ("limits", "fk")), ("stewart", ("bodies",))]
 CHOICES += [
     pytest.param(name, parts, marks=pytest.mark.campaign)
     for name in ("stewart", "prs", "delta with a shaft")

@@ -563,7 +563,7 @@ FILES = {"robot.urdf": URDF, "model.xml": FIVE_BAR, "page.html": "<html/>", "rob
         ("check robot.sdf", "pfabrik import"),
         ("export stewart", "FORMAT"),
         ("export stewart mjfc", "mjcf"),
-        ("export stewart mjcf --name arm", "--name is of c, c-float and"),
+        ("export stewart mjcf --name arm", "--name is of c, c-float, --ros2-control and"),
         ("export stewart klipper -o new.xml", "cannot be exported"),
     ],
 )

@@ -306,7 +306,7 @@ def test_the_border_of_the_workspace_is_shown_on_request(shown: Callable[..., pf
     viewer._searches.show_border("workspace", True)
     until(lambda: "mm²" in panel._note.content)
     told = panel._legend.content
-    assert "p1 max, actuated: 13%" in told and "p2 max: 11%" in told, told  # as in the picture
+    assert "p1, 5 max, actuated: 29%" in told and "p2, 4 max: 21%" in told, told  # as in the picture
     assert borders["workspace"]
     viewer._searches.show_border("workspace", False)
     assert not borders["workspace"]
