@@ -40,7 +40,7 @@ PAGES = {
         "Machines",
         "A machine is a `Mechanism`: joints between bodies, read from a file by `load`, or made of joints or legs "
         "in Python. It never changes; methods with `with_` in their names return another one.",
-        "Mechanism Joint Cone Leg Shape load save catalog decompose SubChain",
+        "Mechanism Joint Cone Leg Shape Mass load save catalog decompose SubChain",
         "description.joint_coordinates.JointCoordinate decomposition.decompose.Split "
         "decomposition.positions.Parallelogram",
     ),
@@ -86,6 +86,12 @@ PAGES = {
         "it is to first order, at a configuration or a batch of them.",
         "forces Forces wrench_capacity WrenchCapacity transmission Transmission Factors stiffness Stiffness "
         "accuracy PoseAccuracy",
+    ),
+    "dynamics": Page(
+        "Inverse dynamics",
+        "What actuators exert to move the masses of a machine, along a path or at a configuration. Forces are in N, "
+        "moments in N m, whatever the machine's unit of length.",
+        "inverse_dynamics Efforts mass_matrix",
     ),
     "calibration": Page(
         "Calibration",

@@ -49,9 +49,6 @@ class Weighed:
         moving = [body for body in mechanism.bodies if body != mechanism.base]
         self.masses = {body: 0.5 + 0.25 * place for place, body in enumerate(moving)}
         self.model = Model.of(to_mjcf(mechanism, masses=self.masses, gravity=(0, 0, -9.81)))
-        doubles = [i for i in range(1, self.model.model.nbody) if self.model.model.body(i).name not in self.masses]
-        self.model.model.body_mass[doubles] = 0.0
-        self.model.update()
         self.centres = {body: np.array(self.model.data.body(body).xipos) / self.metres for body in moving}
 
     @property

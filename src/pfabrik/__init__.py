@@ -6,7 +6,7 @@
     sol = pf.solve_ik(m, [10, 0, 190])           # REACHED, or PROJECTED to the nearest feasible pose
     fk = pf.solve_fk(m, sol.actuators)           # from actuator values to the pose
 
-Describe   load, save, catalog; Mechanism, Joint, Cone, Leg, Shape
+Describe   load, save, catalog; Mechanism, Joint, Cone, Leg, Shape, Mass
 Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
            Solver (one machine, asked again and again)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
@@ -14,6 +14,7 @@ Look over   workspace, singularity_map
 Prove      certify, largest; PoseRegion, Certificate
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Load        forces, wrench_capacity, transmission, stiffness, accuracy
+Move        inverse_dynamics, mass_matrix (what motors exert in motion)
 Apart       clearance (the least distance between links)
 Look into  search_log (every attempt behind an answer)
 Real machines   parameters, sensitivity, Measurements, calibrate
@@ -70,7 +71,10 @@ _NAMES = {
     "configuration": ("configuration",),
     "decomposition.decompose": ("SubChain", "decompose"),
     "description.legs": ("Leg",),
-    "description.mechanism": ("Cone", "Joint", "Mechanism", "Shape"),
+    "description.mechanism": ("Cone", "Joint", "Mass", "Mechanism", "Shape"),
+    "dynamics.efforts": ("Efforts",),
+    "dynamics.inverse_dynamics": ("inverse_dynamics",),
+    "dynamics.mass_matrix": ("mass_matrix",),
     "export.export_c": ("export_c",),
     "export.export_web": ("export_web",),
     "export.ros2_control": ("export_ros2_control",),
@@ -149,7 +153,16 @@ if TYPE_CHECKING:
     from .configuration import configuration as configuration
     from .decomposition.decompose import SubChain as SubChain, decompose as decompose
     from .description.legs import Leg as Leg
-    from .description.mechanism import Cone as Cone, Joint as Joint, Mechanism as Mechanism, Shape as Shape
+    from .description.mechanism import (
+        Cone as Cone,
+        Joint as Joint,
+        Mass as Mass,
+        Mechanism as Mechanism,
+        Shape as Shape,
+    )
+    from .dynamics.efforts import Efforts as Efforts
+    from .dynamics.inverse_dynamics import inverse_dynamics as inverse_dynamics
+    from .dynamics.mass_matrix import mass_matrix as mass_matrix
     from .export.export_c import export_c as export_c
     from .export.export_web import export_web as export_web
     from .export.ros2_control import export_ros2_control as export_ros2_control

@@ -8,6 +8,7 @@ is documented where it is defined.
 Machine       model_of, Model; engine_of, Configurations; task_of, Task
 Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
+Masses        inertias_of, BodyInertia
 Motion        home_coordinates, displacements, end_effector_pose, joint_centres; joint_path, JointPath; tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
               parallel_signs
@@ -15,6 +16,7 @@ First order   generic_of, internal_rates, require_determined; JointRates, cycle_
 
 from .closure.configurations import Configurations
 from .closure.first_order import JointRates
+from .description.body_inertias import BodyInertia, inertias_of
 from .description.graph import tree_of
 from .description.home_mobility import column_joints
 from .description.links import links_of
@@ -40,6 +42,7 @@ from .motion.mobility import generic_of, internal_rates
 from .motion.singularities import parallel_signs
 
 __all__ = [
+    "BodyInertia",
     "Configurations",
     "JointPath",
     "JointRates",
@@ -55,6 +58,7 @@ __all__ = [
     "engine_of",
     "generic_of",
     "home_coordinates",
+    "inertias_of",
     "internal_rates",
     "joint_centres",
     "joint_path",

@@ -14,7 +14,7 @@ from .answers.differential import Mobility, NearlyFree, mobility
 from .clearance.clearance import clearance
 from .decomposition.decompose import decompose
 from .description.home_mobility import universal_axes
-from .description.joints import KINDS
+from .description.joints import DRIVE_FIELDS, KINDS
 from .description.links import has_pairs
 from .description.mechanism import MOST_JOINTS_FOR_FREEDOM, Joint, Mechanism, Shape
 from .description.readouts import readout
@@ -75,8 +75,7 @@ def _joint_as_dict(joint: Joint, mechanism: Mechanism) -> dict[str, Any]:
         "actuated": joint.actuated,
         "home": mechanism.home_coordinate(joint.name),
         "range": joint.range,
-        "max_speed": joint.max_speed,
-        "max_acceleration": joint.max_acceleration,
+        **{field: getattr(joint, field) for field in DRIVE_FIELDS},
         "cone": None if joint.cone is None else dataclasses.asdict(joint.cone),
     }
 

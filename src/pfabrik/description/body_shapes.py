@@ -16,10 +16,10 @@ ShapeKind: TypeAlias = Literal["capsule", "sphere", "box", "disc", "mesh"]
 SHAPE_KINDS: tuple[ShapeKind, ...] = get_args(ShapeKind)
 
 SHAPE_FIELDS: dict[ShapeKind, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "capsule": (("thickness",), ("between", "ends")),
-    "sphere": (("at", "diameter"), ()),
-    "box": (("at", "size"), ("axes",)),
-    "disc": (("at", "axis", "diameter", "thickness"), ()),
+    "capsule": (("thickness",), ("between", "ends", "density")),
+    "sphere": (("at", "diameter"), ("density",)),
+    "box": (("at", "size"), ("axes", "density")),
+    "disc": (("at", "axis", "diameter", "thickness"), ("density",)),
     "mesh": (("file",), ("scale", "at", "axes")),
 }
 """What each shape needs, and what it may have beside."""
@@ -58,6 +58,9 @@ class Shape:
         Path of the file of a mesh: STL, OBJ, PLY and others.
     scale : float or None
         Factor on the numbers of a mesh's file; 1 by default.
+    density : float or None
+        Mass per volume [kg/m³] of what the shape is filled with, from which the mass of its body follows, in place of a
+        `Mass`; not of a mesh. A strut is as long as at home, and weighs on its `body` alone.
     """
 
     body: str
@@ -72,6 +75,7 @@ class Shape:
     axes: tuple[Vector, Vector] | None = None
     file: str | None = None
     scale: float | None = None
+    density: float | None = None
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
 
@@ -89,6 +93,7 @@ class Shape:
             axes: ArrayLike | None = None,
             file: str | os.PathLike[str] | None = None,
             scale: float | None = None,
+            density: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -97,8 +102,13 @@ class Shape:
         named["file"] = _whole_path(self.file)
         set_fields(self, **plain, **named, axis=unit_vector(self.axis), axes=unit_vectors(self.axes))
 
+    @property
+    def is_filled(self) -> bool:
+        """True if its volume can weigh something: that of any kind but a mesh."""
+        return self.kind != "mesh"
 
-_NUMBERS = ("thickness", "ends", "at", "diameter", "size", "scale")
+
+_NUMBERS = ("thickness", "ends", "at", "diameter", "size", "scale", "density")
 
 
 def _whole_path(file: Any) -> Any:

@@ -8,10 +8,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..errors import Fault, near_miss
+from .body_masses import Mass, as_matrix, as_moments
 from .body_shapes import Shape
 from .coercion import numbers, unit_vector
-from .form_faults import direction_faults, is_name, is_pair_of_names, is_point, shown, table_faults
+from .form_faults import direction_faults, is_name, is_numbers, is_pair_of_names, is_point, shown, table_faults
 from .joints import Joint, Vector
 
 MOST_COPIES = 100
@@ -105,6 +108,13 @@ class Patterns:
             for number in range(1, count + 1)
         ]
 
+    def copied_masses(self, mass: Mass) -> list[Mass]:
+        """The masses that one stands for, as of shapes."""
+        pattern = self.copied_bodies().get(mass.body) if isinstance(mass.body, str) else None
+        if pattern is None or pattern.count is None or pattern.axis is None:
+            return [mass]
+        return [_turned_mass(mass, pattern.axis, number - 1, pattern.count) for number in range(1, pattern.count + 1)]
+
     def as_written(self, text: str, copy: Copy) -> str:
         """A text about a copy with the names as its file writes them, without the copy's number."""
         if copy.number > 0:
@@ -193,6 +203,19 @@ def _turned_shape(shape: Shape, axis: Vector, step: int, steps: int) -> Shape:
     if shape.kind in ("box", "mesh") and shape.axes is None:
         at_home["axes"] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     return dataclasses.replace(shape, **{field: _turned(each, axis, step, steps) for field, each in at_home.items()})
+
+
+def _turned_mass(mass: Mass, axis: Vector, step: int, steps: int) -> Mass:
+    """The mass of a copy, turned by `step` of `steps` equal parts of a full turn."""
+    centre, inertia = _turned(mass.centre, axis, step, steps), mass.inertia
+    if step > 0 and inertia is not None and is_numbers(inertia, 6):
+        turn = np.array(
+            [rotated(row, axis, step, steps) for row in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        )
+        inertia = as_moments(turn.T @ as_matrix(inertia) @ turn)
+    return dataclasses.replace(
+        mass, body=f"{mass.body}{step + 1}", centre=centre if step else mass.centre, inertia=inertia
+    )
 
 
 def _turned(value: Any, axis: Vector, step: int, steps: int) -> Any:

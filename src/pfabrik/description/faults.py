@@ -9,6 +9,7 @@ from itertools import chain
 from typing import Any
 
 from ..errors import Fault
+from .body_masses import Mass
 from .body_shapes import Shape
 from .form_faults import shown
 from .joints import Joint
@@ -16,16 +17,25 @@ from .legs import LEG_KEYS
 from .links import collisions_at_home
 from .rules import is_same_place, joint_faults
 from .structure import Structure
-from .whole_rules import form_of_clearance, form_of_shapes, graph_faults, head_faults, home_faults, shape_faults
+from .whole_rules import (
+    form_of_clearance,
+    form_of_shapes,
+    graph_faults,
+    head_faults,
+    home_faults,
+    mass_faults,
+    shape_faults,
+)
 
 _FIELDS: dict[str, tuple[str, ...]] = {
     "joint": tuple(field.name for field in dataclasses.fields(Joint)),
     "leg": LEG_KEYS,
     "body": ("name", "shape", *(field.name for field in dataclasses.fields(Shape)[2:])),
+    "mass": tuple(field.name for field in dataclasses.fields(Mass)),
 }
 """The tables of a description, and what is in them, in order."""
 
-_PLACE = re.compile(r"(joint|leg|body)\[(\d+)\]\.?(\w*)")
+_PLACE = re.compile(r"(joint|leg|body|mass)\[(\d+)\]\.?(\w*)")
 
 
 def find_faults(mechanism: Structure) -> list[Fault]:
@@ -45,6 +55,8 @@ def find_faults(mechanism: Structure) -> list[Fault]:
         if not faults and not of_shapes:
             of_shapes = list(shape_faults(mechanism)) or list(collisions_at_home(mechanism))
         faults += of_shapes
+    if mechanism.masses and not faults:
+        faults += mass_faults(mechanism)
     return in_order(faults)
 
 

@@ -54,6 +54,10 @@ KINDS: dict[JointType, JointKind] = {
 }
 
 
+DRIVE_FIELDS = ("max_speed", "max_acceleration", "max_torque", "rotor_inertia", "gear", "friction")
+"""What can be said of the actuator of a joint, or of both of a C."""
+
+
 def driven_places(joint_type: Any, actuated: Any) -> tuple[int, ...]:
     """Indices of the driven coordinates of a joint of some type, as far as its description is valid.
 
@@ -141,6 +145,16 @@ class Joint:
     max_speed, max_acceleration : float or tuple of float or None
         Limits of the driven coordinate [rad or length, per s and per s²], two values where a C has both driven; None is
         no limit.
+    max_torque : float or tuple of float or None
+        The most that the actuator exerts on its coordinate, both ways, in SI units whatever the machine's length: N m,
+        of a slide N. Here and below two values where a C has both driven.
+    rotor_inertia, gear : float or tuple of float or None
+        Moment of inertia of the motor's rotor [kg m²], and how far it turns per radian, or per metre, of the
+        coordinate: on that, gear² times the inertia acts. Without a gear it is that of the coordinate, of a slide a
+        mass [kg].
+    friction : tuple of float or None
+        Friction of the coordinate, dry and viscous: a force against the motion [N m, N], and one per speed
+        [N m s/rad, N s/m]; two such pairs where a C has both driven.
     """
 
     name: str
@@ -156,6 +170,10 @@ class Joint:
     cone: Cone | None = None
     max_speed: float | tuple[float, float] | None = None
     max_acceleration: float | tuple[float, float] | None = None
+    max_torque: float | tuple[float, float] | None = None
+    rotor_inertia: float | tuple[float, float] | None = None
+    gear: float | tuple[float, float] | None = None
+    friction: tuple[float, float] | tuple[tuple[float, float], tuple[float, float]] | None = None
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
 
@@ -174,6 +192,10 @@ class Joint:
             cone: Cone | None = None,
             max_speed: ArrayLike | None = None,
             max_acceleration: ArrayLike | None = None,
+            max_torque: ArrayLike | None = None,
+            rotor_inertia: ArrayLike | None = None,
+            gear: ArrayLike | None = None,
+            friction: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -189,8 +211,7 @@ class Joint:
             actuated=truths(self.actuated, self.type),
             home=home_value(self.home, self.type),
             range=numbers(self.range),
-            max_speed=numbers(self.max_speed),
-            max_acceleration=numbers(self.max_acceleration),
+            **{field: numbers(getattr(self, field)) for field in DRIVE_FIELDS},
         )
 
     @property

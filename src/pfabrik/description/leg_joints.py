@@ -14,7 +14,7 @@ from ..errors import Fault, near_miss
 from .body_shapes import Shape
 from .copies import MOST_COPIES, read_copies, turned
 from .form_faults import is_pair_of_names, shown, table_faults
-from .joints import Cone, Joint, Vector
+from .joints import DRIVE_FIELDS, Cone, Joint, Vector
 from .leg_points import EXPECTED, PLACEHOLDER, Point, axis_pairs, count_legs, directions, leg_points
 from .legs import CONE_KEYS, JOINT_KEYS, Leg, chain_faults, read_chain
 from .rules import faults_by, form, wrong
@@ -120,8 +120,7 @@ class LegMaker:
                 home=said.get("home", 0.0),
                 range=limits,
                 cone=cones[leg],
-                max_speed=said.get("max_speed"),
-                max_acceleration=said.get("max_acceleration"),
+                **{field: said.get(field) for field in DRIVE_FIELDS},
                 **fields[leg],
             )
             end = self._next_place(index, leg)

@@ -13,12 +13,12 @@ from ..errors import Fault, InvalidArgument
 from ..frozen import FrozenMapping
 from .coercion import numbers, text, texts
 from .form_faults import shown
-from .joints import KINDS, Cone, JointType, Range, set_fields
+from .joints import DRIVE_FIELDS, KINDS, Cone, JointType, Range, set_fields
 
 LEG_KEYS = ("chain", "name", "connects", "base", "via", "platform", "axis", "stroke", "thickness", "copies")
 """What can be said of legs, in the order in which it is told, beside what is said of single joints."""
 
-JOINT_KEYS = ("axis", "axes", "actuated", "home", "range", "cone", "max_speed", "max_acceleration")
+JOINT_KEYS = ("axis", "axes", "actuated", "home", "range", "cone", *DRIVE_FIELDS)
 """What can be said of one joint of a chain."""
 
 CONE_KEYS = ("axis", "half_angle", "fixed_to")
@@ -58,7 +58,8 @@ class Leg:
         The bodies that the legs lead from and to; the base and the end effector by default.
     by_letter : mapping of str to mapping
         What is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are axis,
-        axes, home, range, cone, max_speed and max_acceleration, as in `Joint`, directions as above; and, of a C with
+        axes, home, range, cone and those of actuators, max_speed to friction, as in `Joint`, directions as above; and,
+        of a C with
         `*` in the chain, actuated: which of its coordinates is driven, by default both. A cone is a mapping too:
         half_angle; axis, by default the line that it limits, at home; fixed_to, by default the base or the end effector
         at the ends of the chain and the inner body between.

@@ -14,6 +14,7 @@ from ..checks import require_mapping, require_type
 from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
 from ..frozen import FrozenMapping
 from ..printed import ResultTable
+from .body_masses import Mass
 from .body_shapes import Shape
 from .coercion import items, numbers
 from .copies import Pattern
@@ -33,6 +34,7 @@ __all__ = [
     "Joint",
     "JointType",
     "Limit",
+    "Mass",
     "Mechanism",
     "Range",
     "Shape",
@@ -94,6 +96,8 @@ class Mechanism(Structure):
         Pairs of bodies that may touch each other.
     clearance : float or None
         The least distance that every answer keeps between links [length]; None where links may overlap.
+    masses : tuple of Mass
+        What bodies weigh; those of shapes with a density need none.
     """
 
     if TYPE_CHECKING:  # what may be given, which is more than what the fields then are
@@ -111,6 +115,7 @@ class Mechanism(Structure):
             shapes: Iterable[Shape] = (),
             ignore: Iterable[Sequence[str]] = (),
             clearance: float | None = None,
+            masses: Iterable[Mass] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -154,6 +159,7 @@ class Mechanism(Structure):
         shapes: Iterable[Shape] = (),
         ignore: Iterable[Sequence[str]] = (),
         clearance: float | None = None,
+        masses: Iterable[Mass] = (),
         length_unit: str = "mm",
         angle_unit: Literal["deg", "rad"] = "deg",
         **by_letter: Mapping[str, object],
@@ -194,6 +200,8 @@ class Mechanism(Structure):
             As in `Mechanism`.
         clearance : float, optional
             As in `Mechanism`.
+        masses : iterable of Mass, optional
+            As in `Mechanism`; bodies of legs are called AB1, BC1 by the joints between which they are.
         length_unit, angle_unit : str, optional
             As in `Mechanism`.
         **by_letter : mapping of str to object
@@ -214,12 +222,15 @@ class Mechanism(Structure):
             raise InvalidArgument("joints", shown(own), "a list of joints")
         if not isinstance(own_shapes, tuple) or not all(isinstance(each, Shape) for each in own_shapes):
             raise InvalidArgument("shapes", shown(own_shapes), "a list of Shape")
+        own_masses = items(masses)
+        if not isinstance(own_masses, tuple) or not all(isinstance(each, Mass) for each in own_masses):
+            raise InvalidArgument("masses", shown(own_masses), "a list of Mass")
         head: dict[str, Any] = {"name": legs_name(described) if name is None else name, "end_effector": end_effector}
         head |= {"reference_point": reference_point, "base": base_body, "task": task, "ignore": ignore}
         head |= {"clearance": clearance, "length_unit": length_unit, "angle_unit": angle_unit}
         if not all(isinstance(each, Joint) for each in own):
             return cls(**head, joints=own)  # which names the one that is none
-        return expanded(cls, head, ([Pattern(each) for each in own], described, own_shapes))
+        return expanded(cls, head, ([Pattern(each) for each in own], described, own_shapes, own_masses))
 
     def _check(self) -> None:
         faults = find_faults(self)
@@ -348,6 +359,21 @@ class Mechanism(Structure):
             A clearance that is none, or links that are nearer at home.
         """
         return self._with(clearance=numbers(clearance))
+
+    def with_masses(self, masses: Iterable[Mass]) -> Mechanism:
+        """A copy with other masses of bodies.
+
+        Parameters
+        ----------
+        masses : iterable of Mass
+            The masses, in place of those there are.
+
+        Raises
+        ------
+        InvalidMechanism
+            A mass that none can be, with every fault.
+        """
+        return self._with(masses=items(masses))
 
     def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
         """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""

@@ -20,7 +20,7 @@ from .form_faults import (
     range_text,
     shown,
 )
-from .joints import JOINT_TYPES, KINDS, Coordinate, Joint, JointKind
+from .joints import DRIVE_FIELDS, JOINT_TYPES, KINDS, Coordinate, Joint, JointKind
 
 
 class Rule:
@@ -126,13 +126,26 @@ def _bounds_faults(place: str, bounds: Any, coordinate: Coordinate) -> Iterator[
 
 
 def _pace_faults(place: str, value: Any, joint: Joint, _: object) -> Iterator[Fault]:
-    """Faults of a speed or an acceleration: positive, and one for each coordinate that something drives."""
+    """Faults of a speed, or another number of a drive: positive, and one for each coordinate that something drives."""
     count = len(joint.driven)
     faults = list(number_faults(place, value, count or 1))
     yield from faults
     if not faults and min(value if count > 1 else (value,)) <= 0.0:
         yield Fault(place, shown(value), "a number greater than 0" if count < 2 else "numbers greater than 0")
     elif not faults and joint.actuated is False:
+        yield Fault(place, shown(value), "nothing: the joint is not actuated")
+
+
+def _friction_faults(place: str, value: Any, joint: Joint, _: object) -> Iterator[Fault]:
+    """Faults of friction: dry and viscous, neither negative, for each coordinate that something drives."""
+    two = len(joint.driven) == 2
+    pairs = value if two and isinstance(value, tuple) else (value,)
+    what = "two numbers, dry and viscous, 0 or more" + ", for each coordinate" * two
+    if len(pairs) != 1 + two or not all(
+        is_numbers(pair, 2) and 0.0 <= min(pair) <= max(pair) < math.inf for pair in pairs
+    ):
+        yield Fault(place, shown(value), what)
+    elif joint.actuated is False:
         yield Fault(place, shown(value), "nothing: the joint is not actuated")
 
 
@@ -160,8 +173,8 @@ OF_JOINTS = (
     wrong("along?", lambda v, j, k: v[0] == v[1] and f"'{v[0]}' twice", "two different joints"),
     wrong("along?", lambda v, j, k: j.axis is not None and "both `axis` and `along`", "one of them"),
     wrong("actuated", lambda v, j, k: not isinstance(v, bool) and not _drives_two(k), "true or false"),
-    Rule("max_speed?", _pace_faults),
-    Rule("max_acceleration?", _pace_faults),
+    *(Rule(f"{field}?", _pace_faults) for field in DRIVE_FIELDS if field != "friction"),
+    Rule("friction?", _friction_faults),
     wrong("cone?", lambda v, j, k: not all(hasattr(v, field) for field in ("axis", "half_angle", "fixed_to")),
           "a cone: its axis, half_angle and fixed_to"),
     form("cone.axis", direction_faults),

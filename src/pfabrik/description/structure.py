@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import UnknownName
 from ..kernels.tape import LENGTH, V_DIVIDE, V_SUBTRACT, result
+from .body_masses import Mass
 from .body_shapes import Shape
 from .coercion import items, numbers, text, texts
 from .enclosing import enclosing_radius
@@ -41,10 +42,12 @@ class Structure:
     shapes: tuple[Shape, ...] = ()
     ignore: tuple[tuple[str, str], ...] = ()
     clearance: float | None = None
+    masses: tuple[Mass, ...] = ()
 
     def __post_init__(self) -> None:
         set_fields(self, joints=items(self.joints), reference_point=numbers(self.reference_point))
-        set_fields(self, shapes=items(self.shapes), ignore=as_pairs(self.ignore), clearance=numbers(self.clearance))
+        set_fields(self, shapes=items(self.shapes), masses=items(self.masses), ignore=as_pairs(self.ignore))
+        set_fields(self, clearance=numbers(self.clearance))
         set_fields(self, **{name: text(getattr(self, name)) for name in _TEXT_FIELDS})
         tip = self.end_effector_joint
         if tip is not None and cast(Any, self.reference_point) is None:

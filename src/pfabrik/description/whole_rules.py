@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import Fault, near_miss
 from ..meshes import UnusableMesh, hull_of
 from ..tolerances import TOLERANCES
+from .body_masses import Mass, as_matrix
 from .body_shapes import SHAPE_FIELDS, SHAPE_KINDS, Shape
 from .enclosing import enclosing_radius
 from .form_faults import (
@@ -22,6 +23,7 @@ from .form_faults import (
     coordinate_text,
     direction_faults,
     is_name,
+    is_numbers,
     is_pair_of_names,
     is_point,
     name_faults,
@@ -41,6 +43,7 @@ SQUARE = TOLERANCES.rotation_matrix
 """Cosine of the angle between the axes of a box up to which they count as square, as the rows of a rotation do."""
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(Shape))[2:]
+_POSITIVE = ("thickness", "diameter", "scale", "density")
 _WORDS = {
     "thickness": "a number",
     "diameter": "a number",
@@ -69,8 +72,8 @@ def _mesh_faults(place: str, shape: Shape) -> Iterator[Fault]:
 
 OF_SHAPES = (
     *(rule for field in _FIELDS for rule in _field_rules(field)),
-    *(form(f"{field}?", number_faults, 1) for field in ("thickness", "diameter", "scale")),
-    *(wrong(f"{field}?", lambda v, *_: v <= 0.0, "more than 0") for field in ("thickness", "diameter", "scale")),
+    *(form(f"{field}?", number_faults, 1) for field in _POSITIVE),
+    *(wrong(f"{field}?", lambda v, *_: v <= 0.0, "more than 0") for field in _POSITIVE),
     form("size?", number_faults, 3),
     wrong("size?", lambda v, *_: min(v) <= 0.0, "more than 0"),
     form("at?", number_faults, 3),
@@ -135,6 +138,47 @@ def shape_faults(mechanism: Structure) -> Iterator[Fault]:
                 found = f"nothing, and '{shape.body}' has {len(joints)} joints with a centre"
                 yield Fault(f"{place}.between", found, "the names of two of its joints, or `ends`, two points")
     yield from _ignore_faults(mechanism)
+
+
+def mass_faults(mechanism: Structure) -> Iterator[Fault]:
+    """Faults of the masses of bodies, in a mechanism whose joints and shapes are sound."""
+    masses: Any = mechanism.masses
+    if not isinstance(masses, tuple) or not all(isinstance(each, Mass) for each in masses):
+        yield Fault("masses", shown(masses), "a list of Mass")
+        return
+    bodies = [each.body for each in masses]
+    for index, each in enumerate(masses):
+        yield from faults_by(OF_MASSES, f"mass[{index}]", each, mechanism, bodies[:index])
+
+
+def _is_impossible(moments: Any) -> str | bool:
+    """What is wrong with moments of inertia that no body can have, if anything is."""
+    if not is_numbers(moments, 6) or not all(map(math.isfinite, moments)):
+        return True
+    least, middle, most = np.linalg.eigvalsh(as_matrix(moments)).tolist()
+    principal = f"principal moments {least:.6g}, {middle:.6g} and {most:.6g}"
+    return principal if least < -INERTIA_SLACK * most or most > (1.0 + INERTIA_SLACK) * (least + middle) else False
+
+
+INERTIA_SLACK = 1e-6
+"""Share of the largest moment of inertia by which moments may break their rules: files have six digits."""
+
+OF_MASSES = (
+    wrong("body", lambda v, each, m, before: v not in m.bodies and f"{shown(v)}: no such body"
+          f"{near_miss(v, m.bodies) if isinstance(v, str) else ''}", "a body that a joint connects"),
+    wrong("body", lambda v, each, m, before: v in before and f"'{v}' twice", "one mass of a body"),
+    wrong("mass", lambda v, *_: not isinstance(v, float) or not 0.0 <= v < math.inf, "kilograms, 0 or more"),
+    wrong("mass", lambda v, each, m, before: any(s.body == each.body and s.density is not None for s in m.shapes)
+          and f"a mass beside the density of a shape of '{each.body}'", "one of them"),
+    form("centre?", number_faults, 3),
+    wrong("centre", lambda v, each, m, before: v is None and each.mass != 0.0
+          and not any(s.body == each.body and s.is_filled for s in m.shapes),
+          "three numbers, the centre of mass: the body has no shape to take it from"),
+    wrong("inertia?", lambda v, *_: _is_impossible(v),
+          "Ixx, Iyy, Izz and, if not 0, Ixy, Ixz, Iyz of a body: its principal moments are not negative, "
+          "and none is more than the other two together"),
+)  # fmt: skip
+"""Of a mass, of the mechanism, and of the bodies of the masses before."""
 
 
 def _between_faults(place: str, shape: Shape, mechanism: Structure) -> Iterator[Fault]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from ..description.body_masses import Mass
 from ..description.body_shapes import Shape
 from ..description.copies import Pattern, read_copies
 from ..description.expanded import Described, expanded
@@ -29,6 +30,7 @@ from .units import angle_in_radians, in_radians
 DESCRIBED = ("name", "base", "end_effector", "reference_point", "task", "ignore", "clearance")
 HEAD_KEYS = ("schema", "units", *DESCRIBED, "dimensions", "joint", "leg", "body")
 UNIT_KEYS = ("length", "angle")
+MASS_KEYS = tuple(field.name for field in dataclasses.fields(Mass)[1:])
 SHAPE_KEYS = ("name", "shape", *(field.name for field in dataclasses.fields(Shape)[2:]))
 _JOINT_FIELDS = tuple(field.name for field in dataclasses.fields(Joint))
 
@@ -110,6 +112,7 @@ def _read(table: Table, kind: type[Described]) -> Described:
     patterns = [_pattern(each, f"joint[{index}]", unit, faults) for index, each in enumerate(tables["joint"])]
     legs = [_leg(each, f"leg[{index}]", unit, faults) for index, each in enumerate(tables["leg"])]
     shapes = [_shape(each, f"body[{index}]", faults) for index, each in enumerate(tables["body"])]
+    masses = [_mass(each) for each in tables["body"]]
     in_legs = sum(map(count_joints, legs))
     count = in_legs + sum(pattern.count or 1 for pattern in patterns)
     if in_legs > MOST_JOINTS:
@@ -119,7 +122,7 @@ def _read(table: Table, kind: type[Described]) -> Described:
         faults.append(Fault("joint", f"{count} joints with their copies", f"at most {MOST_JOINTS}"))
     head = {"name": None, "end_effector": None} | {key: table[key] for key in DESCRIBED if key in table}
     head |= {f"{key}_unit": value for key, value in _units(table).items() if key in UNIT_KEYS}
-    return expanded(kind, head, (patterns, legs, shapes), faults)
+    return expanded(kind, head, (patterns, legs, shapes, masses), faults)
 
 
 def _head_faults(table: Table) -> Iterator[Fault]:
@@ -183,9 +186,17 @@ def _cone(table: Any, place: str, angle_unit: str, faults: list[Fault]) -> Cone 
     return Cone(cast(Any, table.get("axis")), half_angle, cast(Any, table.get("fixed_to")))
 
 
-def _shape(table: Table, place: str, faults: list[Fault]) -> Shape:
-    """The shape that a table describes, as far as it can be read."""
-    faults += _unknown_keys(place, table, SHAPE_KEYS)
+def _mass(table: Table) -> Mass | None:
+    """The mass that a table describes, as far as it can be read; None if it says nothing of one."""
+    values = {key: table[key] for key in MASS_KEYS if key in table}
+    return Mass(**{"body": table.get("name"), "mass": None, **values}) if values else None
+
+
+def _shape(table: Table, place: str, faults: list[Fault]) -> Shape | None:
+    """The shape that a table describes, as far as it can be read; None if it only has a mass."""
+    faults += _unknown_keys(place, table, (*SHAPE_KEYS, *MASS_KEYS))
+    if set(table).intersection(MASS_KEYS) and not set(table).intersection(SHAPE_KEYS[1:]):
+        return None
     values = {key: table[key] for key in SHAPE_KEYS[2:] if key in table}
     return Shape(cast(Any, table.get("name")), table.get("shape", "capsule"), **values)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..description.coercion import numbers, truths
 from ..description.form_faults import is_numbers
-from ..description.joints import KINDS, Coordinate, driven_places
+from ..description.joints import DRIVE_FIELDS, KINDS, Coordinate, driven_places
 from ..errors import InvalidArgument, near_miss
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "µm": 1e-6}
@@ -17,6 +17,10 @@ METRES |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 
 MEASURED = ("home", "range", "max_speed", "max_acceleration")
 """Fields of a joint in the unit of its coordinate (per second, per second squared): their numbers may be angles."""
+
+
+IN_SI = tuple(field for field in DRIVE_FIELDS if field not in MEASURED)
+"""Fields of a joint in SI units, whatever those of the file are."""
 
 
 def in_radians(field: str, value: Any, joint_type: Any, actuated: Any, unit: str) -> Any:

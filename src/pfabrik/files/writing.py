@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..description.mechanism import Joint, Mechanism, Shape
+from ..description.mechanism import Joint, Mass, Mechanism, Shape
 from .reading import with_paths
-from .units import MEASURED, converted, exact_degrees, measured
+from .units import IN_SI, MEASURED, converted, exact_degrees, measured
 
 TABLES = ("joint", "leg", "body")
 """Keys of a file that are lists of tables, in their order."""
@@ -32,7 +32,15 @@ def dumps(mechanism: Mechanism, folder: Path | None = None) -> str:
     tables = ["\n".join(_head(mechanism, "deg" if degrees else "rad"))]
     tables += ["\n".join(["[[joint]]", *_joint(joint, convert)]) for joint in mechanism.joints]
     tables += ["\n".join(["[[body]]", *_shape(shape, folder)]) for shape in mechanism.shapes]
+    tables += ["\n".join(["[[body]]", *_mass(mass)]) for mass in mechanism.masses]
     return "\n\n".join(tables) + "\n"
+
+
+def _mass(mass: Mass) -> Iterator[str]:
+    yield f"name = {_value(mass.body)}"
+    for field in dataclasses.fields(mass)[1:]:
+        if (value := getattr(mass, field.name)) is not None:
+            yield f"{field.name} = {_value(value)}"
 
 
 def _shape(shape: Shape, folder: Path | None) -> Iterator[str]:
@@ -83,7 +91,7 @@ def _head(mechanism: Mechanism, angle_unit: str) -> Iterator[str]:
 
 
 def _joint(joint: Joint, convert: Callable[[float], float]) -> Iterator[str]:
-    for field in ("name", "type", "actuated", "connects", "at", "axis", "axes", "along", *MEASURED):
+    for field in ("name", "type", "actuated", "connects", "at", "axis", "axes", "along", *MEASURED, *IN_SI):
         value = getattr(joint, field)
         if field in MEASURED:
             value = converted(value, measured(field, joint.type, joint.actuated), convert)

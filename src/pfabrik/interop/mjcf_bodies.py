@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,6 +13,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..checks import require_mapping, require_positive
+from ..description.body_inertias import BodyInertia, inertias_of
+from ..description.body_masses import as_moments
 from ..description.form_faults import shown
 from ..description.graph import sliding_along
 from ..description.home_mobility import universal_axes
@@ -33,6 +35,9 @@ DENSITY = 100.0
 LINK = 0.1
 """Mass of any other body over that of the end effector."""
 
+DOUBLED = 0.1
+"""Share of the mass of a body that each of its doubles has, in the same place: together they weigh what it does."""
+
 THINNEST = 0.1
 """Least radius of gyration of a body [L]: a light body that turns easily would need shorter steps."""
 
@@ -51,25 +56,30 @@ class Physics:
     Attributes
     ----------
     masses : body -> its mass [kg].
-    given : bodies whose masses the caller gave.
+    given : bodies whose masses the caller gave, or the mechanism has.
+    known : what bodies weigh of which the mechanism has it, lengths in its unit.
     length : the characteristic length [m].
     heaviest : the largest of the masses, which any servo can carry [kg].
     """
 
     masses: Mapping[str, float]
     given: frozenset[str]
+    known: Mapping[str, BodyInertia]
     length: float
     heaviest: float
 
-    def inertia(self, body: str, points: Floats) -> tuple[float, Floats, float]:
-        """Mass [kg], centre of mass (3,) [m] and moment of inertia about any axis [kg m²] of a body with these points.
+    def inertia(self, body: str, points: Floats, metres: float) -> BodyInertia:
+        """Mass [kg], centre of mass [m] and inertia [kg m²] of a body with these points.
 
-        As if its mass were in a ball around them.
+        Where the mechanism does not have it, as if the mass were in a ball around the points.
         """
-        centre = points.mean(axis=0)
-        spread = float(np.sqrt(points.var(axis=0).sum()))
-        mass = self.masses.get(body, LINK**2 * self.heaviest)  # of a doubled body, hardly any
-        return mass, centre, mass * max(spread, THINNEST * self.length) ** 2
+        mass, spread = self.masses[body], float(np.sqrt(points.var(axis=0).sum()))
+        ball = mass * max(spread, THINNEST * self.length) ** 2 * np.eye(3)
+        if body not in self.known:
+            return BodyInertia(mass, points.mean(axis=0), ball)
+        _, centre, inertia = self.known[body]
+        is_solid = np.linalg.eigvalsh(inertia)[0] > 0.0
+        return BodyInertia(mass, centre * metres, inertia * metres**2 if is_solid else ball)
 
     def carried(self, turning: bool) -> float:
         """The load of a servo: a moment of inertia [kg m²] if it turns, else a mass [kg]."""
@@ -87,7 +97,7 @@ class Physics:
 
 
 def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | None) -> Physics:
-    """Masses as given, the others plausible.
+    """Masses as given, else as the mechanism has them, the others plausible.
 
     Parameters
     ----------
@@ -107,9 +117,11 @@ def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | N
     length = mechanism.characteristic_length * metres
     whole = DENSITY * length**3
     plausible = {body: whole if body == mechanism.end_effector_body else LINK * whole for body in mechanism.bodies}
-    every = plausible | given
+    weighed = inertias_of(mechanism, metres)
+    known = {body: each for body, each in weighed.items() if body not in given and each.mass > 0.0}
+    every = plausible | {body: each.mass for body, each in known.items()} | given
     moving = [mass for body, mass in every.items() if body != mechanism.base]
-    return Physics(every, frozenset(given), length, max(moving))
+    return Physics(every, frozenset(given) | known.keys(), known, length, max(moving))
 
 
 SLIDING = ("prismatic", "cylindrical")
@@ -257,7 +269,10 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
         elements[branch.body], origins[branch.body] = body, origin
         for attributes in _joints(mechanism, branch, metres, physics):
             ET.SubElement(body, "joint", attributes)
-        body.append(_inertial(branch.body, points.get(branch.body, [origin]), origin, physics))
+        weighed, doubles = branch.double_of or branch.body, Counter(each.double_of for each in tree.branches)
+        share = DOUBLED if branch.double_of else 1.0 - DOUBLED * doubles[branch.body]
+        inertia = physics.inertia(weighed, np.array(points[weighed]), metres)
+        body.append(_inertial(inertia, share, origin))
     for name in mechanism.bodies:
         elements[name].extend(_drawn(points[name], origins[name], physics))
         elements[name].extend(_thick(mechanism, name, origins[name], metres))
@@ -354,10 +369,11 @@ def _half(half: Half, origin: Floats, metres: float) -> ET.Element:
     return ET.Element("geom", {"name": half.name, "type": "capsule", "fromto": ends, "size": radius, **UNTOUCHED})
 
 
-def _inertial(body: str, points: list[Floats], origin: Floats, physics: Physics) -> ET.Element:
-    mass, centre, moment = physics.inertia(body, np.array(points))
-    place = number_text(centre - origin)
-    return ET.Element("inertial", mass=repr(mass), pos=place, diaginertia=number_text(np.full(3, moment)))
+def _inertial(inertia: BodyInertia, share: float, origin: Floats) -> ET.Element:
+    """What a body weighs, or a share of it."""
+    place, moments = number_text(inertia.centre - origin), np.array(as_moments(share * inertia.inertia))
+    kind = {"fullinertia": number_text(moments)} if moments[3:].any() else {"diaginertia": number_text(moments[:3])}
+    return ET.Element("inertial", {"mass": repr(share * inertia.mass), "pos": place, **kind})
 
 
 def _drawn(points: list[Floats], origin: Floats, physics: Physics) -> Iterator[ET.Element]:

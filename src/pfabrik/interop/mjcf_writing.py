@@ -36,8 +36,8 @@ def to_mjcf(
 
     Lengths become metres, and every joint counts as it does in the mechanism: `qpos` of a hinge or slide is the
     coordinate [rad or m]. Loops are cut at ball joints, which become `connect`; a loop without one gets a double of a
-    body, of hardly any mass, welded to it. Sites are at all joints and at the reference point; actuated joints have
-    position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, and
+    body, with a share of its mass, welded to it. Sites are at all joints and at the reference point; actuated joints
+    have position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, and
     weigh nothing; a strut is two, of which one goes with each part, where these are as long as it is over all of its
     range. Pairs of `ignore` are `exclude`. Cones, which MuJoCo does not know, are in comments and in custom elements,
     as are base, end effector and task, highest speeds and accelerations, struts, and the clearance.
@@ -49,8 +49,8 @@ def to_mjcf(
     path : str or PathLike, optional
         The file to write; None writes none.
     masses : mapping of str to float, optional
-        Body -> its mass [kg]. Those not given are made up, in proportion to the machine: what the model weighs, and so
-        every force in it, means nothing until they are.
+        Body -> its mass [kg]. Others are those of the mechanism, or made up, in proportion to it: what the model
+        weighs, and so every force in it, means nothing until they are given. A point mass becomes a ball.
     gravity : array (3,), optional
         Gravity [m/s²]; none by default, for with masses made up, its forces would be too.
 

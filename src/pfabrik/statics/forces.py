@@ -18,7 +18,7 @@ from ..frozen import FrozenMapping
 from ..kinematics import actuator_units, end_effector_pose, joint_centres
 from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
-from .joint_balance import Balance, about_centres, balance
+from .joint_balance import COMPONENTS, Balance, about_centres, balance, open_components, open_in_words
 from .loads import (
     Asked,
     BodyLoads,
@@ -36,9 +36,7 @@ from .loads import (
 from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
 GRAVITY = (0.0, 0.0, -9.81)
-COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 FREE_PART = "the loads move a part that neither the end effector nor an actuator holds"
-OPEN = "equilibrium does not determine all reactions, for joints work against each other (overconstraint): {}"
 
 
 class _Question(NamedTuple):
@@ -142,14 +140,8 @@ class Forces(Printed):
 
         Of a batch, those of any row.
         """
-        is_open = np.asarray(self._is_open.any(axis=0))
-        parts = [
-            f"{joint.name} {' '.join(name for name, left in zip(COMPONENTS, row, strict=True) if left)}"
-            for joint, row in zip(self._mechanism.joints, is_open, strict=True)
-            if row.any()
-        ]
-        sentences = [OPEN.format(", ".join(parts))] if parts else []
-        return "; ".join(sentences + [GAINS_MOTION] * bool(self._balance.is_singular.any()))
+        sentences = [open_in_words(self._mechanism, self._is_open)]
+        return "; ".join(filter(None, sentences + [GAINS_MOTION] * bool(self._balance.is_singular.any())))
 
     @cached_property
     def rods(self) -> Mapping[str, Floats]:
@@ -200,9 +192,7 @@ class Forces(Printed):
     @cached_property
     def _is_open(self) -> Mask:
         """True where a component of a reaction is not determined, (n, joints, 6)."""
-        left = about_centres(self._mechanism, self._balance.open, *self._places)
-        units = np.repeat([1.0, self._mechanism.characteristic_length], 3) / self._mechanism.characteristic_length
-        return np.asarray(np.linalg.norm(left / units[:, None], axis=-1) > TOLERANCES.alignment)
+        return open_components(self._mechanism, self._balance.open, *self._places)
 
 
 def forces(

@@ -27,6 +27,9 @@ from ..kinematics import JointRates, column_joints, cycle_basis, model_of, tree_
 from ..tolerances import TOLERANCES
 from .transmission import Maps, is_redundantly_actuated
 
+COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+OPEN = "equilibrium does not determine all reactions, for joints work against each other (overconstraint): {}"
+
 ROWS_A_BLOCK = 512
 """Rows whose matrices are in memory at once."""
 
@@ -82,11 +85,23 @@ def pairs_of(mechanism: Mechanism, q: Floats) -> Pairs:
 
 
 def _balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
-    first, owners = JointRates(model_of(mechanism), q), column_joints(mechanism)
-    actuators, by_loop = first.wrench(np.einsum("nci,ncik->nck", first.screws, carried[:, owners]))
+    return balance_at(mechanism, JointRates(model_of(mechanism), q), carried)
+
+
+def balance_at(mechanism: Mechanism, first: JointRates, carried: Floats, on_drives: Floats | float = 0.0) -> Balance:
+    """The equilibrium of what joints carry, (n, joints, 6, k), where their rates are known.
+
+    Parameters
+    ----------
+    on_drives : loads on the actuators' coordinates themselves, (n, n_a, k): of friction, and of rotors.
+    """
+    owners = column_joints(mechanism)
+    work = np.einsum("nci,ncik->nck", first.screws, carried[:, owners])
+    work[:, first.actuated] += on_drives
+    actuators, by_loop = first.wrench(work)
     wrenches = -(carried + of_joints(mechanism, by_loop))
     undone = -np.einsum("nci,ncik->nck", first.screws, wrenches[:, owners])
-    undone[:, first.actuated] += actuators
+    undone[:, first.actuated] += actuators + on_drives
     sizes = TOLERANCES.alignment * np.abs(carried).max(axis=(1, 2), initial=0.0)
     held, idle = (np.abs(np.swapaxes(motions, -1, -2) @ undone) for motions in (first.pairs, first.unseen))
     return Balance(
@@ -120,6 +135,23 @@ def about_centres(mechanism: Mechanism, wrenches: Floats, centres: Floats, refer
     forces = wrenches[:, :, :3] / mechanism.characteristic_length
     arms = (points - reference[:, None])[..., None]
     return np.concatenate([forces, wrenches[:, :, 3:] - np.cross(arms, forces, axis=2)], axis=2)
+
+
+def open_components(mechanism: Mechanism, opened: Floats, centres: Floats, reference: Floats) -> Mask:
+    """True where a component of a reaction is not determined, (n, joints, 6), of what `Balance.open` is."""
+    left = about_centres(mechanism, opened, centres, reference)
+    units = np.repeat([1.0, mechanism.characteristic_length], 3) / mechanism.characteristic_length
+    return np.asarray(np.linalg.norm(left / units[:, None], axis=-1) > TOLERANCES.alignment)
+
+
+def open_in_words(mechanism: Mechanism, is_open: Mask) -> str:
+    """Which components of reactions are not determined in any row (n, joints, 6), in words; empty if none."""
+    parts = [
+        f"{joint.name} {' '.join(name for name, left in zip(COMPONENTS, row, strict=True) if left)}"
+        for joint, row in zip(mechanism.joints, np.asarray(is_open.any(axis=0)), strict=True)
+        if row.any()
+    ]
+    return OPEN.format(", ".join(parts)) if parts else ""
 
 
 class Responses(NamedTuple):

@@ -195,4 +195,5 @@ def _sampled(
         used=used.max(axis=1),
         binding=used.argmax(axis=1),
         limits=(*kinds, ("platform", "speed")),
+        _track=track,
     )

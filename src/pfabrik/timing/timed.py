@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
 
 import numpy as np
 
+from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
@@ -64,6 +65,7 @@ class Timed(Printed):
     used: Floats
     binding: Ints
     limits: tuple[tuple[str, What], ...]
+    _track: Track = field(repr=False)
 
     @property
     def duration(self) -> float:

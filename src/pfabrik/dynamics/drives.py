@@ -1,0 +1,45 @@
+"""Rotors, friction and limits of actuators, in SI units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.mechanism import Mechanism
+
+
+class Drives:
+    """What acts on the actuators' coordinates themselves, (n_a,) each.
+
+    Attributes
+    ----------
+    si : the unit of each coordinate, and of its rate [m or rad].
+    forces : the unit of what it exerts, "N" or "N m".
+    units : N and N m in those of a `Balance`.
+    limits : the most that actuators exert [N m, N]; infinite where there is none.
+    inertia : of rotors [kg m², of a slide kg].
+    friction : dry [N m, N] and viscous [N m s/rad, N s/m], (n_a, 2).
+    """
+
+    def __init__(self, mechanism: Mechanism, metres: float) -> None:
+        is_length = np.array([drive.kind == "length" for drive in mechanism.drives])
+        self.forces = ["N" if length else "N m" for length in is_length]
+        self.si = np.where(is_length, metres, 1.0)
+        self.units = np.where(is_length, mechanism.characteristic_length, 1.0 / metres)
+        self.limits = np.array([_of(drive, "max_torque") or np.inf for drive in mechanism.drives])
+        rotors = [(_of(drive, "rotor_inertia") or 0.0) * (_of(drive, "gear") or 1.0) ** 2 for drive in mechanism.drives]
+        self.inertia = np.array(rotors)
+        self.friction = np.array([_of(drive, "friction") or (0.0, 0.0) for drive in mechanism.drives])
+
+    def loads(self, rates: Floats, gains: Floats) -> Floats:
+        """What rotors and friction resist with at rates and accelerations (n, n_a) of the machine, in N and N m."""
+        v, a = rates * self.si, gains * self.si
+        return np.asarray(-(self.inertia * a + self.friction[:, 0] * np.sign(v) + self.friction[:, 1] * v))
+
+
+def _of(drive: Any, name: str) -> Any:
+    """What is said of a driven coordinate, of a joint that has one or two."""
+    value = getattr(drive.joint, name)
+    return value[drive.place] if len(drive.joint.driven) == 2 and value is not None else value

@@ -1,0 +1,153 @@
+"""What actuators exert, and joints transmit, in motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arrays import Floats, Mask, as_plain
+from ..description.mechanism import Mechanism
+from ..errors import InvalidArgument
+from ..extras import require
+from ..frozen import FrozenMapping
+from ..kinematics import readouts
+from ..printed import Printed, ResultTable, plain
+from ..statics.joint_balance import open_in_words
+from ..statics.loads import Reasons, reasons_in_words
+from .drives import Drives
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Efforts(Printed):
+    """What actuators exert in motion, as `inverse_dynamics` returns it.
+
+    Attributes
+    ----------
+    actuators : array (..., n_a)
+        Force or torque that each actuator exerts on its coordinate, rotor and friction included [N, N m]: positive
+        drives it up. NaN where `reason` says why.
+    rates, accelerations : array (..., n_a)
+        Those of the actuators [length or rad, per s and per s²].
+    power : array (..., n_a)
+        What each actuator gives to the machine, negative where it brakes [W].
+    times : array (n,) or None
+        Times of the rows of a path [s]; None for others.
+    energy : array (n,) or None
+        What all actuators have given since the first row [J]; None without times.
+    is_least_norm : bool
+        True if there are more actuators than motions that they control: of all forces that make the motion, those with
+        the least sum of squares are given, torques compared with forces times L.
+    reason : str or array of str (...)
+        Why there are no such forces; empty where there are. A text for a single answer.
+    """
+
+    actuators: Floats
+    rates: Floats
+    accelerations: Floats
+    times: Floats | None
+    is_least_norm: bool
+    reason: str | Reasons
+    _mechanism: Mechanism = field(repr=False)
+    _drives: Drives = field(repr=False)
+    _reactions: Floats = field(repr=False)
+    _is_open: Mask = field(repr=False)
+
+    @cached_property
+    def power(self) -> Floats:
+        """See the attributes."""
+        return np.asarray(self.actuators * self.rates * self._drives.si)
+
+    @cached_property
+    def energy(self) -> Floats | None:
+        """See the attributes."""
+        if self.times is None:
+            return None
+        power = self.power.sum(axis=-1)
+        return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(self.times))])
+
+    @cached_property
+    def reactions(self) -> FrozenMapping[str, Floats]:
+        """Joint -> force and moment that its first body exerts on its second, (..., 6) [N, N m], in the base frame.
+
+        Moments are about the points that `Forces.reactions` has. NaN where `reason` says why, and where `undetermined`
+        does.
+        """
+        return FrozenMapping(
+            {joint.name: self._reactions[..., place, :] for place, joint in enumerate(self._mechanism.joints)}
+        )
+
+    @property
+    def undetermined(self) -> str:
+        """Which of the reactions the motion does not determine, in words; empty if it determines all."""
+        return open_in_words(self._mechanism, self._is_open)
+
+    def table(self) -> ResultTable:
+        """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""
+        lines, units = reasons_in_words(self.reason, "no forces"), self._drives.forces
+        exerted, power, rates = (np.reshape(x, (-1, len(units))) for x in (self.actuators, self.power, self.rates))
+        known = np.flatnonzero(~np.isnan(exerted).any(axis=1))
+        if not len(known):
+            return ResultTable(self._mechanism.name, lines or ["no row"])
+        single, limits, rows = np.ndim(self.actuators) == 1, self._drives.limits, []
+        header = ["actuator", *(["exerts"] if single else ["largest", "rms"]), "unit", "power [W]", "rate"]
+        weights = np.ones(len(known)) if self.times is None or len(known) < 2 else np.gradient(self.times[known])
+        for place, each in enumerate(readouts(self._mechanism)):
+            own, gives = exerted[known, place], power[known, place]
+            moves, most = each.display(rates[known, place]), float(np.abs(own).max())
+            cells = [each.name, plain(_largest(own), 1e-9 * np.abs(exerted[known]).max())]
+            cells += [] if single else [f"{np.sqrt(weights @ own**2 / weights.sum()):.6g}"]
+            cells += [units[place], f"{_largest(gives):.6g}", f"{_largest(moves):.6g} {each.unit}/s"]
+            if np.isfinite(limits).any():
+                cells.append(f"{most / limits[place]:.0%}" if np.isfinite(limits[place]) else "-")
+            rows.append(cells)
+        if np.isfinite(limits).any():
+            header.append("of its limit")
+        remarks = []
+        if self.energy is not None and self.times is not None:
+            remarks = [f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s"]
+        return ResultTable(self._mechanism.name, lines, header, rows, remarks)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its fields, with power and energy, as plain numbers, lists and texts, ready for JSON."""
+        return {**super().to_dict(), "power": as_plain(self.power), "energy": as_plain(self.energy)}
+
+    def plot(self) -> Figure:
+        """Forces, speeds and power of the actuators over time, one curve each; a Matplotlib figure.
+
+        Raises
+        ------
+        InvalidArgument
+            Configurations that are no path with times.
+        """
+        if self.times is None:
+            raise InvalidArgument("efforts", "no path with times", "those of a `track` with times, or of `time_path`")
+        require("pictures", "matplotlib", "plot")
+        from matplotlib.figure import Figure
+
+        figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
+        shown = readouts(self._mechanism)
+        moves = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
+        kinds = sorted({f"{each.unit}/s" for each in shown}), sorted(set(self._drives.forces))
+        labels = f"exerts [{', '.join(kinds[1])}]", f"rate [{', '.join(kinds[0])}]", "power [W]"
+        for axes, label, values in zip(
+            figure.subplots(3, 1, sharex=True), labels, (self.actuators, moves, self.power), strict=True
+        ):
+            for each, column in zip(shown, values.T, strict=True):
+                axes.plot(self.times, column, label=each.name)
+            axes.set_ylabel(label)
+        axes.set_xlabel("time [s]")
+        handles, names = axes.get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
+        drawn: Figure = figure
+        return drawn
+
+
+def _largest(values: Floats) -> float:
+    """The value of the largest magnitude."""
+    return float(values[np.abs(values).argmax()]) + 0.0

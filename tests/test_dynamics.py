@@ -1,0 +1,551 @@
+"""Masses of files, and the forces of motion: against MuJoCo, closed forms, energy, and statics."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.description.body_inertias import inertias_of
+from pfabrik.files import dumps, loads
+from pfabrik.files.units import metres_of
+
+WITHOUT_IDLE = (
+    *("agile_eye", "ankle_ups", "canfield", "delta", "five_bar", "g1_ankle", "hexaglide", "nrpm", "orthoglide"),
+    *("panda", "prr", "prs", "psu", "rpr", "rps", "rrr", "serial_arm", "servo_hexapod", "stewart", "tricept", "ucu"),
+)
+WITH_IDLE = ("ankle_rss", "linear_delta", "reachy_mini")
+
+
+def weighed(machine: pf.Mechanism, seed: int = 1, own: dict[str, float] | None = None) -> pf.Mechanism:
+    """The machine with random masses, centres and anisotropic inertias; of bodies in `own`, with these masses."""
+    random, length = np.random.default_rng(seed), machine.characteristic_length
+    masses = []
+    for body in machine.bodies:
+        points = [joint.at for joint in machine.joints if body in joint.connects and joint.at is not None]
+        centre = np.mean(points or [machine.reference_point], axis=0) + 0.05 * length * random.standard_normal(3)
+        axes = np.linalg.qr(random.standard_normal((3, 3)))[0]
+        inertia = axes @ np.diag([1.0, 1.3, 1.8]) @ axes.T * (0.2 * length) ** 2
+        mass = random.uniform(0.3, 2.0)
+        if own is not None:
+            mass = own.get(body, 0.0)
+        masses.append(pf.Mass(body, mass, centre, mass * 0.5 * (inertia + inertia.T)))
+    return machine.with_masses(masses)
+
+
+def units(machine: pf.Mechanism) -> Any:
+    """Of actuators: those of their coordinates in L, and in SI."""
+    length, metres = machine.characteristic_length, metres_of(machine.length_unit)
+    is_length = np.array([drive.kind == "length" for drive in machine.drives])
+    return np.where(is_length, length, 1.0), np.where(is_length, metres, 1.0)
+
+
+def somewhere(machine: pf.Mechanism, seed: int = 5) -> Any:
+    """A configuration near home, rates and accelerations of the actuators."""
+    random, (of_length, _) = np.random.default_rng(seed), units(machine)
+    home = pf.solve_ik(machine, machine.home_pose).actuators
+    steps, rates, gains = random.standard_normal((3, len(home))) * of_length
+    solution = pf.solve_fk(machine, home + 0.03 * steps)
+    assert solution
+    return solution, rates, 3.0 * gains
+
+
+def by_mujoco(machine: pf.Mechanism, solution: pf.Solution, rates: Any, gains: Any, gravity: Any) -> Any:
+    """Actuator forces and mass matrix of the exported model, by its constraint rows; their rate by differences."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(pf.interop.to_mjcf(machine, gravity=gravity))
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    model.site_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+    model.dof_armature[:] = 0.0
+    model.dof_damping[:] = 0.0
+    data, start = mujoco.MjData(model), pf.interop.qpos(solution)
+
+    def rows(qpos: Any) -> Any:
+        data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(model, data)
+        return data.efc_J.reshape(-1, model.nv)[: data.ne].copy()
+
+    def after(time: float) -> Any:
+        qpos = start.copy()
+        mujoco.mj_integratePos(model, qpos, v, time)
+        return rows(qpos) @ v
+
+    conditions = rows(start)
+    _, values, right = np.linalg.svd(conditions)
+    motions = right[int((values > 1e-7).sum()) :].T
+    drives = [model.jnt_dofadr[model.actuator_trnid[k, 0]] for k in range(model.nu)]
+    driven = motions[drives]
+    v = motions @ np.linalg.lstsq(driven, rates, rcond=1e-9)[0]
+    h = 1e-3 / max(1.0, np.abs(v).max())
+    drift = (8.0 * (after(h) - after(-h)) - (after(2 * h) - after(-2 * h))) / (12.0 * h)
+    data.qpos[:], data.qvel[:] = start, v
+    mujoco.mj_forward(model, data)
+    mass, bias = np.zeros((model.nv, model.nv)), data.qfrc_bias.copy()
+    for k, one in enumerate(np.eye(model.nv)):
+        mujoco.mj_mulM(model, data, mass[k], one)
+    least = -np.linalg.pinv(conditions, rcond=1e-7) @ drift if len(drift) else np.zeros(model.nv)
+    whole = least + motions @ np.linalg.lstsq(driven, gains - least[drives], rcond=1e-9)[0]
+    _, sizes, axes = np.linalg.svd(driven)
+    idle = motions @ axes[int((sizes > 1e-9).sum()) :].T
+    if idle.size:  # what nothing holds moves as it will
+        whole = whole - idle @ np.linalg.solve(idle.T @ mass @ idle, idle.T @ (mass @ whole + bias))
+    forces = np.linalg.lstsq(driven.T, motions.T @ (mass @ whole + bias), rcond=1e-9)[0]
+    following = motions @ np.linalg.pinv(driven)
+    if idle.size:
+        following = following - idle @ np.linalg.solve(idle.T @ mass @ idle, idle.T @ mass @ following)
+    return forces, following.T @ mass @ following
+
+
+@pytest.mark.parametrize("name", [*WITHOUT_IDLE, *WITH_IDLE])
+def test_efforts_and_mass_matrices_are_mujocos(name: str) -> None:
+    machine = weighed(pf.load(name))
+    solution, rates, gains = somewhere(machine)
+    rates, gravity = rates * (name in WITHOUT_IDLE), (1.0, -2.0, -9.0)  # how fast what is idle spins is a choice
+    found = pf.inverse_dynamics(solution, twists=rates, accelerations=gains, at="actuators", gravity=gravity)
+    si = units(machine)[1]
+    forces, mass = by_mujoco(machine, solution, rates * si, gains * si, gravity)
+    assert found.reason == ""
+    np.testing.assert_allclose(found.actuators, forces, atol=1e-9 * np.abs(forces).max())
+    np.testing.assert_allclose(pf.mass_matrix(solution, "actuators"), mass, atol=1e-9 * np.abs(mass).max())
+
+
+@pytest.mark.parametrize("name", WITHOUT_IDLE)
+def test_at_rest_they_are_static_forces(name: str) -> None:
+    machine = weighed(pf.load(name))
+    solution, *_ = somewhere(machine)
+    metres, length = metres_of(machine.length_unit), machine.characteristic_length
+    body, point, push = machine.end_effector_body, machine.reference_point, [1.0, -2.0, 3.0]
+    weights: Any = {mass.body: (mass.mass, mass.centre) for mass in machine.masses if mass.body != machine.base}
+    found = pf.inverse_dynamics(solution, loads={body: (push, point)})
+    wrench = push if machine.end_effector_is_joint else [*push, 0.0, 0.0, 0.0]
+    forces = pf.forces(solution, wrench, loads=weights)
+    expected = forces.actuators * np.where(units(machine)[0] == length, 1.0, metres)
+    np.testing.assert_allclose(found.actuators, expected, atol=1e-12 * np.abs(expected).max(initial=1.0))
+    size = np.nanmax(np.abs([*forces.reactions.values()]))
+    for name, reaction in forces.reactions.items():
+        moved = reaction * np.repeat([1.0, metres], 3)
+        np.testing.assert_allclose(found.reactions[name], moved, atol=1e-11 * size)
+    assert found.undetermined == forces.undetermined
+
+
+def on_the_way(t: Any) -> tuple[Any, Any, Any]:
+    """Poses, twists and accelerations of a hexapod's platform at times t (n,)."""
+    zero = np.zeros_like(t)
+    p = np.stack([20 * np.sin(3 * t), 15 * np.cos(2 * t), 195 + 10 * np.sin(4 * t)], axis=-1)
+    v = np.stack([60 * np.cos(3 * t), -30 * np.sin(2 * t), 40 * np.cos(4 * t)], axis=-1)
+    a = np.stack([-180 * np.sin(3 * t), -60 * np.cos(2 * t), -160 * np.sin(4 * t)], axis=-1)
+    x, y, dx, dy, ddx, ddy = (
+        *(0.1 * np.sin(2 * t), 0.15 * np.cos(3 * t), 0.2 * np.cos(2 * t), -0.45 * np.sin(3 * t)),
+        *(-0.4 * np.sin(2 * t), -1.35 * np.cos(3 * t)),
+    )
+    about_y = np.stack([zero, np.cos(x), np.sin(x)], axis=-1)  # the y axis, turned about x
+    change = np.stack([zero, -np.sin(x) * dx, np.cos(x) * dx], axis=-1)
+    about_x = np.array([1.0, 0.0, 0.0])
+    w = dx[:, None] * about_x + dy[:, None] * about_y
+    dw = ddx[:, None] * about_x + ddy[:, None] * about_y + dy[:, None] * change
+    turned = np.zeros((len(t), 4, 4))
+    turned[:, 3, 3] = 1.0
+    turned[:, :3, 0] = np.stack([np.cos(y), np.sin(x) * np.sin(y), -np.cos(x) * np.sin(y)], axis=-1)
+    turned[:, :3, 1] = about_y
+    turned[:, :3, 2] = np.cross(turned[:, :3, 0], about_y)
+    turned[:, :3, 3] = p
+    return turned, np.concatenate([v, w], axis=-1), np.concatenate([a, dw], axis=-1)
+
+
+def test_power_goes_into_kinetic_and_potential_energy() -> None:
+    machine, h, gravity = weighed(pf.load("stewart")), 1e-3, np.array([2.0, -1.0, -9.0])
+    middle = np.linspace(0.1, 2.0, 9)
+    t = (middle[:, None] + h * np.array([-2, -1, 0, 1, 2])).ravel()
+    poses, twists, accelerations = on_the_way(t)
+    solutions = pf.solve_ik(machine, poses)
+    si = twists * np.array([1e-3] * 3 + [1.0] * 3)
+    energy = 0.5 * np.einsum("ni,nij,nj->n", si, pf.mass_matrix(solutions), si)
+    for mass in machine.masses:
+        if mass.body != machine.base:
+            up = np.array([point_of(machine, solution, mass) for solution in solutions])
+            energy -= mass.mass * 1e-3 * up @ gravity
+    e = energy.reshape(-1, 5)
+    change = (8.0 * (e[:, 3] - e[:, 1]) - (e[:, 4] - e[:, 0])) / (12.0 * h)
+    found = pf.inverse_dynamics(solutions, twists=twists, accelerations=accelerations, gravity=gravity)
+    power = found.power.sum(axis=-1).reshape(-1, 5)[:, 2]
+    np.testing.assert_allclose(power, change, rtol=1e-8, atol=1e-8 * np.abs(power).max())
+
+
+def point_of(machine: pf.Mechanism, solution: pf.Solution, mass: pf.Mass) -> Any:
+    """Where a body's centre of mass is, by the three or more points of its joints; here of struts and a platform."""
+    if mass.body == machine.end_effector:
+        return solution.pose[:3, :3] @ (np.array(mass.centre) - machine.reference_point) + solution.pose[:3, 3]
+    from pfabrik.kinematics import displacements, home_coordinates
+
+    moved = displacements(machine, (solution.q - home_coordinates(machine))[None])[mass.body][0]
+    return moved[:3, :3] @ np.array(mass.centre) + moved[:3, 3]
+
+
+def lagrange(shown: Callable[[Any], Any], weights: Any, potential: Callable[[Any], Any], q: Any, v: Any, a: Any) -> Any:
+    """Generalised forces of coordinates that show positions and angles with weights: d/dt dT/dv - dT/dq + dU/dq."""
+    h, one = 1e-4, np.eye(len(q))
+
+    def slopes(q: Any) -> Any:
+        return np.array([np.imag(shown(q + 1e-30j * each)) / 1e-30 for each in one]).T
+
+    def momentum(t: float) -> Any:
+        jacobian = slopes(q + v * t + 0.5 * a * t * t)
+        return jacobian.T @ (weights * (jacobian @ (v + a * t)))
+
+    def energy(q: Any) -> Any:
+        return 0.5 * weights @ (slopes(q) @ v) ** 2
+
+    def derivative(of: Callable[[Any], Any]) -> Any:
+        return (8.0 * (of(h) - of(-h)) - (of(2 * h) - of(-2 * h))) / (12.0 * h)
+
+    by_place = [derivative(lambda s, each=each: energy(q + s * each)) for each in one]
+    pull = np.array([np.imag(potential(q + 1e-30j * each)) / 1e-30 for each in one])
+    return derivative(momentum) - np.array(by_place) + pull
+
+
+def test_a_slider_crank_is_as_its_closed_form() -> None:
+    r, length, m = 0.1, 0.25, {"crank": (0.4, 0.03), "rod": (0.3, 0.1), "slider": (0.7, 0.0)}
+
+    def joint(name: str, kind: Any, bodies: Any, at: Any, **more: Any) -> pf.Joint:
+        return pf.Joint(name, kind, bodies, at=at, axis=(0, 0, 1), **more)
+
+    joints = [
+        joint(
+            "A",
+            "revolute",
+            ("base", "crank"),
+            (0, 0, 0),
+            actuated=True,
+            rotor_inertia=1e-5,
+            gear=20,
+            friction=(0.1, 0.02),
+        ),
+        joint("B", "revolute", ("crank", "rod"), (0, r, 0)),
+        joint("C", "revolute", ("rod", "slider"), (math.sqrt(length**2 - r * r), 0, 0)),
+        pf.Joint("D", "prismatic", ("base", "slider"), axis=(1, 0, 0)),
+    ]
+    turn = math.asin(r / length)
+    along = {"crank": (0, 1), "rod": (math.cos(turn), -math.sin(turn)), "slider": (1, 0)}
+    start = {"crank": (0, 0), "rod": (0, r), "slider": (math.sqrt(length**2 - r * r), 0)}
+    masses = [
+        pf.Mass(body, mass, (*np.add(start[body], np.multiply(at, along[body])), 0), (1e-3, 1e-3, 2e-3 * mass))
+        for body, (mass, at) in m.items()
+    ]
+    machine = pf.Mechanism(
+        "slider-crank",
+        joints,
+        "slider",
+        (math.sqrt(length**2 - r * r), 0, 0),
+        length_unit="m",
+        task=("x",),
+        masses=masses,
+    )
+
+    def shown(q: Any) -> Any:
+        theta = q[0] + math.pi / 2  # from the x axis
+        phi = -np.arcsin(r * np.sin(theta) / length)
+        x = r * np.cos(theta) + length * np.cos(phi)
+        rod = (r * np.cos(theta) + 0.1 * np.cos(phi), r * np.sin(theta) + 0.1 * np.sin(phi))
+        return np.array([0.03 * np.cos(theta), 0.03 * np.sin(theta), theta, *rod, phi, x, 0 * x, 0 * x])
+
+    weights = np.array([0.4, 0.4, 8e-4, 0.3, 0.3, 6e-4, 0.7, 0.7, 0.0])
+    q, v, a = np.array([-0.6]), np.array([3.0]), np.array([-7.0])
+    expected = lagrange(shown, weights, lambda q: 9.81 * (weights[[1, 4]] @ shown(q)[[1, 4]]), q, v, a)
+    motion: dict[str, Any] = {"twists": v, "accelerations": a, "at": "actuators", "gravity": (0, -9.81, 0)}
+    found = pf.inverse_dynamics(pf.solve_fk(machine, q), **motion)
+    drive = 1e-5 * 20**2 * a + 0.1 + 0.02 * v
+    np.testing.assert_allclose(found.actuators, expected + drive, rtol=1e-8)
+    np.testing.assert_allclose(found.power, found.actuators * v)
+
+
+def test_a_five_bar_is_as_its_closed_form() -> None:
+    machine = pf.load("five_bar")
+    place = {joint.name: np.array(joint.at)[1:] for joint in machine.joints}
+    ends = {body: [j.name for j in machine.joints if body in j.connects] for body in machine.bodies}
+    masses = [
+        pf.Mass(body, 0.5, (0.0, *(0.5 * (place[a] + place[b]))), (400, 200, 200))
+        for body, (a, b) in list(ends.items())
+        if body != "base"
+    ]
+    machine = machine.with_masses(masses)
+    a0, b0, c0, d0, e0 = (place[f"p{k}"] for k in (1, 2, 3, 4, 5))
+
+    def turned(arm: Any, angle: Any) -> Any:
+        return np.array(
+            [np.cos(angle) * arm[0] - np.sin(angle) * arm[1], np.sin(angle) * arm[0] + np.cos(angle) * arm[1]]
+        )
+
+    base, arm = d0 - b0, c0 - b0
+    side = np.sign(base[0] * arm[1] - base[1] * arm[0])
+
+    def shown(q: Any) -> Any:
+        left, right = a0 + turned(b0 - a0, q[0]), e0 + turned(d0 - e0, q[1])
+        r, s, span = np.linalg.norm(c0 - b0), np.linalg.norm(c0 - d0), right - left
+        d = np.sqrt(span @ span)
+        x = (d * d + r * r - s * s) / (2 * d)
+        tip = left + (x * span + side * np.sqrt(r * r - x * x) * np.array([-span[1], span[0]])) / d
+        angles = [np.arctan(u[1] / u[0]) for u in (tip - left, tip - right)]
+        centres = [0.5 * (a0 + left), 0.5 * (e0 + right), 0.5 * (left + tip), 0.5 * (right + tip)]
+        return 1e-3 * np.concatenate([*centres, 1e3 * q, 1e3 * np.array(angles)])
+
+    weights = np.array([0.5] * 8 + [4e-4] * 4)
+    solution, v, a = somewhere(machine)
+    q = solution.actuators - pf.solve_ik(machine, machine.home_pose).actuators
+    expected = lagrange(shown, weights, lambda q: 9.81 * 0.5 * shown(q)[1:8:2].sum(), q, v, a)
+    found = pf.inverse_dynamics(solution, twists=v, accelerations=a, at="actuators")
+    np.testing.assert_allclose(found.actuators, expected, rtol=1e-7)
+
+
+def test_a_platform_on_legs_without_mass_is_newtons_and_eulers() -> None:
+    machine = weighed(pf.load("stewart"), own={"platform": 1.7})
+    poses, twists, accelerations = on_the_way(np.linspace(0.0, 2.0, 7))
+    solutions = pf.solve_ik(machine, poses)
+    found = pf.inverse_dynamics(solutions, twists=twists, accelerations=accelerations)
+    mass = next(each for each in machine.masses if each.body == "platform")
+    xx, yy, zz, xy, xz, yz = mass.inertia or ()
+    at_home = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) * 1e-6
+    for k, pose in enumerate(poses):
+        arm = pose[:3, :3] @ (np.array(mass.centre) - machine.reference_point) * 1e-3
+        inertia, w, dw = pose[:3, :3] @ at_home @ pose[:3, :3].T, twists[k, 3:], accelerations[k, 3:]
+        at_centre = accelerations[k, :3] * 1e-3 + np.cross(dw, arm) + np.cross(w, np.cross(w, arm))
+        force = mass.mass * (at_centre + np.array([0.0, 0.0, 9.81]))
+        moment = inertia @ dw + np.cross(w, inertia @ w) + np.cross(arm, force)
+        jacobian = pf.inverse_jacobian(solutions[k])  # actuator rates per twist, of mm
+        expected = np.linalg.solve(jacobian.T, np.concatenate([force, moment * 1e3]))
+        np.testing.assert_allclose(found.actuators[k], expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "nrpm", "rps"])
+def test_moved_scaled_and_relabelled_machines_do_the_same(name: str) -> None:
+    machine = weighed(pf.load(name))
+    solution, rates, gains = somewhere(machine)
+    motion: dict[str, Any] = {"at": "actuators", "gravity": (0, 3, -9)}
+    found = pf.inverse_dynamics(solution, twists=rates, accelerations=gains, **motion)
+    shift, scale = np.array([3e4, -1e4, 2e4]), metres_of(machine.length_unit)
+
+    def point(value: Any) -> Any:
+        return None if value is None else (np.array(value) + shift) * scale
+
+    lengths = [joint.type == "prismatic" for joint in machine.joints]
+    joints = [
+        dataclasses.replace(
+            joint,
+            at=point(joint.at),
+            range=None if joint.range is None else np.array(joint.range) * (scale if is_length else 1.0),
+            home=joint.home * scale if is_length and isinstance(joint.home, float) else joint.home,
+        )
+        for joint, is_length in zip(machine.joints, lengths, strict=True)
+    ]
+    masses = [
+        pf.Mass(each.body, each.mass, point(each.centre), np.array(each.inertia) * scale**2) for each in machine.masses
+    ]
+    reference = point(machine.reference_point)
+    other = pf.Mechanism(
+        "other", joints[::-1], machine.end_effector, reference, length_unit="m", task=machine.task, masses=masses
+    )
+    order = [other.actuator_names.index(each) for each in machine.actuator_names]
+    si = units(machine)[1]
+    back = np.argsort(order)
+    there = pf.solve_fk(other, (solution.actuators * si)[back])
+    again = pf.inverse_dynamics(there, twists=(rates * si)[back], accelerations=(gains * si)[back], **motion)
+    np.testing.assert_allclose(
+        again.actuators[order], found.actuators, rtol=1e-7, atol=1e-7 * np.abs(found.actuators).max()
+    )
+    np.testing.assert_allclose(again.power[order], found.power, rtol=1e-7, atol=1e-7 * np.abs(found.power).max())
+    at_task = pf.mass_matrix(solution)
+    np.testing.assert_allclose(pf.mass_matrix(there), at_task, atol=1e-8 * np.abs(at_task).max())
+
+
+def test_paths_with_times_move_as_these_say() -> None:
+    machine = weighed(pf.load("stewart"))
+    t = np.arange(0.0, 1.0, 0.005)
+    poses, twists, accelerations = on_the_way(t)
+    path = pf.track(machine, poses, sample_time=0.005)
+    found = pf.inverse_dynamics(path)
+    expected = pf.inverse_dynamics(path, twists=twists, accelerations=accelerations)
+    size = np.abs(expected.actuators).max()
+    np.testing.assert_allclose(found.actuators[2:-2], expected.actuators[2:-2], atol=1e-5 * size)
+    np.testing.assert_allclose(found.actuators, expected.actuators, atol=1e-3 * size)
+    assert found.energy is not None
+    np.testing.assert_allclose(np.gradient(found.energy, t)[5:-5], found.power.sum(axis=1)[5:-5], atol=1e-2)
+    timed = pf.time_path(path, speed=200, acceleration=3000, rate=200)
+    fast = pf.inverse_dynamics(timed)
+    np.testing.assert_allclose(fast.rates, timed.rates, atol=1e-9 * np.abs(timed.rates).max())
+    np.testing.assert_allclose(fast.accelerations, timed.accelerations, atol=1e-9 * 3000)
+    assert fast.table().rows[0][0] == "BL1"
+
+
+def test_what_a_body_carries_is_as_if_it_weighed_more() -> None:
+    machine = weighed(pf.load("delta"), own={"platform": 0.5})
+    heavier = weighed(pf.load("delta"), own={"platform": 0.0})
+    platform = next(each for each in machine.masses if each.body == "platform")
+    heavier = heavier.with_masses([dataclasses.replace(each, inertia=None) for each in heavier.masses])
+    machine = machine.with_masses([dataclasses.replace(each, inertia=None) for each in machine.masses])
+    motion: dict[str, Any] = {"twists": [100, 50, -20], "accelerations": [3000, -1000, 500]}
+    solution, *_ = somewhere(machine)
+    other = pf.configuration(heavier, solution.q)
+    found = pf.inverse_dynamics(other, **motion, loads={"platform": (0.5, platform.centre)})
+    np.testing.assert_allclose(found.actuators, pf.inverse_dynamics(solution, **motion).actuators, rtol=1e-12)
+
+
+def test_parts_of_a_motion_that_a_task_leaves_out_follow() -> None:
+    machine = weighed(pf.load("rps"))
+    solution = pf.solve_ik(machine, machine.home_pose)
+    found = pf.inverse_dynamics(solution, twists=[99, 0, 50, 0.1, 0.2, 99])
+    rates = pf.inverse_dynamics(solution, twists=found.rates, accelerations=found.accelerations, at="actuators")
+    np.testing.assert_allclose(rates.actuators, found.actuators, rtol=1e-9)
+    np.testing.assert_allclose((pf.forward_jacobian(solution) @ found.rates)[[2, 3, 4]], [50, 0.1, 0.2], atol=1e-9)
+
+
+def test_refusals_name_what_is_lacking() -> None:
+    stewart = pf.load("stewart")
+    home = pf.solve_ik(stewart, stewart.home_pose)
+    with pytest.raises(pf.errors.InvalidArgument, match=r"no mass of cylinderL1, .*rodR3"):
+        pf.inverse_dynamics(home)
+    machine = weighed(stewart)
+    home = pf.solve_ik(machine, machine.home_pose)
+    with pytest.raises(pf.errors.InvalidArgument, match="without times"):
+        pf.inverse_dynamics(pf.track(machine, [machine.home_pose] * 4))
+    with pytest.raises(pf.errors.InvalidArgument, match=r"twists.*batch"):
+        pf.inverse_dynamics(home, twists=np.zeros((3, 6)))
+    waiting = pf.track(machine, [machine.home_pose] * 4, times=[0.0, 1.0, 1.0, 2.0])
+    with pytest.raises(pf.errors.InvalidArgument, match="do not rise") as refused:
+        pf.inverse_dynamics(waiting)
+    assert "2" in str(refused.value)
+
+
+def test_at_singular_poses_a_reason_is_given() -> None:
+    machine = weighed(pf.load("five_bar").without_limits())
+    a, b, c = (np.array(machine.joint(name).at) for name in ("p1", "p2", "p3"))
+    stretched = (np.linalg.norm(b - a) + np.linalg.norm(c - b)) / np.linalg.norm(c - a)
+    found = pf.inverse_dynamics(pf.solve_ik(machine, a + (1.0 - 1e-10) * stretched * (c - a)), twists=c - a)
+    assert "serial singularity" in str(found.reason)
+    assert np.isnan(found.actuators).all()
+    assert "serial singularity" in str(found.table())
+
+
+DESCRIBED = """
+[[body]]
+name = "{body}"
+{text}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "found"),
+    [
+        ("mass = -1\ncentre = [0, 0, 0]", "body[0].mass", "-1"),
+        ("mass = 1", "body[0].centre", "nothing"),
+        ("centre = [0, 0, 0]", "body[0].mass", "nothing"),
+        ("mass = 1\ncentre = [0, 0]", "body[0].centre", "[0, 0]"),
+        ("mass = 1\ncentre = [0, 0, 0]\ninertia = [1, 1, 3]", "body[0].inertia", "moments 1, 1 and 3"),
+        ("mass = 1\ncentre = [0, 0, 0]\ninertia = [1, 1, 1, 2, 0, 0]", "body[0].inertia", "moments -1, 1 and 3"),
+        ("mass = 1\ncentre = [0, 0, 0]\ninertia = 3", "body[0].inertia", "3"),
+        ('shape = "sphere"\nat = [0, 0, 0]\ndiameter = 9\ndensity = 0', "body[0].density", "0"),
+        ('shape = "sphere"\nat = [0, 0, 0]\ndiameter = 9\ndensity = 9\nmass = 3', "body[0].mass", "density"),
+        ("mass = 0\ninertial = [1, 1, 1]", "body[0].inertial", "did you mean 'inertia'"),
+    ],
+)
+def test_faults_of_masses_are_named_at_their_places(text: str, place: str, found: str) -> None:
+    with pytest.raises(pf.errors.InvalidMechanism) as refused:
+        loads(dumps(pf.load("stewart")) + DESCRIBED.format(body="platform", text=text))
+    assert [fault.place for fault in refused.value.faults] == [place]
+    assert found in refused.value.faults[0].found
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("friction = 1", "1"),
+        ("friction = [1, -1]", "[1, -1]"),
+        ("max_torque = 0", "0"),
+        ('gear = "x"', "'x'"),
+        ("rotor_inertia = -1e-5", "-1e-05"),
+    ],
+)
+def test_faults_of_drives_are_named_at_their_places(line: str, found: str) -> None:
+    text = dumps(pf.load("delta")).replace("actuated = true", f"actuated = true\n{line}", 1)
+    with pytest.raises(pf.errors.InvalidMechanism) as refused:
+        loads(text)
+    (fault,) = refused.value.faults
+    assert fault.place.endswith(line.split()[0]) and found in fault.found
+
+
+def test_masses_and_drives_come_back_from_files() -> None:
+    delta = weighed(pf.load("delta"))
+    drive: dict[str, Any] = {"max_torque": 2.5, "rotor_inertia": 1.2e-5, "gear": 20, "friction": (0.1, 0.02)}
+    joints = [dataclasses.replace(joint, **drive) if joint.actuated else joint for joint in delta.joints]
+    masses = [*delta.masses[:-1], pf.Mass(delta.masses[-1].body, 0)]
+    made = pf.Mechanism(delta.name, joints, delta.end_effector, delta.reference_point, task=delta.task, masses=masses)
+    assert loads(dumps(made)) == made
+    assert made != delta
+
+
+def test_copies_of_bodies_have_their_masses_turned_with_them() -> None:
+    text = (
+        dumps(pf.load("delta"))
+        + """
+[[joint]]
+name = "X"
+type = "spherical"
+connects = ["platform", "weight"]
+at = [20, 0, 100]
+copies = { count = 3, axis = [0, 0, 1] }
+
+[[body]]
+name = "weight"
+mass = "m / 2"
+centre = [30, 0, 90]
+inertia = [1, 2, 2.5, 0.1, 0, 0.2]
+
+[dimensions]
+m = 1
+"""
+    )
+    machine = loads(text)
+    turn = pf.pose([0, 0, 0], rotvec=[0, 0, 2 * math.pi / 3])[:3, :3]
+    first, second, _ = machine.masses
+    assert (first.body, first.mass, first.inertia) == ("weight1", 0.5, (1, 2, 2.5, 0.1, 0, 0.2))
+    np.testing.assert_allclose(second.centre, turn @ first.centre)
+    weights = inertias_of(machine, 1e-3)
+    np.testing.assert_allclose(weights["weight2"].inertia, turn @ weights["weight1"].inertia @ turn.T, atol=1e-12)
+
+
+SHAPES: dict[str, tuple[dict[str, Any], str]] = {
+    "capsule": (
+        {"ends": ((0, 0, 0.1), (0.2, 0.1, 0.4)), "thickness": 0.08},
+        'type="capsule" fromto="0 0 .1 .2 .1 .4" size=".04"',
+    ),
+    "sphere": ({"at": (0.1, 0, 0.2), "diameter": 0.3}, 'type="sphere" pos=".1 0 .2" size=".15"'),
+    "box": (
+        {"at": (0.1, 0.2, 0.3), "size": (0.1, 0.2, 0.4), "axes": ((0.6, 0.8, 0), (-0.8, 0.6, 0))},
+        'type="box" pos=".1 .2 .3" size=".05 .1 .2" xyaxes=".6 .8 0 -.8 .6 0"',
+    ),
+    "disc": (
+        {"at": (0.1, 0.2, 0.3), "axis": (0, 0.6, 0.8), "diameter": 0.3, "thickness": 0.1},
+        'type="cylinder" pos=".1 .2 .3" zaxis="0 .6 .8" size=".15 .05"',
+    ),
+}
+
+
+@pytest.mark.parametrize("kinds", [("capsule",), ("sphere",), ("box",), ("disc",), ("box", "capsule")])
+def test_shapes_filled_evenly_weigh_as_in_mujoco(kinds: tuple[Any, ...]) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    geoms = "".join(f'<geom {SHAPES[kind][1]} density="2700"/>' for kind in kinds)
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><body><freejoint/>{geoms}</body></worldbody></mujoco>")
+    joint = pf.Joint("A", "revolute", ("base", "arm"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True)
+    shapes = [pf.Shape("arm", kind, density=2.7e-6 * 1e9, **SHAPES[kind][0]) for kind in kinds]
+    machine = pf.Mechanism("arm", [joint], "arm", (1, 0, 0), length_unit="m", task=("x",), shapes=shapes)
+    found = inertias_of(machine, 1.0)["arm"]
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[1])
+    axes = turn.reshape(3, 3)
+    np.testing.assert_allclose(found.mass, model.body_mass[1])
+    np.testing.assert_allclose(found.centre, model.body_ipos[1], atol=1e-12)
+    np.testing.assert_allclose(found.inertia, axes @ np.diag(model.body_inertia[1]) @ axes.T, atol=1e-9 * found.mass)
