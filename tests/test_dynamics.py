@@ -1,4 +1,4 @@
-"""Masses of files, and the forces of motion: against MuJoCo, closed forms, energy, and statics."""
+"""Forces of motion: against MuJoCo, closed forms, energy, and statics."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik.description.body_inertias import inertias_of
-from pfabrik.files import dumps, loads
 from pfabrik.files.units import metres_of
 
 WITHOUT_IDLE = (
@@ -428,124 +426,3 @@ def test_at_singular_poses_a_reason_is_given() -> None:
     assert "serial singularity" in str(found.reason)
     assert np.isnan(found.actuators).all()
     assert "serial singularity" in str(found.table())
-
-
-DESCRIBED = """
-[[body]]
-name = "{body}"
-{text}
-"""
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "found"),
-    [
-        ("mass = -1\ncentre = [0, 0, 0]", "body[0].mass", "-1"),
-        ("mass = 1", "body[0].centre", "nothing"),
-        ("centre = [0, 0, 0]", "body[0].mass", "nothing"),
-        ("mass = 1\ncentre = [0, 0]", "body[0].centre", "[0, 0]"),
-        ("mass = 1\ncentre = [0, 0, 0]\ninertia = [1, 1, 3]", "body[0].inertia", "moments 1, 1 and 3"),
-        ("mass = 1\ncentre = [0, 0, 0]\ninertia = [1, 1, 1, 2, 0, 0]", "body[0].inertia", "moments -1, 1 and 3"),
-        ("mass = 1\ncentre = [0, 0, 0]\ninertia = 3", "body[0].inertia", "3"),
-        ('shape = "sphere"\nat = [0, 0, 0]\ndiameter = 9\ndensity = 0', "body[0].density", "0"),
-        ('shape = "sphere"\nat = [0, 0, 0]\ndiameter = 9\ndensity = 9\nmass = 3', "body[0].mass", "density"),
-        ("mass = 0\ninertial = [1, 1, 1]", "body[0].inertial", "did you mean 'inertia'"),
-    ],
-)
-def test_faults_of_masses_are_named_at_their_places(text: str, place: str, found: str) -> None:
-    with pytest.raises(pf.errors.InvalidMechanism) as refused:
-        loads(dumps(pf.load("stewart")) + DESCRIBED.format(body="platform", text=text))
-    assert [fault.place for fault in refused.value.faults] == [place]
-    assert found in refused.value.faults[0].found
-
-
-@pytest.mark.parametrize(
-    ("line", "found"),
-    [
-        ("friction = 1", "1"),
-        ("friction = [1, -1]", "[1, -1]"),
-        ("max_torque = 0", "0"),
-        ('gear = "x"', "'x'"),
-        ("rotor_inertia = -1e-5", "-1e-05"),
-    ],
-)
-def test_faults_of_drives_are_named_at_their_places(line: str, found: str) -> None:
-    text = dumps(pf.load("delta")).replace("actuated = true", f"actuated = true\n{line}", 1)
-    with pytest.raises(pf.errors.InvalidMechanism) as refused:
-        loads(text)
-    (fault,) = refused.value.faults
-    assert fault.place.endswith(line.split()[0]) and found in fault.found
-
-
-def test_masses_and_drives_come_back_from_files() -> None:
-    delta = weighed(pf.load("delta"))
-    drive: dict[str, Any] = {"max_torque": 2.5, "rotor_inertia": 1.2e-5, "gear": 20, "friction": (0.1, 0.02)}
-    joints = [dataclasses.replace(joint, **drive) if joint.actuated else joint for joint in delta.joints]
-    masses = [*delta.masses[:-1], pf.Mass(delta.masses[-1].body, 0)]
-    made = pf.Mechanism(delta.name, joints, delta.end_effector, delta.reference_point, task=delta.task, masses=masses)
-    assert loads(dumps(made)) == made
-    assert made != delta
-
-
-def test_copies_of_bodies_have_their_masses_turned_with_them() -> None:
-    text = (
-        dumps(pf.load("delta"))
-        + """
-[[joint]]
-name = "X"
-type = "spherical"
-connects = ["platform", "weight"]
-at = [20, 0, 100]
-copies = { count = 3, axis = [0, 0, 1] }
-
-[[body]]
-name = "weight"
-mass = "m / 2"
-centre = [30, 0, 90]
-inertia = [1, 2, 2.5, 0.1, 0, 0.2]
-
-[dimensions]
-m = 1
-"""
-    )
-    machine = loads(text)
-    turn = pf.pose([0, 0, 0], rotvec=[0, 0, 2 * math.pi / 3])[:3, :3]
-    first, second, _ = machine.masses
-    assert (first.body, first.mass, first.inertia) == ("weight1", 0.5, (1, 2, 2.5, 0.1, 0, 0.2))
-    np.testing.assert_allclose(second.centre, turn @ first.centre)
-    weights = inertias_of(machine, 1e-3)
-    np.testing.assert_allclose(weights["weight2"].inertia, turn @ weights["weight1"].inertia @ turn.T, atol=1e-12)
-
-
-SHAPES: dict[str, tuple[dict[str, Any], str]] = {
-    "capsule": (
-        {"ends": ((0, 0, 0.1), (0.2, 0.1, 0.4)), "thickness": 0.08},
-        'type="capsule" fromto="0 0 .1 .2 .1 .4" size=".04"',
-    ),
-    "sphere": ({"at": (0.1, 0, 0.2), "diameter": 0.3}, 'type="sphere" pos=".1 0 .2" size=".15"'),
-    "box": (
-        {"at": (0.1, 0.2, 0.3), "size": (0.1, 0.2, 0.4), "axes": ((0.6, 0.8, 0), (-0.8, 0.6, 0))},
-        'type="box" pos=".1 .2 .3" size=".05 .1 .2" xyaxes=".6 .8 0 -.8 .6 0"',
-    ),
-    "disc": (
-        {"at": (0.1, 0.2, 0.3), "axis": (0, 0.6, 0.8), "diameter": 0.3, "thickness": 0.1},
-        'type="cylinder" pos=".1 .2 .3" zaxis="0 .6 .8" size=".15 .05"',
-    ),
-}
-
-
-@pytest.mark.parametrize("kinds", [("capsule",), ("sphere",), ("box",), ("disc",), ("box", "capsule")])
-def test_shapes_filled_evenly_weigh_as_in_mujoco(kinds: tuple[Any, ...]) -> None:
-    mujoco = pytest.importorskip("mujoco")
-    geoms = "".join(f'<geom {SHAPES[kind][1]} density="2700"/>' for kind in kinds)
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><body><freejoint/>{geoms}</body></worldbody></mujoco>")
-    joint = pf.Joint("A", "revolute", ("base", "arm"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True)
-    shapes = [pf.Shape("arm", kind, density=2.7e-6 * 1e9, **SHAPES[kind][0]) for kind in kinds]
-    machine = pf.Mechanism("arm", [joint], "arm", (1, 0, 0), length_unit="m", task=("x",), shapes=shapes)
-    found = inertias_of(machine, 1.0)["arm"]
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.body_iquat[1])
-    axes = turn.reshape(3, 3)
-    np.testing.assert_allclose(found.mass, model.body_mass[1])
-    np.testing.assert_allclose(found.centre, model.body_ipos[1], atol=1e-12)
-    np.testing.assert_allclose(found.inertia, axes @ np.diag(model.body_inertia[1]) @ axes.T, atol=1e-9 * found.mass)

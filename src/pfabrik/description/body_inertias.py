@@ -44,20 +44,20 @@ def inertias_of(mechanism: Structure, metres: float) -> dict[str, BodyInertia]:
         if body not in given:
             dense = [(k, shape.density * metres**3) for k, shape in shapes if shape.density is not None]
             if dense:
-                found[body] = _joined([_filled(mechanism, k, density) for k, density in dense])
+                found[body] = joined([_filled(mechanism, k, density) for k, density in dense])
             continue
         mass, centre, moments = given[body].mass, given[body].centre, given[body].inertia
         whole = BodyInertia(0.0, np.zeros(3), np.zeros((3, 3)))
         if centre is not None:
             whole = whole._replace(centre=np.array(centre))
         elif shapes:
-            whole = _joined([_filled(mechanism, k, 1.0) for k, _ in shapes])
+            whole = joined([_filled(mechanism, k, 1.0) for k, _ in shapes])
         inertia = whole.inertia * (mass / (whole.mass or 1.0)) if moments is None else as_matrix(moments)
         found[body] = BodyInertia(mass, whole.centre, inertia)
     return found
 
 
-def _joined(parts: Sequence[BodyInertia]) -> BodyInertia:
+def joined(parts: Sequence[BodyInertia]) -> BodyInertia:
     """Several solids as one."""
     mass = sum(part.mass for part in parts)
     centre = np.sum([part.mass * part.centre for part in parts], axis=0) / mass

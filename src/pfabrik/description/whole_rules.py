@@ -151,7 +151,7 @@ def mass_faults(mechanism: Structure) -> Iterator[Fault]:
         yield from faults_by(OF_MASSES, f"mass[{index}]", each, mechanism, bodies[:index])
 
 
-def _is_impossible(moments: Any) -> str | bool:
+def is_impossible(moments: Any) -> str | bool:
     """What is wrong with moments of inertia that no body can have, if anything is."""
     if not is_numbers(moments, 6) or not all(map(math.isfinite, moments)):
         return True
@@ -174,7 +174,7 @@ OF_MASSES = (
     wrong("centre", lambda v, each, m, before: v is None and each.mass != 0.0
           and not any(s.body == each.body and s.is_filled for s in m.shapes),
           "three numbers, the centre of mass: the body has no shape to take it from"),
-    wrong("inertia?", lambda v, *_: _is_impossible(v),
+    wrong("inertia?", lambda v, *_: is_impossible(v),
           "Ixx, Iyy, Izz and, if not 0, Ixy, Ixz, Iyz of a body: its principal moments are not negative, "
           "and none is more than the other two together"),
 )  # fmt: skip

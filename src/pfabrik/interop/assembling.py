@@ -24,6 +24,7 @@ from ..tolerances import TOLERANCES
 from .closing import CLOSED, ClosedHome, OpenLoops, close_home
 from .collision import Collision
 from .digits import worst
+from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .notes import Note, note_names, noting
 from .opened import OpenMechanism
@@ -82,7 +83,8 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
     noted = list(notes)
     with noting(noted):
         home = closed(opened, noted)
-        mechanism = with_collision(home.mechanism, home.collision, noted)
+        mechanism = with_masses(home.mechanism, home.collision.masses, home.mechanism.bodies, noted)
+        mechanism = with_collision(mechanism, home.collision, noted)
     return Imported(mechanism, home.gap, tuple(noted))
 
 
@@ -244,7 +246,7 @@ def _moved_reference(opened: OpenMechanism, tree: Structure, home: ClosedHome) -
 def _moved_collision(opened: OpenMechanism, tree: Structure, home: ClosedHome) -> Collision:
     """The collision geometry of the machine's bodies at the closed home."""
     collision = opened.collision.on({opened.base, *tree.bodies})
-    if not collision.solids or not home.q.any():
+    if not (collision.solids or collision.masses) or not home.q.any():
         return collision
     return collision.moved({body: motion[0] for body, motion in displacements(tree, home.q[None]).items()})
 

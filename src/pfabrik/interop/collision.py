@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
-from ..description.mechanism import Shape
+from ..description.mechanism import Mass, Shape
+from .imported_masses import mass_in_unit, moved_mass
 
 LENGTHS = ("thickness", "ends", "at", "diameter", "size")
 """Fields of a shape that are lengths, or points."""
@@ -54,40 +54,48 @@ class Collision:
     excluded : pairs of bodies, by their names in the file, that never touch.
     paired : pairs of geoms that touch whatever bits and bodies they have.
     clearance : as of a `Mechanism`.
+    masses : of bodies, which go where solids go.
     """
 
     solids: tuple[Solid, ...] = ()
     excluded: tuple[tuple[str, str], ...] = ()
     paired: frozenset[frozenset[str]] = frozenset()
     clearance: float | None = None
+    masses: tuple[Mass, ...] = ()
 
     def merged(self, stands_for: Mapping[str, str]) -> Collision:
         """With the solids of merged bodies on the body that stands for them."""
-        return self._with_shapes(
-            dataclasses.replace(each.shape, body=stands_for.get(each.shape.body, each.shape.body))
-            for each in self.solids
+        return self._with_parts(
+            [replace(each.shape, body=stands_for.get(each.shape.body, each.shape.body)) for each in self.solids],
+            [replace(each, body=stands_for.get(each.body, each.body)) for each in self.masses],
         )
 
     def moved(self, motions: Mapping[str, Floats]) -> Collision:
         """With bodies moved, each by a transform (4, 4) in base coordinates; those that are not named stay."""
-        return self._with_shapes(
-            moved_shape(each.shape, motions[each.shape.body]) if each.shape.body in motions else each.shape
-            for each in self.solids
+        still = np.eye(4)
+        return self._with_parts(
+            [
+                moved_shape(each.shape, motions[each.shape.body]) if each.shape.body in motions else each.shape
+                for each in self.solids
+            ],
+            [moved_mass(each, motions.get(each.body, still)) for each in self.masses],
         )
 
     def in_unit(self, metres: float) -> Collision:
         """With lengths in a unit, from metres."""
         clearance = None if self.clearance is None else self.clearance / metres
-        shapes = self._with_shapes(shape_in_unit(each.shape, metres) for each in self.solids)
-        return dataclasses.replace(shapes, clearance=clearance)
+        shapes = [shape_in_unit(each.shape, metres) for each in self.solids]
+        parts = self._with_parts(shapes, [mass_in_unit(each, metres) for each in self.masses])
+        return replace(parts, clearance=clearance)
 
     def on(self, bodies: Collection[str]) -> Collision:
-        """The solids on some bodies."""
-        return dataclasses.replace(self, solids=tuple(each for each in self.solids if each.shape.body in bodies))
+        """The solids and masses on some bodies."""
+        masses = tuple(each for each in self.masses if each.body in bodies)
+        return replace(self, solids=tuple(each for each in self.solids if each.shape.body in bodies), masses=masses)
 
-    def _with_shapes(self, shapes: Any) -> Collision:
-        solids = (dataclasses.replace(each, shape=shape) for each, shape in zip(self.solids, shapes, strict=True))
-        return dataclasses.replace(self, solids=tuple(solids))
+    def _with_parts(self, shapes: Sequence[Shape], masses: Sequence[Mass]) -> Collision:
+        solids = (replace(each, shape=shape) for each, shape in zip(self.solids, shapes, strict=True))
+        return replace(self, solids=tuple(solids), masses=tuple(masses))
 
 
 NO_COLLISION = Collision()
@@ -97,7 +105,7 @@ def shape_in_unit(shape: Shape, metres: float) -> Shape:
     """A shape in a unit of length, from metres."""
     lengths = {name: getattr(shape, name) for name in LENGTHS}
     changes: dict[str, Any] = {name: np.divide(value, metres) for name, value in lengths.items() if value is not None}
-    return dataclasses.replace(shape, **changes)
+    return replace(shape, **changes)
 
 
 def moved_shape(shape: Shape, motion: Floats) -> Shape:
@@ -111,7 +119,7 @@ def moved_shape(shape: Shape, motion: Floats) -> Shape:
         changes["axis"] = turn @ shape.axis
     if shape.kind == "box":
         changes["axes"] = plain_axes(turn @ np.array(shape.axes or np.eye(3)[:2]).T)
-    return dataclasses.replace(shape, **changes)
+    return replace(shape, **changes)
 
 
 def plain_axes(axes: Floats) -> Floats | None:

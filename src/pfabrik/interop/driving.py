@@ -6,17 +6,22 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..description.joints import KINDS, Joint
+from ..description.joints import DRIVE_FIELDS, KINDS, Joint
 from ..description.mechanism import Mechanism
 from ..errors import Fault, InvalidMechanism
+from ..files.units import MEASURED
 from .opened import OpenMechanism
 
 
 class Rates(NamedTuple):
-    """The highest speed and acceleration of a coordinate, None where not known."""
+    """What the drive of a coordinate can do, as the fields of a joint: None where not known."""
 
-    speed: float | None = None
-    acceleration: float | None = None
+    max_speed: float | None = None
+    max_acceleration: float | None = None
+    max_torque: float | None = None
+    rotor_inertia: float | None = None
+    gear: float | None = None
+    friction: tuple[float, float] | None = None
 
 
 def require_drives(opened: OpenMechanism, joints: Sequence[Joint], undriven: str) -> None:
@@ -47,18 +52,17 @@ def with_actuators(mechanism: Mechanism, order: Sequence[str], rates: Mapping[st
     def rank(joint: Joint) -> int:
         return min(place.get(drive.name, len(place)) for drive in drives[joint.name])
 
-    def highest(joint: Joint, kind: int) -> tuple[float, ...] | float | None:
+    def said(joint: Joint, field: str) -> Any:
         values = []
         for drive in drives[joint.name]:
-            value = rates.get(drive.name, Rates())[kind]
+            value = getattr(rates.get(drive.name, Rates()), field)
             if value is None:
                 return None
-            values.append(value if drive.kind == "angle" else value / metres)
+            values.append(value / metres if drive.kind == "length" and field in MEASURED else value)
         return tuple(values) if len(values) > 1 else values[0]
 
     def rated(joint: Joint) -> Joint:
-        changes: dict[str, Any] = {"max_speed": highest(joint, 0), "max_acceleration": highest(joint, 1)}
-        return dataclasses.replace(joint, **changes)
+        return dataclasses.replace(joint, **{field: said(joint, field) for field in DRIVE_FIELDS})
 
     driven = iter(sorted((joint for joint in mechanism.joints if joint.driven), key=rank))
     return mechanism._with_joints(rated(next(driven)) if joint.driven else joint for joint in mechanism.joints)

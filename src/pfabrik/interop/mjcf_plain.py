@@ -16,13 +16,14 @@ from .xml_reading import fault, number, number_text
 
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 KEPT: dict[str, tuple[str, ...]] = {
-    "compiler": ("angle", "autolimits", "eulerseq"),
+    "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq"),
     "default": ("class",),
     "body": ("name", "childclass", *PLACE),
     "frame": ("name", "childclass", *PLACE),
     "replicate": ("count", "offset", "euler", "sep", "childclass"),
     "joint": ("name", "class", "type", "pos", "axis", "range", "limited", "ref"),
     "freejoint": ("name",),
+    "inertial": ("mass", "diaginertia", "fullinertia", *PLACE),
     "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *PLACE),
     "site": ("name", "class", "type", "size", "fromto", *PLACE),
     "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
@@ -44,13 +45,16 @@ REFUSED = {
 TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
 """Attributes that say what an actuator drives in place of a joint."""
 
+LEAST = "1e-9"
+"""Mass [kg], and moment of inertia [kg m²], of a body for which the file has none."""
+
 MOST_COPIES = 1000
 """Most copies that `replicate` may make, of copies too."""
 
 STILL = ("option", "size", "visual", "statistic", "custom", "extension", "include")
 """Sections that neither move nor hold anything."""
 
-UNNOTED = ("inertial", "light", "camera", "plugin", "geom")
+UNNOTED = ("light", "camera", "plugin", "geom")
 """Elements inside bodies that nobody would look for in a mechanism, and geoms, which `mjcf_geoms` reads."""
 
 
@@ -81,7 +85,7 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
             bodies = {body.get("name", "") for body in root.iter("body")} | {"world"}
             for each in unread_loops(section, bodies, "world", (), "connect, weld or joint of an equality"):
                 raise InvalidMechanism([each])
-    compiler.attrib |= {"boundmass": "1", "boundinertia": "1"}  # what moves has a mass; which one does not matter
+    compiler.attrib |= {"boundmass": LEAST, "boundinertia": LEAST}  # what moves has a mass; which one does not matter
     noted = Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED})
     note_names(notes, "left out, for they do not move anything", counted_names(noted))
     springs = (joint.get("name", "a joint") for joint in root.iter("joint") if number(joint, "stiffness"))

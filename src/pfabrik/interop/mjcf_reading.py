@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,7 +13,8 @@ from xml.etree import ElementTree as ET
 
 from ..checks import require_names
 from ..description.form_faults import shown
-from ..description.joints import Cone
+from ..description.joints import DRIVE_FIELDS, Cone
+from ..description.mechanism import Mass
 from ..extras import require
 from .assembling import Imported
 from .collision import Collision
@@ -20,7 +23,7 @@ from .mjcf_bodies import is_half, read_struts
 from .mjcf_geoms import read_collision
 from .mjcf_model import MjcfModel
 from .mjcf_plain import plain_model, transmission_text
-from .mjcf_writing import NOTE
+from .mjcf_writing import MADE_UP, NOTE
 from .notes import Note, noting
 from .opened import loops_by_name
 from .robots import ImportOptions, Robot, mechanism_of
@@ -135,7 +138,18 @@ def _collision(root: ET.Element, model: MjcfModel, data: dict[str, str], notes: 
     collision = read_collision(root, model, bool(data), notes)
     struts = dict(read_struts(data))
     solids = [each for each in collision.solids if not is_half(each.name, struts)]
-    return replace(collision, solids=(*solids, *struts.values()), clearance=_clearance(data.get("clearance")))
+    clearance, masses = _clearance(data.get("clearance")), model.masses(root)
+    return replace(collision, solids=(*solids, *struts.values()), clearance=clearance, masses=_weighed(masses, data))
+
+
+def _weighed(masses: Iterable[Mass], data: dict[str, str]) -> tuple[Mass, ...]:
+    """The masses but those that `to_mjcf` made up."""
+    text = data.get(MADE_UP, "[]")
+    try:
+        made_up = require_names(MADE_UP, json.loads(text))
+    except ValueError:
+        raise fault(f"custom text '{MADE_UP}'", shown(text), '["body", ...]') from None
+    return tuple(each for each in masses if each.body not in made_up)
 
 
 def _clearance(text: str | None) -> float | None:
@@ -172,12 +186,12 @@ def _written_by_us(data: dict[str, str]) -> dict[str, Any]:
     if "task" in data:
         fields["task"] = tuple(data["task"].split())
     fields["cones"] = {name: _cone(text) for name, text in _with_prefix(data, "cone.").items()}
-    speeds, accelerations = (
-        {name: float(text) for name, text in _with_prefix(data, prefix).items()}
-        for prefix in ("max_speed.", "max_acceleration.")
-    )
-    names = {**speeds, **accelerations}
-    fields["rates"] = {name: Rates(speeds.get(name), accelerations.get(name)) for name in names}
+    rates: dict[str, dict[str, Any]] = defaultdict(dict)
+    for field in DRIVE_FIELDS:
+        for name, text in _with_prefix(data, f"{field}.").items():
+            numbers = tuple(map(float, text.split()))
+            rates[name][field] = numbers if field == "friction" else numbers[0]
+    fields["rates"] = {name: Rates(**said) for name, said in rates.items()}
     return fields
 
 

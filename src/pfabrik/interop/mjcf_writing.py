@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree as ET
@@ -11,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import array
 from ..arrays import Floats
+from ..description.joints import DRIVE_FIELDS
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..files.units import metres_of
+from ..files.units import MEASURED, metres_of
 from ..whole_files import whole_path
 from .cuts import CutTree, cut_tree
 from .mjcf_bodies import STEP, Names, Physics, as_attributes, bodies, names_of, physics, si_unit, strut_notes
@@ -20,6 +22,9 @@ from .xml_reading import number_text
 
 NOTE = "pfabrik."
 """Prefix of the names of custom elements, which hold what MuJoCo has no word for."""
+
+MADE_UP = "made_up"
+"""The custom element with the names of the bodies whose masses are made up: they are not read back."""
 
 CLOSING_TIME = 2.5 * STEP
 """Time constant by which equalities close what opens [s]: MuJoCo asks for two steps at least."""
@@ -40,7 +45,7 @@ def to_mjcf(
     have position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, and
     weigh nothing; a strut is two, of which one goes with each part, where these are as long as it is over all of its
     range. Pairs of `ignore` are `exclude`. Cones, which MuJoCo does not know, are in comments and in custom elements,
-    as are base, end effector and task, highest speeds and accelerations, struts, and the clearance.
+    as are base, end effector and task, what drives can do, struts, and the clearance.
 
     Parameters
     ----------
@@ -86,6 +91,10 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
         root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=number_text(gravity)
     )
     custom = ET.SubElement(root, "custom")
+    made_up = made_up_of(mechanism, physics)
+    made_up += [branch.body for branch in tree.branches if branch.double_of in made_up]
+    if made_up:
+        ET.SubElement(custom, "text", name=NOTE + MADE_UP, data=json.dumps(made_up))
     for name, text in _notes(mechanism, names, metres):
         ET.SubElement(custom, "text", name=NOTE + name, data=text)
     root.append(bodies(mechanism, tree, names, metres, physics))
@@ -104,13 +113,17 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
 def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
     """Yield the comments for who reads the file."""
     yield f"'{mechanism.name}', written by pfabrik: lengths in m, where its own file has {mechanism.length_unit}"
-    made_up = [body for body in mechanism.bodies if body not in physics.given and body != mechanism.base]
-    if made_up:
+    if made_up := made_up_of(mechanism, physics):
         yield f"masses are made up, in proportion to the machine, of {', '.join(made_up)}"
     for joint in mechanism.joints:
         if joint.cone is not None:
             half_angle = f"{np.degrees(joint.cone.half_angle):.6g} deg"
             yield f"a limit that MuJoCo does not keep: the cone of {joint.name}, {half_angle} about {joint.cone.axis}"
+
+
+def made_up_of(mechanism: Mechanism, physics: Physics) -> list[str]:
+    """The bodies whose masses are made up."""
+    return [body for body in mechanism.bodies if body not in physics.given and body != mechanism.base]
 
 
 def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[str, str]]:
@@ -119,12 +132,13 @@ def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[
     yield "end_effector", mechanism.end_effector
     yield "reference_point", names.reference
     yield "task", " ".join(mechanism.task)
-    for key in ("max_speed", "max_acceleration"):
+    for key in DRIVE_FIELDS:
         for drive in mechanism.drives:
-            rates = getattr(drive.joint, key)
-            rate = rates[drive.place] if isinstance(rates, tuple) else rates
-            if rate is not None:
-                yield f"{key}.{drive.name}", repr(rate * si_unit(drive, metres))
+            said = getattr(drive.joint, key)
+            said = said[drive.place] if len(drive.joint.driven) > 1 and said is not None else said
+            if said is not None:
+                numbers = np.atleast_1d(said) * (si_unit(drive, metres) if key in MEASURED else 1.0)
+                yield f"{key}.{drive.name}", number_text(numbers)
     for joint in mechanism.joints:
         if joint.cone is not None:
             cone = joint.cone

@@ -23,6 +23,7 @@ from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
 from .driving import Rates, require_drives, with_actuators
+from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .names import unique
 from .notes import Note, note_names, with_task
@@ -44,7 +45,7 @@ class Robot:
     places : what an end effector may be called besides a joint -> its body, and the point of it that targets place [m].
     base, end_effector, task, cones : those of a mechanism that the file describes, if any.
     order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
-    rates : coordinate -> its highest speed and acceleration [rad or m, per s and per s^2], None where not known.
+    rates : coordinate -> what its drive can do [rad or m, per s and per s^2, and SI units].
     roundings : joint or loop -> how exactly the digits of the file place it [m, rad]; other loops are as the worst.
     couplings : joints that follow others.
     undriven : what the file has in place of driven joints, for the refusal of a machine without any.
@@ -125,6 +126,7 @@ def _between(robot: Robot, base: str, end_effector: str, asked: ImportOptions, n
     home = closed(opened, notes)
     mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres_of(asked.length_unit))
     mechanism = with_task(mechanism, asked.task is not None, notes)
+    mechanism = with_masses(mechanism, home.collision.masses, robot.places, notes)
     mechanism = with_collision(mechanism, home.collision, notes)
     return Imported(mechanism, home.gap, tuple(notes))
 

@@ -8,8 +8,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..arrays import Floats
+from ..description.body_masses import Mass, as_matrix
 from ..errors import InvalidMechanism
 from .collision import MOST_SOLIDS, Collision, Solid, solid_shape
+from .imported_masses import placed_mass
 from .notes import Note, counted_names, note_names
 from .sdf_links import pose_in
 from .urdf_links import UrdfLinks, origin_of
@@ -47,6 +49,39 @@ def read_collision(root: ET.Element, links: UrdfLinks, notes: list[Note]) -> Col
             solids.append(Solid(solid_shape(name, kind, size, links.frames[name] @ local), name))
     note_names(notes, "collision geometry that has no shape here is left out", counted_names(left_out))
     return Collision(tuple(solids))
+
+
+def read_masses(root: ET.Element, links: UrdfLinks, notes: list[Note]) -> list[Mass]:
+    """The masses of a description [m], as of `read_collision`; links without one weigh nothing beside those with."""
+    masses, left_out = [], []
+    for link in root.iter("link"):
+        name, element = link.get("name", ""), link.find("inertial")
+        if element is None:
+            masses.append(Mass(name, 0.0))
+            continue
+        place, moments = element.find("pose"), element.find("inertia")
+        values = [_said(element.find("mass"), "value"), *(_said(moments, key) for key in MOMENTS)]
+        numbers = numbers_in(" ".join(values), 7)
+        try:
+            frame = links.frames[name] @ origin_of(element.find("origin")) @ pose_in(place, "pose")
+        except (ValueError, InvalidMechanism):
+            numbers = None
+        if numbers is None or (place is not None and place.get("relative_to", name) != name):
+            left_out.append(name)
+        else:
+            masses.append(placed_mass(name, float(numbers[0]), frame, as_matrix(tuple(numbers[1:].tolist()))))
+    note_names(notes, "masses without their numbers are left out, of", left_out)
+    return masses if any(each.mass for each in masses) else []
+
+
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def _said(element: ET.Element | None, key: str) -> str:
+    """The text of an attribute, of an element within or of the element itself; 0 where there is none."""
+    if element is None:
+        return "0"
+    return element.get(key) or element.findtext(key) or (element.text or "0" if key == "value" else "0")
 
 
 def _size(geometry: ET.Element | None) -> Floats | None:

@@ -26,6 +26,9 @@ TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "
 MOST_PARTS, MOST_FAULTS = 5_000, 20
 """Most links or joints of a robot: a humanoid with every bolt ten times; and most faults that are told at once."""
 
+ENDLESS = 1e9
+"""Efforts and friction from which on a number stands for none [SI units]."""
+
 XACRO = "; xacro files want xacro"
 
 ZERO, X = "0 0 0", "1 0 0"
@@ -45,6 +48,7 @@ class UrdfJoint:
     axes : its axis there, of any length but zero, and the second one of a universal joint, (2, 3).
     limits : least and largest coordinate [rad or m]; None where the file has none.
     max_speed : [rad/s or m/s]; None where the file has none, or 0, which stands for none.
+    max_torque : [N m or N], likewise; friction : dry and viscous, in SI units.
     mimic : how it follows another joint; None where it does not.
     written : `frame` as attributes of MuJoCo, in the numbers of the file; empty where it has none.
     """
@@ -58,6 +62,8 @@ class UrdfJoint:
     axes: Floats = field(default_factory=lambda: np.eye(3)[:2])
     limits: tuple[float, float] | None = None
     max_speed: float | None = None
+    max_torque: float | None = None
+    friction: tuple[float, float] | None = None
     mimic: Coupling | None = None
     written: Mapping[str, str] = field(default_factory=dict)
 
@@ -240,6 +246,8 @@ def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
     name, origin, limit = element.get("name", ""), element.find("origin"), element.find("limit")
     is_limited = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
     limits = (_number(limit, "lower", 0.0), _number(limit, "upper", 0.0))
+    effort, losses = _number(limit, "effort", 0.0), element.find("dynamics")
+    friction = _number(losses, "friction", 0.0), _number(losses, "damping", 0.0)
     speed, kind = _number(limit, "velocity", 0.0), retyped.get(name, element.get("type", "")).upper()
     axis = vector_in(element.find("axis"), "xyz", X)
     return UrdfJoint(
@@ -251,6 +259,8 @@ def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
         axes=HERE[:2, :3] if kind == "UNIVERSAL" else np.array([axis, axis]),
         limits=limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
         max_speed=speed if speed > 0.0 else None,
+        max_torque=effort if 0.0 < effort < ENDLESS else None,
+        friction=friction if 0.0 <= min(friction) <= max(friction) < ENDLESS and any(friction) else None,
         mimic=_coupling(name, element.find("mimic")),
         written={"pos": _text(origin, "xyz", ZERO), "euler": _text(origin, "rpy", ZERO)},
     )

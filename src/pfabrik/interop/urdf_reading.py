@@ -24,7 +24,7 @@ from .opened import loops_by_name
 from .robots import ImportOptions, Robot, mechanism_of
 from .sdf_links import Poses, closing, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
-from .urdf_collision import read_collision
+from .urdf_collision import read_collision, read_masses
 from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
 from .xml_reading import fault, read_xml
 
@@ -99,7 +99,8 @@ def from_urdf(
         chosen = None if actuated is None else require_names("actuated", actuated)
         asked = {*(chosen or ()), *require_names("fixed", fixed), *loops_file.actuated}
         links, link_loops = read_description(element, loops_file, asked, notes)
-        robot = replace(_robot(links, link_loops, loops_file, notes), collision=read_collision(element, links, notes))
+        solids, masses = read_collision(element, links, notes), tuple(read_masses(element, links, notes))
+        robot = replace(_robot(links, link_loops, loops_file, notes), collision=replace(solids, masses=masses))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
         wanted = ImportOptions(motors if chosen is None else chosen, length_unit, task, within)
         return mechanism_of(robot, base, end_effector, wanted, notes, fixed, leave_out)
@@ -200,7 +201,10 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
         links.root,
         places,
         order=links.driven,
-        rates={joint.name: Rates(joint.max_speed) for joint in links.joints},
+        rates={
+            joint.name: Rates(joint.max_speed, max_torque=joint.max_torque, friction=joint.friction)
+            for joint in links.joints
+        },
         roundings={**links.joint_roundings, **roundings_of_loops(link_loops, links.roundings)},
         couplings=[joint.mimic for joint in links.joints if joint.mimic is not None],
         undriven="no transmission, no controller, and no motor in a file of loops",
