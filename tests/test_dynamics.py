@@ -392,6 +392,46 @@ def test_what_a_body_carries_is_as_if_it_weighed_more() -> None:
     np.testing.assert_allclose(found.actuators, pf.inverse_dynamics(solution, **motion).actuators, rtol=1e-12)
 
 
+def test_redundant_actuators_share_the_work_within_their_limits() -> None:
+    plain = weighed(pf.load("five_bar"))
+    more = plain._with_joints(dataclasses.replace(joint, actuated=joint.name != "p3") for joint in plain.joints)
+    solution, *_ = somewhere(plain)
+    motion: dict[str, Any] = {"twists": [0, 200, 100], "accelerations": [0, 9000, 5000]}
+    alone = pf.inverse_dynamics(solution, **motion)
+    shared = pf.inverse_dynamics(pf.configuration(more, solution.q), **motion)
+    assert shared.is_least_norm and not alone.is_least_norm
+    np.testing.assert_allclose(shared.power.sum(), alone.power.sum(), rtol=1e-9)
+    assert np.linalg.norm(shared.actuators) < np.linalg.norm(alone.actuators)
+    most = 0.9 * np.abs(shared.actuators).max()
+    held = more._with_joints(
+        dataclasses.replace(joint, max_torque=most) if joint.actuated else joint for joint in more.joints
+    )
+    found = pf.inverse_dynamics(pf.configuration(held, solution.q), **motion)
+    assert np.abs(found.actuators).max() <= most * (1 + 1e-8)
+    np.testing.assert_allclose(found.power.sum(), alone.power.sum(), rtol=1e-7)
+    forearm = [each.reactions["p2"][1:3] - each.reactions["p3"][1:3] for each in (found, shared)]
+    np.testing.assert_allclose(*forearm, atol=1e-6)  # what its ends pass moves it, whoever drives
+
+
+def test_rows_without_a_configuration_have_a_reason() -> None:
+    machine = weighed(pf.load("delta"))
+    targets = [machine.home_pose[:3, 3], [np.nan] * 3]
+    solutions = pf.solve_ik(machine, targets, options=pf.Options(on_invalid="mark"))
+    found = pf.inverse_dynamics(solutions, twists=[10, 0, 0])
+    assert list(np.isnan(found.actuators).any(axis=1)) == [False, True]
+    assert "INVALID" in np.ravel(found.reason)[1]
+    assert np.isnan(pf.mass_matrix(solutions)[1]).all()
+
+
+def test_joints_of_a_serial_model_feel_the_mass_by_their_jacobian() -> None:
+    machine = weighed(pf.load("g1_ankle"))
+    serial = ("pitch_joint", "roll_joint")
+    solution, *_ = somewhere(machine)
+    by_motor = pf.mass_matrix(solution, "actuators")
+    jacobian = pf.actuation(machine, serial).jacobian([solution.joints[name] for name in serial])
+    np.testing.assert_allclose(pf.mass_matrix(solution, serial), jacobian.T @ by_motor @ jacobian, rtol=1e-7)
+
+
 def test_parts_of_a_motion_that_a_task_leaves_out_follow() -> None:
     machine = weighed(pf.load("rps"))
     solution = pf.solve_ik(machine, machine.home_pose)

@@ -9,7 +9,8 @@ Machine       model_of, Model; engine_of, Configurations; task_of, Task
 Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
 Masses        inertias_of, BodyInertia
-Motion        home_coordinates, displacements, end_effector_pose, joint_centres; joint_path, JointPath; tilt_axis
+Motion        home_coordinates, displacements, joint_centres, placed, end_effector_pose; joint_path, JointPath
+              tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
               parallel_signs
 """
@@ -33,6 +34,7 @@ from .motion.displacements import (
     end_effector_pose,
     home_coordinates,
     joint_centres,
+    placed,
     rate_units,
 )
 from .motion.fitting_task import tilt_axis
@@ -66,6 +68,7 @@ __all__ = [
     "model_of",
     "parallel_signs",
     "passive_series",
+    "placed",
     "plane_of",
     "rate_units",
     "readout",

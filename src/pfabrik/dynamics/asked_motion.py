@@ -62,12 +62,12 @@ def task_axes(mechanism: Mechanism, poses: Floats) -> Floats:
     """The components of twists that the task sets, at poses (n, 4, 4), (n, k, 6): along and about axes of the base,
     tilts about the platform's x and y axes."""
     task = task_of(mechanism)
-    lines, turns = np.eye(3)[list(task.axes)], [task.turning_axes(pose) for pose in poses]
-    n_turns = 0 if mechanism.end_effector_is_joint else sum(task.turns)
-    axes = np.zeros((len(poses), len(lines) + n_turns, 6))
-    axes[:, : len(lines), :3] = lines
-    if n_turns and len(poses):
-        axes[:, len(lines) :, 3:] = turns
+    lines, turns = np.eye(3)[list(task.axes)], np.eye(3)[None]
+    if task.rotations == 2:
+        turns = np.swapaxes(poses[:, :3, :3], 1, 2)
+    turns = turns[:, list(task.turns) if not mechanism.end_effector_is_joint else []]
+    axes = np.zeros((len(poses), len(lines) + turns.shape[1], 6))
+    axes[:, : len(lines), :3], axes[:, len(lines) :, 3:] = lines, turns
     return axes
 
 

@@ -42,7 +42,7 @@ class Efforts(Printed):
         What all actuators have given since the first row [J]; None without times.
     is_least_norm : bool
         True if there are more actuators than motions that they control: of all forces that make the motion, those with
-        the least sum of squares are given, torques compared with forces times L.
+        the least sum of squares are given, torques compared with forces times L: within `max_torque` where any are.
     reason : str or array of str (...)
         Why there are no such forces; empty where there are. A text for a single answer.
     """

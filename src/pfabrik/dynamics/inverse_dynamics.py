@@ -16,7 +16,7 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..fk import solve_fk
-from ..kinematics import BodyInertia, actuator_units, generic_of, inertias_of, joint_centres, tree_of
+from ..kinematics import BodyInertia, actuator_units, generic_of, inertias_of, tree_of
 from ..statics.forces import GRAVITY
 from ..statics.joint_balance import Balance, about_centres, balance_at, open_components
 from ..statics.loads import (
@@ -32,7 +32,7 @@ from ..statics.loads import (
 from ..statics.transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated
 from ..timing.timed import Timed
 from .asked_motion import in_lengths, is_missed, motion_of, shown_of, task_axes
-from .drives import Drives
+from .drives import Drives, within_limits
 from .efforts import Efforts
 from .moving_machine import MovingMachine, Weights, weights_of
 
@@ -273,12 +273,21 @@ class _Block:
     def balanced(self, drives: Drives) -> Balance:
         """The forces that make the motion."""
         on_drives = drives.loads(*self.of_actuators()) * drives.units
-        return balance_at(self.mechanism, self.moving.first, self.carried[..., None], on_drives[..., None])
+        found = balance_at(self.mechanism, self.moving.first, self.carried[..., None], on_drives[..., None])
+        limits = drives.limits * drives.units
+        rows = np.flatnonzero((np.abs(found.actuators[..., 0]) > limits).any(axis=1))
+        if not len(rows) or not is_redundantly_actuated(self.mechanism):
+            return found
+        more = np.zeros(on_drives.shape)
+        rates = self.moving.first.pairs[rows][:, self.moving.first.actuated]
+        more[rows] = within_limits(found.actuators[rows, :, 0], rates, limits) - found.actuators[rows, :, 0]
+        against = balance_at(self.mechanism, self.moving.first, self.carried[..., None], (on_drives + more)[..., None])
+        return against._replace(actuators=against.actuators + more[..., None])
 
     def reactions(self, found: Balance) -> tuple[Floats, Mask]:
         """What joints transmit, force [N] and moment about their centres [N length], (n, joints, 6), and where that is
         not determined."""
         length = self.mechanism.characteristic_length
-        places = joint_centres(self.mechanism, self.q), self.moving.reference * length
+        places = self.moving.centres, self.moving.reference * length
         is_open = open_components(self.mechanism, found.open, *places)
         return about_centres(self.mechanism, found.wrenches, *places)[..., 0], is_open

@@ -30,9 +30,8 @@ from ..kinematics import (
     JointRates,
     column_joints,
     cycle_basis,
-    displacements,
-    joint_centres,
     model_of,
+    placed,
     tree_of,
 )
 from ..tolerances import TOLERANCES
@@ -70,16 +69,18 @@ class MovingMachine:
     ----------
     first : the joint rates to first order.
     paths : of the bodies with masses along the joints, (b, joints).
+    centres : of the joints, (n, joints, 3) [length].
+    reference : points, (n, 3) [L].
     """
 
     def __init__(self, mechanism: Mechanism, weights: Weights, q: Floats) -> None:
-        self.mechanism, self.weights, self._q = mechanism, weights, q
+        self.mechanism, self.weights = mechanism, weights
         self.first = JointRates(model_of(mechanism), q)
         self._tree, self._owners, self._graph = tree_of(mechanism), column_joints(mechanism), cycle_basis(mechanism)
         self.paths = np.array([self._tree.paths[body] for body in weights.bodies]).reshape(-1, len(mechanism.joints))
-        self._displaced = displacements(mechanism, q)
-        length = mechanism.characteristic_length
-        self.reference = (self._displaced[mechanism.end_effector_body] @ mechanism.home_pose)[:, :3, 3] / length
+        self._bodies, self.centres = placed(mechanism, q)
+        end = self._bodies[:, mechanism.bodies.index(mechanism.end_effector_body)] @ mechanism.home_pose
+        self.reference = end[:, :3, 3] / mechanism.characteristic_length
 
     @cached_property
     def arms(self) -> Floats:
@@ -97,9 +98,7 @@ class MovingMachine:
 
     @cached_property
     def _of_bodies(self) -> Floats:
-        if not self.weights.bodies:
-            return np.zeros((len(self._q), 0, 4, 4))
-        return np.stack([self._displaced[body] for body in self.weights.bodies], axis=1)
+        return self._bodies[:, [self.mechanism.bodies.index(body) for body in self.weights.bodies]]
 
     def twists(self, u: Floats) -> Floats:
         """Twists of the bodies with masses, (n, b, 6)."""
@@ -117,8 +116,7 @@ class MovingMachine:
         drift = _motion_cross(carriers, parts)
         balls = np.flatnonzero([joints[owner].type == "spherical" for owner in self._owners])
         if len(balls):
-            centres = joint_centres(self.mechanism, self._q)[:, self._owners[balls]]
-            arms = centres / self.mechanism.characteristic_length - self.reference[:, None]
+            arms = self.centres[:, self._owners[balls]] / self.mechanism.characteristic_length - self.reference[:, None]
             velocities = carriers[:, balls, :3] + np.cross(carriers[:, balls, 3:], arms)
             drift[:, balls, :3], drift[:, balls, 3:] = np.cross(velocities, parts[:, balls, 3:]), 0.0
         return drift
@@ -163,13 +161,15 @@ class MovingMachine:
         """The mass matrix between motions (n, c, k) and (n, c, m), (n, k, m) [kg L²]."""
         speeds, spins = self._shown(one)
         others, other_spins = (speeds, spins) if other is one else self._shown(other)
-        of_mass = np.einsum("nbik,nbim,b->nkm", speeds, others, self.weights.masses, optimize=True)
-        return np.asarray(of_mass + np.einsum("nbik,nbij,nbjm->nkm", spins, self.inertias, other_spins, optimize=True))
+        both = speeds * self.weights.masses[:, None, None], np.swapaxes(self.inertias, -1, -2) @ spins
+        pairs = zip(both, (others, other_spins), strict=True)
+        return sum((_stacked(x).swapaxes(-1, -2) @ _stacked(y) for x, y in pairs), np.zeros(()))
 
     def _shown(self, motions: Floats) -> tuple[Floats, Floats]:
         """Velocities of the centres of mass by motions (n, c, k), and angular velocities, (n, b, 3, k)."""
-        path = self.paths[:, self._owners]
-        twists = np.einsum("bc,nci,nck->nbik", path, self.first.screws, motions, optimize=True)
+        by_joint = self.first.screws[..., None] * motions[:, :, None]
+        n, c, _, k = by_joint.shape
+        twists = (self.paths[:, self._owners] @ by_joint.reshape(n, c, 6 * k)).reshape(n, -1, 6, k)
         return twists[..., :3, :] + np.cross(twists[..., 3:, :], self.arms[..., None], axis=2), twists[..., 3:, :]
 
     def free_responses(self, motions: Floats) -> tuple[Floats, Floats]:
@@ -189,3 +189,8 @@ def _motion_cross(carrier: Floats, screw: Floats) -> Floats:
     """The rate of a screw that a twist carries along; [velocity; angular velocity] both."""
     v, w, own_v, own_w = carrier[..., :3], carrier[..., 3:], screw[..., :3], screw[..., 3:]
     return np.concatenate([np.cross(w, own_v) + np.cross(v, own_w), np.cross(w, own_w)], axis=-1)
+
+
+def _stacked(vectors: Floats) -> Floats:
+    """Vectors (n, b, 3, k) one above the other, (n, 3 b, k)."""
+    return vectors.reshape(len(vectors), -1, vectors.shape[-1])
