@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -302,3 +303,61 @@ def test_an_answer_without_a_configuration_has_no_speed() -> None:
     nothing = pf.solve_ik(pf.load("stewart"), np.full((1, 4, 4), np.nan), options=pf.Options(on_invalid="mark"))[0]
     with pytest.raises(InvalidArgument, match="an answer that is INVALID"):
         pf.platform_speed(nothing, speed=1.0)
+
+
+def heavy(name: str, friction: tuple[float, float] = (0.0, 0.0)) -> pf.Mechanism:
+    """A machine with masses, rotors and friction."""
+    machine = pf.load(name)
+    masses = []
+    for body in machine.bodies:
+        points = [joint.at for joint in machine.joints if body in joint.connects and joint.at is not None]
+        size = 0.1 * machine.characteristic_length
+        masses.append(
+            pf.Mass(
+                body,
+                0.5,
+                np.mean(points or [machine.reference_point], axis=0),
+                0.5 * size**2 * np.array([1.0, 1.5, 2.0]),
+            )
+        )
+    drive: dict[str, Any] = {"rotor_inertia": 1e-5, "gear": 10.0, "friction": friction}
+    joints = (dataclasses.replace(joint, **drive) if joint.actuated else joint for joint in machine.joints)
+    return machine._with_joints(joints).with_masses(masses)
+
+
+@pytest.mark.parametrize("friction", [(0.0, 0.0), (0.05, 0.0), (0.0, 0.02)])
+@pytest.mark.parametrize("name", ["servo_hexapod", "linear_delta"])
+def test_motors_are_at_a_limit_of_torque_all_the_way(name: str, friction: tuple[float, float]) -> None:
+    machine, path = heavy(name, friction), followed(name, 2)
+    track = pf.track(machine, path.pose)
+    most = 1.5 * np.abs(pf.inverse_dynamics(track, twists=np.zeros(6)).actuators).max()
+    timed = pf.time_path(track, torque=most)
+    shares = np.abs(pf.inverse_dynamics(timed).actuators).max(axis=1)[1:-1] / most
+    assert shares.max() < 1.0 + 1e-5
+    assert np.mean(shares > 0.99) > 0.97  # no timing is faster; some meet it only at the next point of the grid
+    assert {what for _, what in timed.held_back} == {"torque"}
+
+
+def test_a_mass_on_a_slide_moves_in_the_time_of_its_closed_form() -> None:
+    track = slide()
+    joint = dataclasses.replace(track.mechanism.joint("x"), max_torque=8.0, friction=(2.0, 0.0))
+    table = pf.Mass("table", 3.0, [0, 0, 0])
+    machine = pf.Mechanism("slide", [joint], "table", (0, 0, 0), task=("x",), masses=[table])
+    timed = pf.time_path(pf.track(machine, track.pose), loads={"table": (1.0, [0, 0, 0])}, gravity=(1.5, 0, 0))
+    faster, slower = (8.0 - 2.0 + 6.0) / 4.0, (8.0 + 2.0 - 6.0) / 4.0  # gravity pulls 4 kg along it
+    peak = np.sqrt(2.0 * 0.1 / (1.0 / faster + 1.0 / slower))
+    assert timed.duration == pytest.approx(peak / faster + peak / slower, rel=1e-4)
+
+
+def test_limits_of_torque_that_no_timing_keeps_are_refused() -> None:
+    machine = heavy("five_bar")
+    track = pf.track(machine, followed("five_bar", 1).pose)
+    with pytest.raises(InvalidArgument, match=r"0.1, where 'p\d' has to exert"):
+        pf.time_path(track, torque=0.1)
+    with pytest.raises(InvalidArgument, match="no mass of link1"):
+        pf.time_path(followed("five_bar", 1), torque=1.0)
+    limited = pf.load("five_bar")._with_joints(
+        dataclasses.replace(joint, max_torque=1.0) if joint.actuated else joint for joint in machine.joints
+    )
+    with pytest.raises(InvalidArgument, match="without max_speed"):  # without masses, motors of a file say nothing
+        pf.time_path(pf.track(limited, track.pose))

@@ -19,7 +19,7 @@ from ..description.mechanism import Mechanism
 from ..description.readouts import readouts
 from ..description.task import task_of
 from ..engine import engine_of
-from ..errors import counted
+from ..errors import InvalidArgument, counted
 from ..motion.displacements import actuator_units
 from ..poses import between
 from ..printed import ResultTable, plain
@@ -229,6 +229,15 @@ class Track(Solution):
         beyond = speeds > self._pace.speed_limits * (1.0 + TOLERANCES.speed)
         names = self.mechanism.actuator_names
         return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
+
+
+def refuse_leaps(track: Track) -> None:
+    """Refuse a track with steps that are not reached, or that jump."""
+    for bad, what in ((track.status != Status.REACHED, "not reached"), (track.jumps, "leaping from the one before")):
+        steps = np.flatnonzero(bad)
+        if len(steps):
+            found = f"{len(steps)} step{'s' * (len(steps) > 1)} {what}"
+            raise InvalidArgument("track", found, "a path that is reached throughout", rows=steps[:5].tolist())
 
 
 def _durations(steps: Floats) -> Floats:

@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..answers.tracked import Track
+from ..answers.tracked import Track, refuse_leaps
 from ..arrays import Floats, Mask
 from ..checks import names_of
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..kinematics import actuator_units, cycle_basis, joint_path, task_of
 from ..rotations import to_rotvec
-from ..timing.time_path import refuse_leaps
 from ..tolerances import TOLERANCES
 from .moving_machine import MovingMachine
 

@@ -36,8 +36,11 @@ class Drives:
 
     def loads(self, rates: Floats, gains: Floats) -> Floats:
         """What rotors and friction resist with at rates and accelerations (n, n_a) of the machine, in N and N m."""
-        v, a = rates * self.si, gains * self.si
-        return np.asarray(-(self.inertia * a + self.friction[:, 0] * np.sign(v) + self.friction[:, 1] * v))
+        return np.asarray(-(self.inertia * gains * self.si + self.rubbed(rates)))
+
+    def rubbed(self, rates: Floats) -> Floats:
+        """What friction takes at rates (n, n_a) of the machine, in N and N m."""
+        return self.friction[:, 0] * np.sign(rates) + self.friction[:, 1] * rates * self.si
 
 
 ROUNDS = 2000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,6 @@ from ..checks import require_choice
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
-from ..fk import solve_fk
 from ..kinematics import BodyInertia, actuator_units, generic_of, inertias_of, tree_of
 from ..statics.forces import GRAVITY
 from ..statics.joint_balance import Balance, about_centres, balance_at, open_components
@@ -30,7 +29,6 @@ from ..statics.loads import (
     no_reasons,
 )
 from ..statics.transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated
-from ..timing.timed import Timed
 from .asked_motion import in_lengths, is_missed, motion_of, shown_of, task_axes
 from .drives import Drives, within_limits
 from .efforts import Efforts
@@ -41,6 +39,23 @@ ROWS_A_BLOCK = 256
 
 FREE_PART = "the loads move a part without inertia that neither the end effector nor an actuator holds"
 NOT_MADE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"
+
+
+@runtime_checkable
+class TimedMotion(Protocol):
+    """Configurations at times, and how the actuators move, as `Timed` has them."""
+
+    @property
+    def solution(self) -> Solution: ...
+
+    @property
+    def times(self) -> Floats: ...
+
+    @property
+    def rates(self) -> Floats: ...
+
+    @property
+    def accelerations(self) -> Floats: ...
 
 
 class AskedMotion(NamedTuple):
@@ -62,7 +77,7 @@ class AskedMotion(NamedTuple):
 
 
 def inverse_dynamics(
-    motion: Solution | Track | Timed,
+    motion: Solution | Track | TimedMotion,
     *,
     twists: ArrayLike | None = None,
     accelerations: ArrayLike | None = None,
@@ -113,7 +128,7 @@ def inverse_dynamics(
     asked = _asked(motion, twists, accelerations, at)
     mechanism, solution = asked.solution.mechanism, asked.solution
     metres, pull = metres_of(mechanism.length_unit), checked_gravity(gravity)
-    weights, others = _loads(mechanism, metres, checked_loads(mechanism, loads))
+    weights, others = loads_of(mechanism, metres, checked_loads(mechanism, loads))
     drives, n = Drives(mechanism, metres), len(asked.rates)
     reasons, n_a = no_reasons(n), len(mechanism.actuator_names)
     add_reason(reasons, np.isnan(solution._coordinates).any(axis=1), NO_CONFIGURATION)
@@ -154,11 +169,10 @@ def _asked(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike | Non
     """The configurations, and how they move."""
     require_choice("at", at, ("task", "actuators"))
     is_given = twists is not None or accelerations is not None
-    if isinstance(motion, Timed):
+    if isinstance(motion, TimedMotion):
         if is_given:
             raise InvalidArgument("twists", "twists beside a path with times", "none: the path says how it moves")
-        solution = solve_fk(motion.mechanism, motion.actuators, start=motion._track[motion.steps])
-        return AskedMotion(solution, motion.times, "actuators", motion.rates, motion.accelerations)
+        return AskedMotion(motion.solution, motion.times, "actuators", motion.rates, motion.accelerations)
     solution = checked_solution(motion)
     if isinstance(motion, Track) and not is_given:
         return AskedMotion(motion, motion.times, "path", *motion_of(motion))
@@ -186,20 +200,31 @@ def masses_of(mechanism: Mechanism, metres: float) -> dict[str, BodyInertia]:
     ------
     InvalidArgument : some bodies have no mass.
     """
-    found = inertias_of(mechanism, metres)
+    lacking = lacking_masses(mechanism, metres)
+    if lacking:
+        expected = "a mass of each body that moves: `with_masses`, or in its file, and 0 where it weighs nothing"
+        raise InvalidArgument("mechanism", f"no mass of {', '.join(lacking)}", expected)
+    resting = _resting(mechanism)
+    return {body: each for body, each in inertias_of(mechanism, metres).items() if body not in resting}
+
+
+def lacking_masses(mechanism: Mechanism, metres: float) -> list[str]:
+    """The bodies that move and have no mass."""
+    found, resting = inertias_of(mechanism, metres), _resting(mechanism)
+    return [body for body in mechanism.bodies if body not in found and body not in resting]
+
+
+def _resting(mechanism: Mechanism) -> set[str]:
+    """The base, and the bodies that are held on it."""
     resting = {mechanism.base}
     for index, forward in tree_of(mechanism).steps:
         joint = mechanism.joints[index]
         if joint.is_rigid and joint.connects[0 if forward else 1] in resting:
             resting.add(joint.connects[1 if forward else 0])
-    lacking = [body for body in mechanism.bodies if body not in found and body not in resting]
-    if lacking:
-        expected = "a mass of each body that moves: `with_masses`, or in its file, and 0 where it weighs nothing"
-        raise InvalidArgument("mechanism", f"no mass of {', '.join(lacking)}", expected)
-    return {body: each for body, each in found.items() if body not in resting}
+    return resting
 
 
-def _loads(mechanism: Mechanism, metres: float, loads: BodyLoads) -> tuple[Weights, BodyLoads]:
+def loads_of(mechanism: Mechanism, metres: float, loads: BodyLoads) -> tuple[Weights, BodyLoads]:
     """All masses, those that bodies carry among them, and the other loads, moments in N times the machine's length."""
     parts, others = list(masses_of(mechanism, metres).items()), {}
     for body, (load, point) in loads.items():

@@ -10,13 +10,14 @@ from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
 from ..files.units import metres_of
 from ..kinematics import actuator_units, generic_of
+from ..statics.loads import BodyLoads, checked_loads
 from .asked_motion import checked_at, shown_of
 from .drives import Drives
-from .inverse_dynamics import ROWS_A_BLOCK, masses_of
-from .moving_machine import MovingMachine, weights_of
+from .inverse_dynamics import ROWS_A_BLOCK, loads_of
+from .moving_machine import MovingMachine
 
 
-def mass_matrix(solution: Solution, at: str | Sequence[str] = "task") -> Floats:
+def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: BodyLoads | None = None) -> Floats:
     """The mass matrix M of a machine, as its task, its actuators or some of its joints feel it.
 
     At rest, forces M a accelerate it by a; its kinetic energy is v' M v / 2. In SI units, whatever the machine's unit
@@ -31,6 +32,8 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task") -> Floats:
         "task": x, y and z of the reference point, then rotations, of these what the task sets, along and about the axes
         of the base; tilts about the platform's x and y axes. "actuators": in the order of their names. Or joints, or
         coordinates of joints, that stand in series between base and end effector.
+    loads : mapping of str to tuple, optional
+        Body -> (mass, centre), for what it carries, as in `inverse_dynamics`.
 
     Returns
     -------
@@ -44,7 +47,7 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task") -> Floats:
     """
     mechanism = checked_solution(solution).mechanism
     at, metres = checked_at(mechanism, at), metres_of(mechanism.length_unit)
-    weights, drives = weights_of(masses_of(mechanism, metres)), Drives(mechanism, metres)
+    weights, drives = loads_of(mechanism, metres, checked_loads(mechanism, loads))[0], Drives(mechanism, metres)
     length, rows = mechanism.characteristic_length, solution._rows
     known = np.flatnonzero(~np.isnan(solution._coordinates).any(axis=1))
     found: Floats | None = None

@@ -99,6 +99,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (prove, tuple(_values("i i"))),
     (walk_path, tuple(_values("F2 F1 F2 f3 f3"))),
     (second_derivatives, tuple(_values("F1 F2 f2"))),
-    (fastest, tuple(_values("F1 F2 F2 F1 F1 b f1"))),
+    (fastest, tuple(_values("F1 F2 F2 F2 F2 F1 b f1"))),
 )
 """Every kernel with arguments of its types, the most used first; arrays that it only reads are read-only."""

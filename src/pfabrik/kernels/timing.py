@@ -1,8 +1,8 @@
 """Time-optimal timing of a path: splines through samples, and the fastest speed within limits.
 
 With s along the path, q(s) the actuators, x = s'^2 and u = s'', their velocities are q' sqrt(x) and their accelerations
-q' u + q'' x, linear in (x, u); the next x is x + 2 u (step). Backward pass: the largest x at every point from which the
-end can be reached; forward pass: the largest u that stays below it.
+q' u + q'' x, linear in (x, u), as their torques are, beside those of rest; the next x is x + 2 u (step). Backward pass:
+the largest x at every point from which the end can be reached; forward pass: the largest u that stays below it.
 """
 
 from __future__ import annotations
@@ -35,48 +35,55 @@ def second_derivatives(s: Floats, values: Floats, curves: Floats) -> None:
 
 
 @routine
-def put_line(k: int, rate: float, curve: float, most: float, lines: Floats) -> tuple[int, float]:
-    """Add |rate u + curve x| <= most as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x."""
-    if most == math.inf:
+def put_line(k: int, rate: float, curve: float, low: float, high: float, lines: Floats) -> tuple[int, float]:
+    """Add low <= rate u + curve x <= high as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x.
+
+    0 is within the bounds.
+    """
+    if high == math.inf and low == -math.inf:
         return k, math.inf
     if abs(rate) * 1e12 <= abs(curve) or rate == 0.0:
-        return k, most / abs(curve) if curve != 0.0 else math.inf
-    lines[k, 0] = -most / abs(rate)
-    lines[k, 1] = most / abs(rate)
+        return k, (high if curve > 0.0 else low) / curve if curve != 0.0 else math.inf
+    lines[k, 0] = low / rate if rate > 0.0 else high / rate
+    lines[k, 1] = high / rate if rate > 0.0 else low / rate
     lines[k, 2] = -curve / rate
     return k + 1, math.inf
 
 
 @routine
-def put_lines(i: int, step: float, slopes: Floats, curves: Floats, most: Floats, lines: Floats) -> tuple[int, float]:
+def put_lines(
+    i: int, step: float, slopes: Floats, curves: Floats, low: Floats, high: Floats, lines: Floats
+) -> tuple[int, float]:
     """Fill the bounds of u from point i to the next, at both ends; their number, and the largest x they allow."""
     count, largest = 0, math.inf
-    for j in range(most.shape[0]):
-        count, bound = put_line(count, slopes[i, j], curves[i, j], most[j], lines)
+    for j in range(low.shape[1]):
+        count, bound = put_line(count, slopes[i, j], curves[i, j], low[i, j], high[i, j], lines)
         largest = min(largest, bound)
         ahead = slopes[i + 1, j] + 2.0 * step * curves[i + 1, j]
-        count, bound = put_line(count, ahead, curves[i + 1, j], most[j], lines)
+        count, bound = put_line(count, ahead, curves[i + 1, j], low[i + 1, j], high[i + 1, j], lines)
         largest = min(largest, bound)
     return count, largest
 
 
 @kernel
-def fastest(s: Floats, slopes: Floats, curves: Floats, most: Floats, caps: Floats, at_rest: bool, x: Floats) -> None:
+def fastest(
+    s: Floats, slopes: Floats, curves: Floats, low: Floats, high: Floats, caps: Floats, at_rest: bool, x: Floats
+) -> None:
     """Fill the largest squared speeds x (n,) along s (n,).
 
     Parameters
     ----------
-    slopes, curves : first and second derivatives of the actuators by s, (n, m).
-    most : largest accelerations of the actuators, (m,); infinite without a limit.
+    slopes, curves : of what is limited, by u and by x, (n, m): first and second derivatives of the actuators by s.
+    low, high : its bounds, (n, m), 0 between them; infinite without a limit.
     caps : largest x by the velocity limits, (n,).
     at_rest : True if the path begins and ends at rest.
     """
     n = s.shape[0]
-    reach, lines = np.zeros(n), np.zeros((2 * most.shape[0] + 1, 3))
+    reach, lines = np.zeros(n), np.zeros((2 * low.shape[1] + 1, 3))
     reach[n - 1] = 0.0 if at_rest else caps[n - 1]
     for i in range(n - 2, -1, -1):
         step = s[i + 1] - s[i]
-        count, bound = put_lines(i, step, slopes, curves, most, lines)
+        count, bound = put_lines(i, step, slopes, curves, low, high, lines)
         largest = min(caps[i], bound)
         # what brings x to the next point: - x <= 2 step u <= reach - x
         lines[count, 0], lines[count, 1], lines[count, 2] = 0.0, reach[i + 1] / (2.0 * step), -0.5 / step
@@ -89,7 +96,7 @@ def fastest(s: Floats, slopes: Floats, curves: Floats, most: Floats, caps: Float
     x[0] = 0.0 if at_rest else reach[0]
     for i in range(n - 1):
         step = s[i + 1] - s[i]
-        count, _ = put_lines(i, step, slopes, curves, most, lines)
+        count, _ = put_lines(i, step, slopes, curves, low, high, lines)
         u = (reach[i + 1] - x[i]) / (2.0 * step)
         for a in range(count):
             u = min(u, lines[a, 1] + lines[a, 2] * x[i])

@@ -24,34 +24,26 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
-class Curve:
-    """Cubic splines through the steps of a path, straight at its ends, along the length s of its steps.
+class Spline:
+    """Natural cubic splines along s.
 
     Attributes
     ----------
-    steps : rows of the track that it goes through, (k,): those at which it stands still are left out.
-    s : where they are, (k,).
-    values, curves : actuators and reference point there, (k, n_a + 3), and their second derivatives.
-    poses : (k, 4, 4).
-    n_actuators : how many of the columns are actuators.
+    s : where its values are, (k,).
+    values, curves : (k, m), and their second derivatives.
     """
 
-    steps: np.ndarray
     s: Floats
     values: Floats
     curves: Floats
-    poses: Floats
-    n_actuators: int
 
-    def grid(self) -> Floats:
-        """Points along s, the steps among them."""
-        parts = max(-(-FINEST // (len(self.s) - 1)), FEWEST)
-        shares = np.arange(parts) / parts
-        inner = (self.s[:-1, None] + np.diff(self.s)[:, None] * shares).ravel()
-        return np.append(inner, self.s[-1])
+    @classmethod
+    def through(cls, s: Floats, values: Floats) -> Spline:
+        """Splines through values (k, m)."""
+        return cls(s, values, _curves(s, values))
 
     def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Values, first and second derivatives at s (n,), (n, n_a + 3) each."""
+        """Values, first and second derivatives at s (n,), (n, m) each."""
         place, step = self._places(s)
         after = ((s - self.s[place]) / step)[:, None]
         before, step = 1.0 - after, step[:, None]
@@ -62,6 +54,34 @@ class Curve:
         slopes = (high - low) / step
         slopes += step / 6.0 * ((1.0 - 3.0 * before**2) * bend + (3.0 * after**2 - 1.0) * bend_after)
         return values, slopes, before * bend + after * bend_after
+
+    def _places(self, s: Floats) -> tuple[np.ndarray, Floats]:
+        place = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+        return place, np.diff(self.s)[place]
+
+
+@dataclass(frozen=True)
+class Curve(Spline):
+    """Splines through the steps of a path, straight at its ends, along the length s of its steps.
+
+    Attributes
+    ----------
+    values : actuators and reference point at the steps, (k, n_a + 3).
+    steps : rows of the track that it goes through, (k,): those at which it stands still are left out.
+    poses : (k, 4, 4).
+    n_actuators : how many of the columns are actuators.
+    """
+
+    steps: np.ndarray
+    poses: Floats
+    n_actuators: int
+
+    def grid(self, least: int = FINEST) -> Floats:
+        """Points along s, at least so many, the steps among them."""
+        parts = max(-(-least // (len(self.s) - 1)), FEWEST)
+        shares = np.arange(parts) / parts
+        inner = (self.s[:-1, None] + np.diff(self.s)[:, None] * shares).ravel()
+        return np.append(inner, self.s[-1])
 
     def poses_at(self, s: Floats) -> Floats:
         """Poses at s (n,): positions on the spline, rotations by the shortest turn from step to step."""
@@ -75,9 +95,13 @@ class Curve:
         """The row of the track at, or before, s (n,)."""
         return np.asarray(self.steps[np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 1)])
 
-    def _places(self, s: Floats) -> tuple[np.ndarray, Floats]:
-        place = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-        return place, np.diff(self.s)[place]
+
+def _curves(s: Floats, values: Floats) -> Floats:
+    """Second derivatives of splines; of a single value, nothing."""
+    curves = np.empty_like(values)
+    if len(s) > 1:
+        second_derivatives(s, values, curves)
+    return curves
 
 
 def largest_between(begin: Floats, end: Floats, rise: Floats) -> Floats:
@@ -98,10 +122,7 @@ def curve_of(track: Track) -> Curve:
     s = np.concatenate([[0.0], np.cumsum(moves[steps[1:] - 1])])
     poses = np.ascontiguousarray(track.pose[steps])
     values = np.ascontiguousarray(np.concatenate([track.actuators[steps], poses[:, :3, 3]], axis=1))
-    curves = np.empty_like(values)
-    if len(steps) > 1:
-        second_derivatives(s, values, curves)
-    return Curve(steps, s, values, curves, poses, track.actuators.shape[1])
+    return Curve(s, values, _curves(s, values), steps, poses, track.actuators.shape[1])
 
 
 LOOKS = 80

@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..answers.status import Status
-from ..answers.tracked import Track
+from ..answers.tracked import Track, refuse_leaps
 from ..arrays import Floats
 from ..checks import put_limits, require_positive, require_type
 from ..description.mechanism import Mechanism
+from ..dynamics.inverse_dynamics import lacking_masses
+from ..dynamics.torque_rows import torque_rows
 from ..errors import InvalidArgument
+from ..files.units import metres_of
+from ..fk import solve_fk
 from ..kernels.timing import fastest
 from ..kinematics import actuator_units, readouts
+from ..statics.forces import GRAVITY
+from ..statics.loads import BodyLoads
 from ..tolerances import TOLERANCES
 from .curve import Curve, curve_of, largest_between, refuse_crossings
 from .timed import Timed, What
+from .torque_path import TorquePath
 
 MOST_SAMPLES = 10_000_000
+
+TORQUE_PLACES = 400
+"""Places of a path, at least, between which torques are a spline."""
 
 ROUNDS = 8
 """Largest number of passes that slow down cells of the grid in which an acceleration exceeds its limit; usually three
@@ -31,6 +42,9 @@ def time_path(
     speed: float | Mapping[str, float] | None = None,
     acceleration: float | Mapping[str, float] | None = None,
     platform_speed: float | None = None,
+    torque: float | Mapping[str, float] | None = None,
+    loads: BodyLoads | None = None,
+    gravity: ArrayLike = GRAVITY,
     rate: float = 1000.0,
 ) -> Timed:
     """The fastest timing of a path that was followed, from rest to rest, within the limits of every actuator.
@@ -48,6 +62,14 @@ def time_path(
         have the limits of their joints, `max_speed` and `max_acceleration`.
     platform_speed : float, optional
         Highest speed of the reference point [length/s].
+    torque : float or mapping of str to float, optional
+        The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
+        `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
+        are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline.
+    loads : mapping of str to tuple, optional
+        For torques, as in `inverse_dynamics`.
+    gravity : array (3,), optional
+        For torques, likewise [m/s²].
     rate : float, optional
         Rate of the samples that are returned [1/s].
 
@@ -55,18 +77,24 @@ def time_path(
     ------
     InvalidArgument
         A track with steps that were not reached, leap, cross a parallel singularity, or between which the spline leaves
-        a range, by the number of the step; one that does not move; no limit at all; more than ten million samples.
+        a range, by the number of the step; one that does not move; no limit at all; more than ten million samples. With
+        limits of torque, bodies without a mass, and limits that are exceeded at rest.
+    UnsupportedMechanism
+        Limits of torque of a machine with more actuators than motions.
     """
     require_type("track", track, Track, "a Track, as `track` returns")
     mechanism = track.mechanism
     speeds = limits_of(mechanism, "speed", speed)
     accelerations = limits_of(mechanism, "acceleration", acceleration)
+    torques = limits_of(mechanism, "torque", torque)
+    if torque is None and lacking_masses(mechanism, metres_of(mechanism.length_unit)):
+        torques[:] = np.inf
     most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
     every = 1.0 / require_positive("rate", rate)
-    if not np.isfinite([*speeds, *accelerations, most_platform]).any():
+    if not np.isfinite([*speeds, *accelerations, *torques, most_platform]).any():
         found = f"'{mechanism.name}' without max_speed and max_acceleration"
         raise InvalidArgument(
-            "speed", found, "a limit of speed, acceleration or platform speed, given or in the mechanism"
+            "speed", found, "a limit of speed, acceleration, torque or platform speed, given or in the mechanism"
         )
     if not len(track):
         raise InvalidArgument("track", "an empty path", "two steps or more that differ")
@@ -76,8 +104,38 @@ def time_path(
         raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
     refuse_crossings(track)
     refuse_swings(track, curve)
-    s, x = _fastest(curve, speeds, accelerations, most_platform)
-    return _sampled(track, curve, s, x, (speeds, accelerations, most_platform), every)
+    limits = _Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
+    s, x = _fastest(curve, limits)
+    return _sampled(track, curve, s, x, limits, every)
+
+
+class _Limits(NamedTuple):
+    """What a timing keeps.
+
+    Attributes
+    ----------
+    speeds, accelerations, torques : of the actuators, (n_a,); platform : the highest speed of the reference point.
+    path : the torques along the path.
+    """
+
+    speeds: Floats
+    accelerations: Floats
+    platform: float
+    torques: Floats
+    path: TorquePath | None
+
+
+def _torques(
+    track: Track, curve: Curve, limits: Floats, loads: BodyLoads | None, gravity: ArrayLike
+) -> TorquePath | None:
+    """The torques along a path; None where none is limited."""
+    if not np.isfinite(limits).any():
+        return None
+    mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES), curve.n_actuators
+    values, slopes, _ = (x[:, :n] for x in curve.at(s))
+    steps = curve.step_of(s)
+    solution = solve_fk(mechanism, values, start=track[steps])
+    return TorquePath(mechanism, s, torque_rows(solution, slopes, gravity, loads, steps))
 
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
@@ -90,15 +148,6 @@ def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float
             limits[place] = value
     put_limits(limits, what, given, mechanism.actuator_names)
     return limits
-
-
-def refuse_leaps(track: Track) -> None:
-    """Refuse a track with steps that are not reached, or that jump."""
-    for bad, what in ((track.status != Status.REACHED, "not reached"), (track.jumps, "leaping from the one before")):
-        steps = np.flatnonzero(bad)
-        if len(steps):
-            found = f"{len(steps)} step{'s' * (len(steps) > 1)} {what}"
-            raise InvalidArgument("track", found, "a path that is reached throughout", rows=steps[:5].tolist())
 
 
 def refuse_swings(track: Track, curve: Curve) -> None:
@@ -117,28 +166,55 @@ def refuse_swings(track: Track, curve: Curve) -> None:
         raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
 
 
-def _fastest(curve: Curve, speeds: Floats, accelerations: Floats, most_platform: float) -> tuple[Floats, Floats]:
+def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
     """A grid along s and the largest squared speeds there."""
     s = curve.grid()
     _, slopes, bends = curve.at(s)
-    n = curve.n_actuators
+    n, accelerations = curve.n_actuators, limits.accelerations
     slopes_of, bends_of = np.ascontiguousarray(slopes[:, :n]), np.ascontiguousarray(bends[:, :n])
     steepest = largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None])
     with np.errstate(divide="ignore"):
-        caps = np.min(speeds / steepest[:, :n], axis=1)
-        caps = np.minimum(caps, most_platform / np.linalg.norm(steepest[:, n:], axis=1)) ** 2
+        caps = np.min(limits.speeds / steepest[:, :n], axis=1)
+        caps = np.minimum(caps, limits.platform / np.linalg.norm(steepest[:, n:], axis=1)) ** 2
     caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
-    x, at_rest = np.empty(len(s)), bool(np.isfinite(accelerations).any())
+    by_push, by_speed, most = slopes_of, bends_of, np.tile(accelerations, (len(s), 1))
+    rest = viscous = np.zeros(most.shape)
+    if limits.path is not None:
+        parts = limits.path.at(s, slopes_of, bends_of)
+        by_push, by_speed = _beside(slopes_of, parts.by_push), _beside(bends_of, parts.by_speed)
+        rest, viscous = _beside(rest, parts.rest), _beside(viscous, parts.viscous)
+        most = _beside(most, np.broadcast_to(limits.torques, slopes_of.shape))
+        _refuse_heavy(curve, s, parts.rest, limits)
+    x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
     for _ in range(ROUNDS):
-        fastest(s, slopes_of, bends_of, accelerations, caps, at_rest, x)
+        low, high = np.minimum(-most - held, 0.0), np.maximum(most - held, 0.0)
+        fastest(s, by_push, by_speed, low, high, caps, at_rest, x)
         excess = _excess(s, x, slopes_of, bends_of, accelerations)
-        if excess.max() <= 1.0 + TOLERANCES.speed:
+        before, held = held, rest + viscous * np.sqrt(x)[:, None]
+        drag = np.abs(held - before) > TOLERANCES.speed * most
+        if excess.max() <= 1.0 + TOLERANCES.speed and not drag.any():
             break
         slower = np.where(excess > 1.0, excess, 0.0) ** 2
         slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
         caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
     return s, x / max(1.0, excess.max())
+
+
+def _beside(one: Floats, other: Floats) -> Floats:
+    """Columns of two arrays, (n, m) and (n, k), as kernels take them."""
+    return np.ascontiguousarray(np.hstack([one, other]))
+
+
+def _refuse_heavy(curve: Curve, s: Floats, rest: Floats, limits: _Limits) -> None:
+    """Refuse limits of torque that a machine exceeds while it rests on the path, or begins to move."""
+    over = np.abs(rest) >= limits.torques
+    if limits.path is not None and over.any():
+        place = int(np.argmax((np.abs(rest) / limits.torques).max(axis=0)))
+        name, most = limits.path.names[place], np.abs(rest[:, place]).max()
+        found = f"{limits.torques[place]:.6g}, where '{name}' has to exert {most:.6g} at rest"
+        steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
+        raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
 
 def _excess(s: Floats, x: Floats, slopes: Floats, bends: Floats, most: Floats) -> Floats:
@@ -153,9 +229,7 @@ def _excess(s: Floats, x: Floats, slopes: Floats, bends: Floats, most: Floats) -
     return np.asarray((largest_between(begin, end, rise) / most).max(axis=1))
 
 
-def _sampled(
-    track: Track, curve: Curve, s: Floats, x: Floats, limits: tuple[Floats, Floats, float], every: float
-) -> Timed:
+def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, every: float) -> Timed:
     """Samples at a rate, and at the very end."""
     steps, mean = np.diff(s), 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
     if not (mean > 0.0).all():
@@ -176,13 +250,14 @@ def _sampled(
     n = curve.n_actuators
     rates = slopes * pace[:, None]
     gains = slopes[:, :n] * pushes[cell][:, None] + bends[:, :n] * pace[:, None] ** 2
-    speeds, accelerations, most_platform = limits
-    platform = np.linalg.norm(rates[:, n:], axis=1)
-    used = np.concatenate(
-        [np.abs(rates[:, :n]) / speeds, np.abs(gains) / accelerations, platform[:, None] / most_platform], axis=1
-    )
-    names = track.mechanism.actuator_names
+    platform, names = np.linalg.norm(rates[:, n:], axis=1), track.mechanism.actuator_names
+    shares = [np.abs(rates[:, :n]) / limits.speeds, np.abs(gains) / limits.accelerations]
     kinds: list[tuple[str, What]] = [*((name, "speed") for name in names), *((name, "acceleration") for name in names)]
+    if limits.path is not None:
+        torques = limits.path.at(where, slopes[:, :n], bends[:, :n]).torques(pace, pushes[cell])
+        shares.append(np.abs(torques) / limits.torques)
+        kinds += [(name, "torque") for name in names]
+    used = np.concatenate([*shares, platform[:, None] / limits.platform], axis=1)
     return Timed(
         mechanism=track.mechanism,
         times=times,

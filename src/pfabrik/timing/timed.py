@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
 
 import numpy as np
 
+from ..answers.solution import Solution
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..errors import counted
 from ..extras import require
+from ..fk import solve_fk
 from ..kinematics import readouts
 from ..printed import Printed, ResultTable
 from ..rotations import to_rpy
@@ -22,7 +25,7 @@ from ..whole_files import whole_path
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-What: TypeAlias = Literal["speed", "acceleration"]
+What: TypeAlias = Literal["speed", "acceleration", "torque"]
 
 REACHED = 0.99
 """Share of a limit from which on a sample counts as held back by it; some limits bind only at the next grid point."""
@@ -51,7 +54,7 @@ class Timed(Printed):
     binding : array of int (n,)
         Index of that limit in `limits`.
     limits : tuple of tuple of str
-        Pairs (actuator, "speed" or "acceleration") of all actuators, and ("platform", "speed").
+        Pairs (actuator, "speed", "acceleration" or "torque") of all actuators, and ("platform", "speed").
     """
 
     mechanism: Mechanism
@@ -66,6 +69,11 @@ class Timed(Printed):
     binding: Ints
     limits: tuple[tuple[str, What], ...]
     _track: Track = field(repr=False)
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The configurations of the samples, (n,), by their actuators."""
+        return solve_fk(self.mechanism, self.actuators, start=self._track[self.steps])
 
     @property
     def duration(self) -> float:
