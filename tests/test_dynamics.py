@@ -12,6 +12,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.files.units import metres_of
+from pfabrik.kinematics import displacements, home_coordinates
 
 WITHOUT_IDLE = (
     *("agile_eye", "ankle_ups", "canfield", "delta", "five_bar", "g1_ankle", "hexaglide", "nrpm", "orthoglide"),
@@ -164,25 +165,15 @@ def test_power_goes_into_kinetic_and_potential_energy() -> None:
     solutions = pf.solve_ik(machine, poses)
     si = twists * np.array([1e-3] * 3 + [1.0] * 3)
     energy = 0.5 * np.einsum("ni,nij,nj->n", si, pf.mass_matrix(solutions), si)
+    moved = displacements(machine, solutions.q - home_coordinates(machine))
     for mass in machine.masses:
-        if mass.body != machine.base:
-            up = np.array([point_of(machine, solution, mass) for solution in solutions])
-            energy -= mass.mass * 1e-3 * up @ gravity
+        at = moved[mass.body][:, :3, :3] @ np.array(mass.centre) + moved[mass.body][:, :3, 3]
+        energy -= mass.mass * 1e-3 * at @ gravity
     e = energy.reshape(-1, 5)
     change = (8.0 * (e[:, 3] - e[:, 1]) - (e[:, 4] - e[:, 0])) / (12.0 * h)
     found = pf.inverse_dynamics(solutions, twists=twists, accelerations=accelerations, gravity=gravity)
     power = found.power.sum(axis=-1).reshape(-1, 5)[:, 2]
     np.testing.assert_allclose(power, change, rtol=1e-8, atol=1e-8 * np.abs(power).max())
-
-
-def point_of(machine: pf.Mechanism, solution: pf.Solution, mass: pf.Mass) -> Any:
-    """Where a body's centre of mass is, by the three or more points of its joints; here of struts and a platform."""
-    if mass.body == machine.end_effector:
-        return solution.pose[:3, :3] @ (np.array(mass.centre) - machine.reference_point) + solution.pose[:3, 3]
-    from pfabrik.kinematics import displacements, home_coordinates
-
-    moved = displacements(machine, (solution.q - home_coordinates(machine))[None])[mass.body][0]
-    return moved[:3, :3] @ np.array(mass.centre) + moved[:3, 3]
 
 
 def lagrange(shown: Callable[[Any], Any], weights: Any, potential: Callable[[Any], Any], q: Any, v: Any, a: Any) -> Any:

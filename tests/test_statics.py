@@ -532,3 +532,46 @@ def test_a_wrong_call_says_so_in_one_sentence(sentence: str) -> None:
         WRONG[sentence](machine, pf.solve_ik(machine, [0, 0, 190]))
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def suspended() -> pf.Mechanism:
+    """A platform on eight cables, two more than it has freedoms."""
+    corners = np.array([(x, y, z) for z in (0, 1) for x in (-1, 1) for y in (-1, 1)], float)
+    base = corners * [500, 400, 600]
+    platform = [0, 0, 260] + corners * [60, 60, -80] * np.where(corners[:, 2:] > 0, [1, -1, 1], 1) + [0, 0, 80]
+    return pf.Mechanism.from_legs("U-P*-S", base=base, platform=platform, reference_point=(0, 0, 300), name="cables")
+
+
+def test_cables_share_a_load_within_their_limits_nearest_to_the_middle() -> None:
+    machine, load = suspended(), [10.0, -5.0, -80.0, 300.0, 0.0, 500.0]
+    solutions = pf.solve_ik(machine, pf.pose([[0, 0, 300], [30, -20, 310]], rotvec=[[0, 0, 0], [0, 0, 0.05]]))
+    least, low, high = pf.forces(solutions, load), -99.0, -40.0
+    assert least.actuators.max() > 0.0  # some would push
+    found = pf.forces(solutions, load, limits=(low, high))
+    assert list(found.reason) == ["", ""]
+    for solution, pulls, margin, binding in zip(solutions, found.actuators, found.margin, found.binding, strict=True):
+        assert low * (1 + 1e-8) <= pulls.min() and pulls.max() <= high * (1 - 1e-8)
+        jacobian = pf.inverse_jacobian(solution)
+        np.testing.assert_allclose(jacobian.T @ pulls, -np.array(load), atol=1e-6 * 500)
+        is_free = (pulls > low + 1e-5) & (pulls < high - 1e-5)
+        away = pulls - 0.5 * (low + high)
+        scaled = jacobian / [1, 1, 1, 300, 300, 300]
+        against = away - scaled @ np.linalg.lstsq(scaled[is_free], away[is_free], rcond=1e-9)[0]
+        np.testing.assert_allclose(against[is_free], 0.0, atol=1e-4)  # the conditions of the nearest point
+        assert (against[pulls <= low + 1e-5] >= -1e-4).all() and (against[pulls >= high - 1e-5] <= 1e-4).all()
+        room = np.minimum(pulls - low, high - pulls)
+        assert margin == pytest.approx(room.min(), abs=1e-9)
+        assert binding.split()[0] == machine.actuator_names[int(room.argmin())]
+    ends = [found.reactions[joint.name] for joint in machine.joints if joint.type == "spherical"]
+    np.testing.assert_allclose(np.sum(ends, axis=0)[:, :3], np.tile(np.multiply(load[:3], -1.0), (2, 1)), atol=1e-6)
+
+
+def test_a_load_that_no_forces_within_limits_hold_has_a_reason() -> None:
+    machine = suspended()
+    home = pf.solve_ik(machine, machine.home_pose)
+    assert "within their limits" in str(pf.forces(home, [0, 0, -5000, 0, 0, 0], limits=(-90, -5)).reason)
+    stewart = pf.solve_ik(pf.load("stewart"), pf.load("stewart").home_pose)
+    held = pf.forces(stewart, [0, 0, -60, 0, 0, 0], limits=20.0)
+    np.testing.assert_allclose(held.actuators, pf.forces(stewart, [0, 0, -60, 0, 0, 0]).actuators)
+    assert "of B" in str(held.table()) and held.margin == pytest.approx(20.0 - held.actuators.max())
+    assert "within their limits" in str(pf.forces(stewart, [0, 0, -60, 0, 0, 0], limits=9.0).reason)

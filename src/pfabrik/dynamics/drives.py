@@ -8,7 +8,6 @@ import numpy as np
 
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..tolerances import TOLERANCES
 
 
 class Drives:
@@ -41,33 +40,6 @@ class Drives:
     def rubbed(self, rates: Floats) -> Floats:
         """What friction takes at rates (n, n_a) of the machine, in N and N m."""
         return self.friction[:, 0] * np.sign(rates) + self.friction[:, 1] * rates * self.si
-
-
-ROUNDS = 2000
-"""Projections by which forces come within limits: far from corners tens do."""
-
-
-def within_limits(forces: Floats, rates: Floats, limits: Floats) -> Floats:
-    """The least forces (n, n_a) within limits (n_a,) that do the same work on all motions; as they are where none do.
-
-    Projected in turn on the forces that do the work and on those within limits (Dykstra's algorithm), 0 comes to the
-    point of both that is nearest to it.
-
-    Parameters
-    ----------
-    forces : that do the work, (n, n_a).
-    rates : of the actuators, by motions, (n, n_a, d).
-    """
-    working = rates @ np.linalg.pinv(rates, rcond=TOLERANCES.singular)
-    found, owed = np.zeros(forces.shape), np.zeros(forces.shape)
-    for _ in range(ROUNDS):
-        on = found + (working @ (forces - found)[..., None])[..., 0]
-        found = np.clip(on + owed, -limits, limits)
-        owed += on - found
-        is_there = np.abs(on - found).max(axis=1) <= TOLERANCES.rank * np.abs(forces).max(axis=1)
-        if is_there.all():
-            break
-    return np.where(is_there[:, None], on, forces)
 
 
 def _of(drive: Any, name: str) -> Any:

@@ -28,9 +28,10 @@ from ..statics.loads import (
     in_shape,
     no_reasons,
 )
+from ..statics.sharing import within_limits
 from ..statics.transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated
 from .asked_motion import in_lengths, is_missed, motion_of, shown_of, task_axes
-from .drives import Drives, within_limits
+from .drives import Drives
 from .efforts import Efforts
 from .moving_machine import MovingMachine, Weights, weights_of
 
@@ -305,7 +306,8 @@ class _Block:
             return found
         more = np.zeros(on_drives.shape)
         rates = self.moving.first.pairs[rows][:, self.moving.first.actuated]
-        more[rows] = within_limits(found.actuators[rows, :, 0], rates, limits) - found.actuators[rows, :, 0]
+        least = found.actuators[rows, :, 0]
+        more[rows] = within_limits(least, rates, np.stack([-limits, limits], axis=1))[0] - least
         against = balance_at(self.mechanism, self.moving.first, self.carried[..., None], (on_drives + more)[..., None])
         return against._replace(actuators=against.actuators + more[..., None])
 

@@ -18,13 +18,15 @@ from ..frozen import FrozenMapping
 from ..kinematics import actuator_units, end_effector_pose, joint_centres
 from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
-from .joint_balance import COMPONENTS, Balance, about_centres, balance, open_components, open_in_words
+from .joint_balance import COMPONENTS, Balance, about_centres, balance, open_components, open_in_words, pairs_of
 from .loads import (
     Asked,
     BodyLoads,
+    Bounds,
     Reasons,
     add_reason,
     asked_of,
+    bounds_of,
     carried_of,
     checked_gravity,
     checked_loads,
@@ -33,9 +35,11 @@ from .loads import (
     no_reasons,
     reasons_in_words,
 )
+from .sharing import within_limits
 from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
 GRAVITY = (0.0, 0.0, -9.81)
+BEYOND = "no forces of the actuators within their limits hold the load"
 FREE_PART = "the loads move a part that neither the end effector nor an actuator holds"
 
 
@@ -46,6 +50,7 @@ class _Question(NamedTuple):
     asked: Asked
     loads: BodyLoads
     gravity: Floats
+    limits: Floats | None
 
 
 class Reactions(Printed, FrozenMapping[str, Floats]):
@@ -98,7 +103,13 @@ class Forces(Printed):
         positive one, a cable under tension a negative one. NaN where `reason` says why.
     is_least_norm : bool
         True if there are more actuators than motions that they control: of all forces that hold the load, those with
-        the least sum of squares are given, torques compared with forces times L.
+        the least sum of squares are given, torques compared with forces times L; with `limits`, those nearest to the
+        middle of these.
+    margin : float or array (...)
+        With `limits`, how far the actuator that is nearest to one of its own is from it, in the unit of that; infinite
+        without.
+    binding : str or array of str (...)
+        That limit: the actuator, and "low" or "high"; empty without any.
     reason : str or array of str (...)
         Why there are no such forces; empty where there are. A text for a single answer.
     """
@@ -118,10 +129,39 @@ class Forces(Printed):
         least = 1e-9 * max(map(abs, largest), default=0.0)
         units = ["force" if drive.kind == "length" else f"force {mechanism.length_unit}" for drive in mechanism.drives]
         values = [plain(value, least) for value in largest]
+        remarks = []
+        if self._question.limits is not None:
+            place = int(np.nanargmin(np.ravel(self.margin)))
+            remarks = [f"least margin: {np.ravel(self.margin)[place]:.6g} of {np.ravel(self.binding)[place]}"]
         header = ("actuator", "exerts" if np.ndim(self.actuators) == 1 else "of largest magnitude", "unit")
         return ResultTable(
-            mechanism.name, lines, header, list(zip(mechanism.actuator_names, values, units, strict=True))
+            mechanism.name, lines, header, list(zip(mechanism.actuator_names, values, units, strict=True)), remarks
         )
+
+    @cached_property
+    def margin(self) -> float | Floats:
+        """See the attributes."""
+        of_batch: float | Floats = shaped(self._nearest[0], self._question.asked.shape)
+        return of_batch
+
+    @cached_property
+    def binding(self) -> str | Reasons:
+        """See the attributes."""
+        margins, places = self._nearest
+        words = [f"{name} {end}" for name in self._mechanism.actuator_names for end in ("low", "high")]
+        found = [words[place] if np.isfinite(margin) else "" for margin, place in zip(margins, places, strict=True)]
+        return in_shape(np.array(found, dtype=object), self._question.asked.shape)
+
+    @cached_property
+    def _nearest(self) -> tuple[Floats, Ints]:
+        """The distance to the nearest limit of every row, and which that is: each actuator has a low and a high one."""
+        exerted, limits = np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names))), self._question.limits
+        if limits is None:
+            return np.full(len(exerted), np.inf), np.zeros(len(exerted), np.int64)
+        room = np.stack([exerted - limits[:, 0], limits[:, 1] - exerted], axis=-1)
+        scaled = (room * actuator_units(self._mechanism)[:, None]).reshape(len(exerted), -1)
+        places = np.argmin(np.where(np.isnan(scaled), np.inf, scaled), axis=1)
+        return room.reshape(len(exerted), -1)[np.arange(len(exerted)), places], places
 
     @cached_property
     def reactions(self) -> Reactions:
@@ -171,7 +211,12 @@ class Forces(Printed):
 
     @cached_property
     def _balance(self) -> Balance:
-        return _balanced(self._question, self._coordinates, slice(None))
+        found = _balanced(self._question, self._coordinates, slice(None))
+        if self._question.limits is None:
+            return found
+        exerted = np.reshape(self.actuators, found.actuators.shape[:2]) * actuator_units(self._mechanism)
+        more = np.where(np.isnan(exerted), 0.0, exerted - found.actuators[..., 0])
+        return _balanced(self._question, self._coordinates, slice(None), more[..., None])
 
     @cached_property
     def _places(self) -> tuple[Floats, Floats]:
@@ -202,6 +247,7 @@ def forces(
     at: ArrayLike | None = None,
     loads: BodyLoads | None = None,
     gravity: ArrayLike = GRAVITY,
+    limits: Bounds | None = None,
 ) -> Forces:
     """Forces that the actuators exert to hold a load, and what the joints transmit, in static equilibrium.
 
@@ -223,6 +269,10 @@ def forces(
         frame. Points are those of the body at home, in base coordinates [length].
     gravity : array (3,), optional
         Gravity, for masses, in units of force per mass.
+    limits : float or tuple of float or array (n_a, 2) or mapping of str, optional
+        What actuators exert at most, both ways, or (lowest, highest), for all, each, or by name: (-200, -5) of cables
+        that stay taut. Redundant actuators then share a load within these, as near to their middle as it lets them; a
+        load that none of these forces hold has a reason.
 
     Raises
     ------
@@ -231,14 +281,18 @@ def forces(
     """
     mechanism = checked_solution(solution).mechanism
     question = _Question(
-        solution, asked_of(solution, wrench, at), checked_loads(mechanism, loads), checked_gravity(gravity)
+        solution,
+        asked_of(solution, wrench, at),
+        checked_loads(mechanism, loads),
+        checked_gravity(gravity),
+        None if limits is None else bounds_of("limits", limits, mechanism.actuator_names),
     )
     asked, maps = question.asked, maps_of(solution)
     places = asked.places
     reasons = no_reasons(len(places))
     add_reason(reasons, ~maps.is_valid[places], NO_CONFIGURATION)
     actuators = np.full((len(places), len(mechanism.actuator_names)), np.nan)
-    is_quick = maps.is_regular[places] & (not question.loads)
+    is_quick = maps.is_regular[places] & (not question.loads) & (limits is None)
     forward = maps.forward[places[is_quick]]
     actuators[is_quick] = -np.einsum("nra,nr->na", forward, asked.wrenches[is_quick, : forward.shape[1]])
     rest = np.flatnonzero(maps.is_valid[places] & ~is_quick)
@@ -249,6 +303,13 @@ def forces(
         add_reason(reasons, rest[found.is_singular], GAINS_MOTION)
         add_reason(reasons, rest[found.is_idle[:, 0]], FREE_PART)
         add_reason(reasons, rest[~found.is_held[:, 0]], gives_way_in_words(mechanism))
+        if question.limits is not None:
+            units = actuator_units(mechanism)
+            shared, is_within = within_limits(
+                found.actuators[..., 0], pairs_of(mechanism, q).rates, question.limits * units[:, None]
+            )
+            actuators[rest] = shared / units
+            add_reason(reasons, rest[~is_within], BEYOND)
         actuators[has_reason(reasons)] = np.nan
     return Forces(
         shaped(actuators, asked.shape),
@@ -258,11 +319,11 @@ def forces(
     )
 
 
-def _balanced(question: _Question, q: Floats, rows: slice | NDArray[np.intp]) -> Balance:
-    """The equilibrium of some rows at their coordinates q, (n, c)."""
+def _balanced(question: _Question, q: Floats, rows: slice | NDArray[np.intp], more: Floats | float = 0.0) -> Balance:
+    """The equilibrium of some rows at their coordinates q, (n, c); of other forces than the least, that are `more`."""
     mechanism = question.solution.mechanism
-    wrenches = question.asked.wrenches[rows]
-    return balance(mechanism, q, carried_of(mechanism, q, wrenches, question.loads, question.gravity)[..., None])
+    carried = carried_of(mechanism, q, question.asked.wrenches[rows], question.loads, question.gravity)
+    return balance(mechanism, q, carried[..., None], more)
 
 
 class Rods(NamedTuple):

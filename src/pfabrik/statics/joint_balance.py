@@ -69,11 +69,13 @@ class Pairs(NamedTuple):
     rates: Floats
 
 
-def balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
-    """The equilibrium at coordinates q (n, c) of what joints carry, (n, joints, 6, k)."""
+def balance(mechanism: Mechanism, q: Floats, carried: Floats, on_drives: Floats | float = 0.0) -> Balance:
+    """The equilibrium at coordinates q (n, c) of what joints carry, (n, joints, 6, k), and what drives do."""
+    acting = np.broadcast_to(on_drives, (len(q), len(mechanism.drives), carried.shape[-1]))
     blocks = [
-        _balance(mechanism, q[start : start + ROWS_A_BLOCK], carried[start : start + ROWS_A_BLOCK])
+        balance_at(mechanism, JointRates(model_of(mechanism), q[rows]), carried[rows], acting[rows])
         for start in range(0, max(len(q), 1), ROWS_A_BLOCK)
+        for rows in [slice(start, start + ROWS_A_BLOCK)]
     ]
     return Balance(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
 
@@ -82,10 +84,6 @@ def pairs_of(mechanism: Mechanism, q: Floats) -> Pairs:
     """The motions at coordinates q, (n, c)."""
     first, rows = JointRates(model_of(mechanism), q), 3 if mechanism.end_effector_is_joint else 6
     return Pairs(first.twists[:, :rows] @ first.pairs, first.pairs[:, first.actuated])
-
-
-def _balance(mechanism: Mechanism, q: Floats, carried: Floats) -> Balance:
-    return balance_at(mechanism, JointRates(model_of(mechanism), q), carried)
 
 
 def balance_at(mechanism: Mechanism, first: JointRates, carried: Floats, on_drives: Floats | float = 0.0) -> Balance:
