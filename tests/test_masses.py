@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import pfabrik as pf
+from pfabrik.cli import main
 from pfabrik.description.body_inertias import inertias_of
 from pfabrik.files import dumps, loads
 from test_dynamics import weighed
@@ -161,6 +165,26 @@ m = 1
     np.testing.assert_allclose(second.centre, turn @ first.centre)
     weights = inertias_of(machine, 1e-3)
     np.testing.assert_allclose(weights["weight2"].inertia, turn @ weights["weight1"].inertia @ turn.T, atol=1e-12)
+
+
+def test_a_mass_without_a_centre_is_spread_over_the_shapes_of_its_body() -> None:
+    machine = pf.load("five_bar").with_shapes([pf.Shape("link1", thickness=8.0), pf.Shape("link2", thickness=8.0)])
+    heavy = machine.with_masses([pf.Mass("link1", 0.2)])
+    ends = [np.array(heavy.joint(name).at) for name in ("p1", "p2")]
+    np.testing.assert_allclose(inertias_of(heavy, 1e-3)["link1"].centre, np.mean(ends, axis=0), atol=1e-12)
+    assert loads(dumps(heavy)) == heavy
+    assert pf.solve_ik(heavy, [0, 10, 180])
+
+
+def test_the_command_says_what_motors_exert_along_a_path(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,5\n0.1,0,0,5\n0.2,0,0,5\n")
+    words = ["effort", "linear_delta", str(tmp_path / "path.csv")]
+    done = CliRunner().invoke(main, [*words, "--load", "platform=0.5,0,0,0", "--json"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert found["actuators"][1] == pytest.approx([0.5 * 9.81 / 3] * 3)
+    assert "counted as none: carriage1" in done.stderr
+    assert CliRunner().invoke(main, words).exit_code == 2
 
 
 SHAPES: dict[str, tuple[dict[str, Any], str]] = {

@@ -25,6 +25,7 @@ __all__ = ["main"]
         "certify": ("certify", "Prove that every pose of a region is reached, or find one that is not."),
         "calibrate": ("calibrate", "Find the parameters of a machine from measurements."),
         "time": ("track", "Find the fastest way along a path."),
+        "effort": ("motor_forces", "Tell what motors exert along a path."),
         "speed": ("questions", "Tell how fast the platform may move."),
         "singularities": ("workspace", "Tell how near singularities are, at a pose or over a workspace."),
         "forces": ("statics", "Tell what the actuators exert to hold a load."),

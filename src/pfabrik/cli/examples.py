@@ -15,6 +15,10 @@ EXAMPLES = {
     "certify": ("certify stewart --box -10:10,-10:10,185:195", "certify delta --ball 0,0,-200,20 --tolerance 0.05"),
     "calibrate": ("calibrate printer.cfg", "calibrate printer.cfg --klipper calibrated.cfg"),
     "time": ("time linear_delta part.gcode --speed 300", "time linear_delta part.gcode --speed 300 -o timed.csv"),
+    "effort": (
+        "effort linear_delta part.gcode --load platform=0.5,0,0,0",
+        "effort linear_delta part.gcode --rate 500 --load platform=0.5,0,0,0 --json",
+    ),
     "speed": ("speed five_bar --position 0 10 180 --speed 30", "speed stewart --speed 50 --speed BL1=20"),
     "singularities": ("singularities five_bar --position 0 30 200", "singularities five_bar --over y,z -o map.png"),
     "forces": (

@@ -54,7 +54,9 @@ def _with_tip(mechanism: Mechanism, length: float) -> Mechanism:
         name += "'"
     connects, at = (mechanism.end_effector, f"beyond {name}"), mechanism.reference_point
     tip = Joint(name, "revolute", connects, at=at, axis=(0.0, 0.0, 1.0))
-    read = mechanism._with(joints=(*mechanism.joints, tip), end_effector=name, shapes=(), ignore=(), clearance=None)
+    read = mechanism._with(
+        joints=(*mechanism.joints, tip), end_effector=name, shapes=(), masses=(), ignore=(), clearance=None
+    )
     numbers = home_numbers(read).copy()
     numbers[0] = length
     return with_numbers(read, numbers)
