@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-import numpy as np
 
 import pfabrik as pf
 
@@ -63,4 +62,4 @@ def effort(
     track = pf.track(mechanism, read.targets, times=times, sample_time=sample_time)
     found = pf.inverse_dynamics(track, loads=carried, gravity=gravity)
     print_result(as_json, found)
-    return int(any(np.ravel(found.reason)))
+    return int(any(found.reason))
