@@ -107,8 +107,7 @@ def test_efforts_and_mass_matrices_are_mujocos(name: str) -> None:
     solution, rates, gains = somewhere(machine)
     rates, gravity = rates * (name in WITHOUT_IDLE), (1.0, -2.0, -9.0)  # how fast what is idle spins is a choice
     found = pf.inverse_dynamics(solution, twists=rates, accelerations=gains, at="actuators", gravity=gravity)
-    si = units(machine)[1]
-    forces, mass = by_mujoco(machine, solution, rates * si, gains * si, gravity)
+    forces, mass = by_mujoco(machine, solution, *units(machine)[1] * [rates, gains], gravity)
     assert found.reason == ""
     np.testing.assert_allclose(found.actuators, forces, atol=1e-9 * np.abs(forces).max())
     np.testing.assert_allclose(pf.mass_matrix(solution, "actuators"), mass, atol=1e-9 * np.abs(mass).max())
@@ -312,7 +311,7 @@ def test_a_platform_on_legs_without_mass_is_newtons_and_eulers() -> None:
 
 @pytest.mark.parametrize("name", ["stewart", "delta", "nrpm", "rps"])
 def test_moved_scaled_and_relabelled_machines_do_the_same(name: str) -> None:
-    machine = weighed(pf.load(name))
+    machine = weighed(pf.load(name).without_limits())
     solution, rates, gains = somewhere(machine)
     motion: dict[str, Any] = {"at": "actuators", "gravity": (0, 3, -9)}
     found = pf.inverse_dynamics(solution, twists=rates, accelerations=gains, **motion)
@@ -321,16 +320,9 @@ def test_moved_scaled_and_relabelled_machines_do_the_same(name: str) -> None:
     def point(value: Any) -> Any:
         return None if value is None else (np.array(value) + shift) * scale
 
-    lengths = [joint.type == "prismatic" for joint in machine.joints]
-    joints = [
-        dataclasses.replace(
-            joint,
-            at=point(joint.at),
-            range=None if joint.range is None else np.array(joint.range) * (scale if is_length else 1.0),
-            home=joint.home * scale if is_length and isinstance(joint.home, float) else joint.home,
-        )
-        for joint, is_length in zip(machine.joints, lengths, strict=True)
-    ]
+    homes = [np.multiply(joint.home, scale if joint.type == "prismatic" else 1.0) for joint in machine.joints]
+    pairs = zip(machine.joints, homes, strict=True)
+    joints = [dataclasses.replace(joint, at=point(joint.at), home=home) for joint, home in pairs]
     masses = [
         pf.Mass(each.body, each.mass, point(each.centre), np.array(each.inertia) * scale**2) for each in machine.masses
     ]
@@ -338,8 +330,7 @@ def test_moved_scaled_and_relabelled_machines_do_the_same(name: str) -> None:
     other = pf.Mechanism(
         "other", joints[::-1], machine.end_effector, reference, length_unit="m", task=machine.task, masses=masses
     )
-    order = [other.actuator_names.index(each) for each in machine.actuator_names]
-    si = units(machine)[1]
+    order, si = [other.actuator_names.index(each) for each in machine.actuator_names], units(machine)[1]
     back = np.argsort(order)
     there = pf.solve_fk(other, (solution.actuators * si)[back])
     again = pf.inverse_dynamics(there, twists=(rates * si)[back], accelerations=(gains * si)[back], **motion)
@@ -371,15 +362,15 @@ def test_paths_with_times_move_as_these_say() -> None:
 
 
 def test_what_a_body_carries_is_as_if_it_weighed_more() -> None:
-    machine = weighed(pf.load("delta"), own={"platform": 0.5})
-    heavier = weighed(pf.load("delta"), own={"platform": 0.0})
-    platform = next(each for each in machine.masses if each.body == "platform")
-    heavier = heavier.with_masses([dataclasses.replace(each, inertia=None) for each in heavier.masses])
-    machine = machine.with_masses([dataclasses.replace(each, inertia=None) for each in machine.masses])
+    points = [dataclasses.replace(each, mass=0.0, inertia=None) for each in weighed(pf.load("delta")).masses]
+    (platform,) = (each for each in points if each.body == "platform")
+    heavy = [dataclasses.replace(each, mass=0.5 * (each is platform)) for each in points]
+    bare, machine = (pf.load("delta").with_masses(masses) for masses in (points, heavy))
     motion: dict[str, Any] = {"twists": [100, 50, -20], "accelerations": [3000, -1000, 500]}
     solution, *_ = somewhere(machine)
-    other = pf.configuration(heavier, solution.q)
-    found = pf.inverse_dynamics(other, **motion, loads={"platform": (0.5, platform.centre)})
+    found = pf.inverse_dynamics(
+        pf.configuration(bare, solution.q), **motion, loads={"platform": (0.5, platform.centre)}
+    )
     np.testing.assert_allclose(found.actuators, pf.inverse_dynamics(solution, **motion).actuators, rtol=1e-12)
 
 
