@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -25,14 +26,33 @@ def dask_workers() -> Iterator[Executor]:
         yield client.get_executor()
 
 
+class Unaligned(Executor):
+    """An executor that hands large arrays on as clusters may: read from a stream, at any address."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        function, block = received((fn, args))
+        future.set_result(received(function(*block)))
+        return future
+
+
+def received(sent: Any) -> Any:
+    """What comes out at the other end of a stream."""
+    buffers: list[pickle.PickleBuffer] = []
+    text = pickle.dumps(sent, protocol=5, buffer_callback=buffers.append)
+    streams = [memoryview(b"-" + bytes(each.raw()))[1:] for each in buffers]
+    return pickle.loads(text, buffers=streams)
+
+
 EXECUTORS: dict[str, Callable[[], AbstractContextManager[Executor]]] = {
     "threads": partial(ThreadPoolExecutor, 2),
     "processes": partial(ProcessPoolExecutor, 2),
     "dask": dask_workers,
+    "unaligned": Unaligned,
 }
 
 
-@pytest.fixture(params=["threads", "processes", pytest.param("dask", marks=pytest.mark.campaign)])
+@pytest.fixture(params=["threads", "processes", "unaligned", pytest.param("dask", marks=pytest.mark.campaign)])
 def executor(request: pytest.FixtureRequest) -> Iterator[Executor]:
     with EXECUTORS[request.param]() as workers:
         yield workers
@@ -55,7 +75,7 @@ def assert_same(there: Any, here: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_answers_are_the_same_wherever_they_are_worked_out(executor: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "POSES_A_BLOCK", 512)
+    monkeypatch.setattr(executors, "POSES_A_BLOCK", 900)  # large enough for clusters to send arrays by themselves
     options = pf.Options(on_invalid="mark")
     for name, n in (("delta", 1500), ("nrpm", 600), ("canfield", 20), ("panda", 600)):
         machine = pf.load(name)
@@ -112,15 +132,18 @@ def executors_turn(certificate: pf.Certificate) -> int:
 class Refusing(Executor):
     """An executor whose second block fails; blocks wait until they are asked for."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = 100) -> None:
         self.futures: list[Future[Any]] = []
+        self._most = most
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if len(self.futures) == self._most:
+            raise RuntimeError("cannot schedule new futures: shut down")
         future: Future[Any] = Future()
         self.futures.append(future)
         if len(self.futures) == 1:
             future.set_result(fn(*args, **kwargs))
-        if len(self.futures) == 2:
+        if len(self.futures) == 2 and self._most > 3:
             future.set_exception(OSError("the worker is gone"))
         return future
 
@@ -132,8 +155,25 @@ def test_a_failure_on_a_worker_drops_the_blocks_that_have_not_begun() -> None:
     assert [future.cancelled() for future in refusing.futures] == [False, False, True, True, True]
 
 
+def test_blocks_that_have_not_begun_are_dropped_where_submitting_fails() -> None:
+    refusing = Refusing(most=3)
+    with pytest.raises(RuntimeError, match="shut down"):
+        pf.feasibility(pf.load("delta"), np.zeros((5 * executors.POSES_A_BLOCK, 3)), executor=refusing)
+    assert [future.cancelled() for future in refusing.futures] == [False, True, True]
+
+
+def test_an_answer_from_a_stream_is_a_start() -> None:
+    machine = pf.load("stewart")
+    answers = pf.solve_ik(machine, around_home(machine, 1500), options=pf.Options(on_invalid="mark"))
+    there = received(answers[:700])
+    assert_same(pf.solve_ik(machine, there.pose, start=there), pf.solve_ik(machine, there.pose, start=answers[:700]))
+    assert there[0].active_limits == answers[0].active_limits
+
+
 def test_what_is_no_executor_is_refused() -> None:
     machine = pf.load("delta")
+    with pytest.raises(pf.errors.InvalidArgument, match="the class ThreadPoolExecutor"):
+        pf.solve_ik(machine, [0, 0, 0], executor=ThreadPoolExecutor)  # type: ignore[arg-type]
     for ask in (pf.solve_ik, pf.feasibility):
         with pytest.raises(pf.errors.InvalidArgument, match="executor: found 3; expected an executor of concurrent"):
             ask(machine, [0, 0, 0], executor=3)  # type: ignore[operator]
@@ -151,6 +191,4 @@ def test_functions_that_use_the_package_are_sent_to_other_processes(monkeypatch:
 
 
 def call(function: bytes, machine: pf.Mechanism) -> Any:
-    import pickle
-
     return pickle.loads(function)(machine)

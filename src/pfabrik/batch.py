@@ -25,6 +25,16 @@ def take_each(batch: Batch, places: Any) -> Batch:
     return batch if len(batch[0]) == 1 else take(batch, places)
 
 
+def aligned(value: Any) -> Any:
+    """A value whose arrays kernels can read and write, those of tuples too: others may come so from other processes."""
+    if isinstance(value, np.ndarray):
+        return np.require(value, requirements=["C", "A", "W"])
+    if isinstance(value, tuple):
+        make = getattr(value, "_make", tuple)
+        return make(map(aligned, value))
+    return value
+
+
 def put(batch: Batch, places: Any, source: Batch, source_places: Any = slice(None)) -> None:
     """Write rows of a source at some places."""
     for item, source_item in zip(batch, source, strict=True):

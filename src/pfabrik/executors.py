@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from functools import lru_cache
 from typing import Any, TypeVar
 
+from .batch import aligned
 from .checks import require_method
+from .errors import InvalidArgument
 
 POSES_A_BLOCK = 1 << 14
 """Poses of a block: enough to be worth sending to another process."""
@@ -40,12 +42,15 @@ class Workers:
     executor : Executor or None
         Of `concurrent.futures`, or one like it, such as Dask's or loky's; None answers here.
     shared : object
-        The first argument of every call; pickled once here, and unpacked once on each worker.
+        The first argument of every call; pickled once here, sent with every block, unpacked once on each worker.
     """
 
     def __init__(self, executor: Executor | None, shared: Any) -> None:
         if executor is not None:
-            require_method("executor", executor, "submit", "an executor of concurrent.futures, or None")
+            expected = "an executor of concurrent.futures, or None"
+            require_method("executor", executor, "submit", expected)
+            if isinstance(executor, type):
+                raise InvalidArgument("executor", f"the class {executor.__name__}", f"{expected}: make one of it")
         self._executor, self._shared = executor, shared
         self._sent = b"" if executor is None else pickle.dumps(shared)
 
@@ -58,8 +63,10 @@ class Workers:
             for block in blocks:
                 yield function(self._shared, *block)
             return
-        futures = [self._executor.submit(_on_a_worker, self._sent, function, *block) for block in blocks]
+        futures: list[Future[Result]] = []
         try:
+            for block in blocks:
+                futures.append(self._executor.submit(_on_a_worker, self._sent, function, *block))
             for future in futures:
                 yield future.result()
         finally:
@@ -69,7 +76,7 @@ class Workers:
 
 def _on_a_worker(sent: bytes, function: Callable[..., Result], *block: Any) -> Result:
     """Answer a block on a worker."""
-    return function(_unpacked(sent), *block)
+    return function(_unpacked(sent), *map(aligned, block))
 
 
 @lru_cache(maxsize=4)

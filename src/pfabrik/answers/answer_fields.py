@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, shaped
+from ..batch import aligned
 from ..closure.configurations import Configurations
 from ..closure.projection import projection_modes
 from ..description.mechanism import Mechanism
@@ -82,7 +83,8 @@ class Answer:
         return self.mechanism, self._configurations, self.shape, self._request, self._values
 
     def __setstate__(self, state: _State) -> None:
-        Answer.__init__(self, *state)
+        mechanism, found, shape, *asked = state
+        Answer.__init__(self, mechanism, found, shape, *map(aligned, asked))
 
     @property
     def _rows(self) -> Rows:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
-from ..batch import joined, put, take
+from ..batch import aligned, joined, put, take
 from ..kernels.rows import INVALID, ITERATIONS, LIMIT_EXCESS, N_COUNTERS, PENDING, RESIDUAL, Rows
 from ..model import Model
 from ..motion.loops import Closure
@@ -84,7 +84,7 @@ class Configurations:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with coordinates, not with the function that computes them."""
-        return type(self), (self.rows, self.coordinates)
+        return restored, (type(self), self.rows, self.coordinates)
 
     def __len__(self) -> int:
         return len(self.rows.status)
@@ -147,6 +147,11 @@ class Configurations:
         coordinates = _blank(self.coordinates, n)
         coordinates[mask] = self.coordinates
         return Configurations(rows, coordinates)
+
+
+def restored(kind: type[Configurations], *state: Any) -> Configurations:
+    """Configurations that were pickled."""
+    return kind(*map(aligned, state))
 
 
 def _blank(array: NDArray[Any], n: int) -> NDArray[Any]:

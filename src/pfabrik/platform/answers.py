@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Mask
 from ..batch import put, take
-from ..closure.configurations import Configurations, Places
+from ..closure.configurations import Configurations, Places, restored
 from ..derived import derived
 from ..kernels.rows import Rows
 from ..model import Model
@@ -44,7 +44,7 @@ class LegAnswers(Configurations):
         self._layers = 0
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LegAnswers, (self.rows, self.coordinates, self._sides, self.q_proximal)
+        return restored, (LegAnswers, self.rows, self.coordinates, self._sides, self.q_proximal)
 
     @cached_property
     def sides(self) -> Floats:
