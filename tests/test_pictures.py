@@ -31,6 +31,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from pfabrik.description.plane import plane_of
+from pfabrik.view.canvas import round_length
 from pfabrik.view.crossings import far_to_near
 from pfabrik.view.eye import Eye, eye_for, eye_of, eye_on
 from pfabrik.view.looks import HELD, LOOKS
@@ -519,3 +520,13 @@ def test_a_way_without_end_and_one_of_stretched_links_say_so(monkeypatch: pytest
     axes = pf.plot_travel(pf.travel(pf.solve_ik(free, free.home_pose)))["along"]
     assert [text.get_text() for text in axes.texts] == ["unlimited", "unlimited"]
     assert faults(axes.figure, monkeypatch) == []
+
+
+def test_a_scale_is_the_largest_round_length_up_to_any_number() -> None:
+    for number in (*np.random.default_rng(0).uniform(1e-9, 1e9, 200), np.nextafter(1000.0, 0.0), 1e23, 0.2, 5.0):
+        length = round_length(float(number))
+        assert length <= number < 2.6 * length
+
+
+def test_an_arm_is_drawn_seen_end_on(tmp_path: Path) -> None:
+    pf.plot(pf.load("snake60"), view="side").figure.savefig(tmp_path / "end-on.png")  # type: ignore[union-attr]

@@ -25,6 +25,9 @@ SIDE, LEAST = 4.4, 0.5
 NUMBERS = (0.75, 0.5)
 """Room for numbers and names of axes beside and below a plane [inches]."""
 
+END_ON = 0.02
+"""Least width and height that is shown, as a share of the machine: of an arm that is seen end-on, say."""
+
 EDGE_FREE, STRIP_FREE = 9.0, 3.0
 """Distance of what is drawn from the edge of its axes, and from the key above and the bar below it [points]."""
 
@@ -116,7 +119,7 @@ class Canvas:
         triad = self._triad_box
         below = 0.0 if self.is_plane else float(max(triad[3] - triad[1], SMALL + 2.0 * BAR_OFF)) + STRIP_FREE
         room = np.array([[EDGE_FREE + beside, EDGE_FREE + below], [EDGE_FREE + beside, EDGE_FREE + above]])
-        spans = np.maximum(high - low, 1e-9 * (float((high - low).max()) or 1.0))
+        spans = np.maximum(high - low, END_ON * (float(np.ptp(points, axis=0).max()) or 1.0))
         per_point = float(np.max(spans / np.maximum(size - room.sum(axis=0), 0.1 * size))) or 1.0
         spare = 0.5 * (size * per_point - room.sum(axis=0) * per_point - (high - low))
         start = low - room[0] * per_point - spare
@@ -298,4 +301,5 @@ def draw_scale_bar(axes: Any, look: Look, at: Floats, span: float, unit: str) ->
 def round_length(most: float) -> float:
     """The largest of 1, 2 and 5 times a power of ten that is not above `most`."""
     power = 10.0 ** np.floor(np.log10(most))
-    return float(max(step for step in (1.0, 2.0, 5.0) if step * power <= most) * power)
+    steps = np.array([0.5, 1.0, 2.0, 5.0, 10.0]) * power  # the first and the last where the logarithm was rounded
+    return float(steps[steps <= most].max())
