@@ -14,7 +14,7 @@ Look over   workspace, singularity_map
 Prove      certify, largest; PoseRegion, Certificate
 To first order   mobility, inverse_jacobian, forward_jacobian, singularity
 Load        forces, wrench_capacity, transmission, stiffness, accuracy
-Move        inverse_dynamics, mass_matrix (what motors exert in motion)
+Move        inverse_dynamics, mass_matrix (what motors exert in motion), identify (masses, from what they did)
 Apart       clearance (the least distance between links)
 Look into  search_log (every attempt behind an answer)
 Real machines   parameters, sensitivity, Measurements, calibrate
@@ -73,6 +73,8 @@ _NAMES = {
     "description.legs": ("Leg",),
     "description.mechanism": ("Cone", "Joint", "Mass", "Mechanism", "Shape"),
     "dynamics.efforts": ("Efforts",),
+    "dynamics.identification": ("BaseParameter", "Identification"),
+    "dynamics.identify": ("identify",),
     "dynamics.inverse_dynamics": ("inverse_dynamics",),
     "dynamics.mass_matrix": ("mass_matrix",),
     "export.export_c": ("export_c",),
@@ -161,6 +163,9 @@ if TYPE_CHECKING:
         Shape as Shape,
     )
     from .dynamics.efforts import Efforts as Efforts
+    from .dynamics.identification import BaseParameter as BaseParameter
+    from .dynamics.identification import Identification as Identification
+    from .dynamics.identify import identify as identify
     from .dynamics.inverse_dynamics import inverse_dynamics as inverse_dynamics
     from .dynamics.mass_matrix import mass_matrix as mass_matrix
     from .export.export_c import export_c as export_c

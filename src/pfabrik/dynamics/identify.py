@@ -1,0 +1,170 @@
+"""`identify`: masses of bodies, friction and rotors, from efforts that were measured in motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..answers.solution import Solution
+from ..answers.tracked import Track
+from ..arguments import as_floats
+from ..arrays import Floats, Mask
+from ..checks import names_of, require_known
+from ..description.mechanism import Mass, Mechanism
+from ..errors import InvalidArgument
+from ..files.units import metres_of
+from ..kinematics import inertias_of
+from ..statics.forces import GRAVITY
+from ..statics.loads import BodyLoads, checked_gravity, checked_loads, positive_values
+from .asked_motion import NEIGHBOURS
+from .drives import Drives
+from .effort_fit import EffortFit
+from .identification import Identification
+from .inverse_dynamics import TimedMotion, _asked, _Block, _resting, lacking_masses, loads_of
+from .regressor import BodyScales, EffortRows, effort_rows
+from .unknowns import FRICTION, ROTOR, Unknowns
+
+ROWS_A_BLOCK = 64
+"""Rows whose matrices are in memory at once, ten columns a body."""
+
+LEAST_SIZE = 0.1
+"""Size of a body at least, to compare its moments with [L]: of one without joints apart."""
+
+
+def identify(
+    motion: Solution | Track | TimedMotion,
+    efforts: ArrayLike,
+    *,
+    twists: ArrayLike | None = None,
+    accelerations: ArrayLike | None = None,
+    at: Literal["task", "actuators"] = "task",
+    gravity: ArrayLike = GRAVITY,
+    loads: BodyLoads | None = None,
+    bodies: str | Sequence[str] | None = None,
+    friction: bool = True,
+    rotors: bool = False,
+    sigma: ArrayLike | Mapping[str, float] | None = None,
+) -> Identification:
+    """Masses of bodies, and friction and rotors of actuators, from efforts measured in motion.
+
+    The most likely values, by weighted least squares, of those that bodies can have. Each parameter is expected to be
+    as the file has it, and off by as much as its body weighs: what the efforts do not determine stays there. Parts that
+    nothing holds, such as a rod that spins between two ball joints, are taken to move as the masses of the file would.
+
+    Parameters
+    ----------
+    motion : Solution or Track or Timed
+        How the machine moved, as in `inverse_dynamics`, with its `twists`, `accelerations` and `at`: a path with times,
+        or configurations with rates and accelerations, of the actuators for example. At rest, efforts of gravity say
+        what they can.
+    efforts : array (n, n_a)
+        Force or torque that each actuator exerted [N, N m], at each row of the motion; rows with NaN are left out, and
+        the first and last two steps of a track, whose accelerations are the least exact.
+    twists, accelerations : array (..., 6) or (..., 3), optional
+        How configurations move, as in `inverse_dynamics`; with `at` "actuators", (..., n_a).
+    at : {"task", "actuators"}, optional
+        What `twists` and `accelerations` are of.
+    gravity : array (3,), optional
+        Gravity [m/s²].
+    loads : mapping of str to tuple, optional
+        What bodies carry, and is known, as in `inverse_dynamics`.
+    bodies : str or sequence of str, optional
+        The bodies whose masses are to be identified; by default all that move. Others are as in the file.
+    friction : bool, optional
+        Identify dry and viscous friction of all actuators; else it is as in the file.
+    rotors : bool, optional
+        Identify their `rotor_inertia`, behind the gears of the file.
+    sigma : float or array (n_a,) or mapping of str to float, optional
+        Standard deviations of the efforts [N, N m]. By default those that the residuals of each actuator show.
+
+    Returns
+    -------
+    Identification
+        The machine with identified masses, what the efforts determine and how well, and what is left over.
+
+    Raises
+    ------
+    InvalidArgument or UnknownName
+        A motion that `inverse_dynamics` refuses; efforts of another shape; no body or actuator of a name; no row left.
+    """
+    asked = _asked(motion, twists, accelerations, at)
+    mechanism, n = asked.solution.mechanism, len(asked.rates)
+    metres, names = metres_of(mechanism.length_unit), mechanism.actuator_names
+    drives, carried = Drives(mechanism, metres), checked_loads(mechanism, loads)
+    measured = _efforts(efforts, asked.solution.shape, names) * drives.units
+    known = None if sigma is None else positive_values("sigma", sigma, names) * drives.units
+    wanted = _bodies(mechanism, bodies)
+    lacking = [Mass(body, 0.0) for body in lacking_masses(mechanism, metres) if body in wanted]
+    whole = mechanism.with_masses([*mechanism.masses, *lacking])
+    weights, others = loads_of(whole, metres, carried)
+    has_values = np.isfinite(np.concatenate([measured, asked.solution._coordinates], axis=1))
+    is_used: Mask = np.asarray(has_values.all(axis=1))
+    if asked.at == "path":
+        is_used[: NEIGHBOURS // 2] = is_used[-(NEIGHBOURS // 2) :] = False
+    rows, parts = np.flatnonzero(is_used), []
+    scales = _scales(whole, metres, wanted, measured[rows])
+    for start in range(0, len(rows), ROWS_A_BLOCK):
+        places = rows[start : start + ROWS_A_BLOCK]
+        block = _Block(asked, places, weights, others, checked_gravity(gravity) / metres, metres)
+        parts.append(effort_rows(mechanism, block, drives, scales))
+    if not any(part.is_good.any() for part in parts):
+        raise InvalidArgument("motion", "no row with efforts that the actuators hold", "some, away from singularities")
+    is_good = np.concatenate([part.is_good for part in parts])
+    joined: Any = (np.concatenate(each)[is_good] for each in zip(*parts, strict=True))
+    rows, moved = rows[is_good], EffortRows(*joined)
+    kinds = (*(FRICTION if friction else ()), *([ROTOR] if rotors else []))
+    unknowns = Unknowns(whole, metres, scales, kinds, _typical(kinds, measured[rows] / drives.units, moved))
+    return Identification(unknowns, EffortFit(unknowns, moved, measured[rows], rows, n, known))
+
+
+def _efforts(efforts: Any, shape: tuple[int, ...], names: Sequence[str]) -> Floats:
+    """Efforts in rows, (n, n_a); NaN stays."""
+    expected = f"numbers of shape {(*shape, len(names))}, a row for each of the motion: {', '.join(names)}"
+    found = as_floats("efforts", efforts, expected)
+    if found.shape != (*shape, len(names)):
+        raise InvalidArgument("efforts", f"shape {found.shape}", expected)
+    return found.reshape(-1, len(names))
+
+
+def _bodies(mechanism: Mechanism, given: Any) -> tuple[str, ...]:
+    """The bodies to identify: those given, or all that move."""
+    moving = tuple(body for body in mechanism.bodies if body not in _resting(mechanism))
+    if given is None:
+        return moving
+    names = names_of("bodies", given)
+    require_known("body that moves", names, moving)
+    return tuple(body for body in moving if body in names)
+
+
+def _scales(mechanism: Mechanism, metres: float, bodies: tuple[str, ...], measured: Floats) -> BodyScales:
+    """Where the parameters of bodies are about, and what they are compared with.
+
+    A body without a mass is compared with the mean of the others; without any, with what the efforts would hold at
+    rest on an arm of L.
+    """
+    known, length = inertias_of(mechanism, metres), mechanism.characteristic_length
+    joints = {body: [j.at for j in mechanism.joints if body in j.connects and j.at is not None] for body in bodies}
+    points = [
+        known[body].centre if known[body].mass > 0.0 else np.mean(joints[body] or [mechanism.reference_point], axis=0)
+        for body in bodies
+    ]
+    farthest = [
+        np.linalg.norm(np.reshape(joints[body], (-1, 3)) - point, axis=1).max(initial=LEAST_SIZE * length)
+        for body, point in zip(bodies, points, strict=True)
+    ]
+    masses = np.array([known[body].mass for body in bodies])
+    held = np.sqrt(np.mean(measured**2)) / (np.linalg.norm(GRAVITY) * length) if measured.size else 0.0
+    other = np.mean(masses[masses > 0.0]) if masses.any() else held or 1.0
+    return BodyScales(bodies, np.reshape(points, (-1, 3)), np.array(farthest), np.where(masses > 0.0, masses, other))
+
+
+def _typical(kinds: Sequence[str], efforts: Floats, moved: EffortRows) -> Floats:
+    """What parameters of actuators would be if they took all of an effort, (kinds, n_a)."""
+    sizes = [np.sqrt(np.mean(x**2, axis=0)) for x in (efforts, moved.rates, moved.gains)]
+    by = {"dry": np.ones_like(sizes[0]), "viscous": sizes[1], "rotor": sizes[2]}
+    whole = sizes[0] + np.finfo(float).tiny
+    typical = [np.divide(whole, by[kind], out=np.ones_like(whole), where=by[kind] > 0.0) for kind in kinds]
+    return np.reshape(typical, (len(kinds), len(whole)))

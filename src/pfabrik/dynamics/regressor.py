@@ -1,0 +1,104 @@
+"""Efforts by the inertial parameters of bodies, in which they are linear, and by friction and rotors.
+
+A body has ten parameters about a point p of its own: its mass m, first moments m (c - p), and moments of inertia about
+p. What a mass resists with is linear in them, and of a point mass a polynomial of the second degree in its place: so
+what ten point masses resist with gives the columns of all ten parameters, by the same code as in `inverse_dynamics`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..description.mechanism import Mechanism
+from ..kinematics import BodyInertia
+from ..statics.joint_balance import balance_at
+from .drives import Drives
+from .inverse_dynamics import _Block
+from .moving_machine import MovingMachine, Weights
+
+PARTS = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+"""The parameters of a body: x, y and z are its first moments."""
+
+POWERS = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+"""The power of a length in the unit of each."""
+
+_ENDS = np.eye(3)
+_PLACES = np.array([np.zeros(3), *_ENDS, *-_ENDS, *(_ENDS[[0, 0, 1]] + _ENDS[[1, 2, 2]])])
+
+
+class BodyScales(NamedTuple):
+    """Bodies, the points that their parameters are about, and sizes to compare these with.
+
+    Attributes
+    ----------
+    bodies : their names, b.
+    points : at home, (b, 3) [length].
+    sizes : (b,) [length]; masses : (b,) [kg].
+    """
+
+    bodies: tuple[str, ...]
+    points: Floats
+    sizes: Floats
+    masses: Floats
+
+    @property
+    def units(self) -> Floats:
+        """kg, kg length and kg length² in those of the columns: lengths in sizes, (b, 10)."""
+        return np.asarray(self.sizes[:, None] ** POWERS)
+
+
+def ten_of(masses: Floats, arms: Floats, inertias: Floats) -> Floats:
+    """The parameters (b, 10) of masses (b,) with centres at arms (b, 3), and inertias about these, (b, 3, 3)."""
+    squares = np.einsum("bi,bi->b", arms, arms)[:, None, None] * np.eye(3)
+    about = inertias + masses[:, None, None] * (squares - arms[:, :, None] * arms[:, None])
+    moments = about[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return np.concatenate([masses[:, None], masses[:, None] * arms, moments], axis=1)
+
+
+def body_of(ten: Floats, point: Floats) -> BodyInertia:
+    """The mass, centre and inertia about it of parameters (10,) about a point, all in kg and lengths."""
+    mass, arm = ten[0], ten[1:4] / ten[0] if ten[0] > 0.0 else np.zeros(3)
+    inertia = ten[[4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(3, 3) - mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return BodyInertia(float(mass), point + arm, inertia)
+
+
+class EffortRows(NamedTuple):
+    """Efforts at n configurations in motion, in the units of a `Balance`.
+
+    Attributes
+    ----------
+    described : of the machine as it is described, (n, n_a).
+    by_bodies : by the parameters of bodies, in kg and sizes, (n, n_a, 10 b).
+    rates, gains : of the actuators, and their accelerations [m or rad, per s and per s²], (n, n_a).
+    motions : those that the loops allow the actuators, (n, n_a, d).
+    is_good : False where the actuators do not hold the machine, or it does not move so, (n,).
+    """
+
+    described: Floats
+    by_bodies: Floats
+    rates: Floats
+    gains: Floats
+    motions: Floats
+    is_good: Mask
+
+
+def effort_rows(mechanism: Mechanism, block: _Block, drives: Drives, scales: BodyScales) -> EffortRows:
+    """Efforts of a block of rows, and how they depend on the parameters of bodies."""
+    first, (rates, gains) = block.moving.first, block.of_actuators()
+    held = balance_at(mechanism, first, block.carried[..., None])
+    described = held.actuators[..., 0] - drives.loads(rates, gains) * drives.units
+    places = scales.points[:, None] + scales.sizes[:, None, None] * _PLACES
+    bodies = tuple(body for body in scales.bodies for _ in _PLACES)
+    points = Weights(bodies, np.ones(len(bodies)), places.reshape(-1, 3), np.zeros((len(bodies), 3, 3)))
+    moving = MovingMachine(mechanism, points, block.q)
+    resisted = moving.resistance(block.rates, block.gains, block.drift, block.pull) * block.scale
+    of_places = np.linalg.inv(ten_of(np.ones(10), _PLACES, np.zeros((10, 3, 3))))
+    wrenches = np.einsum("pk,nbki->nbpi", of_places, resisted.reshape(len(rates), len(scales.bodies), 10, 6))
+    carried = np.einsum("bj,nbi->njib", moving.paths, wrenches.reshape(len(rates), -1, 6))
+    columns = balance_at(mechanism, first, carried).actuators
+    is_good = held.is_held[:, 0] & ~held.is_singular & ~block.is_missed
+    motions = np.asarray(first.pairs[:, first.actuated])
+    return EffortRows(described, columns, rates * drives.si, gains * drives.si, motions, is_good)

@@ -1,0 +1,127 @@
+"""The parameters that efforts are to tell: of bodies, and of actuators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..description.joints import Joint
+from ..description.mechanism import Mass, Mechanism
+from ..kinematics import BodyInertia, inertias_of
+from .drives import Drives, _of
+from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
+from .regressor import PARTS, POWERS, BodyScales, EffortRows, body_of, ten_of
+
+FRICTION, ROTOR = ("dry", "viscous"), "rotor"
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """Ten parameters of each body in turn, then those of actuators, kind by kind.
+
+    Attributes
+    ----------
+    mechanism : with a mass of all bodies that move; metres : of its unit of length.
+    scales : of the bodies.
+    kinds : of "dry", "viscous" and "rotor".
+    typical : what those of actuators are compared with, (kinds, n_a), in their units.
+    """
+
+    mechanism: Mechanism
+    metres: float
+    scales: BodyScales
+    kinds: tuple[str, ...]
+    typical: Floats
+
+    @cached_property
+    def drives(self) -> Drives:
+        """The actuators as they are described."""
+        return Drives(self.mechanism, self.metres)
+
+    @cached_property
+    def gears(self) -> Floats:
+        """Gear ratios, (n_a,)."""
+        return np.array([_of(drive, "gear") or 1.0 for drive in self.mechanism.drives])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, p."""
+        actuators = self.mechanism.actuator_names
+        of_bodies = [f"{body}.{part}" for body in self.scales.bodies for part in PARTS]
+        return (*of_bodies, *(f"{name}.{kind}" for kind in self.kinds for name in actuators))
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Their units, p."""
+        length = self.mechanism.length_unit
+        own = [("kg", f"kg {length}".strip(), f"kg {length}²".strip())[power] for power in POWERS]
+        of_slide = {"dry": "N", "viscous": "N s/m", "rotor": "kg"}
+        of_turn = {"dry": "N m", "viscous": "N m s/rad", "rotor": "kg m²"}
+        slides = [unit == "N" for unit in self.drives.forces]
+        return (
+            *own * len(self.scales.bodies),
+            *((of_slide if slide else of_turn)[kind] for kind in self.kinds for slide in slides),
+        )
+
+    @cached_property
+    def described(self) -> Floats:
+        """Their values in the description, (p,)."""
+        known = inertias_of(self.mechanism, self.metres)
+        parts = [known[body] for body in self.scales.bodies]
+        masses = np.array([each.mass for each in parts])
+        arms = np.reshape([each.centre for each in parts], (-1, 3)) - self.scales.points
+        inertias = np.reshape([each.inertia for each in parts], (-1, 3, 3))
+        own = {kind: self.drives.friction[:, place] for place, kind in enumerate(FRICTION)}
+        own[ROTOR] = self.drives.inertia / self.gears**2
+        return np.concatenate([ten_of(masses, arms, inertias).ravel(), *(own[kind] for kind in self.kinds)])
+
+    @cached_property
+    def by_scaled(self) -> Floats:
+        """Parameters by scaled ones, of which `InertialFit` has deviations of 1, (p, p)."""
+        found = np.diag(np.append(np.ones(10 * len(self.scales.bodies)), self.typical))
+        for body, (mass, units) in enumerate(zip(self.scales.masses, self.scales.units, strict=True)):
+            own = slice(10 * body, 10 * body + 10)
+            found[own, own] = mass * units[:, None] * FROM_DENSITY
+        return found
+
+    def columns(self, rows: EffortRows) -> Floats:
+        """Efforts of `EffortRows` by scaled parameters, (n, n_a, p)."""
+        moves = {"dry": np.sign(rows.rates), "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
+        own = [moves[kind][..., None] * np.diag(self.drives.units) for kind in self.kinds]
+        in_sizes = np.append(self.scales.units, np.ones(self.typical.size))
+        return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ (self.by_scaled / in_sizes[:, None]))
+
+    def body(self, values: Floats, place: int) -> BodyInertia:
+        """What a body weighs by parameters (p,); nothing where that is rounding."""
+        ten = values[10 * place : 10 * place + 10]
+        if ten[0] <= IMPOSSIBLE * self.scales.masses[place]:
+            return BodyInertia(0.0, self.scales.points[place], np.zeros((3, 3)))
+        return body_of(ten, self.scales.points[place])
+
+    def apply(self, values: Floats) -> Mechanism:
+        """The machine with parameters (p,)."""
+        found = [(name, self.body(values, place)) for place, name in enumerate(self.scales.bodies)]
+        masses = [Mass(name, each.mass, each.centre, each.inertia) for name, each in found]
+        others = [each for each in self.mechanism.masses if each.body not in self.scales.bodies]
+        shapes = [
+            replace(shape, density=None) if shape.body in self.scales.bodies else shape
+            for shape in self.mechanism.shapes
+        ]
+        own = values[10 * len(masses) :].reshape(self.typical.shape)
+        joints = [self._joint(joint, dict(zip(self.kinds, own, strict=True))) for joint in self.mechanism.joints]
+        return self.mechanism._with(joints=tuple(joints), shapes=tuple(shapes), masses=(*others, *masses))
+
+    def _joint(self, joint: Joint, values: dict[str, Floats]) -> Joint:
+        """A joint with the friction and rotors of its actuators."""
+        places = [place for place, drive in enumerate(self.mechanism.drives) if drive.joint.name == joint.name]
+        changed: dict[str, Any] = {}
+        if places and ROTOR in values:
+            least = np.finfo(float).tiny  # none is 0 in a description
+            changed["rotor_inertia"] = tuple(np.maximum(values[ROTOR][places], least).tolist())
+        if places and FRICTION[0] in values:
+            changed["friction"] = tuple(zip(*(values[kind][places].tolist() for kind in FRICTION), strict=True))
+        return replace(joint, **{name: each if len(places) == 2 else each[0] for name, each in changed.items()})

@@ -1,0 +1,164 @@
+"""Masses from efforts: against the machine that they were simulated of, and inverse dynamics with other masses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from tests.test_dynamics import units, weighed
+
+
+def rubbing(machine: pf.Mechanism, friction: Any = (0.05, 0.02), rotor: float | None = 1e-4) -> pf.Mechanism:
+    joints = [replace(j, friction=friction, rotor_inertia=rotor, gear=5.0) if j.actuated else j for j in machine.joints]
+    return machine._with(joints=tuple(joints))
+
+
+def wandering(machine: pf.Mechanism, seed: int, n: int = 150) -> tuple[pf.Solution, dict[str, Any]]:
+    """Configurations near home, and how they move: sines of actuators."""
+    random, home = np.random.default_rng(seed), pf.solve_ik(machine, machine.home_pose).actuators
+    t, x, v, a = np.linspace(0.0, 4.0, n)[:, None], home, 0.0, 0.0
+    for k in range(3):
+        size = 0.08 * units(machine)[0] * random.standard_normal(len(home)) / (k + 1)
+        speed, phase = (1.3, 2.9, 5.1)[k] * random.uniform(0.8, 1.2, len(home)), random.uniform(0, 6, len(home))
+        x = x + size * np.sin(speed * t + phase)
+        v, a = v + size * speed * np.cos(speed * t + phase), a - size * speed**2 * np.sin(speed * t + phase)
+    solution = pf.solve_fk(machine, x)
+    assert solution
+    return solution, {"twists": v, "accelerations": a, "at": "actuators"}
+
+
+def moved(machine: pf.Mechanism, solution: pf.Solution) -> pf.Solution:
+    return pf.solve_fk(machine, solution.actuators)
+
+
+def drawn(truth: pf.Mechanism) -> pf.Mechanism:
+    """The machine as its drawing has it: other masses, no friction."""
+    shift = 0.03 * truth.characteristic_length
+    return rubbing(
+        truth.with_masses(
+            pf.Mass(each.body, 1.2 * each.mass, np.array(each.centre) + shift, 1.1 * np.array(each.inertia))
+            for each in truth.masses
+        ),
+        None,
+        None,
+    )
+
+
+def parameters(result: pf.Identification, machine: pf.Mechanism) -> dict[str, float]:
+    """The parameters of a machine about the points of a result, by the definition of moments."""
+    found = {}
+    for each in machine.masses:
+        if each.body in result.points:
+            c, (xx, yy, zz, xy, xz, yz) = np.array(each.centre) - result.points[each.body], each.inertia or ()
+            about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + each.mass * (
+                c @ c * np.eye(3) - np.outer(c, c)
+            )
+            values = [each.mass, *(each.mass * c), *about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]]
+            names = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+            found |= {f"{each.body}.{name}": value for name, value in zip(names, values, strict=True)}
+    for drive in machine.drives:
+        joint: Any = drive.joint
+        found |= {f"{drive.name}.{k}": v for k, v in zip(("dry", "viscous"), joint.friction or (0, 0), strict=True)}
+        found[f"{drive.name}.rotor"] = joint.rotor_inertia or 0.0
+    return found
+
+
+@pytest.mark.parametrize("name", ["five_bar", "delta", "stewart"])
+def test_what_efforts_determine_is_within_its_deviation_and_other_motions_are_predicted(name: str) -> None:
+    truth = rubbing(weighed(pf.load(name)))
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    noise = 0.01 * np.abs(efforts).max()
+    measured = efforts + noise * np.random.default_rng(3).standard_normal(efforts.shape)
+    result = pf.identify(moved(drawn(truth), solution), measured, rotors=True, **how)
+    true = parameters(result, truth)
+    for each in result.combinations:
+        assert abs(sum(f * true[n] for n, f in each.factors.items()) - each.value) < 3.0 * each.deviation, each.name
+    assert result.rank > 8
+    np.testing.assert_allclose(result.rms, noise, rtol=0.25)
+    assert (result.rms < 0.2 * result.rms_before).all()
+    other, how = wandering(truth, 7)
+    predicted = pf.inverse_dynamics(moved(result.mechanism, other), **how).actuators
+    assert np.sqrt(np.mean((predicted - pf.inverse_dynamics(other, **how).actuators) ** 2)) < noise
+
+
+@pytest.mark.parametrize("name", ["delta", "nrpm", "rrr"])
+def test_efforts_are_linear_in_the_parameters(name: str) -> None:
+    """Differences of inverse dynamics with other masses, friction and rotors: the columns are exact."""
+    machine, other = rubbing(weighed(pf.load(name))), rubbing(weighed(pf.load(name), 2), (0.3, 0.1), 2e-4)
+    solution, how = wandering(machine, 1, 60)
+    efforts = [pf.inverse_dynamics(moved(m, solution), **how).actuators for m in (machine, other)]
+    result = pf.identify(solution, efforts[0], rotors=True, sigma=1.0, **how)
+    more = np.array(list(map(parameters(result, other).get, result.names)), float) - result.described
+    scaled = np.linalg.solve(result._unknowns.by_scaled, more)
+    change = result._fit._columns @ scaled / result._unknowns.drives.units
+    np.testing.assert_allclose(change, efforts[1] - efforts[0], atol=1e-9 * np.abs(efforts[0]).max())
+
+
+def test_what_no_motion_excites_is_reported_and_stays() -> None:
+    truth = rubbing(weighed(pf.load("five_bar")))
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    start = drawn(truth)
+    result = pf.identify(moved(start, solution), efforts, sigma=0.01, **how)
+    by_name = dict(zip(result.names, zip(result.determined, result.values, result.described, strict=True), strict=True))
+    assert {"link1.x", "link3.Izz", "link4.Ixz"} <= set(result.unseen)  # it moves in the y-z plane
+    assert not any(by_name[name][0] for name in result.unseen)
+    assert "no effort depends on link1 (x" in str(result)
+    assert by_name["p1.dry"][0]
+    assert by_name["p1.dry"][1] == pytest.approx(0.05, abs=0.01)
+    still = pf.identify(moved(start, solution), pf.inverse_dynamics(moved(start, solution), **how).actuators, **how)
+    np.testing.assert_allclose(still.values, still.described, atol=1e-9 * np.abs(still.described).max())
+
+
+def test_a_path_with_times_tells_the_mass_of_its_load_and_every_body_is_possible() -> None:
+    machine = weighed(pf.load("delta"), own={"platform": 0.5, "arm1": 0.2, "arm2": 0.2, "arm3": 0.2})
+    t = np.linspace(0.0, 3.0, 300)
+    points = np.stack([30 * np.sin(3 * t), 25 * np.cos(5 * t), -190 + 15 * np.sin(7 * t)], axis=1)
+    path = pf.track(machine, points, times=t)
+    load = {"platform": (0.3, (0.0, 0.0, -190.0))}
+    efforts = pf.inverse_dynamics(path, loads=load).actuators
+    efforts[7] = np.nan
+    result = pf.identify(path, efforts, bodies="platform", friction=False)
+    assert result.names[result.determined.argmax()] == "platform.mass" and result.rank == 1
+    assert result.values[0] == pytest.approx(0.8, rel=1e-3)
+    assert np.isnan(result.residuals[[0, 1, 7, -2, -1]]).all() and np.isfinite(result.residuals[2:7]).all()
+    loaded = pf.identify(path, efforts, bodies="platform", friction=False, loads=load)
+    assert loaded.values[0] == pytest.approx(0.5, rel=1e-3)
+    random = np.random.default_rng(0)
+    rough = pf.identify(path, efforts + random.standard_normal(efforts.shape) * 0.05)
+    assert rough.adjusted and "likeliest" in str(rough)
+    assert min(each.mass for each in rough.mechanism.masses) >= 0.0  # and moments that its description takes
+    timed = pf.time_path(path, torque=1.0)
+    again = pf.identify(timed, pf.inverse_dynamics(timed).actuators, bodies=["platform"], friction=False)
+    assert again.values[0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_more_actuators_than_motions_tell_masses_however_they_share_the_load() -> None:
+    truth = weighed(pf.load("nrpm"))
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    result = pf.identify(moved(drawn(truth), solution), efforts, friction=False, **how)
+    true = parameters(result, truth)
+    for each in result.combinations:
+        assert abs(sum(f * true[n] for n, f in each.factors.items()) - each.value) < 3.0 * each.deviation, each.name
+
+
+def test_refusals_name_what_is_wrong() -> None:
+    machine = weighed(pf.load("five_bar"))
+    solution, how = wandering(machine, 1, 20)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    with pytest.raises(pf.errors.InvalidArgument, match=r"efforts.*shape \(20, 1\).*p1, p5"):
+        pf.identify(solution, efforts[:, :1], **how)
+    with pytest.raises(pf.errors.UnknownName, match="link9"):
+        pf.identify(solution, efforts, bodies="link9", **how)
+    with pytest.raises(pf.errors.UnknownName, match="p7"):
+        pf.identify(solution, efforts, sigma={"p7": 1.0}, **how)
+    with pytest.raises(pf.errors.InvalidArgument, match="no row with efforts"):
+        pf.identify(solution, np.full_like(efforts, np.nan), **how)
+    with pytest.raises(pf.errors.InvalidArgument, match="nothing says how good they are"):
+        pf.identify(solution[:3], efforts[:3], **{**how, "twists": 0.0 * efforts[0], "accelerations": efforts[:3]})
