@@ -373,3 +373,75 @@ def test_maps_end_at_parallel_singularities_and_come_back() -> None:
     assert beyond.any() and (np.asarray(mapped.status)[beyond & (margin.margin < 0.0)] == Status.PROJECTED).all()
     lost = float((margin.margin < 0.0).mean())
     assert a.hull().share_lost == pytest.approx(lost, abs=0.06)
+
+
+@pytest.mark.parametrize(("name", "joints", "size"), MAPS)
+def test_the_rate_of_the_jacobian_is_its_difference_along_the_motion(name: str, joints: Any, size: float) -> None:
+    a, random, h = actuation_of(name, joints), np.random.default_rng(1), 1e-3
+    units = np.where(a._coordinates.is_angle, 1.0, a.mechanism.characteristic_length)
+    q = a.home + 0.5 * size * units * random.uniform(-1.0, 1.0, (3, len(a.names)))
+    rates = units * random.standard_normal(q.shape)
+    j = [a.jacobian(q + k * h * rates) for k in (-2, -1, 1, 2)]
+    expected = (8.0 * (j[2] - j[1]) - (j[3] - j[0])) / (12.0 * h)
+    found = a.jacobian_rate(q, rates)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(a.jacobian_rate(q[0], rates[0]), found[0], atol=1e-9 * np.abs(expected).max())
+
+
+def test_the_rate_of_a_rotation_vectors_matrix_is_that_of_large_and_small_ones() -> None:
+    from pfabrik.actuation.jacobian_rate import NEAR_NONE, _turning_rate
+    from pfabrik.rotations import turning
+
+    random, h = np.random.default_rng(0), 1e-3
+    directions, speeds = random.standard_normal((2, 6, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    vectors = directions * np.array([0.0, 0.03, 0.999 * NEAR_NONE, 1.001 * NEAR_NONE, 1.0, 3.0])[:, None]
+    near = [turning(vectors + k * h * speeds) for k in (-2, -1, 1, 2)]
+    expected = (8.0 * (near[2] - near[1]) - (near[3] - near[0])) / (12.0 * h)
+    np.testing.assert_allclose(_turning_rate(vectors, speeds), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints"),
+    [
+        ("g1_ankle", ("pitch_joint", "roll_joint")),
+        ("ankle_ups", "pivot"),
+        ("five_bar", ("p1", "p2")),
+        ("delta", "task"),
+    ],
+)
+def test_armature_with_links_is_the_mass_matrix_of_the_joints(name: str, joints: Any) -> None:
+    machine = pf.load(name)
+    driven = [dataclasses.replace(j, rotor_inertia=1e-4, gear=9) if j.actuated else j for j in machine.joints]
+    places = {body: [j.at for j in machine.joints if body in j.connects and j.at] for body in machine.bodies[1:]}
+    machine = machine._with(joints=tuple(driven)).with_masses(
+        pf.Mass(body, 0.7, np.mean(at or [machine.reference_point], axis=0), [9.0, 8.0, 7.0])
+        for body, at in places.items()
+    )
+    a = pf.actuation(machine, joints)
+    q = a.home + 0.02 * np.where(a._coordinates.is_angle, 1.0, machine.characteristic_length)
+    expected = pf.mass_matrix(a.to_actuators(q).solution, joints)
+    np.testing.assert_allclose(a.armature(q, links=True), expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
+    other = a.armature(q, 0.02, links=True) - a.armature(q, 0.02)
+    np.testing.assert_allclose(other, expected - a.armature(q), atol=1e-12)
+
+
+def test_the_rate_of_the_jacobian_goes_on_beyond_limits_and_refuses_balls() -> None:
+    a, h = ankle(), 1e-4
+    q, rates = np.array([0.0, a.high[1] + 0.02]), np.array([1.0, -2.0])
+    assert a.margin(q).margin < 0.0
+    expected = (a.jacobian(q + h * rates) - a.jacobian(q - h * rates)) / (2.0 * h)
+    np.testing.assert_allclose(a.jacobian_rate(q, rates), expected, atol=1e-6)
+    joints = [Joint("ball", "spherical", ("base", "platform"), at=(0, 0, 50))]
+    for k, (x, y) in enumerate([(60, 0), (-30, 50), (-30, -50)]):
+        low, strut = (x, y, 0), (f"cylinder{k}", f"rod{k}")
+        joints += [
+            Joint(f"A{k}", "universal", ("base", strut[0]), at=low),
+            Joint(f"B{k}", "prismatic", strut, along=(f"A{k}", f"C{k}"), actuated=True, range=(40, 140)),
+            Joint(f"C{k}", "spherical", (strut[1], "platform"), at=(0.5 * x - 0.3 * y, 0.5 * y + 0.3 * x, 90)),
+        ]
+    machine = Mechanism("ball", joints, "platform", (0, 0, 50), task=["rotation"])
+    with pytest.raises(UnsupportedMechanism, match="ball"):
+        pf.actuation(machine, "ball").jacobian_rate(np.zeros(3), np.ones(3))
+    with pytest.raises(InvalidArgument, match="rates"):
+        a.jacobian_rate(np.zeros((2, 2)), np.ones((3, 2)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,11 +14,15 @@ from ..answers.start_configuration import Start
 from ..arguments import as_floats
 from ..arrays import Floats, shaped
 from ..description.mechanism import Mechanism, checked_mechanism
+from ..dynamics.drives import Drives
+from ..dynamics.mass_matrix import mass_matrix
 from ..errors import InvalidArgument
+from ..files.units import metres_of
 from ..fk import solve_fk
 from ..kinematics import JointPath, actuator_units, joint_path, require_determined
 from .drive_limits import HalfSpaces, image_of_box, preimage_of_box
 from .hull import Hull, feasible_hull
+from .jacobian_rate import jacobian_rates
 from .named_values import Mapped, inverses, per_actuator, rows_of, speeds_of, vectors_of
 from .placed import Placer
 from .sample import Sample, sample_feasible
@@ -159,6 +164,34 @@ class Actuation:
         J = self._placer.jacobian(rows)
         return J.reshape(*shape, *J.shape[1:])
 
+    def jacobian_rate(self, q: ArrayLike, rates: ArrayLike) -> Floats:
+        """dJ/dt (..., n_a, k) at coordinates q (..., k) with rates (..., k): actuators accelerate by J q'' + dJ/dt q'.
+
+        Exact, from the second order of the loops' conditions. Where loops do not close, that of the nearest
+        configuration that closes them.
+
+        Parameters
+        ----------
+        q : array (..., k)
+            Coordinates [rad or length].
+        rates : array (..., k)
+            Their rates [rad/s or length/s].
+
+        Raises
+        ------
+        UnsupportedMechanism
+            Coordinates of a ball, or the yaw of a platform that tilts too.
+        """
+        speeds = vectors_of("rates", rates, self.names)
+        try:
+            shape = np.broadcast_shapes(vectors_of("q", q, self.names).shape, speeds.shape)[:-1]
+        except ValueError:
+            raise InvalidArgument("rates", f"a batch of {speeds.shape[:-1]}", "one that fits that of q") from None
+        at, moving = (np.broadcast_to(x, (*shape, len(self.names))) for x in (np.asarray(q, float), speeds))
+        rows, _ = rows_of(self.names, at)
+        found = jacobian_rates(self._unlimited.coordinates, self._unlimited.solution(rows), moving.reshape(rows.shape))
+        return found.reshape(*shape, *found.shape[1:])
+
     def velocities(self, q: ArrayLike, rates: ArrayLike) -> Floats:
         """Actuator rates J dq/dt (..., n_a) at joint rates (..., k)."""
         return _times(self.jacobian(q), vectors_of("rates", rates, self.names))
@@ -183,19 +216,38 @@ class Actuation:
         """
         return _times(np.swapaxes(self._inverse(q), -1, -2), vectors_of("torques", torques, self.names))
 
-    def armature(self, q: ArrayLike, rotor_inertia: ArrayLike) -> Floats:
-        """Inertia of the rotors as joints feel it, J^T I J, (..., k, k).
+    def armature(self, q: ArrayLike, rotor_inertia: ArrayLike | None = None, *, links: bool = False) -> Floats:
+        """Inertia of the rotors as joints feel it, J^T I J, and of the links too, (..., k, k), in SI units.
+
+        In kg m² between angles, kg between lengths, kg m between both, as `mass_matrix`.
 
         Parameters
         ----------
         q : array (..., k)
             Coordinates [rad or length].
-        rotor_inertia : float or array (n_a,)
-            Inertia behind the gears, one for all actuators or one for each: gear ratio squared times the rotor's.
+        rotor_inertia : float or array (n_a,), optional
+            Inertia behind the gears, one for all actuators or one for each: gear ratio squared times the rotor's [kg
+            m², of a slide kg]. By default that of the mechanism.
+        links : bool, optional
+            Count the masses of all bodies too, as `mass_matrix` has them.
+
+        Raises
+        ------
+        InvalidArgument
+            With `links`, bodies without a mass.
         """
-        return self._congruent(
-            self.jacobian(q), per_actuator(self.mechanism.actuator_names, "rotor_inertia", rotor_inertia)
-        )
+        metres = metres_of(self.mechanism.length_unit)
+        rows, shape = rows_of(self.names, q)
+        own, drives = self._placer.jacobian(rows), Drives(self.mechanism, metres)
+        J = own * (drives.si[:, None] / np.where(self._coordinates.is_angle, 1.0, metres))
+        inertia = drives.inertia
+        if rotor_inertia is not None:
+            inertia = per_actuator(self.mechanism.actuator_names, "rotor_inertia", rotor_inertia)
+        found = self._congruent(J, inertia)
+        if links:
+            whole = mass_matrix(self._unlimited.solution(rows), "actuators")
+            found = found + np.swapaxes(J, -1, -2) @ whole @ J - self._congruent(J, drives.inertia)
+        return found.reshape(*shape, *found.shape[1:])
 
     def gains(self, q: ArrayLike, kp: ArrayLike, kd: ArrayLike = 0.0) -> Gains:
         """Gains of joints that gains of actuators, each one or (n_a,), make: J^T Kp J and J^T Kd J, (..., k, k) each.
@@ -280,6 +332,13 @@ class Actuation:
         from .torque_map import plot_torque_map
 
         return plot_torque_map(self._placer, torque_max, box, ax)
+
+    @cached_property
+    def _unlimited(self) -> Placer:
+        """The same coordinates without limits, beyond which J goes on."""
+        mechanism = self.mechanism.without_limits()
+        is_task = isinstance(self._coordinates, TaskPath)
+        return Placer(TaskPath(mechanism) if is_task else joint_path(mechanism, self.names))
 
     def _start(self, start: Start | None) -> Start | None:
         """A start for `solve_fk`: coordinates (..., k) as all joint coordinates."""

@@ -102,6 +102,18 @@ class TaskPath:
             parts.append(yaws(poses[:, :3, :3])[:, None])
         return np.concatenate(parts, axis=1)
 
+    def vectors_at(self, poses: Floats) -> Floats:
+        """The rotation vectors (n, 3) [rad] that the task sets at poses (n, 4, 4); 0 without."""
+        return self._vectors(self._values(poses)[:, sum(self._task.axes) :])
+
+    def spread(self, rates: Floats) -> tuple[Floats, Floats]:
+        """Rates (n, k) as those of rotation vectors (n, 3), and twists (n, 6) of the translations alone."""
+        whole, twists = np.zeros((len(rates), len(self._set))), np.zeros((len(rates), 6))
+        whole[:, self._places] = rates
+        n = sum(self._task.axes)
+        twists[:, np.flatnonzero(self._task.axes)] = whole[:, :n]
+        return self._vectors(whole[:, n:]), twists
+
     def rates(self, poses: Floats) -> Floats:
         """Rates of the coordinates by the twist of the platform, (n, k, 6); (n, k, 3) for a joint end effector."""
         return self._all_rates(poses)[:, self._places]
