@@ -129,6 +129,11 @@ def test_a_path_with_times_tells_the_mass_of_its_load_and_every_body_is_possible
     assert np.isnan(result.residuals[[0, 1, 7, -2, -1]]).all() and np.isfinite(result.residuals[2:7]).all()
     loaded = pf.identify(path, efforts, bodies="platform", friction=False, loads=load)
     assert loaded.values[0] == pytest.approx(0.5, rel=1e-3)
+    points_only = [pf.Mass(each.body, each.mass, each.centre) for each in machine.masses]
+    path = pf.track(machine.with_masses(points_only), points, times=t)
+    found = pf.identify(path, efforts, bodies="platform", friction=False).mechanism.masses[-1]
+    assert found.body == "platform" and found.inertia == (0.0,) * 6
+    path = pf.track(machine, points, times=t)
     random = np.random.default_rng(0)
     rough = pf.identify(path, efforts + random.standard_normal(efforts.shape) * 0.05)
     assert rough.adjusted and "likeliest" in str(rough)

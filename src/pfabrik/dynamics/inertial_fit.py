@@ -181,7 +181,7 @@ def combined(directions: Floats, spread: Floats, to_scaled: Floats, sizes: Float
     if not len(shown):
         return Combinations(np.zeros(0, int), shown, np.zeros(0))
     first = np.where(alone, FIRST, 1.0)
-    leading = qr(shown * first, mode="r", pivoting=True)[1][: len(shown)]
+    leading = np.sort(qr(shown * first, mode="r", pivoting=True)[1][: len(shown)])
     back = np.linalg.inv(shown[:, leading])
     factors, deviations = back @ shown, np.linalg.norm(back * spread, axis=1)
     factors[np.abs(factors) <= np.maximum(SLIGHT * deviations[:, None], OPEN)] = 0.0

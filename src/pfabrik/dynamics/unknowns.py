@@ -100,7 +100,13 @@ class Unknowns:
         ten = values[10 * place : 10 * place + 10]
         if ten[0] <= IMPOSSIBLE * self.scales.masses[place]:
             return BodyInertia(0.0, self.scales.points[place], np.zeros((3, 3)))
-        return body_of(ten, self.scales.points[place])
+        found = body_of(ten, self.scales.points[place])
+        spread, axes = np.linalg.eigh(0.5 * np.trace(found.inertia) * np.eye(3) - found.inertia)  # of mass, by place
+        rounding = IMPOSSIBLE * found.mass * self.scales.sizes[place] ** 2
+        spread = np.where(spread <= rounding, 0.0, spread)
+        second = (axes * spread) @ axes.T
+        inertia = spread.sum() * np.eye(3) - 0.5 * (second + second.T)
+        return found._replace(inertia=inertia)
 
     def apply(self, values: Floats) -> Mechanism:
         """The machine with parameters (p,)."""
