@@ -152,6 +152,9 @@ def files() -> dict[str, str]:
             "one_carriage_rod": with_longer_rods("linear_delta", "BR1"),
             "two_carriage_rods": with_longer_rods("linear_delta", "BL3", "BR3"),
             "servo_rod": with_longer_rods("servo_hexapod", "BL1"),
+            "weighed": pf.load("five_bar").with_masses(
+                [pf.Mass(f"link{k}", 0.1 * k, (0, 0, 90)) for k in (1, 2, 3, 4)]
+            ),
             "hundred_legs": Mechanism.from_legs(hundred, reference_point=(0, 0, 180)),
         }
     five_bar = dumps(pf.load("five_bar"))
@@ -168,6 +171,7 @@ def files() -> dict[str, str]:
         "turned.csv": "x,y,z,roll,pitch,yaw\n0,0,190,0,0,0\n5,0,190,0,5,0\n\n10,20,300,0,0,0\n",
         "lift.csv": "x,y,z\n3,1,195\n3,1,205\n3,1,205\n",
         "swing.csv": "x,y,z\n0,5,175\n0,10,180\n",
+        "rise.csv": "t,x,y,z\n" + "".join(f"{k / 10},0,{2 * k},{180 + k * k}\n" for k in range(5)),
         "hole.csv": "x,y,z\n" + "".join(f"{x},0,0\n" for x in hole),
         "tilted.csv": "x,y,z,roll,pitch,yaw\n340,60,0,0,0,5\n340,60,0,0,3,5\n",
         "yawed.csv": "x,y,z,roll,pitch,yaw\n0,10,190,0,0,5\n",

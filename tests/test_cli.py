@@ -540,6 +540,7 @@ def test_wrong_words_are_told_on_stderr_with_exit_code_2_and_write_nothing(line:
         ("speed five_bar --speed ", ["p1=", "p5="]),
         ("stiffness delta --rod rodR", ["rodR1=", "rodR2=", "rodR3="]),
         ("forces stewart --load p", ["platform="]),
+        ("time five_bar path.csv --torque p", ["p1=", "p5="]),
         ("workspace nowhere.toml --fix ", []),
     ],
 )

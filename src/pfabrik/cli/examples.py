@@ -14,7 +14,10 @@ EXAMPLES = {
     "workspace": ("workspace stewart --fix z=190", "workspace five_bar -o workspace.png"),
     "certify": ("certify stewart --box -10:10,-10:10,185:195", "certify delta --ball 0,0,-200,20 --tolerance 0.05"),
     "calibrate": ("calibrate printer.cfg", "calibrate printer.cfg --klipper calibrated.cfg"),
-    "time": ("time linear_delta part.gcode --speed 300", "time linear_delta part.gcode --speed 300 -o timed.csv"),
+    "time": (
+        "time linear_delta part.gcode --speed 300 -o timed.csv",
+        "time linear_delta part.gcode --torque 20 --load platform=0.5,0,0,0",
+    ),
     "effort": (
         "effort linear_delta part.gcode --load platform=0.5,0,0,0",
         "effort linear_delta part.gcode --rate 500 --load platform=0.5,0,0,0 --json",

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
 import click
 
 import pfabrik as pf
 
 from ..cells import is_finite
 from .arguments import FINITE, Triple, actuators, at_a_pose, by_name, completing, joints, numbers_of, positive
-from .printing import Result, json_option, print_result
+from .printing import Result, json_option, note, print_result
+
+Loads: TypeAlias = dict[str, tuple[float, list[float]]]
 
 
 def bodies(mechanism: pf.Mechanism) -> tuple[str, ...]:
@@ -16,21 +22,62 @@ def bodies(mechanism: pf.Mechanism) -> tuple[str, ...]:
     return tuple(name for name in mechanism.bodies if name != mechanism.base)
 
 
+def load_of(words: str) -> tuple[str, tuple[float, list[float]]]:
+    """A body, and its mass and centre, from words such as ``platform=5,0,0,190``."""
+    body, _, numbers = words.rpartition("=")
+    mass, *centre = numbers_of("--load BODY=MASS,X,Y,Z", numbers, (4,))
+    return body, (mass, centre)
+
+
+def carrying(command: Callable[..., int]) -> Callable[..., int]:
+    """Add ``--load``, which the command gets as `loads` by body, and ``--gravity``."""
+
+    @click.option(
+        "--load",
+        "loads",
+        multiple=True,
+        metavar="BODY=MASS,X,Y,Z",
+        shell_complete=completing(bodies, "="),
+        help="A mass that a body carries, and its centre, at home.",
+    )
+    @click.option(
+        "--gravity",
+        type=FINITE,
+        nargs=3,
+        default=(0, 0, -9.81),
+        metavar="X Y Z",
+        help="Of masses.  [default: 0 0 -9.81]",
+    )
+    @functools.wraps(command)
+    def with_loads(*, loads: tuple[str, ...], **parameters: Any) -> int:
+        return command(loads=dict(map(load_of, loads)), **parameters)
+
+    return with_loads
+
+
+def lacking(mechanism: pf.Mechanism) -> list[str]:
+    """The bodies that move and have no mass."""
+    from ..dynamics.inverse_dynamics import lacking_masses
+    from ..files.units import metres_of
+
+    return lacking_masses(mechanism, metres_of(mechanism.length_unit))
+
+
+def weighed(mechanism: pf.Mechanism, loads: Loads) -> pf.Mechanism:
+    """The machine with a mass of every body; a note names those that count as none, and none at all is an error."""
+    if not (loads or mechanism.masses or any(shape.density for shape in mechanism.shapes)):
+        raise click.UsageError("nothing has a mass: give --load, or `mass` in tables [[body]] of the file")
+    weightless = lacking(mechanism)
+    if left := [body for body in weightless if body not in loads]:
+        note(f"without a mass, and counted as none: {', '.join(left)}; `mass` in its table [[body]] gives a body one")
+    return mechanism.with_masses([*mechanism.masses, *(pf.Mass(body, 0.0) for body in weightless)])
+
+
 @click.command()
 @at_a_pose
 @click.option("--force", type=FINITE, nargs=3, metavar="X Y Z", help="What acts on the end effector.")
 @click.option("--moment", type=FINITE, nargs=3, metavar="X Y Z", help="Beside it, or alone [force times length].")
-@click.option(
-    "--load",
-    "loads",
-    multiple=True,
-    metavar="BODY=MASS,X,Y,Z",
-    shell_complete=completing(bodies, "="),
-    help="A mass and its centre, at home.",
-)
-@click.option(
-    "--gravity", type=FINITE, nargs=3, default=(0, 0, -9.81), metavar="X Y Z", help="Of masses.  [default: 0 0 -9.81]"
-)
+@carrying
 @click.option(
     "--limit",
     "limits",
@@ -45,7 +92,7 @@ def forces(
     solution: pf.Solution,
     force: Triple | None,
     moment: Triple | None,
-    loads: tuple[str, ...],
+    loads: Loads,
     gravity: Triple,
     limits: tuple[str, ...],
     reactions: bool,
@@ -63,20 +110,13 @@ def forces(
     if loads and limits:
         raise click.UsageError("--limit goes with --force and --moment, not with --load")
     wrench = (force or (0.0, 0.0, 0.0)) + (moment or ())
-    held = pf.forces(solution, wrench, loads=dict(map(load_of, loads)), gravity=gravity)
+    held = pf.forces(solution, wrench, loads=loads, gravity=gravity)
     others: dict[str, Result] = {"reactions": held.reactions} if reactions else {}
     if limits:
         bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of)
         others["capacity"] = pf.wrench_capacity(solution, bounds, wrench=wrench)
     print_result(as_json, held, others)
     return int(bool(held.reason))
-
-
-def load_of(words: str) -> tuple[str, tuple[float, list[float]]]:
-    """A body, and its mass and centre, from words such as ``platform=5,0,0,190``."""
-    body, _, numbers = words.rpartition("=")
-    mass, *centre = numbers_of("--load BODY=MASS,X,Y,Z", numbers, (4,))
-    return body, (mass, centre)
 
 
 def bounds_of(words: str) -> float | tuple[float, float]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 
 import click
 
@@ -16,7 +17,7 @@ from ..checks import require_ending
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
-from .arguments import FINITE, MECH, actuators, completing, load, note_left_out, projecting
+from .arguments import FINITE, MECH, Triple, actuators, by_name, completing, load, note_left_out, positive, projecting
 from .outputs import (
     OUTPUT,
     STANDARD,
@@ -30,11 +31,14 @@ from .outputs import (
 )
 from .printing import json_option, note, print_json, print_result, print_text
 from .questions import own_limits, speed_limits, speed_option
+from .statics import Loads, carrying, lacking, weighed
 
 if TYPE_CHECKING:
     from ..answers.tracked import TrackSummary
     from ..arrays import Mask
     from ..paths import path as paths
+
+    LimitsOf: TypeAlias = Callable[[pf.Mechanism], dict[str, Any]]
 
 
 MOST_TARGETS = 1_000_000_000
@@ -225,53 +229,87 @@ def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, 
         click.echo(f"wrote {film_path}", err=True)
 
 
+def limiting(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the limits that a path is timed within; the command gets `limits_of`, from a machine to those given."""
+
+    @speed_option
+    @click.option(
+        "--acceleration",
+        "accelerations",
+        multiple=True,
+        metavar="[NAME=]VALUE",
+        shell_complete=completing(actuators, "="),
+        help="Highest acceleration, likewise [deg/s² or length/s²]. Default: the file's max_acceleration.",
+    )
+    @click.option(
+        "--torque",
+        "torques",
+        multiple=True,
+        metavar="[NAME=]VALUE",
+        shell_complete=completing(actuators, "="),
+        help="The most that an actuator exerts, likewise [N m, of slides N]. Default: the file's max_torque.",
+    )
+    @click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s].")
+    @functools.wraps(command)
+    def with_limits(
+        *,
+        speeds: tuple[str, ...],
+        accelerations: tuple[str, ...],
+        torques: tuple[str, ...],
+        platform_speed: float | None,
+        **parameters: Any,
+    ) -> int:
+        def limits_of(mechanism: pf.Mechanism) -> dict[str, Any]:
+            limits = {
+                "speed": speed_limits(mechanism, speeds),
+                "acceleration": speed_limits(mechanism, accelerations, "--acceleration"),
+                "torque": by_name("--torque", torques, "actuator", actuators(mechanism), positive),
+            }
+            given: dict[str, Any] = {name: values for name, values in limits.items() if values}
+            return given | ({} if platform_speed is None else {"platform_speed": platform_speed})
+
+        return command(limits_of=limits_of, **parameters)
+
+    return with_limits
+
+
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
 @click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
-@speed_option
-@click.option(
-    "--acceleration",
-    "accelerations",
-    multiple=True,
-    metavar="[NAME=]VALUE",
-    shell_complete=completing(actuators, "="),
-    help="Highest acceleration, likewise [deg/s² or length/s²]. Default: the file's max_acceleration.",
-)
-@click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s].")
+@limiting
+@carrying
 @click.option("--rate", type=FINITE, default=1000.0, show_default=True, metavar="HZ", help="Samples per second.")
 @json_option("One JSON object on stdout: the time, and what limits it.")
 def time(
     mech: str,
     path: Path,
     output: Path | None,
-    speeds: tuple[str, ...],
-    accelerations: tuple[str, ...],
-    platform_speed: float | None,
+    limits_of: LimitsOf,
+    loads: Loads,
+    gravity: Triple,
     rate: float,
     as_json: bool,
 ) -> int:
     """Find the fastest way along a path.
 
-    PATH is a CSV file or G-code; - is standard input. Every actuator stays within its speed and acceleration; at both
-    ends the machine is at rest. A path with steps that are not reached, that leaps or crosses a parallel singularity
-    is refused.
+    PATH is a CSV file or G-code; - is standard input. Every actuator stays within its speed, acceleration and torque;
+    at both ends the machine is at rest. A path with steps that are not reached, that leaps or crosses a parallel
+    singularity is refused.
+
+    Torques move the masses of the file [kg], and those of --load; gravity is in m/s².
     """
     refuse_both_on_stdout(output, as_json)
     check_outputs([("-o", output)], [path, Path(mech)], as_json=as_json)
     mechanism = load(mech)
-    highest_speeds = speed_limits(mechanism, speeds) or None
-    highest_accelerations = speed_limits(mechanism, accelerations, "--acceleration") or None
+    limits = limits_of(mechanism)
+    if "torque" in limits:
+        mechanism = weighed(mechanism, loads)
+    elif any(joint.max_torque for joint in mechanism.joints) and (left := lacking(mechanism)):
+        note(f"max_torque of the file has no effect: no `mass` of {', '.join(left)} in tables [[body]]")
     targets = pf.read_path(path, mechanism).targets
     with nullcontext() if output is None else whole_file(output) as handle:
-        solution = pf.track(mechanism, targets)
-        timed = pf.time_path(
-            solution,
-            speed=highest_speeds,
-            acceleration=highest_accelerations,
-            platform_speed=platform_speed,
-            rate=rate,
-        )
+        timed = pf.time_path(pf.track(mechanism, targets), **limits, loads=loads, gravity=gravity, rate=rate)
         if handle is not None:
             timed.write(handle)
     print_result(as_json, timed, to_stderr=output == STANDARD)
