@@ -1,26 +1,37 @@
 """Motors of a motion rig: forces over a motion, peak and rms of each.
 
 For a platform on six electric cylinders that heaves and rolls with a cabin on it. You learn what each cylinder has to
-push and pull, how fast, what the joints carry, and how much force is left for the unexpected.
+push and pull, what of that is weight, what motion and what its own motor, what the joints carry, and how much force is
+left for the unexpected.
 """
 
-# The rig: six cylinders between pairs of joints, lengths in millimetres, masses in kilograms, so forces are in newtons
-# and moments in N mm. Points of bodies are given where they are at home.
+# The rig: six cylinders between pairs of joints, lengths in millimetres. Each has a screw that moves 10 mm a turn, so a
+# gear of 200 pi radians per metre, and a motor whose rotor has 3 kg cm². Forces are in N, torques in N m.
 import matplotlib.pyplot as plt
 import numpy as np
 
 import pfabrik as pf
 
-rig = pf.Mechanism.from_legs(
+gear = 2 * np.pi / 0.010
+legs = pf.Leg(
     "U-P*-S",
     base=[[1100, 150, 0], [1100, -150, 0]],
     platform=[[450, 700, 1100], [450, -700, 1100]],
-    stroke=(1080, 1680),
+    by_letter={"B": {"range": (1080, 1680), "rotor_inertia": 3e-4, "gear": gear}},
     copies={"count": 3, "axis": [0, 0, 1]},
-    reference_point=[0, 0, 1100],
-    name="motion rig",
 )
-mass, centre, inertia = 600.0, np.array([50.0, 0.0, 1700.0]), np.diag([180.0, 160.0, 120.0]) * 1e6  # kg, mm, kg mm²
+rig = pf.Mechanism.from_legs(legs, reference_point=[0, 0, 1100], name="motion rig")
+
+# ## What its bodies weigh
+#
+# The cabin has 600 kg and its centre above the platform. Every cylinder and every rod has 25 kg, in the middle between
+# its joints. Points are where they are at home; moments of inertia are about them, in kg mm².
+masses = [pf.Mass("platform", 600.0, (50, 0, 1700), np.array([180.0, 160.0, 120.0]) * 1e6)]
+for leg in range(1, 7):
+    foot, top = (np.array(rig.joint(f"{letter}{leg}").at) for letter in "AC")
+    for body, share in zip(rig.joint(f"B{leg}").connects, (0.25, 0.75), strict=True):
+        masses.append(pf.Mass(body, 25.0, foot + share * (top - foot), [25 * 700**2 / 12] * 3))
+rig = rig.with_masses(masses)
 
 # ## The motion
 #
@@ -29,67 +40,57 @@ times = np.linspace(0, 10, 1001)
 phase = 2 * np.pi * 0.4 * times
 position = np.stack([60 * np.sin(0.5 * phase), 0 * phase, 1100 + 90 * np.sin(phase)], axis=1)
 roll = np.radians(9) * np.sin(phase + 0.8)
-motion = pf.track(rig, pf.pose(position, rotvec=np.stack([roll, 0 * roll, 0 * roll], axis=1)), sample_time=times[1])
+motion = pf.track(rig, pf.pose(position, rotvec=np.stack([roll, 0 * roll, 0 * roll], axis=1)), times=times)
 print(motion)
-
-
-# ## What acts on the platform
-#
-# Weight, and by d'Alembert's principle the inertia of the cabin: m (g - a) in its centre of mass, and -(I w)' for its
-# rotation. Accelerations are in mm/s², so forces come in mN: divide by 1000.
-def rate(values):
-    return np.gradient(values, times, axis=0, edge_order=2)
-
-
-R = motion.pose[:, :3, :3]
-arm = R @ (centre - rig.reference_point)
-acceleration = rate(rate(position + arm))
-spin = np.stack([rate(roll), 0 * roll, 0 * roll], axis=1)
-momentum = np.einsum("nij,jk,nlk,nl->ni", R, inertia, R, spin)
-force = mass * ([0, 0, -9810] - acceleration) / 1000
-moment = -rate(momentum) / 1000
 
 # ## What the cylinders exert
 #
-# Positive pushes. `at` says where the force acts; moments are about that point too.
-load = np.concatenate([force, moment], axis=1)
-found = pf.forces(motion, load, at=motion.pose[:, :3, 3] + arm)
-speeds = rate(motion.actuators)
-print("cylinder   peak push   peak pull   rms force   top speed")
-for name, exerted, speed in zip(rig.actuator_names, found.actuators.T, speeds.T, strict=True):
+# `inverse_dynamics` takes rates and accelerations from the times of the track. Positive pushes.
+found = pf.inverse_dynamics(motion)
+print("cylinder   peak push   peak pull   rms force   top speed   peak power")
+for name, exerted, speed, power in zip(
+    rig.actuator_names, found.actuators.T, found.rates.T, found.power.T, strict=True
+):
     rms, pull = np.sqrt(np.mean(exerted**2)), max(0, -exerted.min())
-    print(f"{name:8} {exerted.max():9.0f} N {pull:9.0f} N {rms:9.0f} N {abs(speed).max():6.0f} mm/s")
+    numbers = f"{exerted.max():9.0f} N {pull:9.0f} N {rms:9.0f} N {abs(speed).max():6.0f} mm/s {power.max():10.0f} W"
+    print(f"{name:8} {numbers}")
 
-# The motor's rms torque decides how warm it gets, its peak how large it must be; both follow from these by the pitch
-# of the screw and its efficiency.
+# The motor's rms torque decides how warm it gets, its peak how large it must be. Of a screw without losses:
+torque = found.actuators / gear
+print(f"motors: peak {abs(torque).max():.1f} N m, rms up to {np.sqrt(np.mean(torque**2, axis=0)).max():.1f} N m")
+
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 axes.plot(times, found.actuators / 1000, linewidth=1.0, label=rig.actuator_names)
 axes.axhline(0, color="0.6", linewidth=0.8)
-axes.set(xlabel="time [s]", ylabel="force [kN], positive pushes", xlim=(0, 5), ylim=(-0.1, 2.6))
+axes.set(xlabel="time [s]", ylabel="force [kN], positive pushes", xlim=(0, 5), ylim=(-0.1, 2.9))
 axes.legend(ncols=6, frameon=False, fontsize=8)
 figure.savefig("forces.png", dpi=110)
 
-# ## Are the cylinders' own weights worth a thought?
+# ## What is it for?
 #
-# Each body may have a load of its own: a mass, and its centre at home. Here every cylinder and every rod has 25 kg, in
-# the middle between its joints.
-weights = {}
-for leg in range(1, 7):
-    foot, top = (np.array(rig.joint(f"{letter}{leg}").at) for letter in "AC")
-    cylinder, rod = rig.joint(f"B{leg}").connects
-    weights |= {cylinder: (25.0, foot + 0.25 * (top - foot)), rod: (25.0, foot + 0.75 * (top - foot))}
-heavier = pf.forces(motion, load, at=motion.pose[:, :3, 3] + arm, loads=weights)
-print(f"the legs' weights add up to {abs(heavier.actuators - found.actuators).max():.0f} N at a cylinder")
+# With `twists` of zero the rig stands still at each step: that is its weight. A rotor is a mass too, seen through its
+# screw: here of 118 kg. At the peak of each cylinder:
+still = pf.inverse_dynamics(motion, twists=np.zeros(6)).actuators
+rotor = 3e-4 * gear**2 * found.accelerations / 1000
+print("cylinder   weight   cabin and legs in motion   rotor")
+for place, name in enumerate(rig.actuator_names):
+    row = np.argmax(found.actuators[:, place])
+    moving = (found.actuators - still - rotor)[row, place]
+    print(f"{name:8} {still[row, place]:6.0f} N {moving:24.0f} N {rotor[row, place]:5.0f} N")
 
 # ## What the joints carry
 #
 # The force in the lower joint of a leg, over the motion.
-lower = np.linalg.norm(heavier.reactions["A1"][:, :3], axis=1)
+lower = np.linalg.norm(found.reactions["A1"][:, :3], axis=1)
 print(f"lower joint A1: at most {lower.max():.0f} N")
 
 # ## What is left
 #
-# With cylinders of 3 kN, the largest force that may come on top of all this from any direction, at the worst moment.
-left = pf.wrench_capacity(motion, 3000, wrench=load, at=motion.pose[:, :3, 3] + arm)
-worst = np.argmin(left.radius)
-print(f"{left.radius[worst]:.0f} N, at {times[worst]:.2f} s in the direction {np.round(left.weakest[worst], 2) + 0.0}")
+# With cylinders of 3 kN, the largest force that may come on top of all this from any direction, at the worst moment
+# of the five seconds after which the motion is repeated: what each cylinder still has, up and down, is its limit there.
+rows = range(0, 500, 10)
+spare = np.stack([-3000 - found.actuators, 3000 - found.actuators], axis=-1)
+left = [pf.wrench_capacity(motion[row], spare[row]) for row in rows]
+worst = np.argmin([each.radius for each in left])
+direction = np.round(left[worst].weakest, 2) + 0.0
+print(f"{left[worst].radius:.0f} N, at {times[rows[worst]]:.1f} s in the direction {direction}")
