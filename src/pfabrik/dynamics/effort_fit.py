@@ -15,6 +15,10 @@ LEAST_NOISE = 1e-4
 none, and would seem to determine what no instrument shows."""
 
 
+FAR = 4.0
+"""Noise of efforts, by that which they are taken to have, from which no machine explains them."""
+
+
 class EffortFit:
     """Parameters that explain efforts, weighed by deviations that are given, or that each actuator's residuals show.
 
@@ -26,6 +30,7 @@ class EffortFit:
     fit : in standard deviations; deviation : of these, more than 1 where residuals are larger than `sigma` says.
     found : what scaled parameters are more than described, (p,).
     is_broken : True for bodies and actuators' parameters that had to be held physical.
+    missed : root mean square of the residuals, in deviations.
     rms_before, rms, largest : residuals of each actuator, and its largest effort, (n_a,) [N, N m].
     residuals : (rows, n_a) [N, N m]; NaN for rows that were not used.
     """
@@ -55,8 +60,9 @@ class EffortFit:
         described = inverse(unknowns.by_scaled) @ unknowns.described
         values, broken = self.fit.physical(described, len(unknowns.scales.bodies), self.deviation)
         self.found, self.is_broken = values - described, broken > IMPOSSIBLE
-        units = unknowns.drives.units
-        left = self._left(self.found, sigma) / units
+        units, left = unknowns.drives.units, self._left(self.found, sigma)
+        self.missed = float(np.sqrt(np.mean((left / sigma) ** 2)))
+        left = left / units
         self.rms_before = np.sqrt(np.mean((self._left(np.zeros_like(values), sigma) / units) ** 2, axis=0))
         self.rms, self.largest = np.sqrt(np.mean(left**2, axis=0)), np.abs(measured / units).max(axis=0)
         self.residuals = np.full((n, n_a), np.nan)

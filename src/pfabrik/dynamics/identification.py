@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats, Mask, as_plain
 from ..description.mechanism import Mechanism
 from ..printed import Printed, ResultTable, error_text, plain
-from .effort_fit import EffortFit
+from .effort_fit import FAR, EffortFit
 from .inertial_fit import Combinations, combined, inverse, lengths
 from .unknowns import Unknowns
 
@@ -139,6 +139,14 @@ class Identification(Printed):
         return tuple(name for name, size in zip(self.names, seen, strict=True) if size <= UNSEEN * seen.max())
 
     @property
+    def doubt(self) -> str:
+        """Why these values may be wrong as a whole, in a sentence; "" if nothing says so."""
+        if not self._fit.missed > FAR:
+            return ""
+        off = f"{self._fit.missed:.3g} times their noise"
+        return f"no possible bodies explain these efforts, missed by {off}: are they in N and N m, and of this motion?"
+
+    @property
     def undetermined(self) -> tuple[str, ...]:
         """What the efforts leave open, in words."""
         shared = [n for n, alone in zip(self.names, self.determined, strict=True) if not alone and n not in self.unseen]
@@ -178,7 +186,7 @@ class Identification(Printed):
         """What is open, and what was not physical, a sentence each."""
         held = ", ".join(self.adjusted)
         sentence = f"no body or actuator can have the likeliest values of {held}: the likeliest possible were taken"
-        return [*self.undetermined, *([sentence] if held else [])]
+        return [*([self.doubt] if self.doubt else []), *self.undetermined, *([sentence] if held else [])]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain numbers, lists and dicts, ready for JSON; the machine aside."""
@@ -190,6 +198,7 @@ class Identification(Printed):
             "rank": self.rank,
             "rms_before": as_plain(self.rms_before),
             "rms": as_plain(self.rms),
+            "doubt": self.doubt,
             "undetermined": list(self.undetermined),
             "adjusted": list(self.adjusted),
         }
