@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import importlib
+import json
 import math
 import os
 from pathlib import Path
@@ -320,3 +321,14 @@ def test_a_missing_library_is_named_before_the_work(monkeypatch: pytest.MonkeyPa
         result = pfabrik(line)
         assert result.exit_code == 2
         assert "pip install '.[plot]'" in result.stderr
+
+
+def test_efforts_of_a_path_go_to_a_file_row_by_row() -> None:
+    write_files("weighed.toml", "rise.csv")
+    done = pfabrik("effort weighed.toml rise.csv --torque 2 -o out.csv --plot out.svg --json")
+    rows, found = rows_of("out.csv"), json.loads(done.stdout)
+    assert [float(row["effort_p5"]) for row in rows] == [row[1] for row in found["actuators"]]
+    assert max(abs(float(row["effort_p5"])) for row in rows) == pytest.approx(2.0, rel=1e-4)
+    by_hand = math.radians(float(rows[5]["rate_p1_deg"])) * float(rows[5]["effort_p1"])
+    assert float(rows[5]["power_p1"]) == pytest.approx(by_hand)
+    assert "<svg" in Path("out.svg").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ EXAMPLES = {
     ),
     "effort": (
         "effort linear_delta part.gcode --load platform=0.5,0,0,0",
-        "effort linear_delta part.gcode --rate 500 --load platform=0.5,0,0,0 --json",
+        "effort linear_delta part.gcode --torque 20 --load platform=0.5,0,0,0 -o efforts.csv --plot efforts.png",
     ),
     "speed": ("speed five_bar --position 0 10 180 --speed 30", "speed stewart --speed 50 --speed BL1=20"),
     "singularities": ("singularities five_bar --position 0 30 200", "singularities five_bar --over y,z -o map.png"),

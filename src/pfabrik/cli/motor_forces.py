@@ -2,46 +2,115 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 import pfabrik as pf
 
 from .arguments import FINITE, MECH, Triple, load
+from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
 from .printing import json_option, print_result
 from .statics import Loads, carrying, weighed
+from .track import check_pictures, limiting
+
+if TYPE_CHECKING:
+    from ..dynamics.efforts import Efforts
+    from .track import LimitsOf
 
 
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
+@click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
 @click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
 @click.option("--rapid", type=FINITE, metavar="V", help="Feed of rapid moves (G0), which say none [length/s].")
 @click.option("--rate", type=FINITE, metavar="HZ", help="Resample the path: targets per second.")
+@limiting
 @carrying
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Picture too: PNG, SVG or PDF.")
 @json_option()
 def effort(
     mech: str,
     path: Path,
-    sample_time: float | None,
-    rapid: float | None,
-    rate: float | None,
+    output: Path | None,
+    limits_of: LimitsOf,
     loads: Loads,
     gravity: Triple,
+    plot: Path | None,
     as_json: bool,
+    **sampling: float | None,
 ) -> int:
     """Tell what motors exert along a path.
 
-    PATH is a CSV file or G-code, as of track, with times, feeds or --sample-time; - is standard input. Masses are those
-    of the file and of --load; bodies without one weigh nothing. Forces are in N, torques in N m, power in W.
+    PATH is a CSV file or G-code, as of track, with times, feeds or --sample-time; - is standard input. With a limit,
+    such as --speed or --torque, it is followed as fast as `pfabrik time` would, whatever its times.
+
+    Masses [kg] are those of the file and of --load; bodies without one weigh nothing. Gravity is in m/s². Forces are in
+    N, torques in N m, power in W.
     """
-    mechanism = weighed(load(mech), loads)
+    refuse_both_on_stdout(output, as_json)
+    check_outputs([("-o", output), ("--plot", plot)], [path, Path(mech)], as_json=as_json)
+    check_pictures(plot, None)
+    mechanism = load(mech)
+    limits = limits_of(mechanism)
+    mechanism = weighed(mechanism, loads)
+    with nullcontext() if output is None else whole_file(output) as handle:
+        found = pf.inverse_dynamics(
+            followed(mechanism, path, limits, loads, gravity, **sampling), loads=loads, gravity=gravity
+        )
+        if handle is not None:
+            write(found, handle)
+    if plot is not None:
+        from ..view.save_picture import save_picture
+
+        save_picture(found.plot(), plot, dpi=150)
+        click.echo(f"wrote {plot}", err=True)
+    print_result(as_json, found, to_stderr=output == STANDARD)
+    return int(any(found.reason))
+
+
+def followed(
+    mechanism: pf.Mechanism,
+    path: Path,
+    limits: dict[str, Any],
+    loads: Loads,
+    gravity: Triple,
+    *,
+    sample_time: float | None,
+    rapid: float | None,
+    rate: float | None,
+) -> pf.Track | pf.Timed:
+    """A path at the times that it has, or as fast as limits let it."""
+    if limits:
+        if sample_time is not None:
+            raise click.UsageError("--sample-time does not go with limits, which time the path")
+        track = pf.track(mechanism, pf.read_path(path, mechanism, rapid=rapid).targets)
+        return pf.time_path(track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0)
     read = pf.read_path(path, mechanism, rapid=rapid, rate=rate)
     if read.times is None and sample_time is None:
-        raise click.UsageError("the path has no times: give --sample-time")
+        raise click.UsageError("the path has no times: give --sample-time, or a limit to time it by, such as --speed")
     times = read.times if sample_time is None else None
-    track = pf.track(mechanism, read.targets, times=times, sample_time=sample_time)
-    found = pf.inverse_dynamics(track, loads=loads, gravity=gravity)
-    print_result(as_json, found)
-    return int(any(found.reason))
+    return pf.track(mechanism, read.targets, times=times, sample_time=sample_time)
+
+
+def write(found: Efforts, handle: TextIO) -> None:
+    """Write a row for each time: what actuators exert [N m, N], their rates [deg/s, length/s] and power [W], the energy
+    given so far [J], and why there are no forces, where there are none."""
+    import numpy as np
+
+    from ..cells import CsvWriter
+    from ..kinematics import readouts
+
+    shown = readouts(found._mechanism)
+    rates = [each.display(column) for each, column in zip(shown, found.rates.T, strict=True)]
+    times, energy = np.asarray(found.times, float), np.asarray(found.energy, float)
+    numbers = np.column_stack([times, found.actuators, *rates, found.power, energy])
+    writer = CsvWriter(handle)
+    header = [f"effort_{each.name}" for each in shown]
+    header += [f"rate_{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
+    writer.writerow(["t", *header, *(f"power_{each.name}" for each in shown), "energy", "reason"])
+    for row, reason in zip((numbers + 0.0).tolist(), found.reason, strict=True):
+        writer.writerow([*row, reason])
