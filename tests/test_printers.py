@@ -6,6 +6,7 @@ Klipper, LinearDeltaKinematics.cpp and RotaryDeltaKinematics.cpp of RepRapFirmwa
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from pathlib import Path
@@ -21,6 +22,7 @@ from machines.redescribed import moved
 from pfabrik.cli import main
 from pfabrik.cli.export import text_of
 from pfabrik.errors import InvalidMechanism, UnsupportedMechanism
+from pfabrik.files import print_region_of
 
 FILES = Path(__file__).parent / "data" / "printers"
 
@@ -281,3 +283,44 @@ def test_every_command_takes_a_printer(tmp_path: Path, monkeypatch: pytest.Monke
     run("workspace", printer, "--fix", "z=0")
     run("new", "--from", other, "-o", "my.toml")
     assert pf.load(tmp_path / "my.toml") == pf.load(other)
+
+
+def test_a_slip_of_a_key_is_named_and_no_key_of_klipper_is_one(tmp_path: Path) -> None:
+    printer, text = tmp_path / "printer.cfg", (FILES / "per_tower.cfg").read_text()
+    own = (
+        "step_pin, dir_pin, rotation_distance, microsteps, full_steps_per_rotation, gear_ratio, endstop_pin, "
+        "step_pulse_duration, position_min, position_max, homing_speed, homing_retract_dist, homing_retract_speed, "
+        "second_homing_speed, homing_positive_dir"
+    )
+    head = "minimum_cruise_ratio, square_corner_velocity, max_velocity, max_accel, max_z_velocity, max_z_accel"
+    all_keys = text.replace("[printer]", "\n".join(["[printer]", *(f"{key}: 1" for key in head.split(", "))]))
+    all_keys += "\n".join(["", "[stepper_a]", *(f"{key}: 1" for key in own.split(", "))])
+    printer.write_text(all_keys)
+    region = print_region_of(str(printer))
+    assert region is not None and region.slips == () and (region.lowest, region.floor) == (-3.0, "minimum_z_position")
+    printer.write_text(f"{text}\n[stepper_b]\narm_lenght: 331\n")
+    checked = CliRunner().invoke(main, ["check", str(printer)])
+    assert "[stepper_b] arm_lenght is not read; did you mean 'arm_length'?" in checked.stderr and not checked.exit_code
+    printer.write_text("[printer]\nkinematics: delta\ndelta_radius: 100\n[stepper_a]\ndiagonal_rod: 330\n")
+    with pytest.raises(InvalidMechanism, match=r"\[stepper_a\] arm_length: found nothing, but 'diagonal_rod'"):
+        pf.load(printer)
+
+
+def test_a_printers_workspace_begins_at_its_bed_and_says_what_it_leaves_out(tmp_path: Path) -> None:
+    """The nozzle can go lower than the firmware lets it: the reach of a linear delta does not change with height."""
+    printer = tmp_path / "printer.cfg"
+    printer.write_text(
+        "[printer]\nkinematics: delta\ndelta_radius: 148\nprint_radius: 140\nminimum_z_position: -5\n"
+        "[stepper_a]\narm_length: 330\nposition_endstop: 320\n"
+    )
+
+    def lowest(*options: str) -> tuple[float, str]:
+        asked = ["workspace", str(printer), "--fix", "y=0", "--resolution", "10", "--json", *options]
+        result = CliRunner().invoke(main, asked)
+        return json.loads(result.stdout)["bounds"]["z"][0], result.stderr
+
+    end, notes = lowest()
+    assert end == pytest.approx(-5.0, abs=1e-2)
+    assert "print_radius 140" in notes and "z from -5 on, minimum_z_position" in notes
+    end, notes = lowest("--within", "z=-100:0")
+    assert end < -90.0 and "upper bound" in notes and "z from" not in notes

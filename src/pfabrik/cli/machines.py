@@ -176,6 +176,7 @@ def check(mech: str, as_json: bool) -> int:
 
     Says "ok", or names every fault, one a line. What is sound but may not be what was meant is noted on stderr.
     """
+    from ..files import print_region_of
     from ..remarks import remarks_on
 
     try:
@@ -184,7 +185,8 @@ def check(mech: str, as_json: bool) -> int:
         if as_json:
             print_json({"ok": False, "faults": [dataclasses.asdict(fault) for fault in error.faults]})
         raise
-    remarks = list(remarks_on(mechanism))
+    printer = print_region_of(mech)
+    remarks = [*(printer.slips if printer else ()), *remarks_on(mechanism)]
     name, task = mechanism.name, mechanism.task
     joints, actuators, chains = len(mechanism.joints), len(mechanism.actuator_names), len(pf.decompose(mechanism))
     if as_json:

@@ -40,8 +40,8 @@ class SpaceOptions:
         """True if any of the options is given."""
         return self != SpaceOptions(None, (), (), None)
 
-    def workspace(self, mechanism: pf.Mechanism, rpy: Triple | None, **others: Any) -> pf.Workspace:
-        """The workspace that the options ask for, about an orientation [deg] if one is given."""
+    def workspace(self, mech: str, mechanism: pf.Mechanism, rpy: Triple | None, **others: Any) -> pf.Workspace:
+        """The workspace that the options ask of the machine MECH, about an orientation [deg] if one is given."""
         names = None if self.over is None else self.over.split(",")
         held = {name: value for name, (value,) in pairs("--fix", self.fixed, 1).items()}
         within = {name: (low, high) for name, (low, high) in pairs("--within", self.within, 2).items()}
@@ -49,6 +49,7 @@ class SpaceOptions:
         if rpy is not None:
             others["orientation"] = pf.pose([0, 0, 0], rpy=rpy, degrees=True)[:3, :3]
         note_slow(mechanism)
+        within = above_bed(mech, "z" in (names or "z") and not {"z"} & {*held, *within}) | within
         return pf.workspace(
             mechanism, over=names, fixed=held or None, within=within or None, resolution=resolution, **others
         )
@@ -157,7 +158,7 @@ def workspace(
     mechanism = load(mech)
     others: dict[str, Any] = {"orientation": "any"} if any_orientation else {}
     others["tilt"] = None if tilt is None else math.radians(tilt)
-    found = space.workspace(mechanism, rpy, certified=certified, **others)
+    found = space.workspace(mech, mechanism, rpy, certified=certified, **others)
     middle = None if centre is None else point(found, centre)
     shape = None if largest is None else found.inscribed(largest, middle)
     for path in outputs:
@@ -196,7 +197,7 @@ def singularities(
         raise click.UsageError("--position and --joint are of one pose: over a workspace, --fix holds a coordinate")
     mechanism = load(mech)
     with nullcontext() if output is None else picture(output, drawn):
-        found = pf.singularity_map(mechanism, space.workspace(mechanism, target.rpy))
+        found = pf.singularity_map(mechanism, space.workspace(mech, mechanism, target.rpy))
         if output is not None:
             found.plot(**drawn.in_space)
     if output is not None:
@@ -212,6 +213,21 @@ def note_slow(mechanism: pf.Mechanism) -> None:
     reason = why_not_measured(mechanism)
     if reason:
         note(f"no closed forms, {reason}: points are tried one by one, for about a minute")
+
+
+def above_bed(mech: str, is_over_z: bool) -> dict[str, tuple[float, float]]:
+    """The ends of z to which a printer's firmware keeps; notes say what else it keeps to, which a machine does not."""
+    from ..files import print_region_of
+
+    printer = print_region_of(mech)
+    if printer is None:
+        return {}
+    radius = f"{printer.radius}, a setting of the firmware, is not applied, and " if printer.radius else ""
+    note(f"{radius}how far the joints tilt is in no firmware's file: an upper bound")
+    if not is_over_z:
+        return {}
+    note(f"z from {printer.lowest:g} on, {printer.floor}; --within z=MIN:MAX looks elsewhere")
+    return {"z": (printer.lowest, math.inf)}
 
 
 def pairs(option: str, words: Sequence[str], n: int) -> dict[str, list[float]]:

@@ -12,12 +12,13 @@ from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, InvalidMechanism, UnknownName
 from ..whole_files import whole_path
-from .printers import printer_table
+from .printers import print_region, printer_table
+from .printers.print_region import PrintRegion
 from .reading import read_mechanism
 from .texts import LARGEST_FILE, refuse_large, text_of, unusable
 from .writing import dumps
 
-__all__ = ["LARGEST_FILE", "dumps", "load", "loads", "save"]
+__all__ = ["LARGEST_FILE", "dumps", "load", "loads", "print_region_of", "save"]
 
 MOST_DOTS = 200
 """Most dots in one line: no line needs more than a few, and a key of many parts takes the parser quadratic time."""
@@ -69,6 +70,20 @@ def loads(text: str, source: str | None = None) -> Mechanism:
         return read_mechanism(_parsed(text))
     except InvalidMechanism as error:
         raise InvalidMechanism(error.faults, source) from None
+
+
+def print_region_of(source: str) -> PrintRegion | None:
+    """What a printer's settings say beside the machine that `load` makes of them; None of any other source."""
+    path = Path(source)
+    if source in catalog() or not os.path.isfile(path):
+        return None
+    text = text_of(path)
+    try:
+        if tomllib.loads(text):
+            return None
+    except (RecursionError, ValueError):
+        pass
+    return print_region(text, path.parent)
 
 
 def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:

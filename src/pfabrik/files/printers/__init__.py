@@ -5,18 +5,27 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from .klipper import klipper_table
-from .m_codes import m_codes_table
-from .marlin import marlin_table
+from .klipper import klipper_region, klipper_table
+from .m_codes import m_codes_region, m_codes_table
+from .marlin import marlin_region, marlin_table
+from .print_region import PrintRegion
 
-_READERS: tuple[tuple[str, Callable[[str, Path | None], dict[str, Any]]], ...] = (
-    (r"^\[(printer|stepper_\w+)\]", klipper_table),
-    (r"^[ \t]*#define[ \t]+[A-Z]", marlin_table),
-    (r"^[^;\n]*\bM(665|666|669)\b|^[ \t]*[GM]\d+\b", m_codes_table),
+
+class _Reader(NamedTuple):
+    """What reads the files of a firmware, recognised by the beginning of a line."""
+
+    begin: str
+    table: Callable[[str, Path | None], dict[str, Any]]
+    region: Callable[[str, Path | None], PrintRegion]
+
+
+_READERS = (
+    _Reader(r"^\[(printer|stepper_\w+)\]", klipper_table, klipper_region),
+    _Reader(r"^[ \t]*#define[ \t]+[A-Z]", marlin_table, marlin_region),
+    _Reader(r"^[^;\n]*\bM(665|666|669)\b|^[ \t]*[GM]\d+\b", m_codes_table, m_codes_region),
 )
-"""Beginnings of lines by which a firmware's file is recognised, and what reads it."""
 
 
 def printer_table(text: str, folder: Path | None) -> dict[str, Any] | None:
@@ -30,5 +39,15 @@ def printer_table(text: str, folder: Path | None) -> dict[str, Any] | None:
     ------
     InvalidMechanism : a printer without closed loops, or settings that are missing or no numbers.
     """
-    reader = next((read for begin, read in _READERS if re.search(begin, text, re.MULTILINE)), None)
-    return None if reader is None else reader(text, folder)
+    reader = _reader_of(text)
+    return None if reader is None else reader.table(text, folder)
+
+
+def print_region(text: str, folder: Path | None) -> PrintRegion | None:
+    """What a printer's settings say beside the machine; None for a text that is no such settings."""
+    reader = _reader_of(text)
+    return None if reader is None else reader.region(text, folder)
+
+
+def _reader_of(text: str) -> _Reader | None:
+    return next((reader for reader in _READERS if re.search(reader.begin, text, re.MULTILINE)), None)

@@ -7,17 +7,33 @@ import math
 import os
 import re
 from collections.abc import Iterator
+from difflib import get_close_matches
 from glob import glob
 from pathlib import Path
 
 from ...errors import InvalidMechanism
 from ..texts import text_of
 from .deltas import LOOPLESS, TOWERS, Table, fault, linear_delta, rotary_delta
+from .print_region import PrintRegion
 
 _INCLUDE = re.compile(r"^\[include +([^\]]+)\]", re.MULTILINE)
 
 _MOST_FILES = 100
 """Files that are included, at most."""
+
+_OTHER_WORDS = {
+    "diagonal_rod": "arm_length",
+    "delta_diagonal_rod": "arm_length",
+    "rod_length": "arm_length",
+    "radius": "delta_radius",
+    "printable_radius": "print_radius",
+    "endstop_position": "position_endstop",
+    "min_z_position": "minimum_z_position",
+}
+"""Words of other firmwares, and habits, with Klipper's in their place."""
+
+_LIKE = 0.8
+"""Share of letters that a slip has in common with a key; Klipper's own keys are all less like those read here."""
 
 
 class KlipperSettings:
@@ -30,6 +46,7 @@ class KlipperSettings:
         lines = text.splitlines()
         saved = "\n".join(["", *(line[3:].removeprefix(" ") for line in lines if line.startswith("#*#"))])
         saved = saved[saved.find("\n[") :] if "\n[" in saved else ""
+        self._read: dict[str, set[str]] = {}
         self._sections = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"))
         above = "\n".join(line for line in lines if not line.startswith("#*#"))
         for part in (saved, _included(above, folder, iter(range(_MOST_FILES)))):
@@ -40,6 +57,7 @@ class KlipperSettings:
 
     def text(self, section: str, key: str) -> str | None:
         """The value of a key, or None."""
+        self._read.setdefault(section, set()).add(key)
         return self._sections.get(section, key, fallback=None)
 
     def number(self, section: str, key: str, default: float | None = None, above: float = -math.inf) -> float:
@@ -53,7 +71,8 @@ class KlipperSettings:
             value = math.nan
         if not (math.isfinite(value) and value > above):
             expected = "a number" if above == -math.inf else f"a number above {above:g}"
-            raise fault(f"[{section}] {key}", "nothing" if said is None else repr(said), expected)
+            slip = "".join(f", but '{name}'" for name, meant in self._unread(section) if meant == key)
+            raise fault(f"[{section}] {key}", f"nothing{slip}" if said is None else repr(said), expected)
         return value
 
     def of_towers(self, key: str, defaults: tuple[float, ...] = (), above: float = -math.inf) -> list[float]:
@@ -63,6 +82,23 @@ class KlipperSettings:
             default = defaults[place] if defaults else (values[0] if values else None)
             values.append(self.number(f"stepper_{letter}", key, default, above))
         return values
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """Remarks on keys that nothing has read, though they are much like one that was."""
+        return tuple(
+            f"[{section}] {name} is not read; did you mean '{meant}'?"
+            for section in self._read
+            for name, meant in self._unread(section)
+        )
+
+    def _unread(self, section: str) -> Iterator[tuple[str, str]]:
+        """Keys of a section that nothing has read, each with one that it was probably meant for."""
+        read = self._read[section]
+        for name in self._sections[section] if self._sections.has_section(section) else ():
+            meant = get_close_matches(_OTHER_WORDS.get(name, name), read - {name}, 1, _LIKE)
+            if name not in read and meant:
+                yield name, meant[0]
 
 
 def _included(text: str, folder: Path | None, read: Iterator[int]) -> str:
@@ -88,7 +124,23 @@ def _included(text: str, folder: Path | None, read: Iterator[int]) -> str:
 
 def klipper_table(text: str, folder: Path | None) -> Table:
     """The machine of a `printer.cfg`: kinematics delta, with the carriages' heights, or rotary_delta, with angles."""
+    return _machine_of(KlipperSettings(text, folder))
+
+
+def klipper_region(text: str, folder: Path | None) -> PrintRegion:
+    """What a `printer.cfg` says beside the machine."""
     settings = KlipperSettings(text, folder)
+    _machine_of(settings)
+    radius, lowest = (settings.text("printer", name) for name in ("print_radius", "minimum_z_position"))
+    return PrintRegion(
+        f"print_radius {radius}" if radius else "",
+        settings.number("printer", "minimum_z_position", 0.0),
+        "minimum_z_position" if lowest else PrintRegion().floor,
+        settings.slips,
+    )
+
+
+def _machine_of(settings: KlipperSettings) -> Table:
     kinematics = settings.text("printer", "kinematics")
     if kinematics == "delta":
         return delta_of(settings)

@@ -9,6 +9,7 @@ from pathlib import Path
 from ..texts import text_of
 from .deltas import LOOPLESS, Table, fault, linear_delta, rotary_delta
 from .marlin import ANGLES, marlin_delta
+from .print_region import PrintRegion
 
 _CODE = re.compile(r"(?:echo:)?\s*(?:N\d+\s*)?M(\d+)\b(.*)", re.IGNORECASE)
 _WORD = re.compile(r"([A-Z])\s*([-+.\d:]+)?")
@@ -30,16 +31,25 @@ Words = dict[str, list[float]]
 
 def m_codes_table(text: str, folder: Path | None) -> Table:
     """The machine of a file with M665, M666 and M669; of Marlin's, if M665 has words that are Marlin's alone."""
+    codes = list(_codes(text, folder))
+    return _marlin(codes) if _is_marlin(codes) else _reprap(codes)
+
+
+def m_codes_region(text: str, folder: Path | None) -> PrintRegion:
+    """What such a file says beside the machine; of Marlin's, B is no radius."""
+    codes = list(_codes(text, folder))
+    radii = [words["B"][0] for code, words in codes if code in (665, 669) and "B" in words and not _is_marlin(codes)]
+    return PrintRegion(f"B{radii[-1]:g}" if radii else "")
+
+
+def _is_marlin(codes: list[tuple[int, Words]]) -> bool:
+    return any(code == 665 and words.keys() & set("SAC") for code, words in codes)
+
+
+def _codes(text: str, folder: Path | None) -> Iterator[tuple[int, Words]]:
     override = (folder or Path()) / _OVERRIDE
     if re.search(r"^\s*M501\b", text, re.MULTILINE) and folder is not None and override.is_file():
         text = f"{text}\n{text_of(override)}"
-    codes = list(_codes(text))
-    if any(code == 665 and words.keys() & set("SAC") for code, words in codes):
-        return _marlin(codes)
-    return _reprap(codes)
-
-
-def _codes(text: str) -> Iterator[tuple[int, Words]]:
     for number, line in enumerate(text.splitlines(), 1):
         match = _CODE.match(line.partition(";")[0].strip())
         if match is None or int(match[1]) not in (665, 666, 669, 851):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..dimensions import NoNumber, number_of
 from .deltas import LOOPLESS, Table, fault, linear_delta
+from .print_region import PrintRegion
 
 ANGLES = (210.0, 330.0, 90.0)
 """Angles of the towers [deg], to which corrections are added; RepRapFirmware's too."""
@@ -71,6 +72,13 @@ def marlin_table(text: str, folder: Path | None) -> Table:
         rod_trims=definitions.three("DELTA_DIAGONAL_ROD_TRIM_TOWER"),
         radius_trims=definitions.three("DELTA_RADIUS_TRIM_TOWER"),
     )
+
+
+def marlin_region(text: str, folder: Path | None) -> PrintRegion:
+    """What a `Configuration.h` says beside the machine."""
+    name = "DELTA_PRINTABLE_RADIUS"
+    radius = _Definitions(text).texts.get(name)
+    return PrintRegion(f"{name} {radius}" if radius else "")
 
 
 class _Definitions:
