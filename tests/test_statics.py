@@ -310,6 +310,16 @@ def test_the_orthoglide_has_its_published_factors() -> None:
     assert here.rotation.velocity.shape == (0,)
 
 
+def test_what_a_tripod_cannot_do_has_the_factor_0_not_rounding() -> None:
+    """Level, it rises and tilts: it moves along z alone, and turns about x and y alone."""
+    found = pf.transmission(pf.solve_ik(pf.load("rps"), pf.load("rps").home_pose))
+    np.testing.assert_array_equal(found.translation.velocity[1:], 0.0)
+    assert found.rotation.velocity[2] == 0.0 and np.isinf(found.rotation.force[2])
+    np.testing.assert_allclose(np.abs(found.translation.directions[:, 0]), [0, 0, 1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.abs(found.rotation.directions[:, 2]), [0, 0, 1], rtol=0, atol=1e-9)
+    assert found.table().rows[0][:4] == ("along", "0", "0", "1")
+
+
 def test_slack_cables_have_no_stiffness() -> None:
     machine = cables()
     for solution in rows_of("cables"):

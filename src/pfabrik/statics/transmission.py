@@ -15,7 +15,7 @@ from ..description.mechanism import Mechanism
 from ..errors import counted
 from ..kinematics import JointRates, columns, cycle_basis, generic_of, model_of, rate_units
 from ..platform.jacobians import regular_forward_map
-from ..printed import Printed, ResultTable, spanned
+from ..printed import Printed, ResultTable, plain, spanned
 from ..tolerances import TOLERANCES
 from .loads import Reasons, add_reason, has_reason, in_shape, no_reasons, reasons_in_words
 
@@ -93,9 +93,10 @@ class Factors:
     ----------
     velocity : array (..., k)
         Factors: the speed when the actuators' rates have a sum of squares of 1. 0 where what moves is at rest in that
-        direction.
+        direction, to a relative 1e-9.
     directions : array (..., 3, k)
-        Unit vectors of these, in the base frame; of a joint's coordinates, (..., coordinates, k).
+        Unit vectors of these, in the base frame, whose largest component is positive; of a joint's coordinates,
+        (..., coordinates, k).
     actuators : array (..., n_a, k)
         The actuators' rates that make them.
     """
@@ -133,20 +134,17 @@ class Transmission(Printed):
     _units: tuple[str, str] = field(repr=False)
 
     def table(self) -> ResultTable:
-        """The factors of each direction; of a batch, their range."""
-        rows = [
-            (
-                f"{name} {place}",
-                spanned(np.ravel(factors.velocity[..., place])),
-                unit,
-                spanned(np.ravel(factors.force[..., place])),
-            )
-            for name, factors, unit in zip(
-                ("translation", "rotation"), (self.translation, self.rotation), self._units, strict=True
-            )
-            for place in range(factors.velocity.shape[-1])
-        ]
-        header = ("direction", "velocity", "per actuator", "force")
+        """The factors of each direction, by its vector; of a batch their ranges, from the fastest direction on."""
+        parts = ("along", "translation", self.translation), ("about", "rotation", self.rotation)
+        is_vector = all(factors.directions.shape[:-1] in ((3,), (0,)) for *_, factors in parts)
+        rows = []
+        for (kind, noun, factors), unit in zip(parts, self._units, strict=True):
+            for place in range(factors.velocity.shape[-1]):
+                vector = [plain(part, TOLERANCES.rank) for part in np.ravel(factors.directions[..., place])]
+                name = (kind, *vector) if is_vector else (f"{noun} {place + 1}",)
+                speed, force = (np.ravel(each[..., place]) for each in (factors.velocity, factors.force))
+                rows.append((*name, spanned(speed), unit, spanned(force)))
+        header = (*(("", "x", "y", "z") if is_vector else ("direction",)), "velocity", "per actuator", "force")
         return ResultTable("Transmission", reasons_in_words(self.reason, "no factors"), header, rows)
 
 
@@ -179,10 +177,12 @@ def transmission(solution: Solution, joint: str | None = None) -> Transmission:
     reasons = maps.reasons
     rates[has_reason(reasons)] = np.nan
     shape, most = solution.shape, _ranks(mechanism) if joint is None else (3, 3)
+    units = np.where(turns, 1.0, mechanism.characteristic_length)
+    rounding = TOLERANCES.rank * np.linalg.norm(rates / units[:, None], axis=(1, 2))
     return Transmission(
         rates.reshape(shape + rates.shape[1:]),
-        _factors(rates[:, ~turns], most[0], shape),
-        _factors(rates[:, turns], most[1], shape),
+        _factors(rates[:, ~turns], most[0], shape, rounding * mechanism.characteristic_length),
+        _factors(rates[:, turns], most[1], shape, rounding),
         in_shape(reasons, shape),
         _units(mechanism),
     )
@@ -212,13 +212,17 @@ def _ranks(mechanism: Mechanism) -> tuple[int, int]:
     return min(ranks[0], generic.mobility.platform), min(ranks[1], generic.mobility.platform)
 
 
-def _factors(rates: Floats, most: int, shape: tuple[int, ...]) -> Factors:
-    """The factors of maps (n, r, n_a), at most so many, in the shape of a batch."""
+def _factors(rates: Floats, most: int, shape: tuple[int, ...], rounding: Floats) -> Factors:
+    """The factors of maps (n, r, n_a), at most so many, in the shape of a batch; 0 below their rounding, (n,)."""
     rows, actuators = rates.shape[1:]
     k = min(rows, actuators, most)
     is_known = np.asarray(~np.isnan(rates).any(axis=(1, 2)))
     left, values, right = np.linalg.svd(np.where(is_known[:, None, None], rates, 0.0), full_matrices=False)
+    values[values <= rounding[:, None]] = 0.0
     found = values[:, :k], left[..., :k], np.swapaxes(right[:, :k], -1, -2)
+    largest = np.take_along_axis(found[1], np.abs(found[1]).argmax(axis=1, keepdims=True), 1) if rows else 1.0
+    for array in found[1:]:
+        array *= np.sign(largest)
     for array in found:
         array[~is_known] = np.nan
     return Factors(*(array.reshape(shape + array.shape[1:]) for array in found))
