@@ -289,10 +289,10 @@ class Worst:
         row = int(known.argmax())
         if known[row] > self.value:
             self.value, self.name = float(known[row]), names[row]
-            self.place = _place(begin, row, lines)
+            self.place = place_of(begin, row, lines)
 
 
-def _place(begin: int, row: int, lines: Sequence[int]) -> str:
+def place_of(begin: int, row: int, lines: Sequence[int]) -> str:
     """The number of a target and, of those that were read, its line; a path may begin at home."""
     line = f" ({f'line {lines[row]}' if lines[row] else 'home'})" if lines else ""
     return f"target {begin + row}{line}"
@@ -323,7 +323,7 @@ class TrackSummary:
         self._counts += Counter(map(Status, status.tolist()))
         off = np.flatnonzero(status != Status.REACHED)
         if len(off) and not self._first_off:
-            self._first_off = _place(begin, int(off[0]), lines)
+            self._first_off = place_of(begin, int(off[0]), lines)
         self._farthest = max(self._farthest, float(track.position_error[new].max()))
         self._failed.add((begin + np.flatnonzero(status >= Status.FAILED)).tolist())
         self._jumps.add((begin + np.flatnonzero(track.jumps[new])).tolist())

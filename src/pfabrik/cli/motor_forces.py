@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -14,10 +14,11 @@ from .arguments import FINITE, MECH, Triple, load
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
 from .printing import json_option, print_result
 from .statics import Loads, carrying, weighed
-from .track import check_pictures, limiting
+from .track import at_lines_of, check_pictures, limiting
 
 if TYPE_CHECKING:
     from ..dynamics.efforts import Efforts
+    from ..paths import path as paths
     from .track import LimitsOf
 
 
@@ -41,7 +42,9 @@ def effort(
     gravity: Triple,
     plot: Path | None,
     as_json: bool,
-    **sampling: float | None,
+    sample_time: float | None,
+    rapid: float | None,
+    rate: float | None,
 ) -> int:
     """Tell what motors exert along a path.
 
@@ -57,10 +60,18 @@ def effort(
     mechanism = load(mech)
     limits = limits_of(mechanism)
     mechanism = weighed(mechanism, loads)
-    with nullcontext() if output is None else whole_file(output) as handle:
-        found = pf.inverse_dynamics(
-            followed(mechanism, path, limits, loads, gravity, **sampling), loads=loads, gravity=gravity
-        )
+    if limits and sample_time is not None:
+        raise click.UsageError("--sample-time does not go with limits, which time the path")
+    read = pf.read_path(path, mechanism, rapid=rapid, rate=None if limits else rate)
+    with nullcontext() if output is None else whole_file(output) as handle, at_lines_of(read):
+        if limits:
+            track = pf.track(mechanism, read.targets)
+            motion: pf.Timed | pf.Track = pf.time_path(
+                track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0
+            )
+        else:
+            motion = at_its_times(mechanism, read, sample_time)
+        found = pf.inverse_dynamics(motion, loads=loads, gravity=gravity)
         if handle is not None:
             write(found, handle)
     if plot is not None:
@@ -72,28 +83,12 @@ def effort(
     return int(any(found.reason))
 
 
-def followed(
-    mechanism: pf.Mechanism,
-    path: Path,
-    limits: dict[str, Any],
-    loads: Loads,
-    gravity: Triple,
-    *,
-    sample_time: float | None,
-    rapid: float | None,
-    rate: float | None,
-) -> pf.Track | pf.Timed:
-    """A path at the times that it has, or as fast as limits let it."""
-    if limits:
-        if sample_time is not None:
-            raise click.UsageError("--sample-time does not go with limits, which time the path")
-        track = pf.track(mechanism, pf.read_path(path, mechanism, rapid=rapid).targets)
-        return pf.time_path(track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0)
-    read = pf.read_path(path, mechanism, rapid=rapid, rate=rate)
-    if read.times is None and sample_time is None:
+def at_its_times(mechanism: pf.Mechanism, path: paths.Path, sample_time: float | None) -> pf.Track:
+    """A path at the times that it has, or one target after the other."""
+    if path.times is None and sample_time is None:
         raise click.UsageError("the path has no times: give --sample-time, or a limit to time it by, such as --speed")
-    times = read.times if sample_time is None else None
-    return pf.track(mechanism, read.targets, times=times, sample_time=sample_time)
+    times = path.times if sample_time is None else None
+    return pf.track(mechanism, path.targets, times=times, sample_time=sample_time)
 
 
 def write(found: Efforts, handle: TextIO) -> None:

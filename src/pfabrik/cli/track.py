@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
@@ -273,6 +273,20 @@ def limiting(command: Callable[..., int]) -> Callable[..., int]:
     return with_limits
 
 
+@contextmanager
+def at_lines_of(path: paths.Path) -> Iterator[None]:
+    """Name the first target that an error is about as `track` does: counted from 1, and by the line it comes from."""
+    from ..answers.tracked import place_of
+
+    try:
+        yield
+    except pf.errors.InvalidArgument as error:
+        if not error.rows:
+            raise
+        place = place_of(1, error.rows[0], path.lines)
+        raise click.ClickException(f"PATH: found {error.found}, first at {place}; expected {error.expected}") from error
+
+
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
@@ -307,9 +321,9 @@ def time(
         mechanism = weighed(mechanism, loads)
     elif any(joint.max_torque for joint in mechanism.joints) and (left := lacking(mechanism)):
         note(f"max_torque of the file has no effect: no `mass` of {', '.join(left)} in tables [[body]]")
-    targets = pf.read_path(path, mechanism).targets
-    with nullcontext() if output is None else whole_file(output) as handle:
-        timed = pf.time_path(pf.track(mechanism, targets), **limits, loads=loads, gravity=gravity, rate=rate)
+    read = pf.read_path(path, mechanism)
+    with nullcontext() if output is None else whole_file(output) as handle, at_lines_of(read):
+        timed = pf.time_path(pf.track(mechanism, read.targets), **limits, loads=loads, gravity=gravity, rate=rate)
         if handle is not None:
             timed.write(handle)
     print_result(as_json, timed, to_stderr=output == STANDARD)

@@ -13,7 +13,7 @@ LARGEST_FILE = 1_000_000
 def text_of(path: Path) -> str:
     """The text of a file that could be a mechanism file; a fault when it cannot be one."""
     if not path.is_file():
-        raise unusable("a directory or device", "a mechanism file")
+        raise unusable("a directory or device" if path.exists() else "no such file", "a mechanism file")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
