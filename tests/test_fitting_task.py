@@ -13,9 +13,12 @@ from click.testing import CliRunner
 import pfabrik as pf
 from in_mujoco import Model
 from machines.redescribed import moved
+from pfabrik.catalog import template
 from pfabrik.cli import main
+from pfabrik.files import loads
 from pfabrik.interop import from_mjcf, to_mjcf
 from pfabrik.motion.fitting_task import fitting_tasks, has_dependent_coordinates
+from pfabrik.remarks import remarks_on
 from pfabrik.rotations import from_rotvec
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
@@ -70,6 +73,17 @@ def test_coordinates_that_never_vary_ask_for_nothing_and_those_that_follow_do() 
 
 
 # A delta as it comes from drawings: no two of its rods are parallel, so that its platform tilts as it moves.
+
+
+@pytest.mark.parametrize("kind", ["3-RRS", "3-RPS", "3-PRS"])
+def test_a_task_of_parasitic_motions_is_remarked_on(kind: str) -> None:
+    """A tripod slides sideways by a hundredth of its size, made to by its tilts: x, y and z are no task for it."""
+    text = template(kind)
+    assert not [remark for remark in remarks_on(loads(text)) if "task" in remark]
+    task = re.sub("^task = .*$", 'task = ["x", "y", "z"]', text, flags=re.MULTILINE)
+    assert any(
+        "hardly varies independently: a task that fits is z tilt" in remark for remark in remarks_on(loads(task))
+    )
 
 
 def crooked_delta() -> str:

@@ -106,6 +106,7 @@ TABLE: list[Case] = [
       ({"pivot": (0, 0)}, "pivot"), ({"pivot": (0, 0, np.inf)}, "pivot"))),
     (travelling("agile_eye", along=(0, 0, 1)), "along.*within the task, rotation"),
     (travelling("rps", along=[(0, 0, 1), (0, 1, 1)]), r"along.*within the task, z tilt.*rows?: 1"),
+    (travelling("rps", about=[(1, 0, 0), (0, 0, 1)]), r"about.*within the task, z tilt.*rows?: 1"),
     (travelling("delta", about=(0, 0, 1)), "about.*within the task, x y z"),
     (partial(pf.travel, FIVE_BAR), "solution: found Mechanism"),
     (lambda: pf.travel(exceeded()), "solution: found an answer that is EXCEEDED"),

@@ -12,7 +12,7 @@ from .description.home_mobility import ends_of_default_axes, universal_axes
 from .description.mechanism import Joint, Mechanism
 from .description.symmetry import crossed_rounds, near_copies
 from .export.rod_lengths import odd_rods, uneven_rods, with_lengths
-from .motion.fitting_task import has_dependent_coordinates, task_remark
+from .motion.fitting_task import has_weak_coordinates, task_remark
 from .overview import NOT_COUNTED, counted_mobility, nearly_free, vector
 
 FULL_TURN = 2.0 * math.pi
@@ -24,7 +24,7 @@ def remarks_on(mechanism: Mechanism) -> Iterator[str]:
     if mobility is None:
         yield f"freedoms are {NOT_COUNTED}: whether they suffice for the task is not known"
     else:
-        if has_dependent_coordinates(mechanism):
+        if has_weak_coordinates(mechanism):
             yield f"{task_remark(mechanism)}; hardly any target can be reached"
         yield from (f"the loops hardly resist a motion of {nearly_free(motion)}" for motion in mobility.nearly_free)
     for _, joint, body in leaves(mechanism):

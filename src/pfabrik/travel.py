@@ -198,8 +198,8 @@ def travel(
         raise InvalidArgument("solution", found, "one feasible configuration")
     default = along is None and about is None
     lines = _lines(mechanism, along, default)
-    axes = _axes(mechanism, solution, about, default)
     centre = solution.pose[:3, 3] if pivot is None else array("pivot", pivot, "3")
+    axes = _axes(mechanism, solution, about, centre, default)
     search = _TravelSearch(solution, lines, axes, centre)
     distances = search.run()
     ends = Solution(mechanism, search.farthest, (len(distances),))
@@ -246,7 +246,7 @@ def _lines(mechanism: Mechanism, along: ArrayLike | None, default: bool) -> Floa
     return lines
 
 
-def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, default: bool) -> Floats:
+def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, pivot: Floats, default: bool) -> Floats:
     """Checked axes of rotation, unit vectors (n, 3)."""
     task, only = task_of(mechanism), tilt_axis(mechanism)
     rotations = task.rotations
@@ -255,8 +255,15 @@ def _axes(mechanism: Mechanism, solution: Solution, about: ArrayLike | None, def
         chosen = turning if default else np.zeros((0, 3))
         return np.stack([chosen, -chosen], axis=1).reshape(-1, 3)
     axes = _directions("about", about)
-    off = np.abs(axes[:, :2]).max(axis=1, initial=0.0) > TOLERANCES.alignment
-    _require_task(mechanism, "about", axes, off if rotations == 1 else np.full(len(axes), rotations == 0))
+    if rotations == 1:
+        off = np.abs(axes[:, :2]).max(axis=1, initial=0.0) > TOLERANCES.alignment
+    elif rotations == 2:  # about the platform's own axis a turn is no tilt, and moves at most the reference point
+        ways = np.cross(axes, (solution.pose[:3, 3] - pivot) / mechanism.characteristic_length)[:, list(task.axes)]
+        across = np.cross(axes, solution.pose[:3, 2])
+        off = np.abs(np.hstack([across, ways])).max(axis=1) <= TOLERANCES.alignment
+    else:
+        off = np.full(len(axes), rotations == 0)
+    _require_task(mechanism, "about", axes, off)
     if only is not None:  # meant, if typed to a few digits
         is_only = np.linalg.norm(np.cross(axes, only), axis=1) <= TOLERANCES.file_angle
         axes[is_only] = np.sign(axes[is_only] @ only)[:, None] * only

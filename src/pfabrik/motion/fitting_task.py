@@ -138,15 +138,23 @@ def has_dependent_coordinates(mechanism: Mechanism) -> bool:
     return int(counts.sum()) > generic.mobility.platform < n_varying
 
 
+def has_weak_coordinates(mechanism: Mechanism) -> bool:
+    """True if coordinates of the task vary independently by parasitic motions at most; they may be dependent too."""
+    if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
+        return False
+    task = _evaluate_task(mechanism.task, *_motions(mechanism))
+    return has_dependent_coordinates(mechanism) or (task is not None and task.conditioning < TOLERANCES.independent)
+
+
 def task_remark(mechanism: Mechanism) -> str:
     """A sentence that says why hardly any target of a task that asks too much is reachable, and which task fits."""
     tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
     fits = f"a task that fits is {' '.join(tasks[0].words)}" if tasks else "no task fits, for nothing moves"
     asked = counted(int(_counted(mechanism.task).sum()), "coordinate")
-    return (
-        f"the task {' '.join(mechanism.task)} asks for {asked}, of which the "
-        f"mechanism can vary {freedoms} independently: {fits}"
-    )
+    varied = "which the mechanism hardly varies independently"
+    if has_dependent_coordinates(mechanism):
+        varied = f"of which the mechanism can vary {freedoms} independently"
+    return f"the task {' '.join(mechanism.task)} asks for {asked}, {varied}: {fits}"
 
 
 def leaves_a_choice(mechanism: Mechanism) -> bool:
