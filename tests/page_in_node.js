@@ -2,9 +2,10 @@
 const fs = require("fs");
 
 const scripts = process.argv.slice(2).map((path) => fs.readFileSync(path, "utf-8"));
-const { kernels, machine, targets, path, values, link } = JSON.parse(fs.readFileSync(0, "utf-8"));
+const { kernels, machine, targets, path, values, link, edges, listed } = JSON.parse(fs.readFileSync(0, "utf-8"));
 
-const { Engine, Session, singularityOf } = new Function(`${scripts.join("\n")}; return { Engine, Session, singularityOf };`)();
+const names = "{ Engine, Scene, Session, singularityOf }";
+const { Engine, Scene, Session, singularityOf } = new Function(`${scripts.join("\n")}; return ${names};`)();
 const named = (limits) => limits.map(({ joint, bound }) => `${joint} ${bound}`);
 const plain = ({ status, pose, actuators, limits }) => ({ status, pose, actuators, limits: named(limits) });
 
@@ -17,7 +18,11 @@ async function main() {
     last = answer.actuators ? answer : last;
     return answer;
   });
-  const travel = engine.travel(home).map(({ distance, ...rest }) => ({ ...rest, distance: Number.isFinite(distance) ? distance : null }));
+  const plainly = ({ distance, ...rest }) => ({ ...rest, distance: Number.isFinite(distance) ? distance : null });
+  const near = engine.ask(listed, home);
+  const travelFrom = (answer) => engine.travel(engine.steady(answer)).map(plainly);
+  const scene = new Scene(machine);
+  const modesOf = (answer) => engine.modes(answer, (each) => scene.marksOf(each));
   const session = new Session(machine, engine);
   session.goHome();
   session.remember();
@@ -33,9 +38,13 @@ async function main() {
     inverse: targets.map((target) => plain(engine.ask(target))),
     followed: followed.map(plain),
     forward: values.map((each) => plain(engine.assemble(each))),
-    travel,
+    travel: travelFrom(home),
+    edges: edges.map((edge) => {
+      const answer = engine.ask(edge, home);
+      return { ...plain(answer), travel: travelFrom(answer), singular: singularityOf(engine, engine.steady(answer)) };
+    }),
     singular: [home, ...followed.filter(({ status }) => status === 0)].map((from) => singularityOf(engine, from)),
-    modes: engine.modes(home).map(plain),
+    modes: [near, ...modesOf(near)].map((each) => modesOf(each).map(plain)),
     steps: { asked: steps[0], kept: kept.answer.pose, undone, redone: session.answer.pose },
   };
   fs.writeFileSync(1, JSON.stringify(answers));

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,10 @@ last digits, which far poses at flat optima show a thousandfold."""
 
 NEAR_RATIO = 1e-4
 """Relative difference of measures of singularity: a page takes differences of answers."""
+
+AT_EDGE = 1e-4
+"""Difference of travel along an edge where links are stretched out [L]: the library goes beyond it by the root of the
+tolerance of a pose."""
 
 NO_ICON = '<link rel="icon" href="data:,">'
 LARGEST = 240_000
@@ -62,10 +67,45 @@ def targets_of(machine: pf.Mechanism, n: int, seed: int) -> Any:
     return targets
 
 
+PRINTER = """
+[printer]
+kinematics: delta
+delta_radius: 148
+minimum_z_position: -5
+[stepper_a]
+arm_length: 330
+position_endstop: 300
+[stepper_b]
+[stepper_c]
+"""
+
+
+@cache
+def loaded(name: str) -> pf.Mechanism:
+    """A machine of the catalogue, or the printer, whose positions end where rods are level."""
+    if name != "printer":
+        return pf.load(name)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "printer.cfg"
+        file.write_text(PRINTER, encoding="utf-8")
+        return pf.load(file)
+
+
+def edges_of(machine: pf.Mechanism) -> Any:
+    """Targets far beyond reach, along the axes of the task, both ways."""
+    length, home = machine.characteristic_length, machine.home_pose
+    slides = machine_data(model_of(machine))["task"]["slides"]
+    targets = np.repeat(home[None], 2 * len(slides), axis=0)
+    for k, axis in enumerate(slides):
+        for sign in (0, 1):
+            targets[2 * k + sign, axis, 3] += (2 * sign - 1) * 3.0 * length
+    return targets
+
+
 @cache
 def asked(name: str) -> tuple[Any, Any, Any]:
     """Targets, a path and actuator values."""
-    machine = pf.load(name)
+    machine = loaded(name)
     targets, path = targets_of(machine, N, 7), targets_of(machine, N // 2, 8)
     lengths = [machine.characteristic_length if drive.kind == "length" else 1.0 for drive in machine.drives]
     near = pf.solve_ik(machine, targets).actuators
@@ -79,11 +119,13 @@ def answered(name: str) -> dict[str, Any]:
     targets, path, values = asked(name)
     question = {
         "kernels": packed((FOLDER / "kernels.wasm").read_bytes()),
-        "machine": machine_data(model_of(pf.load(name))),
+        "machine": machine_data(model_of(loaded(name))),
         "targets": targets.reshape(-1, 16).tolist(),
         "path": path.reshape(-1, 16).tolist(),
         "values": values.tolist(),
         "link": link_to(path[0]),
+        "listed": targets_of(loaded(name), 1, 5).ravel().tolist(),
+        "edges": edges_of(loaded(name)).reshape(-1, 16).tolist(),
     }
     scripts = [str(FOLDER / "web" / f"{each}.js") for each in SCRIPTS[: SCRIPTS.index("session") + 1]]
     text = re.sub(r"\bInfinity\b", "1e999", json.dumps(question))
@@ -142,6 +184,35 @@ def test_a_page_answers_as_the_library_does(name: str) -> None:
     assert np.abs(np.subtract(steps["asked"], steps["kept"])).max() <= NEAR * scale
     assert steps["redone"] == steps["asked"]
     assert np.abs(np.reshape(steps["undone"], (4, 4)) - home.pose).max() <= NEAR * scale
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["printer", "five_bar", "delta"])
+def test_at_the_edge_of_reach_a_page_travels_as_the_library_does(name: str) -> None:
+    """Also along an edge where links are stretched out, and rounding decides if legs reach it."""
+    machine = loaded(name)
+    length, home = machine.characteristic_length, pf.solve_ik(machine, machine.home_pose)
+    for answer, target in zip(answered(name)["edges"], edges_of(machine), strict=True):
+        expected = pf.solve_ik(machine, target, start=home)
+        assert_same(machine, [answer], expected)
+        for reach in answer["travel"]:
+            axis = reach["sign"] * np.eye(3)[reach["axis"]]
+            distance = pf.travel(expected, **{reach["kind"]: axis})[0].distance
+            found = np.inf if reach["distance"] is None else reach["distance"]
+            assert found == pytest.approx(distance, rel=1e-6, abs=AT_EDGE * length)
+        serial = pf.singularity(expected).serial
+        assert answer["singular"]["serial"] == pytest.approx(serial, rel=NEAR_RATIO, abs=NEAR_RATIO)
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["five_bar", "rrr", "prs"])
+def test_modes_keep_the_numbers_of_the_library_s_list_from_each_of_them(name: str) -> None:
+    machine = loaded(name)
+    expected = pf.working_modes(machine, targets_of(machine, 1, 5)[0])
+    for modes in answered(name)["modes"]:
+        assert [mode["status"] for mode in modes] == [int(mode.status) for mode in expected]
+        for mode, other in zip(modes, expected, strict=True):
+            assert np.cos(mode["actuators"]) == pytest.approx(np.cos(other.actuators), abs=NEAR)
 
 
 @pytest.mark.parametrize("name", MACHINES)

@@ -92,6 +92,48 @@ def test_a_slider_drives_an_actuator(browser: Any, pages: Path) -> None:
     assert page.evaluate("page.session.answer.actuators[0]") > machine.drives[0].home
 
 
+def test_a_drag_through_a_parallel_singularity_keeps_its_mode_and_the_page_says_that_it_passed(
+    browser: Any, pages: Path
+) -> None:
+    pf.export_web(pf.load("five_bar").without_limits(), pages / "free.html")
+    page, faults = opened(browser, pages / "free.html")
+    x, y = centre(page)
+    shares, mode = [], page.evaluate("page.session.mode")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for down in range(8, 130, 8):
+        page.mouse.move(x, y + down)
+        page.wait_for_function("!page.later")
+        shares.append(int(page.locator("div.near output").last.text_content().split()[0]))
+        if len(shares) == 1:
+            assert not page.locator("#crossing").inner_text()
+    page.mouse.up()
+    least = shares.index(min(shares))
+    assert min(shares) < 10
+    assert 0 < least < len(shares) - 1
+    assert shares[-1] > 30
+    assert page.locator("#status b").inner_text() == "Reached"
+    assert "passed a parallel singularity" in page.locator("#crossing").inner_text()
+    assert page.evaluate("page.session.mode") == mode
+    page.locator("#home").click()
+    page.wait_for_function("!page.later")
+    assert not page.locator("#crossing").inner_text()
+    assert not faults
+
+
+def test_buttons_of_modes_keep_their_numbers(browser: Any, pages: Path) -> None:
+    page, _ = opened(browser, pages / "five_bar.html", "#p=0,10,180,0,0,0")
+    expected = pf.working_modes(pf.load("five_bar"), [0.0, 10.0, 180.0])
+    page.wait_for_function("document.querySelectorAll('#modes button').length === 4")
+    for number in (3, 2, 4, 1):
+        page.evaluate(f"document.querySelectorAll('#modes button')[{number - 1}].click()")
+        page.wait_for_function("!page.later")
+        lit = page.evaluate("[...document.querySelectorAll('#modes button')].map((each) => each.ariaPressed)")
+        assert [k + 1 for k, each in enumerate(lit) if each == "true"] == [number]
+        actuators = page.evaluate("page.session.answer.actuators")
+        assert np.cos(actuators) == pytest.approx(np.cos(expected[number - 1].actuators), abs=1e-6)
+
+
 def test_a_finger_drags_on_a_phone(browser: Any, pages: Path) -> None:
     page, faults = opened(browser, pages / "five_bar.html", **PHONE)
     x, y = centre(page)

@@ -178,6 +178,7 @@ def drawing_of(model: Model, box: Floats) -> dict[str, Any]:
         "frames": drawing.frames,
         "parts": parts + drawing.solids(),
         "platform": [drawing.indices[name] for name in end],
+        "end": drawing.bodies.get(mechanism.end_effector_body, 1),
         "normal": None if plane is None else np.cross(*plane).tolist(),
         "thickness": THICKNESS * size_of(mechanism) / model.length,
         **_view(mechanism, plane, box),

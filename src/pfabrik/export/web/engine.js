@@ -1,8 +1,11 @@
 // The library's kernels, on the tables of one machine: an image of memory that Python wrote, where kernels open it.
 const BY_LEGS = 0, EXACTLY = 4;
 const PENDING = 9, UNSURE = 10;
-const SHORTEST_STEP = 1e-8, MOST_STEPS_OF_TRAVEL = 400, MOST_MODES = 24;
+const SHORTEST_STEP = 1e-8, MOST_STEPS_OF_TRAVEL = 400;
+const INWARD = [1e-13, 1e-12, 1e-11, 1e-10];
 const ALIKE = 0.999;
+const MOST_BRANCHES = 6, SAME_MODE = 1e-5;
+const isSame = (a, b) => a.every((mark, k) => Math.abs(mark - b[k]) <= SAME_MODE);
 
 async function unpacked(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -150,11 +153,34 @@ class Engine {
     return on;
   }
 
+  /** The axes of the task, along and about which the end effector moves. */
+  get axes() {
+    const { task } = this.machine;
+    return [...task.slides.map((axis) => ["along", axis]), ...task.turns.map((axis) => ["about", axis])];
+  }
+
+  // An answer that legs reach again. Where links are stretched out, rounding decides if they do: then it is one within
+  // reach beside it, towards home or along the axes of the task, nearer than a pose's tolerance.
+  steady(answer) {
+    if (!answer.actuators) return answer;
+    const { home, machine } = this;
+    const isSteady = (pose) => this.solve(pose, answer, { last: BY_LEGS }) === REACHED;
+    if (isSteady(answer.pose)) return answer;
+    const moves = this.axes.map(([kind, axis]) => [kind, axisOf(machine.task, kind, axis, answer.pose)]);
+    const away = minus(originOf(home.pose), originOf(answer.pose));
+    if (norm(away) > 0) moves.unshift(["along", unit(away)]);
+    for (const amount of INWARD)
+      for (const [kind, vector] of moves)
+        for (const sign of [1, -1]) {
+          const pose = displaced(answer.pose, kind, vector, sign * amount * (kind === "along" ? machine.length : 1));
+          if (isSteady(pose)) return { ...answer, ...this.read(REACHED), isBeside: true };
+        }
+    return answer;
+  }
+
   /** How far the end effector goes each way along and about each axis of the task, and what stops it. */
   travel(from) {
-    const { task } = this.machine;
-    const axes = [...task.slides.map((axis) => ["along", axis]), ...task.turns.map((axis) => ["about", axis])];
-    return axes.flatMap(([kind, axis]) => [-1, 1].map((sign) => this.reach(from, kind, axis, sign)));
+    return this.axes.flatMap(([kind, axis]) => [-1, 1].map((sign) => this.reach(from, kind, axis, sign)));
   }
 
   reach(from, kind, axis, sign) {
@@ -181,23 +207,23 @@ class Engine {
     return answer.status === PROJECTED ? answer.limits : [];
   }
 
-  /** The working modes of a pose, and of the platform's other poses where the task leaves some of it open. */
-  modes(from) {
+  // The working modes of an answer's target, and of the platform's other poses where the task leaves some of it open, in
+  // the library's order: nearest to home first. They are the same from each of them. Marks tell configurations apart.
+  modes(from, marksOf) {
     const places = this.machine.branches.flatMap((side, k) => (side ? [k] : []));
-    if (places.length > 6) return [];
-    const starts = [from, ...this.others()];
-    const modes = starts.flatMap((start) =>
-      Array.from({ length: 2 ** places.length }, (_, bits) => {
+    if (places.length > MOST_BRANCHES) return [];
+    const modes = [], home = marksOf({ ...this.home, q: new Array(this.machine.columns).fill(0) });
+    for (const start of [this.home, ...this.others(), from])
+      for (let bits = 0; bits < 2 ** places.length; bits++) {
         const branch = [...start.branch];
-        places.forEach((k, i) => (branch[k] = bits & (1 << i) ? -from.branch[k] : from.branch[k]));
-        return this.mode(from.pose, { ...start, branch, actuators: from.actuators });
-      }).filter(Boolean),
-    );
-    const isSame = (a, b) =>
-      a.branch.every((side, k) => Math.sign(side) === Math.sign(b.branch[k])) &&
-      a.pose.every((value, k) => Math.abs(value - b.pose[k]) < 1e-6 * this.machine.length);
-    const apart = modes.filter((mode, k) => !modes.slice(0, k).some((other) => isSame(mode, other)));
-    return apart.sort((a, b) => a.status - b.status).slice(0, MOST_MODES);
+        places.forEach((k, i) => (branch[k] = bits & (1 << i) ? -1 : 1));
+        const mode = this.mode(from.pose, { ...start, branch, actuators: from.actuators });
+        const marks = mode && marksOf(mode);
+        if (mode && !modes.some((other) => isSame(marks, other.marks))) modes.push({ ...mode, marks });
+      }
+    // Equal distances stay in the order of the branches, whatever rounding makes of them.
+    const distance = ({ marks }) => Math.round(1e9 * marks.reduce((sum, mark, k) => sum + (mark - home[k]) ** 2, 0));
+    return modes.sort((a, b) => distance(a) - distance(b));
   }
 
   /** A pose on some sides of the legs, within limits or beyond; null where the legs do not meet. */

@@ -55,9 +55,11 @@ class Page {
     const began = performance.now();
     if (session.answer.actuators) {
       this.showSlice();
-      panel.showTravel(session.engine.travel(session.answer));
-      panel.showSingular(singularityOf(session.engine, session.answer));
-      panel.showModes(session.engine.modes(session.answer));
+      const from = session.engine.steady(session.answer);
+      panel.showTravel(session.engine.travel(from));
+      panel.showSingular(singularityOf(session.engine, from));
+      const marksOf = (answer) => this.scene.marksOf(answer);
+      panel.showModes(session.engine.modes(from, marksOf), marksOf(session.answer));
     }
     this.later = null;
     this.delay = Math.max(MORE_AFTER, 3 * (performance.now() - began));

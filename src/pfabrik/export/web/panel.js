@@ -7,6 +7,7 @@ function made(tag, properties = {}, ...inside) {
 }
 const chip = (text, className = "") => made("span", { className: `chip ${className}`, textContent: text });
 const MOST_CHIPS = 5;
+const NEARLY = 0.005;
 const MEANINGS = {
   serial: "platform speed per actuator speed, at least; 0 at a dead point of a leg",
   parallel: "actuator speed per platform speed, at least; 0 where locked actuators hold nothing",
@@ -126,7 +127,8 @@ class Panel {
   explanation() {
     const { answer, wished } = this.session;
     const has = answer.limits.length > 0;
-    if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : "Every limit kept, all loops closed.";
+    const kept = this.machine.limits.length ? "Every limit kept, all loops closed." : "All loops closed; this machine has no limits.";
+    if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : kept;
     if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";
     if (answer.status === FAILED) return "The last feasible pose is shown.";
     if (wished) return "These values do not fit together; this is the nearest that does.";
@@ -213,28 +215,36 @@ class Panel {
       const share = measures ? measures[kind] / this.atHome[kind] : NaN;
       const percent = clamp(Math.round(100 * share), 0, 100);
       const fill = made("i");
-      fill.style.width = `${percent}%`;
-      fill.style.background = `color-mix(in srgb, var(--blue) ${percent}%, var(--singular))`;
+      fill.style.width = `${percent || 0}%`;
+      fill.style.background = `color-mix(in srgb, var(--blue) ${percent || 0}%, var(--singular))`;
       const leg = kind === "serial" && measures?.leg && share < 0.5 ? `: ${measures.leg}` : "";
       const title = `${MEANINGS[kind]}: ${measures?.[kind].toPrecision(3)}, at home ${this.atHome[kind]?.toPrecision(3)}`;
-      const [name, value] = [made("span", { textContent: kind + leg }), made("output", { textContent: `${(100 * share).toFixed(0)} %` })];
+      const [name, value] = [made("span", { textContent: kind + leg }), made("output", { textContent: Number.isFinite(share) ? `${(100 * share).toFixed(0)} %` : "–" })];
       return made("div", { className: "row", title }, name, made("span", { className: "bar" }, fill), value);
     });
     document.querySelectorAll(".near").forEach((each) => (each.hidden = !(this.atHome.serial > 1e-6 && measures)));
     $("div.near").replaceChildren(...rows);
+    this.session.observe(measures);
+    $("#crossing").textContent = this.crossing(measures);
   }
 
-  showModes(modes) {
-    const { answer } = this.session;
+  /** A sentence about the singularity that an answer is on, or that it has passed. */
+  crossing(measures) {
+    if (!measures) return "";
+    const isOn = (kind) => measures[kind] < NEARLY * this.atHome[kind];
+    if (isOn("parallel")) return "On a parallel singularity: locked actuators do not hold it.";
+    if (isOn("serial")) return "On a serial singularity: a leg is at its dead point.";
+    return this.session.isAcross ? "It passed a parallel singularity: these actuator values have another pose on the side it came from." : "";
+  }
+
+  /** A button for each mode, numbered as in the library's list. */
+  showModes(modes, present) {
     $("#modes").hidden = $("#modes-tab").hidden = modes.length < 2;
-    const isSame = (mode) =>
-      mode.branch.every((side, k) => Math.sign(side) === Math.sign(answer.branch[k])) &&
-      mode.pose.every((value, k) => Math.abs(value - answer.pose[k]) <= 1e-6 * this.machine.length);
     const buttons = modes.map((mode, k) => {
       const isBeyond = mode.status === EXCEEDED;
       const title = isBeyond ? `Mode ${k + 1}, beyond limits` : `Mode ${k + 1}`;
       const button = made("button", { className: isBeyond ? "chip beyond" : "chip", textContent: k + 1, title, ariaLabel: title });
-      button.setAttribute("aria-pressed", isSame(mode));
+      button.setAttribute("aria-pressed", isSame(mode.marks, present));
       button.onclick = () => this.session.take(mode);
       return button;
     });

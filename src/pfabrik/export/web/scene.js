@@ -39,18 +39,29 @@ class Scene {
     return norm(axis) ? turn(axis, value, cross(axis, velocity)) : shift(scaled(velocity, value / this.length));
   }
 
-  pointsAt(pose, q) {
+  pointsAt(pose, q, frames = this.framesAt(pose, q)) {
     const points = [];
-    this.frames = this.framesAt(pose, q);
     for (const { at, frame, amid } of this.drawing.points)
-      points.push(amid ? middle(amid.map((k) => points[k])) : placed(this.frames[frame], at));
+      points.push(amid ? middle(amid.map((k) => points[k])) : placed(frames[frame], at));
     return points;
+  }
+
+  /** What tells configurations apart, as the library's fingerprints: end effector, actuators, and centres of joints. */
+  marksOf({ pose, q, actuators }) {
+    const turns = actuators.map((value, k) =>
+      this.machine.actuators[k].isAngle ? [Math.cos(value), Math.sin(value)] : [value / this.length],
+    );
+    const frames = this.framesAt(pose, q);
+    const end = withLengths(frames[this.drawing.end], 0);
+    const joints = this.pointsAt(pose, q, frames).filter((_, k) => this.drawing.points[k].joint);
+    return [...end, ...scaled(originOf(pose), 1 / this.length), ...turns.flat(), ...joints.flat()];
   }
 
   /** Place everything at an answer. */
   show(pose, q) {
     this.pose = withLengths(pose, 1 / this.length);
-    this.points = this.pointsAt(pose, q);
+    this.frames = this.framesAt(pose, q);
+    this.points = this.pointsAt(pose, q, this.frames);
   }
 
   /** Solids at the answer, what joints at their limits light up in another colour; and the shapes of bodies, clear. */

@@ -1,6 +1,6 @@
 // What is asked for, the answer to it, the steps that can be undone, and the link that keeps them.
 const REACHED = 0, PROJECTED = 1, EXCEEDED = 2, FAILED = 3;
-const MOST_STEPS = 200;
+const MOST_STEPS = 200, SINGULAR = 1e-4;
 
 class Session {
   constructor(machine, engine = null) {
@@ -12,8 +12,9 @@ class Session {
     const start = !isFresh && this.answer?.actuators ? this.answer : null;
     this.start = start;
     let answer = this.timed(() => this.engine.ask(target, start));
-    if (start && !answer.actuators) answer = this.engine.ask(target, null);
-    this.settle({ target: [...target], answer, wished: null });
+    const isKept = start !== null && answer.actuators !== null;
+    if (start && !isKept) answer = this.engine.ask(target, null);
+    this.settle({ target: [...target], answer, wished: null, origin: isKept ? this.origin : null });
   }
 
   /** Ask for values of the actuators. */
@@ -25,7 +26,7 @@ class Session {
 
   /** Take an answer that was found already, such as one in another working mode. */
   take(answer) {
-    this.settle({ target: [...answer.pose], answer, wished: null });
+    this.settle({ target: [...answer.pose], answer, wished: null, origin: null });
   }
 
   goHome() {
@@ -44,6 +45,20 @@ class Session {
     this.onChange?.();
   }
 
+  /** The signs of legs that have two branches. */
+  get mode() {
+    return this.answer.branch.filter((_, k) => this.machine.branches[k]).map((side) => (side < 0 ? "-" : "+"));
+  }
+
+  /** Note if a parallel singularity was passed since a configuration was shown, in one mode without a dead point. */
+  observe(measures) {
+    if (!measures) return;
+    const mode = this.mode.join("");
+    if (measures.serial < SINGULAR) this.origin = null;
+    else if (this.origin?.mode !== mode) this.origin = { mode, side: measures.side };
+    this.isAcross = measures.parallel >= SINGULAR && measures.side * (this.origin?.side ?? 0) < 0;
+  }
+
   get isFar() {
     return this.answer.status !== REACHED;
   }
@@ -55,10 +70,10 @@ class Session {
 
   /** Keep the present state as a step that can be undone. */
   remember() {
-    const { target, answer, wished } = this;
+    const { target, answer, wished, origin } = this;
     if (this.present?.answer === answer) return;
     if (this.present) this.past = [...this.past.slice(-MOST_STEPS), this.present];
-    this.present = { target, answer, wished };
+    this.present = { target, answer, wished, origin };
     this.future = [];
   }
 
@@ -82,8 +97,7 @@ class Session {
   get link() {
     const compact = (value) => String(Math.abs(value) < 1e-9 ? 0 : +value.toPrecision(10));
     const numbers = [...originOf(this.target), ...anglesOf(this.target)].map(compact);
-    const branches = this.answer.branch.filter((_, k) => this.machine.branches[k]).map((side) => (side < 0 ? "-" : "+"));
-    return `#p=${numbers.join(",")}${branches.length ? `&m=${branches.join("")}` : ""}`;
+    return `#p=${numbers.join(",")}${this.mode.length ? `&m=${this.mode.join("")}` : ""}`;
   }
 
   open(link) {
