@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+import time
 from itertools import pairwise
 
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 import pfabrik as pf
 from pfabrik.telling import in_words, lines_on_pipes, telling
+from pfabrik.workspace.measuring import MapProgress
 
 
 class Terminal(io.StringIO):
@@ -59,6 +61,22 @@ def test_a_pipe_has_a_line_each_ten_per_cent_in_a_command_and_none_else(monkeypa
 def test_what_is_left_goes_by_the_share_done() -> None:
     assert in_words(1, 4, 30.0) == "25%, 30 s, about 1 min 30 s left"
     assert in_words(7, 0, 3.0) == "7 done, 3 s"
+
+
+def test_a_map_whose_level_is_slower_than_the_one_before_expects_so_of_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A hundred cells took 1 s, the next take 9 s and more: so will the hundred after these."""
+    clock, told = [0.0], list[tuple[int, int]]()
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    progress = MapProgress(lambda *each: told.append(each), 3, 1.0)
+    progress.begin(100, 100.0, 2)
+    for clock[0], halved in ((0.0, [100.0, 100.0]), (1.0, [100.0])):
+        progress.expect(25, halved, 0)
+    clock[0] = 10.0
+    progress.add(1000)
+    done, total = told[-1]
+    assert clock[0] * (total - done) / done == pytest.approx(9.0)
 
 
 def test_proofs_report_too() -> None:

@@ -212,7 +212,7 @@ def note_slow(mechanism: pf.Mechanism) -> None:
 
     reason = why_not_measured(mechanism)
     if reason:
-        note(f"no closed forms, {reason}: points are tried one by one, for about a minute")
+        note(f"no closed forms, {reason}: points are tried one by one, which takes a minute or more")
 
 
 def above_bed(mech: str, is_over_z: bool) -> dict[str, tuple[float, float]]:

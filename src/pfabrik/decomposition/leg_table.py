@@ -19,7 +19,7 @@ from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.legs import records as K
 from ..tolerances import TOLERANCES
-from .decompose import sub_chains
+from .decompose import SubChain, sub_chains
 from .intermediate_platforms import legs_of_sub_chain
 from .leg_forms import ElementaryJoint, LegForm, NoLeg, RedundantJoint, Rod, closed_form_coordinates
 from .leg_records import leg_records
@@ -28,6 +28,9 @@ from .tape import area, largest, sign
 
 NO_PATH = "does not lead to the end effector"
 """The reason of a sub-chain that is on no path to the end effector."""
+
+MOST_WRITTEN = 12
+"""Joints of a sub-chain that are all written in a message: more do not fit a line."""
 
 COMPLETED_WITHIN = 2.0
 """How far what a task leaves open may move from its start [L or rad]: farther off there may be other completions."""
@@ -183,12 +186,18 @@ def _forms(home: RecordedHome) -> list[LegForm]:
     forms: list[LegForm] = []
     for chain in sub_chains(home):
         if chain.reason == NO_PATH:
-            raise NoLeg(f"sub-chain {chain} {NO_PATH}")
+            raise NoLeg(f"sub-chain {_name_of(chain)} {NO_PATH}")
         try:
             forms += legs_of_sub_chain(home, chain)
         except NoLeg as reason:
-            raise NoLeg(f"sub-chain {chain}: {reason}") from None
+            raise NoLeg(f"sub-chain {_name_of(chain)}: {reason}") from None
     return forms
+
+
+def _name_of(chain: SubChain) -> str:
+    """A sub-chain in the field's notation; a long one by its ends."""
+    joints = chain.joints
+    return str(chain) if len(joints) <= MOST_WRITTEN else f"of {len(joints)} joints, {joints[0]} to {joints[-1]}"
 
 
 def _aimed(legs: Records, coordinates: Records) -> Records:

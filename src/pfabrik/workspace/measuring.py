@@ -136,7 +136,8 @@ class MapProgress:
             total = self._first_total
         else:
             now, began = time.monotonic(), self._level[1] if self._level is not None else self._began
-            left = max(self._ahead - (now - began), self._later)
+            on_level, level = now - began, max(self._ahead - self._later, 1e-9)
+            left = max(self._ahead - on_level, self._later * on_level / level)  # a slow level makes later ones slow
             total = self._done * (1.0 + left / max(now - self._began, 1e-9))
         self._on_progress(self._done, max(self._done, math.ceil(total)))
 
