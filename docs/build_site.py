@@ -26,8 +26,8 @@ FOR_DEVELOPERS = ("CONTRIBUTING.md", "SECURITY.md")
 OUTSIDE = re.compile(r"\]\(((?:\.\./)+)(notebooks/\w+\.ipynb|CONTRIBUTING\.md)\)")
 HOME_ENDS = "\n## What it does not do yet"
 PICTURE = re.compile(r"(!\[[^\]]*\])\((?!\w+:)([^)#\s]+\.(?:png|gif|webp))\)(?!\{)")
-LIVE = re.compile(r"^<!-- live: (\w+) -->$", re.MULTILINE)
-"""Where a page has a machine of the gallery on the site."""
+LIVE = re.compile(r"^<!-- live: (\w+)( without limits)? -->$", re.MULTILINE)
+"""Where a page has a machine of the gallery on the site, or one without the limits of its joints."""
 
 
 def main() -> None:
@@ -113,7 +113,13 @@ def marked(page: Path) -> str:
 
     text = PICTURE.sub(mark, page.read_text(encoding="utf-8"))
     up = "../" * (len(page.relative_to(SITE).parts) - 1)
-    return LIVE.sub(lambda found: gallery.frame(found[1], f"{up}gallery/"), text)
+
+    def live(found: re.Match[str]) -> str:
+        name, without = found[1], found[2] or ""
+        file = gallery.write_free(name, SITE) if without else name
+        return gallery.frame(file, gallery.title(name) + without, f"{up}gallery/")
+
+    return LIVE.sub(live, text)
 
 
 if __name__ == "__main__":

@@ -164,17 +164,24 @@ pip install ".[view]"
 pfabrik view {name}
 ```"""
     size = round(file.stat().st_size / 1000)
-    return f"""{frame(name)}
+    return f"""{frame(name, title(name))}
 
 [The machine alone](live/{name}.html): one file of {size} kB, which works without a network. Made by
 `pfabrik export {name} --web {name}.html`.
 {{ .under }}"""
 
 
-def frame(name: str, gallery: str = "") -> str:
-    """A machine, live, in a page that the folder of the gallery is named relative to."""
-    source = f"{gallery}live/{name}.html"
-    return f'<iframe class="live" src="{source}" title="{title(name)}, live" loading="lazy"></iframe>'
+def write_free(name: str, site: Path) -> str:
+    """Write the page of a machine whose joints have no limits; its name."""
+    free = f"{name}_without_limits"
+    pf.export_web(pf.load(name).without_limits(), site / "gallery" / "live" / f"{free}.html")
+    return free
+
+
+def frame(file: str, name: str, gallery: str = "") -> str:
+    """A page of a machine in another page, which the folder of the gallery is named relative to."""
+    source = f"{gallery}live/{file}.html"
+    return f'<iframe class="live" src="{source}" title="{name}, live" loading="lazy"></iframe>'
 
 
 def six_lines(name: str) -> str:

@@ -104,7 +104,7 @@ def test_a_drag_through_a_parallel_singularity_keeps_its_mode_and_the_page_says_
     for down in range(8, 130, 8):
         page.mouse.move(x, y + down)
         page.wait_for_function("!page.later")
-        shares.append(int(page.locator("div.near output").last.text_content().split()[0]))
+        shares.append(int(page.locator("#near output").last.text_content().split()[0]))
         if len(shares) == 1:
             assert not page.locator("#crossing").inner_text()
     page.mouse.up()

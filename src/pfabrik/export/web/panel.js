@@ -87,7 +87,7 @@ class Panel {
   }
 
   addTabs() {
-    const tabs = { pose: "Pose", actuators: "Actuators", travel: "Travel", modes: "Modes" };
+    const tabs = { pose: "Pose", actuators: "Actuators", travel: "Travel", near: "Singularity", modes: "Modes" };
     const open = (name) => {
       for (const each of Object.keys(tabs)) {
         $(`#${each}`).classList.toggle("shown", each === name);
@@ -222,8 +222,8 @@ class Panel {
       const [name, value] = [made("span", { textContent: kind + leg }), made("output", { textContent: Number.isFinite(share) ? `${(100 * share).toFixed(0)} %` : "–" })];
       return made("div", { className: "row", title }, name, made("span", { className: "bar" }, fill), value);
     });
-    document.querySelectorAll(".near").forEach((each) => (each.hidden = !(this.atHome.serial > 1e-6 && measures)));
-    $("div.near").replaceChildren(...rows);
+    $("#near").hidden = $("#near-tab").hidden = !(this.atHome.serial > 1e-6 && measures);
+    $("#near div").replaceChildren(...rows);
     this.session.observe(measures);
     $("#crossing").textContent = this.crossing(measures);
   }
