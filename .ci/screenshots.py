@@ -4,7 +4,8 @@
 
 Each page is opened on a desk and on a phone, light and dark, scrolled to its end. Nothing may be asked of another host,
 no error told, no picture missing, nothing wider than the screen, and no page heavier than `HEAVIEST`. The gallery and
-the search are tried from files too, without a server. Without Chromium nothing is tried, which is said.
+the search are tried from files too, without a server. Links of all pages within the site have to lead somewhere; without
+Chromium only these are tried, which is said.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
 ROOT = Path(__file__).resolve().parent.parent
 SITE, SHOTS = ROOT / "site", ROOT / "out" / "shots"
@@ -96,18 +99,18 @@ def served(folder: Path) -> Iterator[str]:
 
 
 def main() -> int:
-    """Try the pages; 1 if something is wrong, and 0 without a browser."""
+    """Try the pages; 1 if something is wrong."""
+    faults = [*dead_links()]
     chromium = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     if chromium is None:
-        print("no pictures of the site: Chromium is not installed")
-        return 0
+        print(*faults, "no pictures of the site: Chromium is not installed", sep="\n")
+        return bool(faults)
     from playwright.sync_api import sync_playwright
 
     shutil.rmtree(SHOTS, ignore_errors=True)
     SHOTS.mkdir(parents=True)
     sandbox = ["--no-sandbox"] * (hasattr(os, "geteuid") and os.geteuid() == 0)
     software = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-    faults: list[str] = []
     with sync_playwright() as started, served(SITE) as address:
         browser = started.chromium.launch(executable_path=chromium, args=[*software, *sandbox])
         for screen, size in SCREENS.items():
@@ -123,6 +126,40 @@ def main() -> int:
     print(*faults, sep="\n")
     print(f"{len(list(SHOTS.glob('*.png')))} pictures in {SHOTS.relative_to(ROOT)}; {len(faults)} faults")
     return bool(faults)
+
+
+class Anchors(HTMLParser):
+    """Where a page leads, and the places in it that links can name."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.links: set[str] = set()
+        self.names: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.links |= {link for name in ("href", "src") if (link := given.get(name))}
+        self.names |= {place for name in ("id", "name") if (place := given.get(name))}
+
+
+def dead_links() -> Iterator[str]:
+    """Links within the site that lead to no file, or to no place in a page."""
+    pages = {
+        page: Anchors(page.read_text(encoding="utf-8")) for page in SITE.rglob("*.html") if page.name != "404.html"
+    }
+    for page, anchors in sorted(pages.items()):
+        for link in sorted(anchors.links):
+            address = urlsplit(link)
+            if address.scheme or address.netloc:
+                continue
+            file = (page.parent / unquote(address.path)).resolve() if address.path else page
+            file = file / "index.html" if file.is_dir() else file
+            is_there = file.is_file() and (
+                not address.fragment or file not in pages or unquote(address.fragment) in pages[file].names
+            )
+            if not is_there:
+                yield f"{page.relative_to(SITE)}: {link} leads nowhere"
 
 
 def visited(browser: Any, address: str, name: str, shot: str, **options: Any) -> list[str]:

@@ -26,6 +26,7 @@ FOR_DEVELOPERS = ("CONTRIBUTING.md", "SECURITY.md")
 OUTSIDE = re.compile(r"\]\(((?:\.\./)+)(notebooks/\w+\.ipynb|CONTRIBUTING\.md)\)")
 HOME_ENDS = "\n## What it does not do yet"
 PICTURE = re.compile(r"(!\[[^\]]*\])\((?!\w+:)([^)#\s]+\.(?:png|gif|webp))\)(?!\{)")
+LINK = re.compile(r"(?<!!)\[([^\[\]]+)\]\((?!\w+:)([^)#\s]+)\)")
 LIVE = re.compile(r"^<!-- live: (\w+)( without limits)? -->$", re.MULTILINE)
 """Where a page has a machine of the gallery on the site, or one without the limits of its joints."""
 
@@ -44,12 +45,12 @@ def main() -> None:
         text = (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](").replace("](SECURITY", "](security")
         (SITE / name.lower()).write_text(text, encoding="utf-8")
     for page in SITE.rglob("*.md"):
-        page.write_text(OUTSIDE.sub(_inside, marked(page)), encoding="utf-8")
+        page.write_text(without_files(page, OUTSIDE.sub(_inside, marked(page))), encoding="utf-8")
 
 
 def home(readme: str) -> str:
     """The first screen of the README as the home of the site: its text in one column, its film beside it."""
-    screen = readme.partition(HOME_ENDS)[0].replace("](docs/", "](").replace("[`examples/`](examples)", "`examples/`")
+    screen = readme.partition(HOME_ENDS)[0].replace("](docs/", "](")
     first, install, lines, wishes = re.split(r"\n## .*\n", screen)
     title, sentence, film, caption = (part.strip() for part in first.strip().split("\n\n"))
     code, shown = re.findall(r"^```.*?^```$", lines, re.DOTALL | re.MULTILINE)
@@ -96,6 +97,18 @@ def _inside(found: re.Match[str]) -> str:
     """A link out of the folder of pages, to a notebook or a page for developers, as one to its page of the site."""
     up, name = found[1].removeprefix("../"), found[2]
     return f"]({up}{name.removesuffix('.ipynb') + '.md' if name.endswith('.ipynb') else name.lower()})"
+
+
+def without_files(page: Path, text: str) -> str:
+    """The text of a page, in which names of files that the site does not have, such as programs, are no links."""
+
+    def plain(found: re.Match[str]) -> str:
+        if (page.parent / found[2]).exists():
+            return found[0]
+        source = DOCS / page.parent.relative_to(SITE)
+        return found[1] if any((folder / found[2]).exists() for folder in (source, ROOT)) else found[0]
+
+    return LINK.sub(plain, text)
 
 
 def marked(page: Path) -> str:
