@@ -227,7 +227,15 @@ def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
     assert jump["rig: target"]["message"].startswith("REFUSED: a jump of an actuator: B") and "command" not in jump
     (measured,) = answers("stewart", ["measure"], "show=measured")
     assert measured["rig: actuators"]["message"] == "no position of BL1"
-    for wrong, expected in (("command=both", "expected one of array, joint_state"), ("show_rate=0", "more than 0 Hz")):
+    for wrong, expected in (
+        ("command=both", "expected one of array, joint_state"),
+        ("show_rate=0", "show_rate: found 0; expected 0.001 to 1000"),
+        ("largest_step=-1", "largest_step: found -1; expected 0 to 1e+06"),
+        ("largest_step=nan", "largest_step: found nan"),
+        ("steps=0", "steps: found 0; expected 1 to 10000"),
+        ("starts=-1", "starts: found -1; expected 0 to 10000"),
+        ("starts=3000000000", "starts: found 3000000000"),
+    ):
         run = subprocess.run([str(node("stewart")), wrong], capture_output=True, text=True)
         assert run.returncode == 2 and expected in run.stdout
 

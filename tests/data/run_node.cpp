@@ -100,7 +100,11 @@ int main(int argc, char ** argv)
   if (node_main(0, nullptr) != 0) {  // whose node is gone: its callbacks are those of the next
     return 2;
   }
-  world() = World{world().parameters, {}, {}, {}, {}};
+  for (const auto & name : world().settable) {  // though it is read once
+    std::cout << name << " is not read-only\n";
+    return 3;
+  }
+  world() = World{world().parameters, {}, {}, {}, {}, {}};
   const rig_node::Node node;
   sensor_msgs::msg::JointState measured;
   std::string line, word;

@@ -14,6 +14,7 @@
 #include "@NAME@_platform.hpp"
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "geometry_msgs/msg/pose_stamped.hpp"
+#include "rcl_interfaces/msg/parameter_descriptor.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "sensor_msgs/msg/joint_state.hpp"
 #include "std_msgs/msg/float64_multi_array.hpp"
@@ -30,14 +31,11 @@ class Node : public rclcpp::Node
 public:
   Node() : rclcpp::Node("@NAME@"), platform_(settings())
   {
-    base_frame_ = declare_parameter<std::string>("base_frame", @BASE@);
-    platform_frame_ = declare_parameter<std::string>("platform_frame", @PLATFORM@);
+    base_frame_ = parameter<std::string>("base_frame", @BASE@);
+    platform_frame_ = parameter<std::string>("platform_frame", @PLATFORM@);
     const auto command = choice("command", "array", {"array", "joint_state"});
     show_ = choice("show", "achieved", {"achieved", "measured", "nothing"});
-    const double rate = declare_parameter<double>("show_rate", 30.0);
-    if (!(rate > 0.0)) {
-      throw std::invalid_argument("show_rate: expected more than 0 Hz");
-    }
+    const double rate = number("show_rate", 30.0, 0.001, 1000.0);
     if (show_ == "measured" && !kHasForward) {
       throw std::invalid_argument("show: this machine's actuators do not determine its pose; expected achieved or nothing");
     }
@@ -80,9 +78,29 @@ public:
   }
 
 private:
+  // A parameter that is read now and never again: setting it later is refused.
+  template <typename T>
+  T parameter(const char * name, const T & usual)
+  {
+    rcl_interfaces::msg::ParameterDescriptor descriptor;
+    descriptor.read_only = true;
+    return declare_parameter<T>(name, usual, descriptor);
+  }
+
+  template <typename T>
+  T number(const char * name, T usual, T least, T most)
+  {
+    const T value = parameter<T>(name, usual);
+    if (!(value >= least && value <= most)) {  // nor NaN
+      const auto expected = text(least) + " to " + text(most);
+      throw std::invalid_argument(std::string(name) + ": found " + text(value) + "; expected " + expected);
+    }
+    return value;
+  }
+
   std::string choice(const char * name, const char * usual, const std::vector<std::string> & choices)
   {
-    const auto value = declare_parameter<std::string>(name, usual);
+    const auto value = parameter<std::string>(name, usual);
     std::string expected;
     for (const auto & each : choices) {
       if (value == each) {
@@ -101,9 +119,9 @@ private:
     if (settings.projects && !kHasNearest) {
       throw std::invalid_argument("out_of_reach: no nearest pose is found for this machine; expected hold");
     }
-    settings.steps = static_cast<int>(declare_parameter<std::int64_t>("steps", settings.steps));
-    settings.starts = static_cast<int>(declare_parameter<std::int64_t>("starts", settings.starts));
-    settings.largest_step = declare_parameter<double>("largest_step", settings.largest_step);
+    settings.steps = static_cast<int>(number<std::int64_t>("steps", settings.steps, 1, 10000));
+    settings.starts = static_cast<int>(number<std::int64_t>("starts", settings.starts, 0, 10000));
+    settings.largest_step = number("largest_step", settings.largest_step, 0.0, 1e6);
     return settings;
   }
 
@@ -278,6 +296,8 @@ private:
     std::snprintf(digits, sizeof digits, "%.6g", value);
     return digits;
   }
+
+  static std::string text(std::int64_t value) { return std::to_string(value); }
 
   static void add(DiagnosticStatus & status, const char * key, const std::string & value)
   {

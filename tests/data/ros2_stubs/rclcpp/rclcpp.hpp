@@ -10,10 +10,12 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "rcl_interfaces/msg/parameter_descriptor.hpp"
 #include "std_msgs/msg/header.hpp"
 
 namespace rclcpp
@@ -23,6 +25,7 @@ struct World
   std::map<std::string, std::any> parameters, callbacks, messages;
   std::map<std::string, std::size_t> published;
   std::vector<std::function<void()>> timers;
+  std::set<std::string> settable;  // parameters that `ros2 param set` changes
 };
 inline World & world()
 {
@@ -84,8 +87,12 @@ public:
   Time now() const { return {}; }
 
   template <typename T>
-  T declare_parameter(const std::string & name, const T & usual)
+  T declare_parameter(
+    const std::string & name, const T & usual, const rcl_interfaces::msg::ParameterDescriptor & descriptor = {})
   {
+    if (!descriptor.read_only) {
+      world().settable.insert(name);
+    }
     const auto at = world().parameters.find(name);
     return at == world().parameters.end() ? usual : std::any_cast<T>(at->second);
   }
