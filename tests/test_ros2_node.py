@@ -248,7 +248,7 @@ def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
     assert ET.fromstring(files["urdf/my_delta.urdf"]).get("name") == "Linear delta"
     assert "project(my_delta_node " in files["CMakeLists.txt"]
     ast.parse(files["launch/my_delta.launch.py"])
-    parameters = yaml.safe_load(files["config/params.yaml"])["my_delta"]["ros__parameters"]
+    parameters = yaml.safe_load(files["config/params.yaml"])["/**/my_delta"]["ros__parameters"]
     assert {name for name in parameters if f'"{name}"' in files["src/my_delta_node.cpp"]} == {*parameters}
     assert parameters["base_frame"] == "base" and parameters["out_of_reach"] == "project"
 
