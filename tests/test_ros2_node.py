@@ -240,6 +240,20 @@ def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
         assert run.returncode == 2 and expected in run.stdout
 
 
+@needs_compilers
+def test_actuators_may_be_measured_in_parts() -> None:
+    """By several broadcasters on one topic: what one of them leaves out, or another machine's, is no fault."""
+    mechanism = machine("stewart")
+    parts = ["BL1 BL2", "another", "BR3 another BL3 BR1 BR2", "another", "BL1"]
+    good, *said = answers("stewart", [line_of(mechanism.home_pose, 1e-3), *(f"measure {part}" for part in parts)])
+    for answer in said[:2]:
+        assert answer["rig: actuators"] == {"level": 2, "message": "no position of BL3"} and "pose" not in answer
+    for answer in said[2:]:
+        assert answer["rig: actuators"] == {"level": 0, "message": "measured"}
+    assert ["pose" in answer for answer in said[2:]] == [True, False, True]
+    np.testing.assert_allclose([said[2]["pose"], said[4]["pose"]], [good["achieved"]] * 2, atol=1e-12)
+
+
 def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
     folder = pf.export_ros2_node(machine("linear_delta"), tmp_path / "my_delta")
     files = {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()}

@@ -1,5 +1,5 @@
 // Runs an exported node in the stub of rclcpp. Arguments are its parameters, name=value; each line of input is a target,
-// a frame and seven numbers, or "measure". Writes one line of JSON after each: the last message of every topic that had
+// a frame and seven numbers, or "measure" and the joints in the message: without any, all of them. Writes one line of JSON after each: the last message of every topic that had
 // one since.
 #include <iostream>
 #include <sstream>
@@ -112,7 +112,13 @@ int main(int argc, char ** argv)
     std::istringstream words(line);
     words >> word;
     if (word == "measure") {
-      send("~/actuator_states", measured);
+      sensor_msgs::msg::JointState part;
+      while (words >> word) {
+        const auto at = std::find(measured.name.begin(), measured.name.end(), word) - measured.name.begin();
+        part.name.push_back(word);
+        part.position.push_back(measured.position.at(static_cast<std::size_t>(at)));
+      }
+      send("~/actuator_states", part.name.empty() ? measured : part);
     } else {
       geometry_msgs::msg::PoseStamped target;
       double values[7];

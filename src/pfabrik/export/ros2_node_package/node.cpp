@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -39,6 +40,7 @@ public:
     if (show_ == "measured" && !kHasForward) {
       throw std::invalid_argument("show: this machine's actuators do not determine its pose; expected achieved or nothing");
     }
+    heard_.fill(kNaN);
     command_.data.resize(kActuators);
     command_state_.position.resize(kActuators);
     for (const Actuator & actuator : kActuatorTable) {
@@ -156,29 +158,37 @@ private:
     }
   }
 
-  // Names in any order, others among them; where one is missing nothing is measured.
+  // Names in any order, others among them. Several may publish, each a part: the rest is as it was last heard.
   void on_actuators(const JointState & state)
   {
-    std::array<double, kActuators> values;
+    is_heard_ = true;
+    bool has_any = false;
     for (std::size_t i = 0; i < kActuators; ++i) {
       std::size_t k = 0;
       while (k < state.name.size() && state.name[k] != kActuatorTable[i].name) {
         ++k;
       }
-      if (k >= state.name.size() || k >= state.position.size()) {
-        missing_ = kActuatorTable[i].name;
-        return;
+      if (k < state.name.size() && k < state.position.size()) {
+        heard_[i] = state.position[k];
+        has_any = true;
       }
-      values[i] = state.position[k];
     }
-    missing_ = nullptr;
-    is_measured_ = true;
-    const int code = measured_code_ = platform_.measure(values);
+    if (!has_any || missing() < kActuators) {
+      return;
+    }
+    const int code = measured_code_ = platform_.measure(heard_);
     if (@IS_MEASURED@) {
       put(platform_.measured().pose, measured_.pose);
       measured_.header.stamp = state.header.stamp;
       measured_publisher_->publish(measured_);
     }
+  }
+
+  // The first actuator without a position so far, or whose last one is NaN; kActuators: none.
+  std::size_t missing() const
+  {
+    const auto at = std::find_if(heard_.begin(), heard_.end(), [](double value) { return std::isnan(value); });
+    return static_cast<std::size_t>(at - heard_.begin());
   }
 
   // Joint states and the transform of what is shown: home until the first target, or measurement.
@@ -215,7 +225,7 @@ private:
     diagnostic_msgs::msg::DiagnosticArray array;
     array.header.stamp = now();
     array.status.push_back(of_target());
-    if (is_measured_ || missing_ != nullptr) {
+    if (is_heard_) {
       array.status.push_back(of_actuators());
     }
     diagnostics_publisher_->publish(array);
@@ -271,9 +281,9 @@ private:
   {
     DiagnosticStatus status = named("actuators", "measured");
     status.level = DiagnosticStatus::OK;
-    if (missing_ != nullptr) {
+    if (missing() < kActuators) {
       status.level = DiagnosticStatus::ERROR;
-      status.message = std::string("no position of ") + missing_;
+      status.message = std::string("no position of ") + kActuatorTable[missing()].name;
     } else if (measured_code_ != 0) {
       status.level = DiagnosticStatus::WARN;
       status.message = @NAME@_what(measured_code_);
@@ -309,8 +319,8 @@ private:
 
   Platform platform_;
   std::string base_frame_, platform_frame_, show_, frame_;
-  bool is_in_frame_ = true, is_measured_ = false;
-  const char * missing_ = nullptr;
+  bool is_in_frame_ = true, is_heard_ = false;
+  std::array<double, kActuators> heard_;
   int measured_code_ = 0;
   std::array<std::size_t, 5> counts_{};
   std_msgs::msg::Float64MultiArray command_;
