@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -265,6 +266,21 @@ def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
     parameters = yaml.safe_load(files["config/params.yaml"])["/**/my_delta"]["ros__parameters"]
     assert {name for name in parameters if f'"{name}"' in files["src/my_delta_node.cpp"]} == {*parameters}
     assert parameters["base_frame"] == "base" and parameters["out_of_reach"] == "project"
+
+
+def test_names_stand_in_a_package_as_they_are(tmp_path: Path) -> None:
+    """Of bodies and machines, in any language, whatever they mean in a template, in Markdown or in XML."""
+    pf.save(machine("stewart"), tmp_path / "it.toml")
+    text = (tmp_path / "it.toml").read_text(encoding="utf-8")
+    (tmp_path / "it.toml").write_text(text.replace('"base"', '"@ACTUATORS_XML@"'), encoding="utf-8")
+    rig = replace(pf.load(tmp_path / "it.toml"), name="plâteau <b>|`x_1` 台")
+    folder = pf.export_ros2_node(rig, tmp_path / "rig_node")
+    readme = (folder / "README.md").read_text(encoding="utf-8")
+    assert r"'plâteau \<b\>\|\`x\_1\` 台'" in readme and r"the frame '@ACTUATORS\_XML@'" in readme
+    parameters = yaml.safe_load((folder / "config/params.yaml").read_text(encoding="utf-8"))
+    assert parameters["/**/rig"]["ros__parameters"]["base_frame"] == "@ACTUATORS_XML@"
+    described = ET.fromstring((folder / "package.xml").read_text(encoding="utf-8")).findtext("description")
+    assert rig.name in described and "BL1, " in described
 
 
 def test_the_command_writes_a_package_and_says_how_to_run_it(tmp_path: Path) -> None:

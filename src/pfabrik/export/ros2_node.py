@@ -16,7 +16,7 @@ from ..files.units import metres_of
 from .export_c import Part, c_source
 from .machine_data import Machine
 from .ros2_description import PlatformDescription, ShownJoint
-from .ros2_texts import filled, in_xml, package_name, plain, write_package
+from .ros2_texts import filled, in_markdown, in_xml, package_name, plain, write_package
 from .source import ACTIVE, features
 from .static_data import literal, quoted
 
@@ -119,12 +119,13 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "MACRO": name.upper(),
         "GUARD": f"{name}_node__{name}".upper(),
         "MACHINE": plain(mechanism.name),
+        "MACHINE_MARKDOWN": in_markdown(mechanism.name),
         "MACHINE_XML": in_xml(mechanism.name),
         "MACHINE_TEXT": quoted(mechanism.name),
-        "ACTUATORS": plain(listed),
+        "ACTUATORS_MARKDOWN": in_markdown(listed),
         "ACTUATORS_XML": in_xml(listed),
         "BASE": _exact(mechanism.base),
-        "BASE_PLAIN": plain(mechanism.base),
+        "BASE_MARKDOWN": in_markdown(mechanism.base),
         "PLATFORM": _exact(mechanism.end_effector),
         "COMMANDS": "\n".join(f"    {each}" for each in commands(mechanism, Path(), name)),
         "METRES": literal(metres),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from html import escape
 from importlib import resources
@@ -29,9 +30,7 @@ def filled(package: str, files: Mapping[str, str], words: Mapping[str, str]) -> 
     templates, texts = resources.files(__package__).joinpath(package), {}
     for template, place in files.items():
         text = templates.joinpath(template).read_text(encoding="utf-8")
-        for word, meant in words.items():
-            text = text.replace(f"@{word}@", meant)
-        texts[place.format(name=words["NAME"])] = text
+        texts[place.format(name=words["NAME"])] = re.sub("@([A-Z_]+)@", lambda word: words[word[1]], text)
     return texts
 
 
@@ -48,6 +47,12 @@ def write_package(folder: Path, texts: Mapping[str, str]) -> Path:
 def plain(text: str) -> str:
     """Text safe in a comment and in a string of C++."""
     return comment(text).replace("\\", "/").replace('"', "'")
+
+
+def in_markdown(text: str) -> str:
+    """Text that is read as it is within a line, or a cell of a table, of Markdown."""
+    printable = "".join(character if character.isprintable() else " " for character in text)
+    return re.sub(r"[\\`*_\[\]<>&|~]", r"\\\g<0>", printable)
 
 
 def in_xml(text: str) -> str:
