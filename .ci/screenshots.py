@@ -4,8 +4,8 @@
 
 Each page is opened on a desk and on a phone, light and dark, scrolled to its end. Nothing may be asked of another host,
 no error told, no picture missing, nothing wider than the screen, and no page heavier than `HEAVIEST`. The gallery and
-the search are tried from files too, without a server. Links of all pages within the site have to lead somewhere; without
-Chromium only these are tried, which is said.
+the search are tried from files too, without a server. Links of all pages within the site have to lead somewhere;
+without Chromium only these are tried, which is said.
 """
 
 from __future__ import annotations
