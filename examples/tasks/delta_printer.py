@@ -1,5 +1,8 @@
 """A delta printer: its dimensions, its build volume, its Klipper file.
 
+You have a printer, with its `printer.cfg`, `config.g` or `Configuration.h`? That file is the machine already: see
+[From my printer](../from-my-printer.md). This page describes one from nothing.
+
 For a printer with three carriages on upright rails. You learn how to describe it by the numbers that its firmware
 uses, how high and how wide it prints, what ends the build volume, and how to write the settings for Klipper.
 """
