@@ -52,10 +52,10 @@ class Feasibility(NamedTuple):
         mechanism has a clearance and no other limit is exceeded, links count too: the rest of their distance as a share
         of L, as in `margins`.
     binding : int or array of int (...)
-        Index in `limits` of the limit that has it, the first of those equal to 1e-9; -1 if there is none.
+        Index in `limits` of the limit that has it, the first if several are equal to 1e-9; -1 if there is none.
     limits : tuple of tuple of str
         Pairs (joint, bound) of every limit: "min", "max" and "cone", as in `margins`; "reach" of a leg's proximal
-        joint, and "closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
+        joint, and "not closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
     """
 
     margin: Any
@@ -205,7 +205,7 @@ def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> 
 def _limits(table: LegTable) -> tuple[tuple[str, str], ...]:
     """Limits in the order of the kernel: ranges and cones, then the reach of legs, then their closure."""
     reach = tuple((_proximal_joint(form), "reach") for form in table.forms)
-    closed = tuple((form.elements[0].joint.name if form.elements else "", "closed") for form in table.forms)
+    closed = tuple((form.elements[0].joint.name if form.elements else "", "not closed") for form in table.forms)
     return table.limits + reach + closed
 
 

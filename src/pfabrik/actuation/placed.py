@@ -248,7 +248,7 @@ class Placer:
         margin[missed] = -np.linalg.norm((self.values(solution) - q)[missed] / units, axis=1)
         if len(missed):
             binding = solution[missed].binding
-            limits[missed] = np.where(binding["joint"][:, None] == "", [("", "closed")], _columns(binding))
+            limits[missed] = np.where(binding["joint"][:, None] == "", [("", "not closed")], _columns(binding))
         return margin, limits
 
     def _may_be_dead_point(self, q: Floats) -> Mask:

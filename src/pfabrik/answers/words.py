@@ -86,7 +86,7 @@ def given_up(answer: Answer) -> list[str]:
     if preferred.hold == HOLD_NOTHING:
         return []
     free_part = "position" if options.hold == "orientation" else "orientation"
-    return [f"no {free_part} was found that suits the {options.hold}: both give way"]
+    return [f"no {free_part} was found at which the {options.hold} asked for can be kept, so both differ"]
 
 
 def why_without_limits(answer: Answer) -> str:
