@@ -211,7 +211,6 @@ def not_found(browser: Any, address: str) -> Iterator[str]:
         page = browser.new_page(viewport=SCREENS["desk"])
         page.goto(f"{address}index.html")
         page.keyboard.press("/")
-        page.wait_for_timeout(SETTLING)
         page.keyboard.type(words, delay=TYPING)
         page.wait_for_timeout(SEARCHING)
         answer = page.evaluate(FIRST_ANSWER)
