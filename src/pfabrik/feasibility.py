@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .answers.start_configuration import Start, start_of
+from .answers.words import bound_notes
 from .arrays import Floats, Ints, shaped
 from .closure.configurations import Configurations
 from .closure.link_distances import least_distances, pair_names
@@ -72,7 +73,7 @@ class Feasibility(NamedTuple):
             limit = self.limits[int(bindings[0])] if bindings[0] >= 0 else ("-", "-")
             words = "feasible" if margins[0] >= 0.0 else "not feasible"
             row = (*limit, plain(margins[0], TOLERANCES.active, ".4g"))
-            return ResultTable("Feasibility", [words], ("joint", "bound", "margin"), [row])
+            return ResultTable("Feasibility", [words], ("joint", "bound", "margin"), [row], [bound_notes([limit])])
         n_feasible = int(np.count_nonzero(margins >= 0.0))
         lines = [f"batch of shape {np.shape(self.margin)}", f"{n_feasible} of {counted(len(margins), 'row')} feasible"]
         places, counts = np.unique(bindings[bindings >= 0], return_counts=True)
@@ -80,7 +81,8 @@ class Feasibility(NamedTuple):
             (*self.limits[place], str(count), plain(np.nanmin(margins[bindings == place]), TOLERANCES.active, ".4g"))
             for count, place in sorted(zip(counts.tolist(), places.tolist(), strict=True), reverse=True)
         ]
-        return ResultTable("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows)
+        notes = bound_notes(self.limits[place] for place in places.tolist())
+        return ResultTable("Feasibility", lines, ("joint", "bound", "rows", "least margin"), rows, [notes])
 
 
 def feasibility(

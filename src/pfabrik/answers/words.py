@@ -221,6 +221,19 @@ def limit_name(joint: str, bound: str) -> str:
     return f"{joint} {'too near' if bound == 'clearance' else bound}".strip()
 
 
+BOUND_NOTES = {
+    "reach": "reach: a rod is stretched out or folded, and does not reach farther",
+    "closed": "closed: the hinges and rods of a leg do not come together beyond",
+}
+"""Bounds that are no limits of a joint, explained."""
+
+
+def bound_notes(limits: Iterable[tuple[str, str]]) -> str:
+    """A line for each bound among limits, by joint and bound, that is no limit of a joint; empty where all are."""
+    bounds = {bound for _, bound in limits}
+    return "\n".join(line for bound, line in BOUND_NOTES.items() if bound in bounds)
+
+
 def exceeded(answer: Answer) -> list[ActiveLimit]:
     """The limits that an answer exceeds, without those that it only lies on."""
     return [limit for limit in answer._limits[0] if is_exceeded(limit, answer.mechanism)]

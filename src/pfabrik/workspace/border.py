@@ -63,7 +63,8 @@ def groups_of(region: Region) -> list[Group]:
     for is_motors, colours in ((True, MOTOR_COLOURS), (False, JOINT_COLOURS)):
         copies: dict[tuple[str, str], list[tuple[str, str]]] = {}
         for joint, bound in region.shares:
-            if bound != "clearance" and is_actuated(region, joint) == is_motors:
+            is_stop = bound in ("min", "max") and is_actuated(region, joint)
+            if bound != "clearance" and is_stop == is_motors:
                 copies.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
         shares = {key: sum(region.shares[limit] for limit in alike) for key, alike in copies.items()}
         order = sorted(copies.items(), key=lambda item: (-round(shares[item[0]], 2), item[0]))

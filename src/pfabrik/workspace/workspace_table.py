@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..answers.words import limit_name
+from ..answers.words import bound_notes, limit_name
 from ..arrays import Floats
 from ..description.sketch import HEIGHT, MARGIN, WIDTH
 from ..printed import ResultTable
@@ -36,6 +36,7 @@ def workspace_table(region: Region, remarks: Sequence[str]) -> ResultTable:
         lines.append(f"{name} from {low:.6g} to {high:.6g} {unit}")
     kinds = {joint.name: joint.type + ", actuated" * bool(joint.actuated) for joint in region.mechanism.joints}
     rows = [(f"{share:.1%}", limit_name(*limit), kinds.get(limit[0], "")) for limit, share in region.shares.items()]
+    remarks = [bound_notes([*region.shares][:MOST_LIMITS]), *remarks]
     n_more = len(rows) - MOST_LIMITS
     rows[MOST_LIMITS:] = [("", f"and {n_more} more", "")] if n_more > 0 else []
     drawing = outline(region) if len(region.names) == 2 else ""
