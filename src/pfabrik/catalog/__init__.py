@@ -41,7 +41,7 @@ def template(name: str) -> str:
     """The text of a starting file, whether its name is in capitals or not; `UnknownName` if there is none."""
     known = {each.lower(): each for each in templates()}
     if name.lower() not in known:
-        raise UnknownName("template", name, templates())
+        raise UnknownName("kind of machine", name, templates())
     return (_TEMPLATES / f"{known[name.lower()]}{_SUFFIX}").read_text(encoding="utf-8")
 
 

@@ -76,10 +76,11 @@ class CommandGroup(click.Group):
             called = self._invoked(ctx)
             options = [each for each in called.command.params if isinstance(each, click.Option)]
             named = {name: each.opts[0] for each in options for name in (each.name, each.opts[0][2:].replace("-", "_"))}
-            if error.argument not in named or error.argument == "path":  # of whichever option: the name says it
+            name, _, key = error.argument.partition("['")
+            if name not in named or name == "path":  # of whichever option: the name says it
                 raise
-            words = str(error).removeprefix(error.argument)
-            raise click.UsageError(f"{named[error.argument]}{words}", called) from error
+            words, place = str(error).removeprefix(error.argument), f" {key.removesuffix(chr(39) + ']')}" if key else ""
+            raise click.UsageError(f"{named[name]}{place}{words}", called) from error
 
     def _invoked(self, ctx: click.Context) -> click.Context:
         """The context of the subcommand that ran, or the group's own if there is none."""

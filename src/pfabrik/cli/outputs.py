@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from ..checks import require_ending
+from ..errors import InvalidArgument
 from ..extras import require
 from ..whole_files import whole_path
 from .printing import note
@@ -80,6 +81,17 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise click.ClickException(f"{path}: is a folder; expected the name of a file")
     if path != STANDARD and path.is_file() and not force:
         raise click.ClickException(f"{path}: exists already; --force replaces it")
+
+
+def require_format(path: Path, known: Sequence[str]) -> None:
+    """Stop if a file that is to be written has an ending of no format; the message has the option that was typed."""
+    try:
+        require_ending(path, known)
+    except InvalidArgument as error:
+        context = click.get_current_context()
+        values = [(each.opts[0], context.params.get(each.name or "")) for each in context.command.params]
+        option = next(name for name, value in values if value == path or (isinstance(value, tuple) and path in value))
+        raise click.UsageError(f"{option}{str(error).removeprefix(error.argument)}") from error
 
 
 def is_same_file(path: Path, other: Path, standard: TextIO) -> bool:
@@ -263,7 +275,7 @@ def picture(path: Path, drawn: PictureOptions | None = None) -> Iterator[None]:
     """
     from ..view.save_picture import PICTURES, save_picture
 
-    require_ending(path, PICTURES)
+    require_format(path, PICTURES)
     require("pictures", "matplotlib", "plot")
     import matplotlib
     from matplotlib import pyplot

@@ -13,9 +13,8 @@ import click
 
 import pfabrik as pf
 
-from ..checks import require_ending
 from .arguments import FINITE, MECH, STANDARD_INPUT, TargetOptions, completing, load, named_joints, series, targeted
-from .outputs import PictureOptions, check_outputs, picture, pictured
+from .outputs import PictureOptions, check_outputs, picture, pictured, require_format
 from .printing import note
 
 
@@ -121,7 +120,7 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     """
     if html is not None:
         check_outputs([("--html", html)], [Path(mech), *([path] if path else [])])
-        require_ending(html, (".html", ".htm"))
+        require_format(html, (".html", ".htm"))
     shown: str | pf.Mechanism | pf.Track = mech
     if mech == STANDARD_INPUT or path is not None:
         shown = mechanism = load(mech)

@@ -13,7 +13,6 @@ import click
 
 import pfabrik as pf
 
-from ..checks import require_ending
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
@@ -27,6 +26,7 @@ from .outputs import (
     picture,
     pictured,
     refuse_both_on_stdout,
+    require_format,
     whole_file,
 )
 from .printing import json_option, note, print_json, print_result, print_text
@@ -124,7 +124,7 @@ def check_pictures(picture_path: Path | None, film_path: Path | None) -> None:
 
     for path, endings in ((picture_path, PICTURES), (film_path, FILMS)):
         if path is not None:
-            require_ending(path, endings)
+            require_format(path, endings)
             require("pictures", "matplotlib", "plot")
 
 

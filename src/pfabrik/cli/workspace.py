@@ -15,11 +15,10 @@ import click
 import pfabrik as pf
 
 from ..cells import is_finite
-from ..checks import require_ending
 from ..extras import require
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, TargetOptions, Triple, answered, completing, load, numbers_of, rpy_option, targeted
-from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured
+from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured, require_format
 from .printing import json_option, note, print_result
 
 if TYPE_CHECKING:
@@ -150,7 +149,7 @@ def workspace(
 
     check_outputs([("-o", path) for path in outputs], [Path(mech)], as_json=as_json)
     for path in outputs:
-        require_ending(path, (*ENDINGS, *PICTURES))
+        require_format(path, (*ENDINGS, *PICTURES))
         if path.suffix.lower() in PICTURES:
             require("pictures", "matplotlib", "plot")
     if not any(path.suffix.lower() in PICTURES for path in outputs):
@@ -160,7 +159,12 @@ def workspace(
     others["tilt"] = None if tilt is None else math.radians(tilt)
     found = space.workspace(mech, mechanism, rpy, certified=certified, **others)
     middle = None if centre is None else point(found, centre)
-    shape = None if largest is None else found.inscribed(largest, middle)
+    try:
+        shape = None if largest is None else found.inscribed(largest, middle)
+    except pf.errors.InvalidArgument as error:
+        if error.argument != "kind":
+            raise
+        raise click.UsageError(f"--largest{str(error).removeprefix(error.argument)}") from error
     for path in outputs:
         write(found, path, shape, drawn)
     print_result(as_json, found, {} if shape is None else {"largest": shape})

@@ -38,12 +38,15 @@ class PlatformSpeed(NamedTuple):
         Where it cannot do so without moving in what its task leaves out, that follows.
     limited_by : str
         The actuator that limits it, of a redundant machine the one that does so the most; "" where none does.
+    is_slowest : bool
+        True of the direction along which the reference point is slowest of all.
     """
 
     kind: str
     direction: tuple[float, float, float]
     speed: float
     limited_by: str
+    is_slowest: bool = False
 
 
 class PlatformSpeeds(Printed, tuple[PlatformSpeed, ...]):
@@ -73,9 +76,8 @@ class PlatformSpeeds(Printed, tuple[PlatformSpeed, ...]):
             value = math.degrees(motion.speed) if turns else motion.speed
             speed = plain(value, 1e-9) if math.isfinite(value) else "unlimited"
             unit = f"{'deg' if turns else self.mechanism.length_unit}/s"
-            rows.append(
-                (motion.kind, *(plain(part, 1e-9) for part in motion.direction), speed, unit, motion.limited_by)
-            )
+            kind = "slowest along" if motion.is_slowest else motion.kind
+            rows.append((kind, *(plain(part, 1e-9) for part in motion.direction), speed, unit, motion.limited_by))
         return ResultTable(f"Platform speed of {self.mechanism.name}", (), _HEADER, rows)
 
     def to_dict(self) -> dict[str, Any]:
@@ -135,7 +137,8 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
         speeds.append(_fastest(twist, rates / limits, shares, mechanism.actuator_names))
     slowest = _slowest(_translations(inverse, forward, sizes), inverse / limits[:, None], shares)
     if slowest is not None:
-        speeds.append(_fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names))
+        found = _fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names)
+        speeds.append(found._replace(is_slowest=True))
     return PlatformSpeeds(solution.mechanism, speeds)
 
 

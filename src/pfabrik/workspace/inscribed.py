@@ -81,7 +81,8 @@ class Inscribed(Printed):
         size = math.prod(factors) * self.size  # of a box in a plane of space 0
         words = f", {size:,.6g} {product_of(units)}" if size else ""
         header = ("coordinate", "centre", "extent")
-        return ResultTable(f"Largest {self.kind}", [f"largest {self.kind}{words}"], header, rows)
+        name = "circle" if self.kind == "sphere" and len(self.extents) == 2 else self.kind
+        return ResultTable(f"Largest {name}", [f"largest {name}{words}"], header, rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, ready for JSON."""

@@ -13,7 +13,7 @@ from ..arguments import array
 from ..arrays import Floats
 from ..checks import require_finite, require_known, require_mapping, require_names
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, UnknownName
 from ..kinematics import columns, generic_of, home_coordinates, task_of, tilt_axis
 from ..poses import SupportsMatrix, is_rotation
 from ..rotations import from_rotvec
@@ -112,8 +112,12 @@ def space_of(
     """
     joint = _pivot(mechanism)
     known = (*POSITIONS, *TURNS, *(_coordinate_names(joint) if joint else ()))
-    fixed = _checked_fixed(fixed, known)
-    chosen = _checked_over(over, known, fixed)
+    try:
+        fixed = _checked_fixed(fixed, known)
+        chosen = _checked_over(over, known, fixed)
+    except UnknownName as error:  # those that move are worth a try
+        usable = (*_moving(mechanism), *known[len(POSITIONS) + len(TURNS) :])
+        raise UnknownName(error.kind, error.name, usable) from None
     if joint is not None and _is_about(joint, chosen, fixed, orientation):
         return _of_joint(mechanism, joint, chosen, fixed)
     rotation = _rotation(mechanism, orientation, start)
