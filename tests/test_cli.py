@@ -500,6 +500,7 @@ REFUSED = [
     ("new -o my.toml", "one KIND of 3-PRS, "),
     ("new delta --json", "--json goes with --list"),
     ("new delta -o no/such/my.toml", "no/such/my.toml: No such file or directory"),
+    ("new 3-PRS --rod -130", "--rod: found -130; expected a positive length"),
     ("new delta --rods 3", "no dimension or option named '--rods'; did you mean '--rod'?"),
     ("new delta --fore", "did you mean '--force'?"),
     ("new delta --rod long", "--rod: found 'long'; expected a number"),

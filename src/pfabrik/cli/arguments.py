@@ -184,6 +184,8 @@ def noted(mechanism: pf.Mechanism, options: TargetOptions) -> Target:
 
     target = options.of(mechanism)
     note_left_out(ignored(mechanism, options), mechanism)
+    if options.rpy and "tilt" in mechanism.task and options.rpy[2] and any(options.rpy[:2]):
+        note("the task sets the tilt: of --rpy the direction of the z axis counts, to which other angles may lead")
     axis = tilt_axis(mechanism)
     if axis is not None and abs(as_targets(mechanism, target)[0] - as_poses(target)[0]).max() > TOLERANCES.alignment:
         note(f"of the tilt only the angle about {vector(axis)} counts, about which alone the end effector tilts")

@@ -146,12 +146,24 @@ def with_dimensions(text: str, options: Sequence[str]) -> str:
             value = float(number)
         except ValueError:
             raise click.UsageError(f"{name}: found '{number}'; expected a number") from None
+        require_sign(name, dimension, value, text)
         line = re.compile(rf"^({dimension} *= *)(\"[^\"]*\"|[^ #\n]+)( *)", re.MULTILINE)
         text = line.sub(rf"\g<1>{value:.15g}\g<3>", text, count=1)
     from ..files import loads
 
     loads(text)
     return text
+
+
+def require_sign(option: str, dimension: str, value: float, text: str) -> None:
+    """Refuse a length that is not positive: a radius, or one that a file squares; note where another changes sign."""
+    before = tomllib.loads(text)["dimensions"][dimension]
+    if value > 0.0 or not isinstance(before, int | float) or before <= 0.0:
+        return
+    if dimension.endswith("radius") or re.search(rf"\b{dimension}\*\*2", text):
+        raise click.UsageError(f"{option}: found {value:g}; expected a positive length")
+    if value < 0.0:
+        note(f"{option} {value:g} is negative; the starting file has {before:g} there")
 
 
 @click.command()
