@@ -312,6 +312,23 @@ def test_the_border_of_the_workspace_is_shown_on_request(shown: Callable[..., pf
     assert not borders["workspace"]
 
 
+def test_a_search_that_is_no_longer_wanted_ends_and_says_no_more(
+    shown: Callable[..., pf.Viewer], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer = shown("stewart")
+    panel, searches, said = viewer._stage.panel, viewer._searches, list[str]()
+
+    def tell(words: str) -> None:
+        said.append(words)
+        panel._borders["workspace"].value = "%" not in words  # unticked as soon as it is on its way
+
+    monkeypatch.setattr(panel, "tell", tell)
+    panel._borders["workspace"].value = True
+    searches.show_border("workspace", True)
+    until(lambda: searches._newest.answered == 1)
+    assert len(said) == 2 and "%" in said[1] and searches._space is None
+
+
 def test_singularities_are_shown_where_they_are_and_limits_are_let_go(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("five_bar")
     machine = viewer.mechanism

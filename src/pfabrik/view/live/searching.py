@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ from ...modes.working import working_modes
 from ...telling import OnProgress
 from ..looks import SINGULAR
 from .live_machine import LiveMachine
-from .panel import FAR, LOCUS, WORKSPACE, Panel
+from .panel import FAR, LOCUS, WORKSPACE
 from .scene import Patch
 from .workers import Newest
 
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from ...workspace.result import Workspace
 
 POSITIONS = ("x", "y", "z")
+
+
+class _Unwanted(Exception):
+    """Nobody wants to see any more what is looked for."""
 
 
 class Searches:
@@ -84,27 +88,47 @@ class Searches:
         from ...workspace.ask import workspace
         from ...workspace.workspace_table import in_words
 
-        panel = machine.panel
-        if not panel.wants(WORKSPACE) and not panel.wants(LOCUS):
+        both = WORKSPACE, LOCUS
+        if not self._is_wanted(machine, both):
             return
         if self._space is None or self._space[0] is not start:
-            progress = _progress(panel, "the workspace")
-            space = workspace(start.mechanism, start=start, within=_ends(start.mechanism), on_progress=progress)
+            progress = self._progress(machine, "the workspace", both)
+            try:
+                space = workspace(start.mechanism, start=start, within=_ends(start.mechanism), on_progress=progress)
+            except _Unwanted:
+                return
             self._space, self._found = (start, space), {}
         _, space = self._space
         notes = [f"workspace: {in_words(space)}"]
         for name, find in ((WORKSPACE, border_of), (LOCUS, locus_of)):
-            if not panel.wants(name):
+            if not self._is_wanted(machine, (name,)):
                 continue
             if name not in self._found:
-                self._found[name] = find(space, start, _progress(panel, "singularities"))
-            patches, note = self._found[name]
+                with suppress(_Unwanted):
+                    self._found[name] = find(space, start, self._progress(machine, "singularities", (name,)))
             with self._lock:
-                if self._shown() is machine and panel.wants(name):
+                if name in self._found and self._is_wanted(machine, (name,)):
+                    patches, note = self._found[name]
                     machine.show_border(name, patches)
                     notes.append(note)
-        if self._shown() is machine:
-            panel.tell("\n".join(filter(None, notes)))
+        with self._lock:
+            if self._is_wanted(machine, both):
+                machine.panel.tell("\n".join(filter(None, notes)))
+
+    def _is_wanted(self, machine: LiveMachine, names: tuple[str, ...]) -> bool:
+        """True if a machine is shown, and the user wants to see one of these borders of it."""
+        return self._shown() is machine and any(map(machine.panel.wants, names))
+
+    def _progress(self, machine: LiveMachine, what: str, names: tuple[str, ...]) -> OnProgress:
+        """A callback that shows how much of a search for borders is done, and ends it where none of them is wanted."""
+
+        def tell(done: int, total: int) -> None:
+            with self._lock:
+                if not self._is_wanted(machine, names):
+                    raise _Unwanted
+                machine.panel.tell(f"looking for {what}: {100 * done // max(total, 1)} %")
+
+        return tell
 
     def end(self) -> None:
         """Let the thread end."""
@@ -115,11 +139,6 @@ def _kept(mode: Solution) -> str:
     """The limits that a mode exceeds, in words; "within limits" if there are none."""
     beyond = by_bound(exceeded(mode))
     return f"beyond {beyond}" if beyond else "within limits"
-
-
-def _progress(panel: Panel, what: str) -> Callable[[int, int], None]:
-    """A callback that shows how much of a search is done."""
-    return lambda done, total: panel.tell(f"looking for {what}: {100 * done // max(total, 1)} %")
 
 
 def _ends(mechanism: Mechanism) -> dict[str, tuple[float, float]] | None:
