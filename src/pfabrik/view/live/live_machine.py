@@ -127,16 +127,22 @@ class LiveMachine:
     def page(self) -> str:
         """The scene as a page of its own, HTML: the machine as it is, or moving along its path."""
         self._handles.show_all(False)
-        serializer = self._server.get_scene_serializer()
-        if self.track is not None:
-            for step in self.track:
+        try:
+            serializer = self._server.get_scene_serializer()
+            if self.track is not None:
+                self._play_into(serializer, self.track)
+            return str(serializer.as_html())
+        finally:
+            self._handles.show_all(True)
+
+    def _play_into(self, serializer: Any, track: Track) -> None:
+        try:
+            for step in track:
                 if np.isfinite(step.pose).all():
                     self.scene.show(step)
-                    serializer.insert_sleep(due_after(self.track))
+                    serializer.insert_sleep(due_after(track))
+        finally:
             self.scene.show(self.session.solution)
-        page = str(serializer.as_html())
-        self._handles.show_all(True)
-        return page
 
 
 def checked(what: object) -> Shown:
