@@ -364,6 +364,14 @@ def test_what_is_done_is_undone(shown: Callable[..., pf.Viewer]) -> None:
     until(lambda: viewer.target[2, 3] == 200.0)
     viewer._change_actuator(0, 200.0)
     until(lambda: viewer.solution.actuators[0] == pytest.approx(200.0))
+    viewer._change_target("yaw", 10.0)
+    for _ in range(2):  # the same value again is nothing to undo
+        viewer._asked_by = ""
+        until(lambda: viewer._newest.answered == viewer._stage.asked)
+        viewer._change_target("yaw", 10.0)
+    until(lambda: viewer._newest.answered == viewer._stage.asked)
+    viewer._undo()
+    until(lambda: viewer.solution.actuators[0] == pytest.approx(200.0))
     viewer._undo()
     until(lambda: viewer.solution.pose == pytest.approx(pf.pose((0, 0, 200))))
     viewer._undo()

@@ -33,6 +33,9 @@ MOST_STEPS = 200
 SINGULAR = 1e-3
 """Measure below which an answer is too near to a singularity for the sides of parallel ones to have a sign."""
 
+SAME = 1e-12
+"""Share of a value, and of the characteristic length, by which rounding alone changes a target that is given again."""
+
 Asked: TypeAlias = Literal["pose", "actuators", "configuration"]
 
 
@@ -92,6 +95,20 @@ class Session:
         if gesture != self._gesture:
             self._gesture = gesture
             self._past.append(_Step(self.solution, self.start, self.asked, self.target, self.actuators, self._side))
+
+    def forget_nothing_new(self) -> None:
+        """Drop the step that was kept last where the present state is the one that it would go back to."""
+        if self._past and self._past[-1].asked == self.asked:
+            before, small = self._past[-1], SAME * max(1.0, self.mechanism.characteristic_length)
+            pairs = {
+                "pose": (before.target, self.target),
+                "actuators": (before.actuators, self.actuators),
+                "configuration": (before.solution.q, self.solution.q),
+            }
+            is_same = np.allclose(*pairs[self.asked], rtol=SAME, atol=small, equal_nan=True)
+            if is_same and before.solution.status == self.solution.status:
+                self._past.pop()
+                self._gesture = None
 
     @property
     def can_undo(self) -> bool:

@@ -277,6 +277,8 @@ class Viewer:
             if gesture is not None:
                 self._stage.session.remember(gesture)
             question(self._stage)
+            if gesture is not None:
+                self._stage.session.forget_nothing_new()
             self._stage.refresh(is_newest=number is None or number == self._stage.asked)
 
     # The machine, and its file.
