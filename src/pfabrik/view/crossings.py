@@ -57,9 +57,9 @@ def _lines_nearer(outlines: Sequence[Floats], is_plate: Sequence[bool]) -> Float
     along = np.concatenate([np.diff(outlines[place], axis=0) for place in lines])
     owner = np.repeat(lines, [len(outlines[place]) - 1 for place in lines])
     to = start[None, :, :2] - start[:, None, :2]
-    across = _cross(along[:, None], along[None])
+    across = cross(along[:, None], along[None])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = _cross(to, along[None]) / across  # of the first line up to where they cross
+        share = cross(to, along[None]) / across  # of the first line up to where they cross
     is_within = np.isfinite(share) & (share > ENDS) & (share < 1.0 - ENDS)
     first, second = np.nonzero(is_within & is_within.T)
     depth = start[first, 2] + share[first, second] * along[first, 2]
@@ -69,7 +69,8 @@ def _lines_nearer(outlines: Sequence[Floats], is_plate: Sequence[bool]) -> Float
     return nearer
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Floats, b: Floats) -> Floats:
+    """The upright component of the cross product of vectors (..., 2 or more): twice the area that they span."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints, Mask
+from .crossings import cross
 
 AT_ONCE = 2_000_000
 """Pixels that faces are tried at, at once: more would need much memory."""
@@ -122,18 +123,14 @@ def rasterised(seen: Floats, faces: Ints, width: int, margin: int = 2, *, both_s
 def _area(points: Floats, faces: Ints) -> Floats:
     """Twice the area of faces (f, 3) on the screen; negative where they turn away."""
     a, b, c = points[faces[:, 0], :2], points[faces[:, 1], :2], points[faces[:, 2], :2]
-    return _cross(b - a, c - a)
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+    return cross(b - a, c - a)
 
 
 def _weights(corners: Floats, area: Floats, at: NDArray[Any]) -> Floats:
     """Barycentric coordinates (..., 3) of pixels (..., 2) in triangles (..., 3, 3) of an area (...)."""
     away = at - corners[..., 0, :2]
-    second = _cross(away, corners[..., 2, :2] - corners[..., 0, :2]) / area
-    third = _cross(corners[..., 1, :2] - corners[..., 0, :2], away) / area
+    second = cross(away, corners[..., 2, :2] - corners[..., 0, :2]) / area
+    third = cross(corners[..., 1, :2] - corners[..., 0, :2], away) / area
     return np.stack([1.0 - second - third, second, third], axis=-1)
 
 

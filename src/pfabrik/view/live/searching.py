@@ -17,6 +17,7 @@ from ...kinematics import plane_of
 from ...modes.assembly import assembly_modes
 from ...modes.working import working_modes
 from ...telling import OnProgress
+from ...workspace.space import POSITIONS
 from ..looks import SINGULAR
 from .live_machine import LiveMachine
 from .panel import FAR, LOCUS, WORKSPACE
@@ -25,8 +26,6 @@ from .workers import Newest
 
 if TYPE_CHECKING:
     from ...workspace.result import Workspace
-
-POSITIONS = ("x", "y", "z")
 
 
 class _Unwanted(Exception):
