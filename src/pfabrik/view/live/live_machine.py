@@ -16,8 +16,9 @@ from ...drawn_parts import free_axes
 from ...kinematics import plane_of
 from ...rotations import from_quaternion
 from ...skeleton import checked_shown, skeleton_of
+from ..eye import VIEWS, Eye, eye_on
 from ..plot_track import checked_track
-from .panel import VIEWS, Actions, Panel
+from .panel import Actions, Panel
 from .scene import MACHINE, Patch, Scene, quaternion
 from .session import Session
 from .workers import due_after
@@ -44,7 +45,8 @@ ASPECT = 1.4
 IN_VIEW = 0.8
 """Share of the camera's angle within which the target is kept: its handles need room around it."""
 
-SEEN_FROM = np.array([0.5, -0.8, 0.35]) / np.linalg.norm([0.5, -0.8, 0.35])
+UPRIGHT, STEEP = np.array([0.0, 0.0, 1.0]), 0.99
+"""The axis that a view is turned about, and the part of a direction along it from which on it is none for it."""
 
 
 class LiveMachine:
@@ -86,7 +88,7 @@ class LiveMachine:
         self._handles = Handles(server, mechanism, drag)
         steps = 0 if self.track is None else len(self.track)
         self.panel = Panel(server.gui, mechanism, self.session, actions, steps, limits)
-        self.look_from(server.initial_camera, VIEWS[0], 1.0)
+        self.look_from(server.initial_camera, 1.0)
         self.refresh()
 
     def refresh(self, *, is_newest: bool = True) -> None:
@@ -112,15 +114,15 @@ class LiveMachine:
         self.scene.show_border(name, patches)
         self.panel.list_patches(patch for border in self._borders.values() for patch in border)
 
-    def look_from(self, camera: Any, view: str, aspect: float) -> None:
-        """Place a camera so that the machine is in view, from one of the panel's `VIEWS`.
+    def look_from(self, camera: Any, aspect: float, view: str | None = None) -> None:
+        """Place a camera so that the machine is in view, from a side by its name, or as at first.
 
-        Of a planar machine, the front is its plane. `aspect` is the width of the picture per height.
+        `aspect` is the width of the picture per height.
         """
         seen = self._points / self.session.mechanism.characteristic_length
         middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
         radius = max(1.0, float(np.linalg.norm(seen - middle, axis=1).max()))
-        direction, camera_up = eye_of(self.session.mechanism, view)
+        direction, camera_up = seen_from(self.session.mechanism, view)
         away = DISTANCE * radius / min(1.0, aspect * ASPECT)
         place_camera(camera, middle + away * direction, middle, camera_up)
 
@@ -234,14 +236,15 @@ def backed_off(position: Floats, middle: Floats, angle: float, point: Floats) ->
     return np.asarray(position - max(missing, 0.0) * along)
 
 
-def eye_of(mechanism: Mechanism, view: str) -> tuple[Floats, Floats]:
-    """The direction that a view is seen from, and what is up in it, unit vectors (3,)."""
+def seen_from(mechanism: Mechanism, view: str | None = None) -> tuple[Floats, Floats]:
+    """The direction that a view is seen from, and the axis about which the user turns it, unit vectors (3,).
+
+    Without a view, "iso"; a planar machine is seen in its plane.
+    """
     plane = plane_of(mechanism)
-    right, up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) if plane is None else plane
-    front = np.cross(right, up)
-    if view == "iso" and plane is None:
-        return SEEN_FROM, up
-    return {"top": (up, -front), "side": (right, up)}.get(view, (front, up))
+    eye = eye_on(plane) if view is None and plane is not None else Eye(*VIEWS[view or "iso"])
+    _, up, direction = eye.axes
+    return direction, UPRIGHT if abs(direction @ UPRIGHT) < STEEP else up
 
 
 def place_camera(camera: Any, position: Floats, middle: Floats, up: Floats) -> None:

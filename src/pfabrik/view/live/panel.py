@@ -15,6 +15,7 @@ from ...description.mechanism import Mechanism
 from ...drawn_parts import free_axes
 from ...errors import counted
 from ...kinematics import Readout, readout, readouts
+from ..eye import VIEWS
 from .panel_html import legend_html, margins_html, note_html, page_html, pose_html, singular_html, status_html
 from .scene import Patch
 from .session import COORDINATES, Session, coordinates
@@ -30,9 +31,6 @@ STEPS = 10_000.0
 
 WORKSPACE, LOCUS = "workspace", "locus"
 """Borders that can be shown, by their names."""
-
-VIEWS = ("iso", "front", "side", "top")
-"""Views by their names, the one at first first."""
 
 UNDO, HOME = "Undo", "Home"
 
@@ -86,7 +84,7 @@ class Panel:
         back = gui.add_button_group("Back", (UNDO, HOME), hint="Undo is also Ctrl Z")
         back.on_click(lambda event: actions.undo() if event.target.value == UNDO else actions.go_home())
         gui.add_command(UNDO, hotkey="Z", modifier="cmd/ctrl").on_trigger(lambda _: actions.undo())
-        views = gui.add_button_group("View", VIEWS)
+        views = gui.add_button_group("View", tuple(VIEWS))
         views.on_click(lambda event: actions.look_from(event.client, event.target.value))
         with gui.add_folder("Target"):
             slides, turns = free_axes(mechanism)

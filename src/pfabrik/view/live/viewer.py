@@ -27,7 +27,7 @@ from ...files import load
 from ...first_answers import prepare
 from ...whole_files import whole_path
 from .live_machine import LiveMachine, Shown, checked, keep_in_view
-from .panel import VIEWS, Actions
+from .panel import Actions
 from .searching import Searches
 from .session import moved
 from .workers import Newest, Player, Watch
@@ -235,9 +235,9 @@ class Viewer:
         self._take_step(step)
         self._stage.panel.show_step(step)
 
-    def _look_from(self, client: Any, view: str) -> None:
+    def _look_from(self, client: Any, view: str | None = None) -> None:
         if client is not None:
-            self._stage.look_from(client.camera, view, client.camera.aspect)
+            self._stage.look_from(client.camera, client.camera.aspect, view)
 
     def _show_solids(self, visible: bool) -> None:
         with self._lock:
@@ -319,7 +319,7 @@ class Viewer:
 
     def _fit(self, camera: Any) -> None:
         if camera.aspect < 1.0 and np.allclose(camera.position, self._server.initial_camera.position):
-            self._look_from(camera.client, VIEWS[0])
+            self._look_from(camera.client)
 
     def _prepare(self) -> None:
         """Do ahead what first answers prepare, since that takes longer than a motion of the mouse."""
