@@ -351,7 +351,11 @@ def _leaf_faults(mechanism: Structure, bodies: Counter[str]) -> Iterator[Fault]:
         meant = near_miss(body, others, MISSPELT)
         if meant:
             found = f"'{body}', which no other joint connects{meant}"
-            yield Fault(f"joint[{index}].connects", found, "a body that other joints connect too, or a name less like that of another body")
+            yield Fault(
+                f"joint[{index}].connects",
+                found,
+                "a body that other joints connect too, or a name less like that of another body",
+            )
 
 
 def _connection_faults(mechanism: Structure) -> Iterator[Fault]:
