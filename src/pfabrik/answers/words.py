@@ -223,7 +223,7 @@ def limit_name(joint: str, bound: str) -> str:
 
 BOUND_NOTES = {
     "reach": "reach: a rod is stretched out or folded, and does not reach farther",
-    "closed": "closed: the hinges and rods of a leg do not come together beyond",
+    "not closed": "not closed: the hinges and rods of a leg do not come together beyond",
 }
 """Bounds that are no limits of a joint, explained."""
 
