@@ -25,8 +25,17 @@ from machines import closure
 from oracles.annuli import Ring, area, within
 from pfabrik.errors import InvalidArgument
 from pfabrik.view.border_parts import patches_of
+from pfabrik.view.eye import Eye
 from pfabrik.view.looks import look_of
-from pfabrik.workspace.border import LINK_COLOURS, MOTOR_COLOURS, group_of_limits, groups_of
+from pfabrik.view.solid import in_the_light
+from pfabrik.workspace.border import (
+    JOINT_COLOURS,
+    LINK_COLOURS,
+    MOTOR_COLOURS,
+    group_of_limits,
+    groups_of,
+    stems_of,
+)
 from pfabrik.workspace.verdicts import MapQuestion
 
 Array = NDArray[np.float64]
@@ -482,6 +491,45 @@ def test_groups_beyond_the_colours_are_one_of_their_own(monkeypatch: pytest.Monk
     monkeypatch.setattr(sys.modules["pfabrik.workspace.border"], "MOTOR_COLOURS", ("#0072b2",))
     names = [group.name for group in groups_of(space("five_bar"))]
     assert names[-1] == "2 other limits" and len(names) == 4
+
+
+def test_copies_are_joints_of_one_type_that_a_number_or_letters_tell_apart() -> None:
+    prismatic = ["carriage_a", "carriage_b", "carriage_c", "axis_1", "axis_2"]
+    turning = [
+        "upper_al",
+        "upper_ar",
+        "upper_bl",
+        "upper_br",
+        "liftX",
+        "liftY",
+        "liftZ",
+        "arm_l",
+        "arm_r",
+        "carriage_d",
+    ]
+    stems = stems_of(dict.fromkeys(prismatic, "prismatic") | dict.fromkeys(turning, "revolute"))
+    alone = {"arm_l", "arm_r", "carriage_d"}  # a pair may be left and right; one is of another type
+    assert {name for name, stem in stems.items() if stem == name} == alone
+    assert set(stems.values()) - alone == {"carriage_", "axis_", "upper_", "lift"}
+
+
+@pytest.mark.parametrize("first", [MOTOR_COLOURS[:2], MOTOR_COLOURS[2:], JOINT_COLOURS[:2], JOINT_COLOURS[2:]])
+def test_both_bounds_of_a_joint_differ_in_any_light(first: tuple[str, str]) -> None:
+    """In lightness, green-red and blue-yellow of CIELAB: no light of the one looks like a light of the other."""
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    deuteranope = [[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]]
+    protanope = [[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]]
+    turns = np.radians(np.arange(0, 91, 10))
+    eye = Eye(90.0, -90.0)
+    normals = np.array([[np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)] for a in turns for b in 4.0 * turns])
+    for seen in (np.eye(3), deuteranope, protanope):
+        labs = []
+        for colour in first:
+            value = in_the_light(normals, eye, np.array([int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]))
+            linear = np.where(value > 0.04045, ((value + 0.055) / 1.055) ** 2.4, value / 12.92)
+            x, y, z = np.cbrt(np.clip(linear @ np.transpose(seen), 1e-3, 1.0) @ to_xyz.T / to_xyz.sum(axis=1)).T
+            labs.append(np.stack([116.0 * y, 500.0 * (x - y), 200.0 * (y - z)], axis=1))
+        assert np.linalg.norm(labs[0][:, None] - labs[1], axis=2).min() > 25.0
 
 
 def test_limits_that_are_met_together_do_not_alternate() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,14 +15,18 @@ from ..arrays import Ints
 if TYPE_CHECKING:
     from .region import Region
 
-MOTOR_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#332288")
-"""Cold colours: stops of motors. These and the warm ones are distinct for colour-blind people (Okabe and Ito; Tol)."""
+MOTOR_COLOURS = ("#0072b2", "#009e73", "#aaddff", "#a6d96a")
+"""Cold colours: stops of motors. Neighbours differ in hue, for colour-blind people
+too: light and shade change lightness, in which both bounds of a joint must not differ alone."""
 
-JOINT_COLOURS = ("#e69f00", "#cc79a7", "#882255", "#f0e442")
+JOINT_COLOURS = ("#e69f00", "#cc79a7", "#f0e442", "#882255")
 """Warm colours: limits of passive joints, ends of reach and of the map."""
 
 MANY = 3
 """Numbers in a row from which on a span of them is named by its ends: "BL1…3 max"."""
+
+LETTERED = re.compile(r"(?<=_)[A-Za-z]{1,2}$|(?<=[a-z])[A-Z]$|(?<=[A-Z0-9])[a-z]$")
+"""Letters at the end of a name that may number it: one or two after an underscore, or one of another case."""
 
 LINK_COLOURS = ("#d55e00", "#7a1f00", "#f4a582")
 """Reds: links that are too near to each other."""
@@ -60,15 +67,17 @@ def groups_of(region: Region) -> list[Group]:
     """
     groups: list[Group] = []
     others: list[tuple[str, str]] = []
+    types = {joint.name: str(joint.type) for joint in region.mechanism.joints}
+    stems = stems_of(types)
     for is_motors, colours in ((True, MOTOR_COLOURS), (False, JOINT_COLOURS)):
-        copies: dict[tuple[str, str], list[tuple[str, str]]] = {}
+        copies: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
         for joint, bound in region.shares:
             is_stop = bound in ("min", "max") and is_actuated(region, joint)
             if bound != "clearance" and is_stop == is_motors:
-                copies.setdefault((joint.rstrip("0123456789"), bound), []).append((joint, bound))
+                copies.setdefault((stems.get(joint, joint), types.get(joint, ""), bound), []).append((joint, bound))
         shares = {key: sum(region.shares[limit] for limit in alike) for key, alike in copies.items()}
         order = sorted(copies.items(), key=lambda item: (-round(shares[item[0]], 2), item[0]))
-        for colour, ((stem, bound), alike) in zip(colours, order, strict=False):
+        for colour, ((stem, _, bound), alike) in zip(colours, order, strict=False):
             name = f"{stem}{_span([joint[len(stem) :] for joint, _ in alike])} {bound}".strip()
             groups.append(_group(region, name, colour, alike, is_motors))
         others += [limit for _, alike in order[len(colours) :] for limit in alike]
@@ -77,10 +86,31 @@ def groups_of(region: Region) -> list[Group]:
     return [*groups, _group(region, f"{len(others)} other limits", REST, others, False)] if others else groups
 
 
+def stems_of(types: Mapping[str, str]) -> dict[str, str]:
+    """What the names of copies have in common, by name; a name alone for a joint that is no copy.
+
+    Copies are joints of one type whose names differ in a number at their end, or, where there are at least three, in
+    letters there: carriage_a, carriage_b, carriage_c; upper_al, upper_ar, upper_bl, …; armX, armY, armZ.
+
+    Parameters
+    ----------
+    types : of joints, by name.
+    """
+    stems = {name: name.rstrip("0123456789") for name in types}
+    lettered = {name: LETTERED.sub("", name) for name, stem in stems.items() if stem == name and LETTERED.search(name)}
+    counts = Counter((stem, types[name]) for name, stem in lettered.items())
+    return stems | {name: stem for name, stem in lettered.items() if counts[stem, types[name]] >= MANY}
+
+
 def _span(numbers: list[str]) -> str:
-    """The numbers of joints in their order; by their ends where none is left out: "1…3"."""
+    """The numbers or letters of joints in their order; by their ends where none is left out: "1…3"."""
     numbers = sorted(numbers, key=lambda number: (len(number), number))
-    if len(numbers) >= MANY and all(numbers) and int(numbers[-1]) - int(numbers[0]) == len(numbers) - 1:
+    places = [
+        int(number) if number.isdecimal() else ord(number)
+        for number in numbers
+        if number.isdecimal() or len(number) == 1
+    ]
+    if len(numbers) >= MANY and len(places) == len(numbers) and places[-1] - places[0] == len(places) - 1:
         return f"{numbers[0]}…{numbers[-1]}"
     return ", ".join(numbers)
 
