@@ -13,7 +13,10 @@ from pfabrik.errors import InvalidArgument
 from test_pictures import faults
 
 pytest.importorskip("matplotlib")
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from pfabrik.view.eye import Eye, upright
 from pfabrik.view.raster import lines_between, rasterised
@@ -121,3 +124,48 @@ def test_a_solid_goes_on_axes_of_ones_own_with_a_shape_that_fits_in() -> None:
         region.plot(Figure().add_subplot(projection="3d"))
     with pytest.raises(InvalidArgument, match="view"):
         region.plot(view="left")  # type: ignore[arg-type]
+
+
+COLUMN = (3.5, 3.0)
+"""A column of a page [inches]."""
+
+
+@pytest.mark.parametrize("kind", ["space", "plane", "singular", "singular in a plane", "travel"])
+@pytest.mark.filterwarnings("error")
+def test_words_of_a_picture_in_a_column_hide_nothing_and_are_whole(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = pf.load({"travel": "stewart", "space": "delta"}.get(kind, "rps"))
+    if kind == "travel":
+        found = pf.travel(pf.solve_ik(machine, machine.home_pose))
+        figure = next(iter(pf.plot_travel(found, size=COLUMN).values())).figure
+    else:
+        over = ("z", "tilt_x") if "plane" in kind else OVER.get(kind if kind == "space" else "rps")
+        region = pf.workspace(machine, over=over, resolution=machine.characteristic_length / 12.0)
+        drawn = pf.singularity_map(machine, region) if kind.startswith("singular") else region
+        figure = drawn.plot(size=COLUMN).figure
+    drawn_boxes: dict[Text, Bbox] = {}
+
+    def draw(text: Text, renderer: RendererBase) -> None:  # only those ticks that are within their axes
+        if text.get_text().strip() and text.get_visible():
+            drawn_boxes[text] = text.get_window_extent(renderer)
+
+    monkeypatch.setattr(Text, "draw", draw)
+    figure.canvas.draw()
+    drawn_boxes.clear()
+    figure.canvas.draw()
+    texts, boxes = list(drawn_boxes), list(drawn_boxes.values())
+    page = figure.bbox.padded(1.0)
+    for row, (text, box) in enumerate(zip(texts, boxes, strict=True)):
+        assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
+        for other, beside in zip(texts[:row], boxes[:row], strict=True):
+            shrunk = beside.padded(-1.0)
+            assert not box.overlaps(shrunk), (text.get_text(), other.get_text())
+
+
+def test_a_picture_that_is_too_small_for_words_is_refused() -> None:
+    machine = pf.load("stewart")
+    for draw in (
+        space_of("delta").plot,
+        lambda size: pf.plot_travel(pf.travel(pf.solve_ik(machine, machine.home_pose)), size=size),
+    ):
+        with pytest.raises(InvalidArgument, match=r"size: found 2 x 2 inches; expected 3 x 2\.\d+ at least"):
+            draw(size=(2.0, 2.0))

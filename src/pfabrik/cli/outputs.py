@@ -254,7 +254,7 @@ def _size(context: click.Context, parameter: click.Parameter, words: str | None)
     from ..view.canvas import checked_size
 
     try:
-        return checked_size(tuple(map(float, words.lower().split("x"))))
+        return checked_size(tuple(map(float, words.lower().split("x"))), (0.0, 0.0))
     except ValueError:
         raise click.UsageError(f"--size: found '{words}'; expected WxH in inches, such as 6x4") from None
 

@@ -91,7 +91,7 @@ def animate(
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)
     skeletons = {step: skeleton_of(track[step]) for step in np.unique(steps).tolist()}
-    size = None if size is None else checked_size(size)
+    size = None if size is None else checked_size(size, (0.0, 0.0))
     film = _Film(track, skeletons, view, size, require_count("dpi", dpi or DPI), look_of(theme))
     with (
         telling(f"drawing {os.fspath(path)}", on_progress) as tell,

@@ -34,6 +34,9 @@ EDGE_FREE, STRIP_FREE = 9.0, 3.0
 TITLE, TITLE_LINE = SMALL + 2.0, 15.0
 """Size of the letters of a title, and the height of one of its lines [points]."""
 
+LEAST_SIZE = (3.0, 2.5)
+"""Of a picture with axes and words, which are not legible in less [inches]: a column of a page is wider."""
+
 LETTER = 0.56
 """Width of a letter, as a share of its size: more than the mean, so that what is estimated fits."""
 
@@ -210,7 +213,7 @@ def new_canvas(
     InvalidArgument : a size that is not two positive numbers.
     MissingLibrary : matplotlib is not installed.
     """
-    width, height = usual_size(points, eye, is_plane=is_plane) if size is None else checked_size(size)
+    width, height = usual_size(points, eye, is_plane=is_plane) if size is None else checked_size(size, (0.0, 0.0))
     if size is None:
         width += 2.0 * beside / 72.0
     figure = new_figure(width, height, layout="constrained" if is_plane else None)
@@ -249,7 +252,7 @@ STRIP = 30.0
 """Room above and below a machine in a new figure, for its key and its scale [points]."""
 
 
-def checked_size(size: Any, least: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
+def checked_size(size: Any, least: tuple[float, float] = LEAST_SIZE) -> tuple[float, float]:
     """Width and height of a figure [inches]; InvalidArgument for what is not two positive numbers, or too small."""
     try:
         width, height = size

@@ -14,6 +14,7 @@ from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.space import POSITIONS
 from ..workspace.workspace_table import labels, shown
 from .border_parts import patches_of
+from .canvas import wrapped
 from .frame import machine_of, title_of
 from .looks import Look
 from .slices import DASHED, area_of, loops_of, outline_of, stretches_of
@@ -34,8 +35,12 @@ BORDER, MACHINE = 2.2, 1.1
 WINDOW = 0.75
 """How much is shown around a workspace at most, as a share of its size: a machine may be far larger."""
 
-MOST_WIDENINGS, EDGE_FREE = 12, 12.0
-"""How often axes are widened for names, at most, and the distance of names from their edge [pixels]."""
+MOST_WIDENINGS, EDGE_FREE, WIDEST = 12, 12.0, 2.0
+"""How often axes are widened for names, at most, the distance of names from their edge [pixels], and how much wider
+they become at most: where that is not enough, the key alone names limits."""
+
+BESIDE = 5.0
+"""Width of a figure from which on its key is beside the axes [inches]."""
 
 OFF, SIDEWAYS = 5.0, 0.2
 """Distance of a name from the border [points]; component of a direction from which on it stands to that side."""
@@ -47,25 +52,35 @@ def plot_plane(region: Region, axes: Any, shape: Inscribed | None, look: Look) -
     _draw_plane(axes, region, groups, look)
     if shape is not None:
         axes.plot(*shown(region, outline_of(shape)).T, color=look.ink, **DASHED)
-    _draw_key(axes, groups, look)
-    axes.set_title(title_of(region), fontsize=SMALL + 1, color=look.ink)
+    width = axes.figure.bbox.width / axes.figure.dpi
+    _draw_key(axes, groups, look, is_below=width < BESIDE)
+    axes.set_title(wrapped(title_of(region), width, SMALL + 1), fontsize=SMALL + 1, color=look.ink)
     _make_room(axes)
 
 
-def _draw_key(axes: Any, groups: list[Group], look: Look) -> None:
-    """The limits beside the axes: stops of motors, links that are too near, then all else, each with its line."""
+def _draw_key(axes: Any, groups: list[Group], look: Look, *, is_below: bool) -> None:
+    """The limits beside the axes: stops of motors, links that are too near, then all else, each with its line.
+
+    Parameters
+    ----------
+    is_below : True for a short key below the axes, without the names of kinds.
+    """
     from matplotlib.lines import Line2D
 
     handles: list[Line2D] = []
     kinds = ((True, False, "stops of motors"), (False, True, "links"), (False, False, "passive joints, reach"))
     for is_motors, is_links, title in kinds:
         of_kind = [group for group in groups if (group.is_motors, group.is_links) == (is_motors, is_links)]
-        if of_kind:
+        if of_kind and not is_below:
             handles.append(Line2D([], [], linestyle="", label=title))
         for group in of_kind:
             style: Any = "-" if is_motors else DASHES
             handles.append(Line2D([], [], color=group.colour, linewidth=4, linestyle=style, label=group.name))
     letters: dict[str, Any] = {"fontsize": SMALL, "title_fontsize": SMALL, "labelcolor": look.ink}
+    if is_below:
+        columns = min(len(handles), 2)
+        axes.figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, **letters)
+        return
     legend = axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False, **letters)
     legend.set_title("border formed by")
     legend.get_title().set_color(look.ink)
@@ -104,8 +119,9 @@ def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> N
 
 
 def _make_room(axes: Any) -> None:
-    """Widen the ends of axes in a plane until the names beside the border are within them."""
+    """Widen the ends of axes in a plane until the names beside the border are within them, or leave the names out."""
     root = axes.get_figure(root=True)
+    usual = axes.get_xlim(), axes.get_ylim()
     for _ in range(MOST_WIDENINGS):
         root.draw_without_rendering()
         box = axes.get_window_extent()
@@ -119,6 +135,14 @@ def _make_room(axes: Any) -> None:
             start, end = getattr(axes, f"get_{name}lim")()
             unit = (end - start) / size
             axes.set(**{f"{name}lim": (start - unit * low, end + unit * high)})
+        if any(
+            np.ptp(now) > WIDEST * np.ptp(was)
+            for now, was in zip((axes.get_xlim(), axes.get_ylim()), usual, strict=True)
+        ):
+            break
+    for text in list(axes.texts):
+        text.remove()
+    axes.set(xlim=usual[0], ylim=usual[1])
 
 
 def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], look: Look) -> None:

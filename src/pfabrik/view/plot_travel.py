@@ -14,7 +14,7 @@ from ..checks import require_method
 from ..drawing import SMALL, new_figure
 from ..errors import InvalidArgument
 from ..travel import Reach, Travel
-from .canvas import TITLE, checked_size, round_length, wrapped
+from .canvas import LEAST_SIZE, TITLE, checked_size, round_length, wrapped
 from .looks import Look, Theme, dress, look_of
 
 if TYPE_CHECKING:
@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 
 HEIGHT, THICK = 0.55, 0.42
 """Height of a row [inches]; thickness of a bar, as a share of it."""
+
+NARROW, SPARSE = 3.6, 0.42
+"""Width for each panel below which they stand one below the other, and height of a row below which its bars name one
+limit each [inches]."""
+
+ROUND_PANEL, LEAST_HEIGHT = 0.5, 0.28
+"""Height of what is around a panel, and the least height of a row [inches]."""
 
 MOST_FOR_NAMES = 0.8
 """The largest share of a side that names beyond its bars may take."""
@@ -78,18 +85,30 @@ def plot_travel(
     look = look_of(theme)
     if figure is None:
         usual = (4.4 * len(kinds) + 0.4, 1.6 + HEIGHT * max(map(len, kinds.values())))
-        figure = new_figure(*checked_size(size or usual))
+        n_rows = sum(map(len, kinds.values()))
+        least = (LEAST_SIZE[0], max(LEAST_SIZE[1], ROUND_PANEL * len(kinds) + LEAST_HEIGHT * n_rows))
+        figure = new_figure(*(checked_size(size, least) if size else usual))
     require_method("figure", figure, "subplots", "a matplotlib figure, or None")
     figure.set_facecolor(look.paper)
     mechanism = found.origin.mechanism
     place = ", ".join(f"{part:.4g}" for part in found.origin.pose[:3, 3])
     title = f"Travel of {mechanism.name} from ({place}) {mechanism.length_unit}"
-    figure.suptitle(wrapped(title, figure.bbox.width / figure.dpi), fontsize=TITLE, color=look.ink)
-    panels = figure.subplots(1, len(kinds), squeeze=False)[0]
+    width, height = figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
+    is_narrow = width < NARROW * len(kinds)
+    letters = SMALL if is_narrow else TITLE
+    figure.suptitle(wrapped(title, width, letters), fontsize=letters, color=look.ink)
+    if is_narrow:
+        shares = [len(rows) for rows in kinds.values()]
+        panels = figure.subplots(len(kinds), 1, squeeze=False, height_ratios=shares)[:, 0]
+        per_row = (height - ROUND_PANEL * len(kinds)) / sum(shares)
+    else:
+        panels = figure.subplots(1, len(kinds), squeeze=False)[0]
+        per_row = (height - ROUND_PANEL) / max(map(len, kinds.values()))
+    terse = is_narrow or per_row < SPARSE
     longest = []
     for axes, (kind, rows) in zip(panels, kinds.items(), strict=True):
         dress(axes, look)
-        longest.append(_draw(axes, kind, [[_bar_of(found, reach) for reach in row] for row in rows], look))
+        longest.append(_draw(axes, kind, [[_bar_of(found, reach) for reach in row] for row in rows], look, terse))
     figure.get_figure(root=True).draw_without_rendering()
     share = max(_names_share(axes) for axes in panels)  # of all panels the same, so that their longest bars are alike
     for axes, length in zip(panels, longest, strict=True):
@@ -124,17 +143,18 @@ def _rows(reaches: Sequence[Reach]) -> list[list[Reach]]:
     return rows
 
 
-def _draw(axes: Axes, kind: str, rows: list[list[Bar]], look: Look) -> float:
+def _draw(axes: Axes, kind: str, rows: list[list[Bar]], look: Look, terse: bool) -> float:
     """Draw one panel, a row for each direction, its own side to the right; returns the length of the longest bar."""
     longest = max((bar.length for row in rows for bar in row if np.isfinite(bar.length)), default=0.0) or 1.0
     for height, row in enumerate(rows):
         for bar, side in zip(row, (1.0, -1.0), strict=False):
-            _draw_bar(axes, bar, side, height, longest, look)
+            _draw_bar(axes, bar, side, height, longest, look, terse)
     axes.axvline(0.0, color=look.ink, linewidth=0.9)
     left = -longest if any(len(row) > 1 for row in rows) else 0.0
     axes.set(xlim=(left, longest), ylim=(len(rows) - 0.4, -0.6), xlabel=f"{kind} [{rows[0][0].unit}]")
     axes.set_yticks(range(len(rows)), [_name(row[0].reach.direction) for row in rows])
     step = round_length(longest) / (1.0 if longest >= 2.0 * round_length(longest) else 2.0)
+    step *= 2.0 if terse else 1.0
     ticks = np.arange(np.ceil(left / step), np.floor(longest / step) + 1.0) * step
     axes.set_xticks(ticks.tolist(), [f"{abs(tick):g}" for tick in ticks.tolist()])
     axes.grid(axis="x", color=look.faint, linewidth=0.8)
@@ -158,24 +178,26 @@ def _make_room(axes: Axes, longest: float, share: float) -> None:
     axes.set_xlim(axes.get_xlim()[0] / (1.0 - share), longest / (1.0 - share))
 
 
-def _draw_bar(axes: Axes, bar: Bar, side: float, height: int, longest: float, look: Look) -> None:
-    """Draw one reach as a bar, with the limit that stops it on two lines at its end."""
+def _draw_bar(axes: Axes, bar: Bar, side: float, height: int, longest: float, look: Look, terse: bool) -> None:
+    """Draw one reach as a bar, with the limits that stop it at its end: two of them, or one if terse."""
     is_bounded = np.isfinite(bar.length)
     length = side * (bar.length if is_bounded else STUB * longest)
     fill, edge = look.faces["platform"] if is_bounded else "none", look.edges["platform"]
     axes.barh(height, length, THICK, color=fill, edgecolor=edge, linewidth=1.0, linestyle="-" if is_bounded else "--")
-    lines = [f"{bar.length:.4g}", *_stop(bar.reach)] if is_bounded else ["unlimited"]
+    lines = [f"{bar.length:.4g}", *_stop(bar.reach, 1 if terse else 2)] if is_bounded else ["unlimited"]
     beside: dict[str, Any] = {"textcoords": "offset points", "ha": "left" if side > 0.0 else "right", "va": "center"}
     letters: dict[str, Any] = {"fontsize": SMALL - 1.0, "color": look.ink, "linespacing": 1.1}
     axes.annotate("\n".join(lines), (length, height), (BESIDE * side, 0.0), **beside, **letters)
 
 
-def _stop(reach: Reach) -> list[str]:
-    """The limits that stop a reach; those beyond the second are counted."""
+def _stop(reach: Reach, most: int) -> list[str]:
+    """The limits that stop a reach; those beyond the first few are counted."""
     if not reach.stopped_by:
         return wrap(reach.why, LETTERS)
-    named = short_names(reach.stopped_by[:2])
-    n_more = len(reach.stopped_by) - 2
+    named = short_names(reach.stopped_by[:most])
+    n_more = len(reach.stopped_by) - most
+    if most == 1:  # on one line, whatever its length
+        return [f"{named} +{n_more}" if n_more > 0 else named]
     return wrap(f"{named}; {n_more} more" if n_more > 0 else named, LETTERS)
 
 

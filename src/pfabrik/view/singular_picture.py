@@ -13,7 +13,7 @@ from ..workspace.parts import connected
 from ..workspace.region import Region
 from ..workspace.singular import signed_at
 from ..workspace.workspace_table import for_people, labels
-from .canvas import checked_size
+from .canvas import checked_size, wrapped
 from .eye import Eye, View, eye_of, upright
 from .frame import axes_for, box_of, draw_box, fit
 from .looks import SINGULAR, Look, Theme, look_of
@@ -23,6 +23,7 @@ from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_o
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from ..workspace.singular import SingularityMap
 
@@ -52,6 +53,9 @@ SLICES_IN = {"left": 0.55, "right": 0.9, "top": 0.86, "bottom": 0.11, "hspace": 
 
 SLICES = (0.10, 0.37, 0.63, 0.90)
 """Where slices are, as shares of the locus from its lowest to its highest point."""
+
+ROOMY, ALONE = (7.2, 3.8), (0.0, 0.0, 1.0, 0.86)
+"""Width and height of a figure below which a locus has no slices [inches], and the place of it alone."""
 
 ACROSS = 44
 """Points of a slice along its longer side: each is solved for."""
@@ -117,7 +121,7 @@ def plot_singular_map(
     if len(region.names) == 3 and len(region.faces):
         return _plot_in_space(found, vertices, faces, ax, (view, size), look, title)
     axes: Any = axes_for(ax, size or PLANE_SIZE, look)
-    axes.set_title(title, fontsize=SMALL + 1, color=look.ink)
+    _title(axes, title, look)
     if not len(found.points):
         axes.axis("off")
         return axes  # type: ignore[no-any-return]
@@ -139,6 +143,57 @@ def plot_singular_map(
     axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
     _dress_bar(axes.figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.03), look)
     return axes  # type: ignore[no-any-return]
+
+
+def _title(axes: Any, title: str, look: Look) -> None:
+    width = axes.figure.bbox.width / axes.figure.dpi
+    axes.set_title(wrapped(title, width, SMALL + 1), fontsize=SMALL + 1, color=look.ink)
+
+
+def _bare(width: float, height: float, look: Look, layout: str | None = None) -> Figure:
+    figure = new_figure(width, height, layout=layout)
+    figure.set_facecolor(look.paper)
+    return figure
+
+
+def _plot_slices(
+    found: SingularityMap,
+    vertices: Floats,
+    faces: Ints,
+    size: tuple[float, float] | None,
+    order: tuple[int, int, int],
+    look: Look,
+    title: str,
+) -> Axes:
+    """Slices of the measure alone: where nothing is singular there is no locus to see; a small figure has one slice."""
+    width, height = checked_size(size or SIZE)
+    figure = _bare(width, height, look, "constrained")
+    is_small = width < ROOMY[0] or height < ROOMY[1]
+    panels = figure.subplots(1 if is_small else 2, 1 if is_small else 2, squeeze=False).ravel().tolist()
+    words = "\n".join(wrapped(text, width, SMALL) for text in (title, _least_in_words(found)))
+    figure.suptitle(words, fontsize=SMALL, color=look.ink)
+    drawn = _draw_slices(panels, found, vertices, faces, order, look)
+    if drawn is not None:
+        _dress_bar(figure.colorbar(drawn, ax=panels, shrink=0.8, pad=0.02), look)
+    return panels[0]  # type: ignore[no-any-return]
+
+
+def _least_at(found: SingularityMap) -> Floats:
+    """Where the parallel measure is least (d,) [length or rad]."""
+    return np.asarray(found.points[int(np.nanargmin(found.measures.parallel))])
+
+
+def _least_in_words(found: SingularityMap) -> str:
+    """The least parallel measure and where it is, and the least of the other measures."""
+    region = found.workspace
+    factors, units = for_people(region.units)
+    at = ", ".join(
+        f"{name} {value * factor + 0.0:.3g} {unit}".replace("-", "\N{MINUS SIGN}")
+        for name, value, factor, unit in zip(region.names, _least_at(found), factors, units, strict=True)
+    )
+    others = [(kind, np.asarray(getattr(found.measures, kind))) for kind in ("serial", "constraint")]
+    least = [f"least {kind} {np.nanmin(values):.2g}" for kind, values in others if np.isfinite(values).any()]
+    return "; ".join([f"least parallel measure {np.nanmin(found.measures.parallel):.2g} at {at}", *least])
 
 
 def _outline(area: Any, look: Look) -> Any:
@@ -269,10 +324,17 @@ def _plot_in_space(
     if ax is not None:
         axes: Any = axes_for(ax, SIZE, look)
         _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
-        axes.set_title(title, fontsize=SMALL + 1, color=look.ink)
+        _title(axes, title, look)
         return axes  # type: ignore[no-any-return]
-    figure = new_figure(*checked_size(size or SIZE), layout=None)
-    figure.set_facecolor(look.paper)
+    if not len(faces):
+        return _plot_slices(found, vertices, faces, size, order, look, title)
+    width, height = checked_size(size or SIZE)
+    if width < ROOMY[0] or height < ROOMY[1]:
+        axes = _bare(width, height, look).add_axes(ALONE)
+        _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
+        _title(axes, title, look)
+        return axes  # type: ignore[no-any-return]
+    figure = _bare(width, height, look)
     grid = figure.add_gridspec(2, 2, **SLICES_IN)
     axes = figure.add_axes(SPACE)
     _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
@@ -320,7 +382,8 @@ def _draw_slices(
     factors = np.array(for_people(region.units)[0])
     axis = _axis_across(vertices / found.step, faces, order[2])
     heights = vertices[np.unique(faces), axis] if len(faces) else region.vertices[:, axis]
-    planes = [plane_across(axis, float(level), order) for level in np.quantile(heights, SLICES)]
+    levels = np.quantile(heights, SLICES) if len(panels) > 1 else [_least_at(found)[axis]]
+    planes = [plane_across(axis, float(level), order) for level in levels]
     highest, drawn = _highest(np.abs(found._signed)), None
     for panel, plane in zip(panels, planes, strict=True):
         area = draw_slice(panel, region, plane, look)
@@ -339,7 +402,7 @@ def _draw_slices(
             drawn = draw_measure(panel, grid, corner, step * factors[plane.across], highest, area)
         cut = cut_mesh(vertices, faces, plane)
         _draw_curves(panel, (cut.points * factors[plane.across])[cut.segments], area)
-    for place, panel in enumerate(panels):  # all have the same axes
+    for place, panel in enumerate(panels[: len(panels) // 2 * 2]):  # all have the same axes
         if place % 2:
             panel.set_ylabel("")
             panel.tick_params(labelleft=False)

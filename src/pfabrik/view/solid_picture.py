@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints, Mask
 from ..drawing import SMALL, new_figure
 from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.workspace_table import for_people
-from .canvas import checked_size, draw_triad
+from .canvas import checked_size, draw_triad, wrapped
 from .eye import Eye, View, eye_of, upright
 from .frame import PADS, axes_for, box_of, dense, draw_box, fit, machine_of, title_of
 from .looks import Look
@@ -99,7 +99,8 @@ def plot_solid(
     if ax is not None:
         axes: Any = axes_for(ax, (0.0, 0.0), look)
         _draw_solid(axes, first, colours, shape, look)
-        axes.set_title(title_of(region), fontsize=SMALL + 1, color=look.ink)
+        title = wrapped(title_of(region), axes.figure.bbox.width / axes.figure.dpi, SMALL + 1)
+        axes.set_title(title, fontsize=SMALL + 1, color=look.ink)
         key = _key(groups, look)
         while key["ncols"] > 1 and _legend(axes, key).get_window_extent().width > axes.get_window_extent().width:
             key["ncols"] -= 1
