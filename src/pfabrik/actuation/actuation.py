@@ -335,7 +335,7 @@ class Actuation:
 
     @cached_property
     def _unlimited(self) -> Placer:
-        """The same coordinates without limits, beyond which J goes on."""
+        """Coordinates without limits, beyond which the Jacobian goes on."""
         mechanism = self.mechanism.without_limits()
         is_task = isinstance(self._coordinates, TaskPath)
         return Placer(TaskPath(mechanism) if is_task else joint_path(mechanism, self.names))

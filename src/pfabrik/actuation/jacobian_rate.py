@@ -1,4 +1,4 @@
-"""How the Jacobian of a map changes as its coordinates move: exact, from the second order of the loops' conditions.
+"""Rate of the Jacobian of a map: exact, from the second order of the loops' conditions.
 
 Actuators x(q) accelerate by x'' = J q'' + J' q'. With q'' = 0 that is a quadratic form h(q') of the rates: the second
 derivatives H of x, by which J' = H q'. So a column of J' follows from two motions,
@@ -98,7 +98,7 @@ def _second_order(coordinates: Coordinates, moving: MovingMachine, poses: Floats
 
 
 def _along(coordinates: Coordinates, poses: Floats, twists: Floats) -> Floats:
-    """What a task sets of twists (n, 6), (n, m)."""
+    """Components of twists (n, 6) that a task sets, (n, m)."""
     return np.asarray(np.einsum("nki,ni->nk", task_axes(coordinates.mechanism, poses), twists))
 
 
@@ -113,7 +113,7 @@ def _turned(coordinates: TaskPath, poses: Floats, rates: Floats) -> tuple[Floats
 
 
 def _turning_rate(vectors: Floats, speeds: Floats) -> Floats:
-    """How `turning` changes as rotation vectors v (n, 3) move: b' V + b W + c' V^2 + c (V W + W V), with W of dv/dt."""
+    """Rate of `turning` as rotation vectors v (n, 3) move: b' V + b W + c' V^2 + c (V W + W V), with W of dv/dt."""
     a = np.linalg.norm(vectors, axis=1)[:, None, None]
     V, W = ((each @ CROSSED).reshape(-1, 3, 3) for each in (vectors, speeds))
     s = np.maximum(a, NEAR_NONE)

@@ -143,7 +143,7 @@ def certify(
 
 
 class _Looked(NamedTuple):
-    """What was seen of some cells.
+    """Outcome of a look at some cells.
 
     Attributes
     ----------
