@@ -159,6 +159,9 @@ JSON: dict[str, Callable[[], Any]] = {
     "stiffness five_bar --position 0 10 180 --k 500 --k p1=100": lambda: pf.stiffness(
         pf.solve_ik(FIVE_BAR, (0, 10, 180)), [100.0, 500.0]
     ),
+    "stiffness five_bar --position 0 10 180 --k 500 --force 0 0 -1": lambda: pf.stiffness(
+        bar := pf.solve_ik(FIVE_BAR, (0, 10, 180)), 500.0, forces=pf.forces(bar, (0, 0, -1))
+    ),
     "accuracy five_bar --position 0 10 180 --error 0.5 --error p3=0.1 --rms": lambda: pf.accuracy(
         pf.solve_ik(FIVE_BAR, (0, 10, 180)), dict.fromkeys(("p1", "p5"), math.radians(0.5)) | {"p3": 0.1}, "rms"
     ),

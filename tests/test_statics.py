@@ -324,17 +324,115 @@ def test_slack_cables_have_no_stiffness() -> None:
     machine = cables()
     for solution in rows_of("cables"):
         jacobian, forces = struts_jacobian(solution), np.array([-5.0, -5, -5, -5, -5, -5, 1.0, 0.0])
-        springs = np.diag(np.where(forces < 0.0, 50.0, 0.0))
         found = pf.stiffness(solution, 50.0, cables=machine.actuator_names, forces=forces)
-        np.testing.assert_allclose(found.matrix, jacobian.T @ springs @ jacobian, rtol=1e-7, atol=1e-3)
+        np.testing.assert_allclose(
+            found.matrix, stiffness_of_struts(solution, 50.0, np.minimum(forces, 0.0)), rtol=1e-6, atol=1e-3
+        )
         whole = pf.stiffness(solution, 50.0)
         np.testing.assert_allclose(whole.matrix, 50.0 * jacobian.T @ jacobian, rtol=1e-7, atol=1e-3)
-        forces[:3] = 2.0
+        forces[:3], forces[3:6] = 2.0, -1e-9
         slack = pf.stiffness(solution, 50.0, cables=machine.actuator_names, forces=forces)
         assert "slack" in str(slack.reason)
         assert np.isnan(slack.compliance).all()
         springs = np.diag(np.where(forces < 0.0, 50.0, 0.0))
         np.testing.assert_allclose(slack.matrix, jacobian.T @ springs @ jacobian, rtol=1e-7, atol=1e-3)
+
+
+def stiffness_of_struts(solution: pf.Solution, k: float, exerted: Array) -> Array:
+    """The wrench by which struts and cables resist, by differences of poses: they exert less as they grow."""
+    springs, step = np.where(exerted == 0.0, 0.0, k), 1e-3
+
+    def change(axis: int, way: float) -> Array:
+        shift, turn = np.split(way * step * np.eye(6)[axis] * np.repeat([1.0, 1e-3], 3), 2)
+        pose = solution.pose.copy()
+        pose[:3, 3], pose[:3, :3] = pose[:3, 3] + shift, Rotation.from_rotvec(turn).as_matrix() @ pose[:3, :3]
+        moved = pf.solve_ik(solution.mechanism, pose)
+        return -struts_jacobian(moved).T @ (exerted - springs * (moved.actuators - solution.actuators))
+
+    columns = [(change(axis, 1.0) - change(axis, -1.0)) / (2 * step) for axis in range(6)]
+    return np.array(columns).T * np.repeat([1.0, 1e3], 3)
+
+
+def test_cables_are_as_stiff_as_differences_of_their_pull_say() -> None:
+    """With tensions within limits, under a load with a moment: by which the matrix is not symmetric."""
+    machine, load = cables(), np.array([20.0, -10.0, -300.0, 2e4, 1e4, -3e4])
+    batch = pf.solve_ik(machine, np.array([solution.pose for solution in rows_of("cables")]))
+    held = pf.forces(batch, load, limits=(-900.0, -20.0))
+    assert held.is_least_norm and list(held.reason) == ["", ""]
+    found = pf.stiffness(batch, 40.0, cables=machine.actuator_names, forces=held)
+    for row, solution in enumerate(rows_of("cables")):
+        expected, exerted = stiffness_of_struts(solution, 40.0, held.actuators[row]), held.actuators[row]
+        np.testing.assert_allclose(found.matrix[row], expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max())
+        np.testing.assert_allclose(found.matrix[row] @ found.compliance[row], np.eye(6), atol=1e-7)
+        alone = pf.stiffness(solution, 40.0, forces=exerted)
+        np.testing.assert_allclose(alone.matrix, found.matrix[row], rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+    skew = found.matrix[:, 3:, 3:] - np.swapaxes(found.matrix[:, 3:, 3:], 1, 2)
+    np.testing.assert_allclose(skew[:, [2, 0, 1], [1, 2, 0]], np.tile(-load[3:], (2, 1)), rtol=1e-6)
+
+
+def test_a_platform_on_four_cables_in_a_plane_has_the_second_derivatives_of_its_energy() -> None:
+    """E = sum k (l - l0)^2 / 2 of cables between fixed points and those of a platform that turns, in closed form."""
+    machine = closure.planar_4rpr().without_limits()
+    solution, k = pf.solve_ik(machine, pf.pose([10, -5, 0], rotvec=[0, 0, 0.1])), 30.0
+    tensions = -pf.forces(solution, [5.0, -8.0, 0, 0, 0, 40.0], limits=(-500.0, -30.0)).actuators
+    expected, turned = np.zeros((3, 3)), np.array([[0.0, -1.0], [1.0, 0.0]])
+    for leg, tension in enumerate(tensions, 1):
+        start, end = (solution.points[f"R{leg}.{place}"][:2] for place in (1, 3))
+        arm, length = end - solution.pose[:2, 3], np.linalg.norm(end - start)
+        along, motion = (end - start) / length, np.c_[np.eye(2), turned @ arm]
+        across = motion.T @ (np.eye(2) - np.outer(along, along)) @ motion / length
+        across[2, 2] -= along @ arm
+        expected += k * np.outer(motion.T @ along, motion.T @ along) + tension * across
+    found = pf.stiffness(solution, k, cables=machine.actuator_names, forces=-tensions)
+    shown = [0, 1, 5]
+    np.testing.assert_allclose(found.matrix[np.ix_(shown, shown)], expected, rtol=1e-8, atol=1e-6)
+    assert (found.reason, found.rigid) == ("", 3)
+
+
+@pytest.mark.parametrize(
+    "name", named("stewart", "delta", "tricept", "rps", "five_bar", "g1_ankle", "canfield", "panda")
+)
+def test_what_a_load_adds_to_stiffness_is_what_differences_of_forces_say(name: str) -> None:
+    """With weights on every body: actuators exert t(q) - k (q - q0) against what they need, which changes too."""
+    machine, rng = pf.load(name).without_limits(), np.random.default_rng(1)
+    length, n_a = machine.characteristic_length, len(machine.actuator_names)
+    loads = {body: (1.0, rng.uniform(-1, 1, 3) * length) for body in machine.bodies if body != machine.base}
+    if name == "stewart":
+        loads = {"platform": (rng.uniform(-5, 5, 6), rng.uniform(-1, 1, 3) * length)}
+    for solution in reached_at_random(pf.load(name), 2, rng):
+        wrench = np.r_[rng.uniform(-20, 20, 3), rng.uniform(-5, 5, 3) * length]
+        wrench = wrench[:3] if machine.end_effector_is_joint else wrench
+        kinds = np.array([machine.joint(drive).type == "revolute" for drive in machine.actuator_names])
+        units, step = np.where(kinds, 1.0, length), 1e-5
+        k = 500.0 * length / units**2
+        shifts = np.concatenate([way * step * np.diag(units) for way in (1.0, -1.0)])
+        here = pf.solve_fk(machine, solution.actuators + np.vstack([np.zeros(n_a), shifts]), start=solution.q)
+        held = pf.forces(here, wrench, loads=loads)
+        change = (held.actuators[1 : n_a + 1] - held.actuators[n_a + 1 :]) / (2 * step * units[:, None])
+        forward = pf.forward_jacobian(here[0])
+        expected = forward @ np.linalg.solve(np.diag(k) + change.T, forward.T)
+        found = pf.stiffness(here[0], k, forces=pf.forces(here[0], wrench, loads=loads))
+        assert found.reason == ""
+        np.testing.assert_allclose(found.compliance, expected, atol=2e-7 * np.abs(expected).max())
+        assert np.abs(expected - forward @ np.diag(1 / k) @ forward.T).max() > 1e-4 * np.abs(expected).max()
+
+
+def test_a_load_that_tips_and_cables_that_would_push_are_said() -> None:
+    solution = rows_of("stewart")[0]
+    heavy = pf.stiffness(solution, 1.0, forces=pf.forces(solution, [0, 0, -1e5]))
+    assert "not stable" in str(heavy.reason) and np.isnan(heavy.compliance).all()
+    assert np.linalg.eigvalsh(heavy.matrix + heavy.matrix.T)[0] < 0.0
+    machine, hung = cables(), rows_of("cables")[0]
+    pushed = pf.forces(hung, [0, 0, 2000.0, 0, 0, 0])
+    pushing = [name for name, force in zip(machine.actuator_names, pushed.actuators, strict=True) if force > 0.0]
+    loose = pf.stiffness(hung, 40.0, cables=machine.actuator_names, forces=pushed)
+    assert pushing and all(name in str(loose.reason) for name in pushing) and np.isnan(loose.matrix).all()
+    low, high = [-900.0, -20.0]
+    beyond = str(pf.forces(hung, [0, 0, 0, 0, 0, 1e6], limits=(low, high)).reason)
+    assert "would push" in beyond and any(name in beyond for name in machine.actuator_names)
+    elsewhere = pf.forces(rows_of("cables")[1], [0, 0, -5.0])
+    with pytest.raises(InvalidArgument, match="forces of other configurations"):
+        pf.stiffness(hung, 40.0, forces=elsewhere)
 
 
 def test_rods_that_stretch_are_as_soft_as_slides_in_them() -> None:
@@ -368,7 +466,7 @@ def test_the_worst_error_is_that_of_forward_kinematics_at_the_worst_corner() -> 
     for row in rows_of("stewart"):
         solution = pf.solve_ik(machine, row.pose)
         found = pf.accuracy(solution, errors)
-        exact = pf.solve_fk(machine, solution.actuators + corners, start=solution)
+        exact = pf.solve_fk(machine, solution.actuators + corners, start=solution.q)
         shifts = np.linalg.norm(exact.pose[:, :3, 3] - solution.pose[:3, 3], axis=1)
         turns = Rotation.from_matrix(exact.pose[:, :3, :3] @ solution.pose[:3, :3].T).magnitude()
         assert shifts.max() == pytest.approx(found.position, rel=1e-4)

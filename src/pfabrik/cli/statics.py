@@ -73,19 +73,29 @@ def weighed(mechanism: pf.Mechanism, loads: Loads) -> pf.Mechanism:
     return mechanism.with_masses([*mechanism.masses, *(pf.Mass(body, 0.0) for body in weightless)])
 
 
+def pressing(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the load on the end effector and on bodies, and ``--limit``, by actuator."""
+    options: list[Callable[[Callable[..., int]], Callable[..., int]]] = [
+        click.option("--force", type=FINITE, nargs=3, metavar="X Y Z", help="What acts on the end effector."),
+        click.option(
+            "--moment", type=FINITE, nargs=3, metavar="X Y Z", help="Beside it, or alone [force times length]."
+        ),
+        carrying,
+        click.option(
+            "--limit",
+            "limits",
+            multiple=True,
+            metavar="[NAME=]VALUE|MIN:MAX",
+            shell_complete=completing(actuators, "="),
+            help="Of an actuator, or of all.",
+        ),
+    ]
+    return functools.reduce(lambda built, option: option(built), reversed(options), command)
+
+
 @click.command()
 @at_a_pose
-@click.option("--force", type=FINITE, nargs=3, metavar="X Y Z", help="What acts on the end effector.")
-@click.option("--moment", type=FINITE, nargs=3, metavar="X Y Z", help="Beside it, or alone [force times length].")
-@carrying
-@click.option(
-    "--limit",
-    "limits",
-    multiple=True,
-    metavar="[NAME=]VALUE|MIN:MAX",
-    shell_complete=completing(actuators, "="),
-    help="Of an actuator, or of all.",
-)
+@pressing
 @click.option("--reactions", is_flag=True, help="List what every joint transmits, and forces along rods.")
 @json_option()
 def forces(
@@ -154,16 +164,34 @@ def rods(mechanism: pf.Mechanism) -> tuple[str, ...]:
     shell_complete=completing(rods, "="),
     help="Of a rod, or all [force/length]. Default: rigid.",
 )
+@pressing
 @json_option()
-def stiffness(solution: pf.Solution, k: tuple[str, ...], given: tuple[str, ...], as_json: bool) -> int:
+def stiffness(
+    solution: pf.Solution,
+    k: tuple[str, ...],
+    given: tuple[str, ...],
+    force: Triple | None,
+    moment: Triple | None,
+    loads: Loads,
+    gravity: Triple,
+    limits: tuple[str, ...],
+    as_json: bool,
+) -> int:
     """Tell how stiff a machine is whose actuators and rods give.
 
     At a pose, home by default: along and about each axis, the force or moment that moves the end effector by one unit
     of length, or by one rad.
+
+    With a load, what that changes as the end effector moves counts too; --limit says what cables pull: -200:-5, say.
     """
     by_actuator = by_name("--k", k, "actuator", actuators(solution.mechanism), positive)
     by_rod = by_name("--rod", given, "rod", rods(solution.mechanism), positive)
-    found = pf.stiffness(solution, by_actuator, rods=by_rod or None)
+    held = None
+    if force or moment or loads or limits:
+        bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of) if limits else None
+        wrench = (force or (0.0, 0.0, 0.0)) + (moment or ())
+        held = pf.forces(solution, wrench, loads=loads, gravity=gravity, limits=bounds)
+    found = pf.stiffness(solution, by_actuator, rods=by_rod or None, forces=held)
     print_result(as_json, found)
     return int(bool(found.reason))
 

@@ -15,15 +15,27 @@ from ..arrays import Floats, Ints, Mask, as_plain, shaped
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..frozen import FrozenMapping
-from ..kinematics import actuator_units, end_effector_pose, joint_centres
+from ..kinematics import JointRates, actuator_units, end_effector_pose, joint_centres, model_of
 from ..printed import Printed, ResultTable, plain
 from ..tolerances import TOLERANCES
-from .joint_balance import COMPONENTS, Balance, about_centres, balance, open_components, open_in_words, pairs_of
+from .geometric_stiffness import geometric_stiffness
+from .joint_balance import (
+    COMPONENTS,
+    Balance,
+    Pairs,
+    about_centres,
+    balance,
+    open_components,
+    open_in_words,
+    pairs_at,
+    pairs_of,
+)
 from .loads import (
     Asked,
     BodyLoads,
     Bounds,
     Reasons,
+    acting,
     add_reason,
     asked_of,
     bounds_of,
@@ -39,7 +51,7 @@ from .sharing import within_limits
 from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
 GRAVITY = (0.0, 0.0, -9.81)
-BEYOND = "no forces of the actuators within their limits hold the load"
+BEYOND = "no forces of the actuators within their limits hold the load: {} would {}"
 FREE_PART = "the loads move a part that neither the end effector nor an actuator holds"
 
 
@@ -212,7 +224,7 @@ class Forces(Printed):
     @cached_property
     def _balance(self) -> Balance:
         found = _balanced(self._question, self._coordinates, slice(None))
-        if self._question.limits is None:
+        if not self.is_least_norm:
             return found
         exerted = np.reshape(self.actuators, found.actuators.shape[:2]) * actuator_units(self._mechanism)
         more = np.where(np.isnan(exerted), 0.0, exerted - found.actuators[..., 0])
@@ -223,6 +235,22 @@ class Forces(Printed):
         """Joint centres (n, joints, 3) and reference points (n, 3) [length]."""
         mechanism, q = self._mechanism, self._coordinates
         return joint_centres(mechanism, q), end_effector_pose(mechanism, q)[:, :3, 3]
+
+    def _is_at(self, solution: Solution) -> bool:
+        """True if the forces are those at the configurations of a solution."""
+        asked, own = self._question.asked, self._question.solution
+        is_same = own.mechanism == solution.mechanism and asked.shape == solution.shape
+        return is_same and np.array_equal(own._coordinates[asked.places], solution._coordinates, equal_nan=True)
+
+    def _geometric_stiffness(self) -> tuple[Pairs, Floats]:
+        """Motions, and the stiffness by these of the forces as the geometry changes, (n, d, d)."""
+        mechanism, q, (centres, reference) = self._mechanism, self._coordinates, self._places
+        first, (_, asked, loads, gravity, _) = JointRates(model_of(mechanism), q), self._question
+        arms = (centres - reference[:, None]) / mechanism.characteristic_length
+        pulling = acting(mechanism, q, asked.wrenches, loads, gravity)
+        return pairs_at(mechanism, first), geometric_stiffness(
+            mechanism, first, arms, self._balance.wrenches[..., 0], pulling
+        )
 
     @cached_property
     def _is_unknown(self) -> Mask:
@@ -305,11 +333,12 @@ def forces(
         add_reason(reasons, rest[~found.is_held[:, 0]], gives_way_in_words(mechanism))
         if question.limits is not None:
             units = actuator_units(mechanism)
-            shared, is_within = within_limits(
+            shared, beyond, is_within = within_limits(
                 found.actuators[..., 0], pairs_of(mechanism, q).rates, question.limits * units[:, None]
             )
             actuators[rest] = shared / units
-            add_reason(reasons, rest[~is_within], BEYOND)
+            for row in np.flatnonzero(~is_within):
+                add_reason(reasons, [rest[row]], _beyond_in_words(mechanism, question.limits, beyond[row] / units))
         actuators[has_reason(reasons)] = np.nan
     return Forces(
         shaped(actuators, asked.shape),
@@ -317,6 +346,15 @@ def forces(
         in_shape(reasons, asked.shape),
         question,
     )
+
+
+def _beyond_in_words(mechanism: Mechanism, limits: Floats, beyond: Floats) -> str:
+    """A reason that names the actuator whose force is farthest beyond its limits (n_a, 2), by (n_a,)."""
+    place = int(np.abs(beyond * actuator_units(mechanism)).argmax())
+    is_above, highest = beyond[place] > 0.0, limits[place, 1]
+    pushes = is_above and highest <= 0.0 < highest + beyond[place]
+    does = "push" if pushes else f"be {'above' if is_above else 'below'} its own"
+    return BEYOND.format(mechanism.actuator_names[place], does)
 
 
 def _balanced(question: _Question, q: Floats, rows: slice | NDArray[np.intp], more: Floats | float = 0.0) -> Balance:

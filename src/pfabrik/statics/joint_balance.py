@@ -82,7 +82,12 @@ def balance(mechanism: Mechanism, q: Floats, carried: Floats, on_drives: Floats 
 
 def pairs_of(mechanism: Mechanism, q: Floats) -> Pairs:
     """The motions at coordinates q, (n, c)."""
-    first, rows = JointRates(model_of(mechanism), q), 3 if mechanism.end_effector_is_joint else 6
+    return pairs_at(mechanism, JointRates(model_of(mechanism), q))
+
+
+def pairs_at(mechanism: Mechanism, first: JointRates) -> Pairs:
+    """The motions where joint rates are known."""
+    rows = 3 if mechanism.end_effector_is_joint else 6
     return Pairs(first.twists[:, :rows] @ first.pairs, first.pairs[:, first.actuated])
 
 

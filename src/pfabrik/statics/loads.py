@@ -61,10 +61,11 @@ def no_reasons(rows: int) -> Reasons:
     return np.full(rows, "", dtype=object)
 
 
-def add_reason(reasons: Reasons, rows: Any, reason: str) -> None:
-    """Give some rows this reason, by indices or a mask, unless they have one."""
+def add_reason(reasons: Reasons, rows: Any, reason: str | Reasons) -> None:
+    """Give some rows this reason, or each its own, by indices or a mask, unless they have one."""
     places = np.arange(len(reasons))[rows]
-    reasons[places[~has_reason(reasons[places])]] = reason
+    is_open = ~has_reason(reasons[places])
+    reasons[places[is_open]] = reason if isinstance(reason, str) else reason[is_open]
 
 
 def reasons_in_words(reason: str | Reasons, lacking: str) -> list[str]:
@@ -137,27 +138,48 @@ def asked_of(solution: Solution, wrench: ArrayLike | None, at: ArrayLike | None)
     return Asked(shape, places, wrenches)
 
 
+class Acting(NamedTuple):
+    """A load on a body at n configurations; lengths in L, and of the present reference point.
+
+    Attributes
+    ----------
+    body : that it acts on.
+    wrench : force times L, and moment about the reference point, (n, 6).
+    arm : from there to the point that it acts at, (n, 3).
+    """
+
+    body: str
+    wrench: Floats
+    arm: Floats
+
+
+def acting(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoads, gravity: Floats) -> list[Acting]:
+    """All loads at coordinates q (n, c): on the end effector, (n, 6) about the reference point, and on bodies."""
+    length, bodies = mechanism.characteristic_length, displacements(mechanism, q)
+    reference = (bodies[mechanism.end_effector_body] @ mechanism.home_pose)[:, :3, 3]
+    found = [Acting(mechanism.end_effector_body, _scaled(wrenches, length), np.zeros((len(q), 3)))]
+    for body, (load, point) in loads.items():
+        wrench = _load(body, load, gravity)
+        place = array(f"loads['{body}'][1]", point, "3", note=f", the point of {OF_LOADS}")
+        arms = bodies[body][:, :3, :3] @ place + bodies[body][:, :3, 3] - reference
+        moments = wrench[3:] + np.cross(arms, wrench[:3])
+        both = np.concatenate([np.broadcast_to(wrench[:3], moments.shape), moments], axis=1)
+        found.append(Acting(body, _scaled(both, length), arms / length))
+    return found
+
+
 def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoads, gravity: Floats) -> Floats:
     """What each joint carries of loads, by the way of the tree to the base, (n, joints, 6).
 
-    As force times L, and moment about the present reference point: what screws of `JointRates` do work with.
+    As `Acting.wrench`: what screws of `JointRates` do work with.
 
     Parameters
     ----------
     wrenches : on the end effector, about the reference point, (n, 6).
     """
-    tree, length = tree_of(mechanism), mechanism.characteristic_length
-    bodies = displacements(mechanism, q)
-    reference = (bodies[mechanism.end_effector_body] @ mechanism.home_pose)[:, :3, 3]
-    carried = tree.paths[mechanism.end_effector_body][:, None] * _scaled(wrenches, length)[:, None]
-    for body, (load, point) in loads.items():
-        acting = _load(body, load, gravity)
-        place = array(f"loads['{body}'][1]", point, "3", note=f", the point of {OF_LOADS}")
-        arms = bodies[body][:, :3, :3] @ place + bodies[body][:, :3, 3] - reference
-        moments = acting[3:] + np.cross(arms, acting[:3])
-        wrench = np.concatenate([np.broadcast_to(acting[:3], moments.shape), moments], axis=1)
-        carried = carried + tree.paths[body][:, None] * _scaled(wrench, length)[:, None]
-    return np.asarray(carried)
+    paths = tree_of(mechanism).paths
+    found = acting(mechanism, q, wrenches, loads, gravity)
+    return np.asarray(sum(paths[load.body][:, None] * load.wrench[:, None] for load in found))
 
 
 def checked_loads(mechanism: Mechanism, loads: Any) -> BodyLoads:

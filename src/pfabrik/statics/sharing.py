@@ -11,7 +11,7 @@ ROUNDS = 5000
 """Projections by which forces come within limits: far from corners tens do."""
 
 
-def within_limits(forces: Floats, rates: Floats, limits: Floats) -> tuple[Floats, Mask]:
+def within_limits(forces: Floats, rates: Floats, limits: Floats) -> tuple[Floats, Floats, Mask]:
     """The forces (n, n_a) within limits that do the same work on all motions, nearest to the middle of the limits.
 
     Projected in turn on the forces that do the work and on those within limits (Dykstra's algorithm), the middle comes
@@ -25,7 +25,8 @@ def within_limits(forces: Floats, rates: Floats, limits: Floats) -> tuple[Floats
 
     Returns
     -------
-    The forces, and a mask of rows with such: others keep those given, (n,).
+    The forces; how far the nearest that do the work are beyond limits, signed, (n, n_a); and a mask of rows with forces
+    that are not, (n,): others keep those given.
     """
     low, high = limits.T
     is_bounded = np.isfinite(limits).all(axis=1)
@@ -42,4 +43,4 @@ def within_limits(forces: Floats, rates: Floats, limits: Floats) -> tuple[Floats
         is_within = np.abs(on - found).max(axis=1, initial=0.0) <= TOLERANCES.rank * size
         if is_within.all():
             break
-    return np.where(is_within[:, None], on, forces), is_within
+    return np.where(is_within[:, None], on, forces), on - found, is_within
