@@ -219,3 +219,55 @@ def test_shapes_filled_evenly_weigh_as_in_mujoco(kinds: tuple[Any, ...]) -> None
     np.testing.assert_allclose(found.mass, model.body_mass[1])
     np.testing.assert_allclose(found.centre, model.body_ipos[1], atol=1e-12)
     np.testing.assert_allclose(found.inertia, axes @ np.diag(model.body_inertia[1]) @ axes.T, atol=1e-9 * found.mass)
+
+
+GEOMS = """<mujoco model="arm"><compiler {compiler}/>
+<asset><mesh name="m" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>
+<default><geom density="500"/><default class="seen"><geom type="mesh" mesh="m" {seen}/></default></default>
+<worldbody><geom type="plane" size="1 1 1"/><body name="a" pos=".1 .2 .3" euler="10 20 30">
+  <joint name="A" axis="0 0 1"/><geom size=".02 .05 .03" type="ellipsoid" pos=".01 0 .1"/>
+  <geom fromto="0 0 0 .3 0 .1" size=".01" type="capsule" mass=".4"/><geom class="seen"/>
+  <body name="b" pos=".3 0 .1" quat="1 .2 .3 .1"><joint name="B" axis="0 1 0"/>
+    <geom type="box" size=".02 .03 .1" pos="0 0 .1" shellinertia="true"/><geom type="sphere" size=".1" group="4"/>
+    <body name="c" pos="0 0 .2"><joint name="C" axis="1 0 0"/>
+      <inertial pos="0 .1 0" mass=".3" diaginertia="1e-3 2e-3 2e-3"/>
+      <geom type="cylinder" size=".05 .02" euler="5 0 0"/>
+      <body name="d" pos="0 0 .2"><joint name="D" axis="0 1 0"/>
+        <frame pos=".1 0 0"><replicate count="3" offset=".1 0 0"><geom size=".02"/></replicate></frame>
+        <geom type="mesh" mesh="m" {seen}/></body></body></body></body></worldbody>
+<actuator><motor joint="A"/><motor joint="B"/><motor joint="C"/><motor joint="D"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("compiler", "seen", "known"),
+    [
+        ("", 'mass="0"', "abcd"),
+        ("", 'density="0.0"', "abcd"),
+        ("", "", "bc"),
+        ('inertiafromgeom="true"', "", "bc"),
+        ('inertiafromgeom="true" inertiagrouprange="0 1"', 'group="2"', "abcd"),
+        ('inertiafromgeom="false"', "", "c"),
+        ('settotalmass="7"', 'mass="0"', "abcd"),
+        ('settotalmass="7"', "", ""),
+    ],
+)
+def test_bodies_of_geoms_weigh_what_mujoco_says(compiler: str, seen: str, known: str) -> None:
+    """By primitives, whose meshes weigh nothing or are not counted; a body that a mesh makes heavier is named."""
+    mujoco = pytest.importorskip("mujoco")
+    text = GEOMS.format(compiler=compiler, seen=seen)
+    bounded = text.replace("<compiler ", '<compiler boundmass="1e-12" boundinertia="1e-15" ')
+    model = mujoco.MjModel.from_xml_string(bounded)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    read = pf.interop.from_mjcf(text, base="world", end_effector="d")
+    masses = {each.body: each for each in read.mechanism.masses}
+    assert "".join(sorted(masses)) == known
+    for body, mass in masses.items():
+        index, turn = model.body(body).id, data.body(body).ximat.reshape(3, 3)
+        np.testing.assert_allclose(mass.mass, model.body_mass[index], rtol=1e-9)
+        np.testing.assert_allclose(mass.centre, data.xipos[index], atol=1e-9)
+        assert mass.inertia is not None
+        found = inertias_of(read.mechanism, 1.0)[body].inertia
+        np.testing.assert_allclose(found, turn @ np.diag(model.body_inertia[index]) @ turn.T, atol=1e-9 * mass.mass)
+    told = any("masses that follow from meshes" in str(note) for note in read.notes)
+    assert told == (known in ("bc", ""))

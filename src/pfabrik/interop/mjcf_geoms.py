@@ -35,6 +35,7 @@ class Geom(NamedTuple):
     kind : its type; "mesh" too where a primitive is fitted to one.
     touches : True if it collides with something, by its bits or by a pair.
     copies : how many `replicate` makes of it.
+    weighs : False if its mass or density is 0.
     """
 
     element: ET.Element
@@ -42,6 +43,7 @@ class Geom(NamedTuple):
     touches: bool
     group: str
     copies: int
+    weighs: bool
 
 
 def read_collision(root: ET.Element, model: MjcfModel, is_ours: bool, notes: list[Note]) -> Collision:
@@ -57,7 +59,7 @@ def read_collision(root: ET.Element, model: MjcfModel, is_ours: bool, notes: lis
     named = [(pair.get("geom1", ""), pair.get("geom2", "")) for pair in root.iterfind("contact/pair")]
     pairs = frozenset(frozenset(pair) for pair in named if all(pair))
     paired = {name for pair in pairs for name in pair}
-    geoms = list(_geoms(root, paired))
+    geoms = list(geoms_of(root, paired))
     by_group = is_ours or not any(geom.touches and geom.kind not in UNBOUNDED for geom in geoms)
     colliding = [geom for geom in geoms if geom.touches or (by_group and geom.group == str(OWN_GROUP))]
     if len(colliding) < len(geoms) and not is_ours:
@@ -80,7 +82,7 @@ def _with_bits(solid: Solid) -> Solid:
     return replace(solid, contype=EVERYTHING, conaffinity=EVERYTHING) if is_without else solid
 
 
-def _geoms(root: ET.Element, paired: set[str]) -> Iterator[Geom]:
+def geoms_of(root: ET.Element, paired: set[str]) -> Iterator[Geom]:
     """Yield the geoms of all bodies, with what they inherit from classes."""
     classes: dict[str, Mapping[str, str]] = {"main": {}}
     for section in root.iterfind("default"):
@@ -97,7 +99,8 @@ def _geoms(root: ET.Element, paired: set[str]) -> Iterator[Geom]:
                 kind = "mesh" if is_mesh else "hfield" if "hfield" in given else given.get("type", "sphere")
                 bits = [given.get(key, "1").strip() for key in ("contype", "conaffinity")]
                 touches = bits != ["0", "0"] or given.get("name", "") in paired
-                yield Geom(child, kind, touches, given.get("group", "0").strip(), copies)
+                weighs = given.get("mass", given.get("density", "1")).strip().strip("0.") != ""
+                yield Geom(child, kind, touches, given.get("group", "0").strip(), copies, weighs)
             elif child.tag in IN_BODIES:
                 waiting.append((child, child.get("childclass", class_), copies))
 
@@ -133,12 +136,17 @@ def _solids(root: ET.Element, chosen: set[int], model: MjcfModel, notes: list[No
     for index in range(geoms.ngeom):
         body = int(geoms.geom_bodyid[index])
         kind = mujoco.mjtGeom(int(geoms.geom_type[index])).name.removeprefix("mjGEOM_").lower()
-        frame = _frame(model.data.xpos[body], model.data.xmat[body])
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, geoms.geom_quat[index])
-        shape = solid_shape(model.body(body), kind, geoms.geom_size[index], frame @ _frame(geoms.geom_pos[index], turn))
+        frame = frame_on(model, body, geoms.geom_pos[index], geoms.geom_quat[index])
+        shape = solid_shape(model.body(body), kind, geoms.geom_size[index], frame)
         bits = int(geoms.geom_contype[index]), int(geoms.geom_conaffinity[index])
         yield Solid(shape, shape.body, str(geoms.geom(index).name), *bits)
+
+
+def frame_on(model: MjcfModel, body: int, at: Floats, quat: Floats) -> Floats:
+    """A frame (4, 4) in the world, from where it is on a body: its origin (3,) and its rotation (4,)."""
+    turn = np.empty(9)
+    model.mujoco.mju_quat2Mat(turn, quat)
+    return _frame(model.data.xpos[body], model.data.xmat[body]) @ _frame(at, turn)
 
 
 def _frame(at: Floats, turn: Floats) -> Floats:

@@ -13,11 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints, Mask
 from ..description.joints import Joint
-from ..description.mechanism import Mass
 from ..errors import UnknownName
 from .couplings import Coupling
 from .digits import ModelDigits, Rounding, worst
-from .imported_masses import placed_mass
 from .names import unique
 from .notes import Note, note_names
 from .opened import Loop
@@ -118,16 +116,6 @@ class MjcfModel(CompiledModel):
             for i in range(model.nsite)
         }
         return sites | {self.body(i): (self.body(i), data.xpos[i].copy()) for i in range(model.nbody)}
-
-    def masses(self, root: ET.Element) -> Iterator[Mass]:
-        """Yield the masses of bodies whose file has them, [m]; those that follow from geoms are not known."""
-        given = {body.get("name") for body in root.iter("body") if body.find("inertial") is not None}
-        for index in range(1, self.model.nbody):
-            if self.body(index) in given:
-                frame = np.eye(4)
-                frame[:3, :3], frame[:3, 3] = self.data.ximat[index].reshape(3, 3), self.data.xipos[index]
-                inertia = np.diag(self.model.body_inertia[index])
-                yield placed_mass(self.body(index), float(self.model.body_mass[index]), frame, inertia)
 
     def joints(self, notes: list[Note]) -> Iterator[Joint]:
         """Yield every joint, between its body and the parent's; several on one body have bodies between them."""

@@ -15,8 +15,10 @@ from .urdf_links import UrdfJoint, UrdfLinks
 from .xml_reading import fault, number, number_text
 
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+BY_GEOMS = ("inertiafromgeom", "inertiagrouprange", "settotalmass")
+WEIGHING = ("mass", "density", "shellinertia", "group")
 KEPT: dict[str, tuple[str, ...]] = {
-    "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq"),
+    "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq", *BY_GEOMS),
     "default": ("class",),
     "body": ("name", "childclass", *PLACE),
     "frame": ("name", "childclass", *PLACE),
@@ -24,7 +26,7 @@ KEPT: dict[str, tuple[str, ...]] = {
     "joint": ("name", "class", "type", "pos", "axis", "range", "limited", "ref"),
     "freejoint": ("name",),
     "inertial": ("mass", "diaginertia", "fullinertia", *PLACE),
-    "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *PLACE),
+    "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *WEIGHING, *PLACE),
     "site": ("name", "class", "type", "size", "fromto", *PLACE),
     "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
     "weld": ("name", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),

@@ -21,6 +21,7 @@ from .collision import Collision
 from .driving import Rates
 from .mjcf_bodies import is_half, read_struts
 from .mjcf_geoms import read_collision
+from .mjcf_masses import read_masses
 from .mjcf_model import MjcfModel
 from .mjcf_plain import plain_model, transmission_text
 from .mjcf_writing import MADE_UP, NOTE
@@ -50,7 +51,8 @@ def from_mjcf(
     `closing_<name>_2` meet in a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
     motion against the base does not depend on is left out. Loops that are open are closed by moving passive joints.
     Base coordinates are those of the world at the configuration. Geoms that collide become shapes of their bodies; what
-    the file lets pass through each other, and what overlaps at home, may touch (`ignore`).
+    the file lets pass through each other, and what overlaps at home, may touch (`ignore`). Bodies weigh what MuJoCo says,
+    by their inertial elements or by geoms that are no meshes.
 
     Parameters
     ----------
@@ -138,7 +140,7 @@ def _collision(root: ET.Element, model: MjcfModel, data: dict[str, str], notes: 
     collision = read_collision(root, model, bool(data), notes)
     struts = dict(read_struts(data))
     solids = [each for each in collision.solids if not is_half(each.name, struts)]
-    clearance, masses = _clearance(data.get("clearance")), model.masses(root)
+    clearance, masses = _clearance(data.get("clearance")), read_masses(root, model, notes)
     return replace(collision, solids=(*solids, *struts.values()), clearance=clearance, masses=_weighed(masses, data))
 
 
