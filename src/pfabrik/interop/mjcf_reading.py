@@ -51,8 +51,8 @@ def from_mjcf(
     `closing_<name>_2` meet in a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
     motion against the base does not depend on is left out. Loops that are open are closed by moving passive joints.
     Base coordinates are those of the world at the configuration. Geoms that collide become shapes of their bodies; what
-    the file lets pass through each other, and what overlaps at home, may touch (`ignore`). Bodies weigh what MuJoCo says,
-    by their inertial elements or by geoms that are no meshes.
+    the file lets pass through each other, and what overlaps at home, may touch (`ignore`). Masses are those of
+    inertial elements, or of geoms that are no meshes, as MuJoCo has them.
 
     Parameters
     ----------
