@@ -564,35 +564,21 @@ def test_the_border_is_divided_where_one_motor_takes_over_from_another() -> None
     found = pf.workspace(pf.load("five_bar"), resolution=8.0)
     groups = groups_of(found)
     place = group_of_limits(found, groups)
-    patches = patches_of(found, found.vertices, found.faces, place[found.vertex_limit], place)
+    patches = patches_of(found, place)
     ends = place[found.vertex_limit[found.faces]]
     is_divided = ends[:, 0] != ends[:, 1]
-    assert len(patches.faces) == len(found.faces) + is_divided.sum() > len(found.faces)
+    assert len(patches.segments) == len(found.faces) + is_divided.sum() > len(found.faces)
+    whole, divided = (
+        np.linalg.norm(np.diff(points[pairs], axis=1), axis=2).sum()
+        for points, pairs in ((found.vertices, found.faces), (patches.vertices, patches.segments))
+    )
+    assert divided == pytest.approx(whole, rel=1e-12)
     new = patches.vertices[len(found.vertices) : len(found.vertices) + is_divided.sum()]
     margins = pf.margins(pf.solve_ik(found.mechanism, found.poses(new)))
     second = np.sort(np.stack([np.abs(values) for values in margins.values()]), axis=0)[1]
     changing = np.unique(found.faces[is_divided])
     beside = pf.margins(pf.solve_ik(found.mechanism, found.poses(found.vertices[changing])))
     assert second.max() < 0.5 * np.sort(np.stack(list(beside.values())), axis=0)[1].max()
-
-
-@pytest.mark.parametrize("name", ["delta", "stewart"])
-def test_patches_are_the_border_and_no_more(name: str) -> None:
-    found = space(name)
-    groups = groups_of(found)
-    place = group_of_limits(found, groups)
-    patches = patches_of(found, found.vertices, found.faces, place[found.vertex_limit], place)
-    areas = []
-    for vertices, faces in ((found.vertices, found.faces), (patches.vertices, patches.faces)):
-        corners = vertices[faces]
-        areas.append(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    for normals in areas:
-        assert np.linalg.norm(normals.sum(axis=0)) < 1e-9 * np.linalg.norm(normals, axis=1).sum()  # closed
-    whole, divided = (np.linalg.norm(normals, axis=1).sum() for normals in areas)
-    assert divided == pytest.approx(whole, rel=1e-12)
-    sides = np.sort(np.concatenate([patches.faces[:, (k, (k + 1) % 3)] for k in range(3)]), axis=1)
-    edges = Counter(map(tuple, sides.tolist()))
-    assert set(edges.values()) == {2}
 
 
 def test_a_window_is_looked_at_however_far_from_the_start_it_is_and_may_be_empty() -> None:

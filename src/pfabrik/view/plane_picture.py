@@ -90,10 +90,10 @@ def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> N
     from matplotlib.patches import PathPatch
 
     place = group_of_limits(region, groups)
-    patches = patches_of(region, region.vertices, region.faces, place[region.vertex_limit], place)
+    patches = patches_of(region, place)
     points = shown(region, patches.vertices)
-    group_of = dict(zip(map(tuple, patches.faces.tolist()), patches.groups.tolist(), strict=True))
-    for loop in loops_of(patches.faces):
+    group_of = dict(zip(map(tuple, patches.segments.tolist()), patches.groups.tolist(), strict=True))
+    for loop in loops_of(patches.segments):
         for group, corners in stretches_of(loop, group_of):
             drawn = groups[group]
             style: Any = "-" if drawn.is_motors else DASHES
