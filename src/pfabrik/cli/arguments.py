@@ -18,12 +18,11 @@ import pfabrik as pf
 from ..cells import is_finite
 from ..errors import counted, near_miss
 from ..tolerances import TOLERANCES
+from .options import STANDARD_INPUT, named_values, series, together
 from .printing import note
 
 if TYPE_CHECKING:
     from ..targets import Target
-
-STANDARD_INPUT = "-"
 
 Triple: TypeAlias = tuple[float, float, float]
 Value = TypeVar("Value")
@@ -41,41 +40,6 @@ class MechanismName(click.types.StringParamType):
 
 
 MECH = MechanismName()
-
-
-def completing(
-    names_of: Callable[[pf.Mechanism], Iterable[str]], ending: str = ""
-) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
-    """A completion to names that the machine MECH has, each after the last comma and before an ending."""
-
-    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        mech = ctx.params.get("mech") or next(iter(ctx.args), None)  # left over where the option still has no value
-        done, comma, begun = incomplete.rpartition(",")
-        try:
-            names = () if mech in (None, STANDARD_INPUT) else names_of(pf.load(mech))
-        except (pf.errors.PfabrikError, OSError):  # a file that is not finished has no names yet
-            return []
-        fitting = [name for name in names if name.startswith(begun) and name not in done.split(",")]
-        return [CompletionItem(f"{done}{comma}{name}{ending}") for name in fitting]
-
-    return complete
-
-
-def actuators(mechanism: pf.Mechanism) -> tuple[str, ...]:
-    """Names of the actuators."""
-    return mechanism.actuator_names
-
-
-def joints(mechanism: pf.Mechanism) -> list[str]:
-    """Names of all joints."""
-    return [joint.name for joint in mechanism.joints]
-
-
-def series(mechanism: pf.Mechanism) -> tuple[str, ...]:
-    """Names of the passive joints in series from base to end effector."""
-    from ..kinematics import passive_series
-
-    return passive_series(mechanism)
 
 
 def load(mech: str) -> pf.Mechanism:
@@ -107,21 +71,21 @@ class TargetOptions:
 
     position: Triple | None
     rpy: Triple | None
-    joints: tuple[str, ...]
+    joint: tuple[str, ...]
 
     @property
     def is_given(self) -> bool:
         """True if any of the options is given."""
-        return (self.position, self.rpy, self.joints) != (None, None, ())
+        return self != TargetOptions(None, None, ())
 
     def of(self, mechanism: pf.Mechanism) -> Target:
         """The target that the options give; home's pose where they give none."""
-        if not self.joints:
+        if not self.joint:
             position = self.position or mechanism.reference_point
             return pf.pose(position, rpy=self.rpy or (0, 0, 0), degrees=True)
         if self.position is not None or self.rpy is not None:
             raise click.UsageError("--joint says it all: it does not go with --position or --rpy")
-        return joint_target(mechanism, self.joints)
+        return joint_target(mechanism, self.joint)
 
 
 rpy_option = click.option(
@@ -129,23 +93,20 @@ rpy_option = click.option(
 )
 
 
-def targeted(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--position``, ``--rpy`` and ``--joint``, which the command gets as one `target`."""
-
-    @click.option("--position", type=FINITE, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home.")
-    @rpy_option
-    @click.option(
+targeted = together(
+    "target",
+    TargetOptions,
+    click.option("--position", type=FINITE, nargs=3, metavar="X Y Z", help="Of the reference point. Default: at home."),
+    rpy_option,
+    named_values(
         "--joint",
-        multiple=True,
-        metavar="NAME=VALUE[,VALUE...]",
-        shell_complete=completing(series, "="),
-        help="Coordinates [deg or length] of each joint from base to end effector, in place of the others.",
-    )
-    @functools.wraps(command)
-    def with_target(*, position: Triple | None, rpy: Triple | None, joint: tuple[str, ...], **parameters: Any) -> Any:
-        return command(target=TargetOptions(position, rpy, joint), **parameters)
-
-    return with_target
+        "joint",
+        series,
+        "Coordinates [deg or length] of each joint from base to end effector, in place of the others.",
+        "NAME=VALUE[,VALUE...]",
+    ),
+)
+"""Adds ``--position``, ``--rpy`` and ``--joint``, which a command gets as one `target`."""
 
 
 def at_a_pose(command: Callable[..., int | None]) -> Callable[..., int]:
@@ -292,21 +253,22 @@ def named_joints(option: tuple[str, ...], words: tuple[str, ...]) -> tuple[str, 
     return tuple(name for word in (*option, *words) for name in word.split(",") if name)
 
 
-def projecting(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--hold``, which the command gets as `options` for the solver."""
+def _options(hold: Literal["orientation", "position", "none"]) -> pf.Options:
+    return pf.Options(hold=None if hold == "none" else hold)
 
-    @click.option(
+
+projecting = together(
+    "options",
+    _options,
+    click.option(
         "--hold",
         type=click.Choice(["orientation", "position", "none"]),
         default="orientation",
         show_default=True,
         help="Of a target out of reach: what to keep exactly, where that is possible.",
-    )
-    @functools.wraps(command)
-    def with_options(*, hold: Literal["orientation", "position", "none"], **parameters: Any) -> Any:
-        return command(options=pf.Options(hold=None if hold == "none" else hold), **parameters)
-
-    return with_options
+    ),
+)
+"""Adds ``--hold``, which a command gets as `options` for the solver."""
 
 
 def note_left_out(given: Iterable[str], mechanism: pf.Mechanism) -> None:

@@ -10,9 +10,9 @@ import click
 
 import pfabrik as pf
 
-from .arguments import FINITE, MECH, completing, joints, load, numbers_of
-from .outputs import check_outputs
-from .printing import json_option, print_result
+from .arguments import FINITE, MECH, load, numbers_of
+from .options import completing, joints
+from .printing import printing_result
 
 
 @click.command()
@@ -35,7 +35,7 @@ from .printing import json_option, print_result
 )
 @click.option("--budget", type=click.IntRange(min=1), metavar="N", help="Cells to look at, at most.")
 @click.option("--uncertain", type=FINITE, metavar="R", help="For joints that may be so far off their points [length].")
-@json_option()
+@printing_result
 def certify(
     mech: str,
     box: str | None,
@@ -49,8 +49,7 @@ def certify(
     tolerance: float | None,
     budget: int | None,
     uncertain: float | None,
-    as_json: bool,
-) -> int:
+) -> pf.Certificate:
     """Prove that every pose of a region is reached, or find one that is not.
 
     Exit code 0: proved. 1: refuted, by a pose that is printed; or left open.
@@ -62,7 +61,6 @@ def certify(
         raise click.UsageError(f"{' and '.join(given) or 'no region'}: give one of --box, --cylinder, --ball, --track")
     if path is not None and (rotation is not None or tilt is not None or yaw is not None):
         raise click.UsageError("--track has its orientations; leave out --rotation, --tilt and --yaw")
-    check_outputs([], [Path(mech)], as_json=as_json)
     mechanism = load(mech)
     region = (
         pf.read_path(path, mechanism).targets if path is not None else _region(box, cylinder, ball, rotation, tilt, yaw)
@@ -70,9 +68,7 @@ def certify(
     asked: dict[str, Any] = {"tolerance": tolerance, "uncertain": uncertain or 0.0}
     if budget is not None:
         asked["budget"] = budget
-    certificate = pf.certify(mechanism, region, limits=None if limits is None else limits.split(","), **asked)
-    print_result(as_json, certificate)
-    return 0 if certificate else 1
+    return pf.certify(mechanism, region, limits=None if limits is None else limits.split(","), **asked)
 
 
 def _region(

@@ -11,7 +11,8 @@ from click.shell_completion import CompletionItem
 
 import pfabrik as pf
 
-from .arguments import MECH, comma_separated, completing, load, named_joints, series
+from .arguments import MECH, comma_separated, load, named_joints
+from .options import joints_option
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import note
 
@@ -23,6 +24,9 @@ NAMED = ("c", "c-float")
 BACKENDS = ("torch", "jax", "numpy")
 FILES = (*BACKENDS, "web")
 """Formats that are options with a file of their own."""
+
+FOLDER: dict[str, Any] = {"metavar": "FOLDER", "type": click.Path(path_type=Path, file_okay=False)}
+"""Settings of an option that takes a folder to write."""
 
 
 def text_of(
@@ -71,27 +75,14 @@ def complete_format(ctx: click.Context, param: click.Parameter, incomplete: str)
 @click.option("--jax", help="The same in JAX.", **OUTPUT)
 @click.option("--numpy", help="The same in NumPy, without gradients.", **OUTPUT)
 @click.option("--web", help="Write a page, HTML, on which one drags the machine; it needs no network.", **OUTPUT)
-@click.option(
-    "--ros2-control",
-    "folder",
-    metavar="FOLDER",
-    type=click.Path(path_type=Path, file_okay=False),
-    help="Write a package with a transmission for ros2_control.",
-)
+@click.option("--ros2-control", "folder", help="Write a package with a transmission for ros2_control.", **FOLDER)
 @click.option(
     "--ros2-node",
     "node",
-    metavar="FOLDER",
-    type=click.Path(path_type=Path, file_okay=False),
     help="Write a package with a ROS 2 node for a platform: poses in, commands of actuators out.",
+    **FOLDER,
 )
-@click.option(
-    "--joints",
-    metavar="NAME[,NAME]...",
-    multiple=True,
-    shell_complete=completing(series),
-    help="Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.",
-)
+@joints_option("Joints in series from the base to the end effector, as coordinates. Default: poses of the platform.")
 @click.option(
     "--name",
     metavar="NAME",

@@ -14,7 +14,7 @@ import pfabrik as pf
 
 from .arguments import MECH, Finite, comma_separated, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
-from .printing import complain, json_option, note, print_json, print_result
+from .printing import complain, json_option, note, print_json, printing_result
 
 if TYPE_CHECKING:
     from ..interop import Choice, Imported, NoEndEffector
@@ -155,17 +155,10 @@ def imported(
 )
 @click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of the original, if a URDF.")
 @click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of it: home.")
-@json_option()
+@printing_result
 def verify(
-    mech: str,
-    referee: str,
-    poses: int,
-    seed: int,
-    original: Path | None,
-    loops: Path | None,
-    configuration: str,
-    as_json: bool,
-) -> int:
+    mech: str, referee: str, poses: int, seed: int, original: Path | None, loops: Path | None, configuration: str
+) -> pf.interop.Verification:
     """Compare answers with those of MuJoCo.
 
     At random poses that are reached, MuJoCo says how far our loops are open, by its own constraint rows; then it closes
@@ -174,9 +167,6 @@ def verify(
 
     Exit code 0 if all agree, 1 if some do not, none was found, or all are too near to home to say anything.
     """
-    mechanism = load(mech)
-    verification = pf.interop.verify(
-        mechanism, poses=poses, seed=seed, original=original, loops=loops, configuration=configuration
+    return pf.interop.verify(
+        load(mech), poses=poses, seed=seed, original=original, loops=loops, configuration=configuration
     )
-    print_result(as_json, verification)
-    return 0 if verification else 1

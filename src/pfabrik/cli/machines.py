@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
@@ -19,7 +20,10 @@ from ..errors import counted
 from ..printed import aligned
 from .arguments import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
-from .printing import json_option, note, print_answer, print_json, print_result, print_text
+from .printing import json_option, note, print_answer, print_json, print_text, printing_result
+
+if TYPE_CHECKING:
+    from ..overview import Overview
 
 ALIASES = {"hexapod": "6-UPS", "five-bar": "5-bar", "servo-hexapod": "6-RUS", "hexaglide": "6-PUS", "tripod": "3-RPS"}
 """Other names of kinds."""
@@ -168,16 +172,15 @@ def require_sign(option: str, dimension: str, value: float, text: str) -> None:
 
 @click.command()
 @click.argument("mech", type=MECH)
-@json_option()
-def info(mech: str, as_json: bool) -> int:
+@printing_result
+def info(mech: str) -> Overview:
     """Show what a mechanism is made of.
 
     Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
     """
     from ..overview import Overview
 
-    print_result(as_json, Overview(load(mech)))
-    return 0
+    return Overview(load(mech))
 
 
 @click.command()

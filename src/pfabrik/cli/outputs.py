@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import errno
-import functools
 import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import combinations
@@ -21,6 +20,7 @@ from ..checks import require_ending
 from ..errors import InvalidArgument
 from ..extras import require
 from ..whole_files import whole_path
+from .options import Decorator, together
 from .printing import note
 
 if TYPE_CHECKING:
@@ -200,8 +200,8 @@ class PictureOptions:
         return {"view": self.view, **self.looks}
 
 
-def pictured(*, with_view: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add ``--view``, ``--size``, ``--dpi`` and ``--theme``, which the command gets as one `drawn`."""
+def pictured(*, with_view: bool = True) -> Decorator:
+    """Adds ``--view``, ``--size``, ``--dpi`` and ``--theme``, which a command gets as one `drawn`."""
     options = [
         click.option("--size", callback=_size, metavar="WxH", help="Width and height of a picture [inches]."),
         click.option("--dpi", type=click.IntRange(10, 2400), metavar="N", help="Pixels an inch."),
@@ -210,21 +210,15 @@ def pictured(*, with_view: bool = True) -> Callable[[Callable[..., Any]], Callab
     if with_view:
         seen = "Where it is seen from: top, front, side, iso, or elevation and azimuth [deg]."
         options.insert(0, click.option("--view", callback=_view, metavar="NAME|EL,AZ", help=seen))
+    return together("drawn", _picture_options, *options)
 
-    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(command)
-        def with_pictures(
-            *, size: Any, dpi: int | None, theme: Theme | None, view: View | None = None, **parameters: Any
-        ) -> Any:
-            if size is not None and size[0] * size[1] * (dpi or USUAL_DPI) ** 2 > MOST_PIXELS:
-                raise click.UsageError(f"--size and --dpi: expected a picture of at most {MOST_PIXELS:,} pixels")
-            return command(drawn=PictureOptions(view, size, theme or "light", dpi), **parameters)
 
-        for option in reversed(options):
-            with_pictures = option(with_pictures)
-        return with_pictures
-
-    return decorate
+def _picture_options(
+    size: tuple[float, float] | None, dpi: int | None, theme: Theme | None, view: View | None = None
+) -> PictureOptions:
+    if size is not None and size[0] * size[1] * (dpi or USUAL_DPI) ** 2 > MOST_PIXELS:
+        raise click.UsageError(f"--size and --dpi: expected a picture of at most {MOST_PIXELS:,} pixels")
+    return PictureOptions(view, size, theme or "light", dpi)
 
 
 USUAL_DPI, MOST_PIXELS = 150, 100_000_000

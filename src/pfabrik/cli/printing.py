@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
@@ -14,6 +15,7 @@ from typing import Any, Protocol
 import click
 
 from ..printed import ResultTable
+from .options import Decorator
 
 LEAST = 20
 """Least width of a last column that goes on below itself; a narrower one goes on at the margin [characters]."""
@@ -29,7 +31,7 @@ class Result(Protocol):
     def table(self) -> ResultTable: ...
 
 
-def json_option(help: str = "One JSON object on stdout; angles in radians.") -> Callable[..., Any]:
+def json_option(help: str = "One JSON object on stdout; angles in radians.") -> Decorator:
     """The option ``--json``, which a command gets as `as_json`."""
     return click.option("--json", "as_json", is_flag=True, help=help)
 
@@ -54,6 +56,19 @@ def print_result(
         lambda: "\n\n".join(str(each.table()) for each in (result, *(others or {}).values())),
         to_stderr=to_stderr,
     )
+
+
+def printing_result(command: Callable[..., Result]) -> Callable[..., Any]:
+    """Adds ``--json`` to a command whose result is printed; exit code 1 if it is no success, or has a `reason`."""
+
+    @json_option()
+    @functools.wraps(command)
+    def with_printing(*, as_json: bool, **parameters: Any) -> int:
+        result = command(**parameters)
+        print_result(as_json, result)
+        return int(not result or bool(getattr(result, "reason", "")))
+
+    return with_printing
 
 
 def print_text(text: str, *, to_stderr: bool = False) -> None:

@@ -18,10 +18,8 @@ from .arguments import (
     MECH,
     TargetOptions,
     Triple,
-    actuators,
     at_a_pose,
     by_name,
-    completing,
     load,
     note_unused_projection,
     noted,
@@ -29,8 +27,9 @@ from .arguments import (
     projecting,
     targeted,
 )
+from .options import actuators, named_values
 from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured
-from .printing import complain, json_option, print_answer, print_result
+from .printing import Result, complain, json_option, print_answer, print_result, printing_result
 
 if TYPE_CHECKING:
     from ..arrays import Floats
@@ -186,26 +185,24 @@ def travel(
     return 0
 
 
-speed_option = click.option(
+speed_option = named_values(
     "--speed",
     "speeds",
-    multiple=True,
-    metavar="[NAME=]VALUE",
-    shell_complete=completing(actuators, "="),
-    help="Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
+    actuators,
+    "Highest speed of an actuator, or of all [deg/s or length/s]. May be repeated. Default: the file's max_speed.",
 )
 
 
 @click.command()
 @at_a_pose
 @speed_option
-@json_option()
-def speed(solution: pf.Solution, speeds: tuple[str, ...], as_json: bool) -> None:
+@printing_result
+def speed(solution: pf.Solution, speeds: tuple[str, ...]) -> Result:
     """Tell how fast the platform may move.
 
     Along and about each axis at a pose (default: home), and along the slowest direction of all.
     """
-    print_result(as_json, pf.platform_speed(solution, speed=speed_limits(solution.mechanism, speeds) or None))
+    return pf.platform_speed(solution, speed=speed_limits(solution.mechanism, speeds) or None)
 
 
 def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "--speed") -> dict[str, float]:

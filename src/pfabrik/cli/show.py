@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import webbrowser
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,8 @@ import click
 
 import pfabrik as pf
 
-from .arguments import FINITE, MECH, STANDARD_INPUT, TargetOptions, completing, load, named_joints, series, targeted
+from .arguments import FINITE, MECH, TargetOptions, load, named_joints, targeted
+from .options import STANDARD_INPUT, joints_option, together
 from .outputs import PictureOptions, check_outputs, picture, pictured, require_format
 from .printing import note
 
@@ -35,31 +34,25 @@ class TorqueMap:
         return pf.actuation(mechanism, names).plot_torques(self.torque)
 
 
-def torque_map_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--torque-map``, ``--joints`` and ``--torque``, which the command gets as one `torque_map`, or None."""
+def _torque_map(
+    wanted: bool, joints: tuple[str, ...], words: tuple[str, ...], torque: float | None
+) -> TorqueMap | None:
+    if words and not joints:
+        raise click.UsageError(f"found {' '.join(words)}; expected one MECH, or names after --joints")
+    if not wanted and (joints or torque is not None):
+        raise click.UsageError("--joints and --torque belong to --torque-map")
+    return TorqueMap(named_joints(joints, words), 1.0 if torque is None else torque) if wanted else None
 
-    @click.option("--torque-map", "wanted", is_flag=True, help="Draw the torques that actuators give two joints.")
-    @click.option(
-        "--joints",
-        metavar="NAME[,NAME]...",
-        multiple=True,
-        shell_complete=completing(series),
-        help="The joints of --torque-map.  [default: the passive ones in series]",
-    )
-    @click.argument("words", metavar="", nargs=-1)
-    @click.option("--torque", type=FINITE, help="Of every actuator, for --torque-map.  [default: 1]")
-    @functools.wraps(command)
-    def with_torque_map(
-        *, wanted: bool, joints: tuple[str, ...], words: tuple[str, ...], torque: float | None, **parameters: Any
-    ) -> Any:
-        if words and not joints:
-            raise click.UsageError(f"found {' '.join(words)}; expected one MECH, or names after --joints")
-        if not wanted and (joints or torque is not None):
-            raise click.UsageError("--joints and --torque belong to --torque-map")
-        torque_map = TorqueMap(named_joints(joints, words), 1.0 if torque is None else torque) if wanted else None
-        return command(torque_map=torque_map, **parameters)
 
-    return with_torque_map
+torque_map_options = together(
+    "torque_map",
+    _torque_map,
+    click.option("--torque-map", "wanted", is_flag=True, help="Draw the torques that actuators give two joints."),
+    joints_option("The joints of --torque-map.  [default: the passive ones in series]"),
+    click.argument("words", metavar="", nargs=-1),
+    click.option("--torque", type=FINITE, help="Of every actuator, for --torque-map.  [default: 1]"),
+)
+"""Adds ``--torque-map``, ``--joints`` and ``--torque``, which a command gets as one `torque_map`, or None."""
 
 
 @click.command()

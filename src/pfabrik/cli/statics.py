@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -11,8 +10,9 @@ import click
 import pfabrik as pf
 
 from ..cells import is_finite
-from .arguments import FINITE, Triple, actuators, at_a_pose, by_name, completing, joints, numbers_of, positive
-from .printing import Result, json_option, note, print_result
+from .arguments import FINITE, Triple, at_a_pose, by_name, numbers_of, positive
+from .options import actuators, joints, named_values, together
+from .printing import Result, json_option, note, print_result, printing_result
 
 Loads: TypeAlias = dict[str, tuple[float, list[float]]]
 
@@ -29,30 +29,21 @@ def load_of(words: str) -> tuple[str, tuple[float, list[float]]]:
     return body, (mass, centre)
 
 
-def carrying(command: Callable[..., int]) -> Callable[..., int]:
-    """Add ``--load``, which the command gets as `loads` by body, and ``--gravity``."""
+def _by_body(loads: tuple[str, ...]) -> Loads:
+    return dict(map(load_of, loads))
 
-    @click.option(
-        "--load",
-        "loads",
-        multiple=True,
-        metavar="BODY=MASS,X,Y,Z",
-        shell_complete=completing(bodies, "="),
-        help="A mass that a body carries, and its centre, at home.",
-    )
-    @click.option(
-        "--gravity",
-        type=FINITE,
-        nargs=3,
-        default=(0, 0, -9.81),
-        metavar="X Y Z",
-        help="Of masses.  [default: 0 0 -9.81]",
-    )
-    @functools.wraps(command)
-    def with_loads(*, loads: tuple[str, ...], **parameters: Any) -> int:
-        return command(loads=dict(map(load_of, loads)), **parameters)
 
-    return with_loads
+MOMENT = "Beside it, or alone [force times length]."
+CARRIED, DOWN = "A mass that a body carries, and its centre, at home.", (0, 0, -9.81)
+carrying = together(
+    "loads",
+    _by_body,
+    named_values("--load", "loads", bodies, CARRIED, "BODY=MASS,X,Y,Z"),
+    click.option(
+        "--gravity", type=FINITE, nargs=3, default=DOWN, metavar="X Y Z", help="Of masses.  [default: 0 0 -9.81]"
+    ),
+)
+"""Adds ``--load``, which a command gets as `loads` by body, and ``--gravity``."""
 
 
 def lacking(mechanism: pf.Mechanism) -> list[str]:
@@ -73,24 +64,16 @@ def weighed(mechanism: pf.Mechanism, loads: Loads) -> pf.Mechanism:
     return mechanism.with_masses([*mechanism.masses, *(pf.Mass(body, 0.0) for body in weightless)])
 
 
-def pressing(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the load on the end effector and on bodies, and ``--limit``, by actuator."""
-    options: list[Callable[[Callable[..., int]], Callable[..., int]]] = [
-        click.option("--force", type=FINITE, nargs=3, metavar="X Y Z", help="What acts on the end effector."),
-        click.option(
-            "--moment", type=FINITE, nargs=3, metavar="X Y Z", help="Beside it, or alone [force times length]."
-        ),
+def pressing(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds the load on the end effector and on bodies, and ``--limit``, by actuator."""
+    for option in (
+        named_values("--limit", "limits", actuators, "Of an actuator, or of all.", "[NAME=]VALUE|MIN:MAX"),
         carrying,
-        click.option(
-            "--limit",
-            "limits",
-            multiple=True,
-            metavar="[NAME=]VALUE|MIN:MAX",
-            shell_complete=completing(actuators, "="),
-            help="Of an actuator, or of all.",
-        ),
-    ]
-    return functools.reduce(lambda built, option: option(built), reversed(options), command)
+        click.option("--moment", type=FINITE, nargs=3, metavar="X Y Z", help=MOMENT),
+        click.option("--force", type=FINITE, nargs=3, metavar="X Y Z", help="What acts on the end effector."),
+    ):
+        command = option(command)
+    return command
 
 
 @click.command()
@@ -148,24 +131,10 @@ def rods(mechanism: pf.Mechanism) -> tuple[str, ...]:
 
 @click.command()
 @at_a_pose
-@click.option(
-    "--k",
-    multiple=True,
-    required=True,
-    metavar="[NAME=]VALUE",
-    shell_complete=completing(actuators, "="),
-    help="Of an actuator, or all [force/length, torque/rad]",
-)
-@click.option(
-    "--rod",
-    "given",
-    multiple=True,
-    metavar="[NAME=]VALUE",
-    shell_complete=completing(rods, "="),
-    help="Of a rod, or all [force/length]. Default: rigid.",
-)
+@named_values("--k", "k", actuators, "Of an actuator, or all [force/length, torque/rad]", required=True)
+@named_values("--rod", "given", rods, "Of a rod, or all [force/length]. Default: rigid.")
 @pressing
-@json_option()
+@printing_result
 def stiffness(
     solution: pf.Solution,
     k: tuple[str, ...],
@@ -175,8 +144,7 @@ def stiffness(
     loads: Loads,
     gravity: Triple,
     limits: tuple[str, ...],
-    as_json: bool,
-) -> int:
+) -> pf.Stiffness:
     """Tell how stiff a machine is whose actuators and rods give.
 
     At a pose, home by default: along and about each axis, the force or moment that moves the end effector by one unit
@@ -191,9 +159,7 @@ def stiffness(
         bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of) if limits else None
         wrench = (force or (0.0, 0.0, 0.0)) + (moment or ())
         held = pf.forces(solution, wrench, loads=loads, gravity=gravity, limits=bounds)
-    found = pf.stiffness(solution, by_actuator, rods=by_rod or None, forces=held)
-    print_result(as_json, found)
-    return int(bool(found.reason))
+    return pf.stiffness(solution, by_actuator, rods=by_rod or None, forces=held)
 
 
 def error_names(mechanism: pf.Mechanism) -> dict[str, None]:
@@ -203,18 +169,16 @@ def error_names(mechanism: pf.Mechanism) -> dict[str, None]:
 
 @click.command()
 @at_a_pose
-@click.option(
+@named_values(
     "--error",
     "errors",
-    multiple=True,
+    error_names,
+    "How far an actuator or all may be off [deg or length], or the play of a joint [length].",
     required=True,
-    metavar="[NAME=]VALUE",
-    shell_complete=completing(error_names, "="),
-    help="How far an actuator or all may be off [deg or length], or the play of a joint [length].",
 )
 @click.option("--rms", is_flag=True, help="Errors are standard deviations, not bounds.")
-@json_option()
-def accuracy(solution: pf.Solution, errors: tuple[str, ...], rms: bool, as_json: bool) -> int:
+@printing_result
+def accuracy(solution: pf.Solution, errors: tuple[str, ...], rms: bool) -> pf.Accuracy:
     """Tell how far off a pose is if actuators are off and joints have play.
 
     At a pose, home by default. The error of an actuator is half its resolution and half its backlash together; play of
@@ -225,30 +189,26 @@ def accuracy(solution: pf.Solution, errors: tuple[str, ...], rms: bool, as_json:
     drives = {readout.name: readout for readout in readouts(solution.mechanism)}
     bounds = by_name("--error", errors, "actuator or joint", error_names(solution.mechanism), positive, drives)
     by_unit = {name: drives[name].coordinate(value) if name in drives else value for name, value in bounds.items()}
-    found = pf.accuracy(solution, by_unit, "rms" if rms else "worst")
-    print_result(as_json, found)
-    return int(bool(found.reason))
+    return pf.accuracy(solution, by_unit, "rms" if rms else "worst")
 
 
 @click.command()
 @at_a_pose
-@json_option()
-def transmission(solution: pf.Solution, as_json: bool) -> int:
+@printing_result
+def transmission(solution: pf.Solution) -> pf.Transmission:
     """Tell the velocity and force of the end effector per actuator.
 
     At a pose, home by default: in directions square to each other, the fastest first.
     """
-    found = pf.transmission(solution)
-    print_result(as_json, found)
-    return int(bool(found.reason))
+    return pf.transmission(solution)
 
 
 @click.command()
 @at_a_pose
-@json_option()
-def clearance(solution: pf.Solution, as_json: bool) -> None:
+@printing_result
+def clearance(solution: pf.Solution) -> pf.Clearance:
     """Tell how far apart links are, and which two are nearest.
 
     At a pose, home by default. Links have the thickness that the file gives legs, or the shapes of its [[body]] tables.
     """
-    print_result(as_json, pf.clearance(solution))
+    return pf.clearance(solution)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
@@ -16,7 +15,8 @@ import pfabrik as pf
 from ..errors import counted, near_miss
 from ..extras import require
 from ..telling import telling
-from .arguments import FINITE, MECH, Triple, actuators, by_name, completing, load, note_left_out, positive, projecting
+from .arguments import FINITE, MECH, Triple, by_name, load, note_left_out, positive, projecting
+from .options import actuators, named_values, together
 from .outputs import (
     OUTPUT,
     STANDARD,
@@ -229,48 +229,40 @@ def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, 
         click.echo(f"wrote {film_path}", err=True)
 
 
-def limiting(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the limits that a path is timed within; the command gets `limits_of`, from a machine to those given."""
+def _limits_of(
+    speeds: tuple[str, ...], accelerations: tuple[str, ...], torques: tuple[str, ...], platform_speed: float | None
+) -> LimitsOf:
+    def limits_of(mechanism: pf.Mechanism) -> dict[str, Any]:
+        limits = {
+            "speed": speed_limits(mechanism, speeds),
+            "acceleration": speed_limits(mechanism, accelerations, "--acceleration"),
+            "torque": by_name("--torque", torques, "actuator", actuators(mechanism), positive),
+        }
+        given: dict[str, Any] = {name: values for name, values in limits.items() if values}
+        return given | ({} if platform_speed is None else {"platform_speed": platform_speed})
 
-    @speed_option
-    @click.option(
+    return limits_of
+
+
+limiting = together(
+    "limits_of",
+    _limits_of,
+    speed_option,
+    named_values(
         "--acceleration",
         "accelerations",
-        multiple=True,
-        metavar="[NAME=]VALUE",
-        shell_complete=completing(actuators, "="),
-        help="Highest acceleration, likewise [deg/s² or length/s²]. Default: the file's max_acceleration.",
-    )
-    @click.option(
+        actuators,
+        "Highest acceleration, likewise [deg/s² or length/s²]. Default: the file's max_acceleration.",
+    ),
+    named_values(
         "--torque",
         "torques",
-        multiple=True,
-        metavar="[NAME=]VALUE",
-        shell_complete=completing(actuators, "="),
-        help="The most that an actuator exerts, likewise [N m, of slides N]. Default: the file's max_torque.",
-    )
-    @click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s].")
-    @functools.wraps(command)
-    def with_limits(
-        *,
-        speeds: tuple[str, ...],
-        accelerations: tuple[str, ...],
-        torques: tuple[str, ...],
-        platform_speed: float | None,
-        **parameters: Any,
-    ) -> int:
-        def limits_of(mechanism: pf.Mechanism) -> dict[str, Any]:
-            limits = {
-                "speed": speed_limits(mechanism, speeds),
-                "acceleration": speed_limits(mechanism, accelerations, "--acceleration"),
-                "torque": by_name("--torque", torques, "actuator", actuators(mechanism), positive),
-            }
-            given: dict[str, Any] = {name: values for name, values in limits.items() if values}
-            return given | ({} if platform_speed is None else {"platform_speed": platform_speed})
-
-        return command(limits_of=limits_of, **parameters)
-
-    return with_limits
+        actuators,
+        "The most that an actuator exerts, likewise [N m, of slides N]. Default: the file's max_torque.",
+    ),
+    click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s]."),
+)
+"""Adds the limits that a path is timed within; a command gets `limits_of`, from a machine to those given."""
 
 
 @contextmanager

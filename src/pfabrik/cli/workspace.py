@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,8 @@ import pfabrik as pf
 from ..cells import is_finite
 from ..extras import require
 from ..view.save_picture import PICTURES
-from .arguments import FINITE, MECH, TargetOptions, Triple, answered, completing, load, numbers_of, rpy_option, targeted
+from .arguments import FINITE, MECH, TargetOptions, Triple, answered, load, numbers_of, rpy_option, targeted
+from .options import completing, named_values, together
 from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured, require_format
 from .printing import json_option, note, print_result
 
@@ -62,43 +62,22 @@ def coordinates(mechanism: pf.Mechanism) -> dict[str, None]:
     return dict.fromkeys((*usual, *free_coordinates(mechanism)))
 
 
-def spanning(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--over``, ``--fix``, ``--within`` and ``--resolution``, which the command gets as one `space`."""
+HOLD, LOOK = "Hold a coordinate [length or deg]. May be repeated.", "Where to look [length or deg]. May be repeated."
 
-    @click.option(
+spanning = together(
+    "space",
+    SpaceOptions,
+    click.option(
         "--over",
         metavar="NAME,NAME[,NAME]",
         shell_complete=completing(coordinates),
         help="Coordinates: of x, y, z, tilt_x, tilt_y, yaw. Default: x,y,z.",
-    )
-    @click.option(
-        "--fix",
-        "fixed",
-        multiple=True,
-        metavar="NAME=VALUE",
-        shell_complete=completing(coordinates, "="),
-        help="Hold a coordinate [length or deg]. May be repeated.",
-    )
-    @click.option(
-        "--within",
-        multiple=True,
-        metavar="NAME=MIN:MAX",
-        shell_complete=completing(coordinates, "="),
-        help="Where to look [length or deg]. May be repeated.",
-    )
-    @click.option("--resolution", type=FINITE, metavar="R", help="Cells at the border [length; deg if all are angles].")
-    @functools.wraps(command)
-    def with_space(
-        *,
-        over: str | None,
-        fixed: tuple[str, ...],
-        within: tuple[str, ...],
-        resolution: float | None,
-        **parameters: Any,
-    ) -> Any:
-        return command(space=SpaceOptions(over, fixed, within, resolution), **parameters)
-
-    return with_space
+    ),
+    named_values("--fix", "fixed", coordinates, HOLD, "NAME=VALUE"),
+    named_values("--within", "within", coordinates, LOOK, "NAME=MIN:MAX"),
+    click.option("--resolution", type=FINITE, metavar="R", help="Cells at the border [length; deg if all are angles]."),
+)
+"""Adds ``--over``, ``--fix``, ``--within`` and ``--resolution``, which a command gets as one `space`."""
 
 
 @click.command()
@@ -197,7 +176,7 @@ def singularities(
         if solution is not None:
             print_result(as_json, pf.singularity(solution), {"mobility": pf.mobility(solution.mechanism)})
         return 0 if solution else 1
-    if target.position or target.joints:
+    if target.position or target.joint:
         raise click.UsageError("--position and --joint are of one pose: over a workspace, --fix holds a coordinate")
     mechanism = load(mech)
     with nullcontext() if output is None else picture(output, drawn):
