@@ -75,6 +75,11 @@ class Skeleton:
         return np.concatenate([places, *outlines, self.rails.reshape(-1, 3), [self.reference], *solids])
 
     @property
+    def joints_and_reference(self) -> Floats:
+        """The places of all joints, then the reference point, (n, 3) [length]."""
+        return np.array([*(mark.place for mark in self.marks), self.reference])
+
+    @property
     def held(self) -> set[str]:
         """The joints whose limits are active."""
         return {mark.joint.name for mark in self.marks if mark.held_by}

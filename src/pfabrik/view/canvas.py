@@ -57,6 +57,9 @@ an axis is seen on its edge, and is left out."""
 BAR, BAR_WIDTH, BAR_OFF = 0.28, 1.6, 3.0
 """Longest scale bar, as a share of what it is a scale of; its width, and the distance of its words [points]."""
 
+ACROSS, UP = 32.0, 18.0
+"""Room that each number of a plane's axes has at least: on the level one, and on the upright one [points]."""
+
 SMALL_BAR, SMALLER = 0.1, {"m": ("mm", 1000.0)}
 """Length below which a bar speaks of a smaller unit, and this unit, with how many of it are one of the other."""
 
@@ -129,6 +132,7 @@ class Canvas:
         self.axes.set_aspect("equal")
         self.axes.set(xlim=(start[0], start[0] + size[0] * per_point), ylim=(start[1], start[1] + size[1] * per_point))
         if self.is_plane:
+            number_axes(self.axes)
             return
         draw_triad(self.axes, self.eye, self.look, start + (EDGE_FREE - triad[:2]) * per_point)
         corner = start + [size[0] * per_point, 0.0] + np.array([-EDGE_FREE, EDGE_FREE + SMALL + BAR_OFF]) * per_point
@@ -271,6 +275,14 @@ def _size(axes: Any) -> Floats:
         root.draw_without_rendering()
     box = axes.get_window_extent()
     return np.array([box.width, box.height]) * 72.0 / float(root.dpi)
+
+
+def number_axes(axes: Any) -> None:
+    """Round numbers at axes that are laid out, no more than have room."""
+    from matplotlib.ticker import MaxNLocator
+
+    for axis, length, room in zip((axes.xaxis, axes.yaxis), _size(axes), (ACROSS, UP), strict=True):
+        axis.set_major_locator(MaxNLocator(int(np.clip(length / room, 1, 9)), steps=[1, 2, 2.5, 5, 10]))
 
 
 def draw_triad(axes: Any, eye: Eye, look: Look, at: Floats, names: Sequence[str] = "xyz") -> None:

@@ -13,14 +13,15 @@ from .canvas import Canvas
 DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 30))), np.sin(np.radians(range(0, 360, 30)))], axis=1)
 """Directions from its joint in which a name is tried, to the right first."""
 
-DISTANCES = (9.0, 16.0, 27.0)
+DISTANCES = (9.0, 16.0, 27.0, 40.0)
 """Distances at which it is tried, one after the other [points]."""
 
 OFF = 6.0
 """Area [points²] that a name may rather cover than be a point farther from its joint."""
 
-JOINT, LINE = 6.0, 2.5
-"""Half the sides of the squares kept free around a joint's marker, and around a dot of a line [points]."""
+JOINT, LINE = 7.5, 3.5
+"""Half the sides of the squares kept free around a joint's marker, and around a dot of a line, which may be a rail
+[points]."""
 
 DOTS = 32
 """Dots that represent a line."""
@@ -28,7 +29,10 @@ DOTS = 32
 APART = 1.0
 """Least distance between two names [points]."""
 
-WORDS, OUTSIDE = 20.0, 4.0
+ROUNDS = 2
+"""How often each name is placed: first among those before it, then among all others."""
+
+WORDS, OUTSIDE = 60.0, 4.0
 """Weight of the area of other words, and of that beyond the axes, against an area of lines."""
 
 
@@ -51,19 +55,20 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
     squares += [(place, LINE) for place in pixels(canvas.seen(dots))]
     taken = [np.concatenate([place - half * point, place + half * point]) for place, half in squares]
     others = [*([axes.get_legend()] if axes.get_legend() else []), *(text for text in axes.texts if text.get_text())]
-    words = [other.get_window_extent().extents for other in others if other not in texts]
+    words = {other: other.get_window_extent().extents for other in others if other not in texts}
     box = axes.get_window_extent().extents
-    for text in texts:
+    for text in [*texts] * ROUNDS:
         at = pixels(text.xy)
         extent = text.get_window_extent()
         size = np.array([extent.width, extent.height])
         offsets = np.array([way * off * point + way * size / 2.0 for off in DISTANCES for way in DIRECTIONS])
         boxes = np.concatenate([at + offsets - size / 2.0, at + offsets + size / 2.0], axis=1)
         far = np.repeat(DISTANCES, len(DIRECTIONS)) * OFF * point**2
-        covered = _overlaps(boxes, taken, APART * point) + WORDS * _overlaps(boxes, words, APART * point)
+        written = [place for other, place in words.items() if other is not text]
+        covered = _overlaps(boxes, taken, APART * point) + WORDS * _overlaps(boxes, written, APART * point)
         outside = np.prod(size) - _overlaps(boxes, [box], 0.0)
         best = int(np.argmin(covered + OUTSIDE * outside + far))
-        words.append(boxes[best])
+        words[text] = boxes[best]
         text.set_position(offsets[best] / point)
 
 

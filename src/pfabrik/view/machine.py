@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..answers.solution import Solution
 from ..checks import require_names
 from ..description.mechanism import Mechanism
@@ -101,7 +99,7 @@ def machine_eye(mechanism: Mechanism, view: View | None = None) -> tuple[Eye, bo
     if plane is not None:
         return eye_on(plane), True
     home = skeleton_of(mechanism)
-    return eye_for(np.array([*(mark.place for mark in home.marks), home.reference]), home.lines), False
+    return eye_for(home.joints_and_reference, home.lines), False
 
 
 def _beside(skeleton: Skeleton, named: set[str]) -> float:
@@ -136,4 +134,4 @@ def write_names(canvas: Canvas, skeleton: Skeleton, named: set[str]) -> None:
         if mark.held_by or mark.joint.name in named:
             style: dict[str, Any] = {"color": HELD if mark.held_by else canvas.look.ink, "zorder": ON_TOP}
             texts.append(canvas.words(mark.place, _words(mark), **style))
-    place_names(canvas, texts, np.array([mark.place for mark in skeleton.marks]), skeleton.lines)
+    place_names(canvas, texts, skeleton.joints_and_reference, skeleton.lines)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 BORDER, ROUND = 1.8, 96
 """Width of a border [points], and straight pieces of a circle."""
 
-ACROSS, UP = 23.0, 12.0
+ACROSS, UP = 23.0, 15.0
 """Room that each number needs on a level and on an upright axis [points]."""
 
 AROUND = 6

@@ -119,7 +119,8 @@ def plot_solid(
     figure.text(left, top, title_of(region), fontsize=SMALL + 2, color=look.ink, ha="left", va="top")
     started = "home" if region._question.start is None else "the start"
     which = "the limit that ends it there" if is_told_apart(region) else "one of the limits that bind there"
-    words = f"each face in the colour of {which}; + is {started}"
+    inside = ", inside" if _is_hidden(first) else ""
+    words = f"each face in the colour of {which}; + is {started}{inside}"
     under = top - 0.2 / figure.get_size_inches()[1]
     figure.text(left, under, words, fontsize=SMALL, color=look.soft, ha="left", va="top")
     figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), **_key(groups, look))
@@ -237,15 +238,21 @@ def _draw_solid(axes: Any, solid: SeenSolid, colours: Colours, shape: Inscribed 
         hidden |= _draw_hidden(axes, solid, dense(edge * solid.scale))
     home = region._question.space.start * solid.scale
     if ((home >= region.bounds[0] * solid.scale) & (home <= region.bounds[1] * solid.scale)).all():
-        _mark(axes, eye.seen(home)[:2])
+        _mark(axes, eye.seen(home)[:2], is_hidden=_is_hidden(solid))
         hidden |= solid.raster.mask_of(eye.seen(home[None]))
     draw_box(axes, eye, box_of(region, solid.scale), look, [eye.seen(dense(line))[:, :2] for line, _ in lines])
     _name_faces(axes, solid, colours, before, hidden)
 
 
-def _mark(axes: Any, place: Floats) -> None:
-    """The start, as a cross that is seen on every colour."""
-    for colour, size, width, order in (("white", 11.0, 3.0, 6.0), ("black", 9.0, 1.2, 7.0)):
+def _is_hidden(solid: SeenSolid) -> bool:
+    """True if the start is within the solid, or behind it."""
+    return bool(solid.hides((solid.region._question.space.start * solid.scale)[None])[0])
+
+
+def _mark(axes: Any, place: Floats, *, is_hidden: bool) -> None:
+    """The start, as a cross that is seen on every colour; pale, as lines are, where it is in the solid or behind it."""
+    pale, bold = ("white", 7.0, 0.9 * EDGE_WIDTH, 4.0), (("white", 11.0, 3.0, 6.0), ("black", 9.0, 1.2, 7.0))
+    for colour, size, width, order in (pale,) if is_hidden else bold:
         axes.plot(*place, "+", color=colour, markersize=size, markeredgewidth=width, zorder=order)
 
 
