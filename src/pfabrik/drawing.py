@@ -16,12 +16,14 @@ SMALL = 8.0
 """Size of letters [points]."""
 
 
-def new_figure(width: float, height: float, *, dpi: int = 150, layout: str | None = "constrained") -> Figure:
-    """A new figure [inches]; MissingLibrary where matplotlib is not installed."""
+def new_figure(
+    width: float, height: float, paper: str | None = None, *, dpi: int = 150, layout: str | None = "constrained"
+) -> Figure:
+    """A new figure [inches] on a ground of a colour; MissingLibrary where matplotlib is not installed."""
     require("pictures", "matplotlib", "plot")
     from matplotlib import pyplot
 
-    return pyplot.figure(figsize=(width, height), dpi=dpi, layout=layout)
+    return pyplot.figure(figsize=(width, height), dpi=dpi, layout=layout, facecolor=paper)
 
 
 def require_flat(ax: Axes) -> None:

@@ -142,14 +142,10 @@ class Canvas:
         """Draw a key in as few rows as fit into a width; its height with what is free below it [points]."""
         if not key:
             return 0.0
-        dpi = float(self.axes.get_figure(root=True).dpi)
-        for columns in range(len(key), 0, -1):
-            legend = self.axes.legend(handles=key, ncols=columns, labelcolor=self.look.ink, **KEY)
-            legend.set_zorder(ON_TOP)
-            box = legend.get_window_extent()
-            if box.width * 72.0 / dpi <= width:
-                break
-        return float(box.height) * 72.0 / dpi + STRIP_FREE
+        point = float(self.axes.get_figure(root=True).dpi) / 72.0
+        legend = draw_key(self.axes, width * point, {"handles": key, "labelcolor": self.look.ink, **KEY}, len(key))
+        legend.set_zorder(ON_TOP)
+        return float(legend.get_window_extent().height) / point + STRIP_FREE
 
     @property
     def _triad_box(self) -> Floats:
@@ -220,8 +216,7 @@ def new_canvas(
     width, height = usual_size(points, eye, is_plane=is_plane) if size is None else checked_size(size, (0.0, 0.0))
     if size is None:
         width += 2.0 * beside / 72.0
-    figure = new_figure(width, height, layout="constrained" if is_plane else None)
-    figure.set_facecolor(look.paper)
+    figure = new_figure(width, height, look.paper, layout="constrained" if is_plane else None)
     title = wrapped(title, width)
     if is_plane:
         axes = figure.add_subplot()
@@ -240,6 +235,21 @@ def usual_size(points: Floats, eye: Eye, *, is_plane: bool) -> tuple[float, floa
     shape = np.maximum(spans / (float(spans.max()) or 1.0), LEAST) * SIDE
     width, height = (shape + (NUMBERS if is_plane else (0.0, 2.0 * STRIP / 72.0))).tolist()
     return width, height
+
+
+def draw_key(axes: Any, width: float, key: dict[str, Any], columns: int) -> Any:
+    """A key in at most so many columns, and in as few rows as fit into a width [pixels]."""
+    while True:
+        legend = axes.legend(ncols=columns, **key)
+        if columns == 1 or legend.get_window_extent().width <= width:
+            return legend
+        columns -= 1
+
+
+def draw_title(axes: Any, title: str, look: Look) -> None:
+    """Write a title above axes that are as wide as their figure, in as many lines as it needs."""
+    width = axes.figure.bbox.width / axes.figure.dpi
+    axes.set_title(wrapped(title, width, SMALL + 1), fontsize=SMALL + 1, color=look.ink)
 
 
 def wrapped(title: str, width: float, letters: float = TITLE) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
@@ -27,9 +27,11 @@ VIEWS: dict[str, tuple[float, float]] = {
 USUAL = (22.0, -58.0)
 """Elevation and azimuth where no other shows more [deg]."""
 
-ELEVATIONS, TURN, OFF_AXES = (12.0, 18.0, 24.0, 30.0), 10.0, 12.0
-"""Elevations tried, step of the azimuths, and their least distance from an axis [deg]: from higher up a machine looks
-flat, and along an axis another one is a point."""
+ELEVATIONS = (12.0, 18.0, 24.0, 30.0)
+"""Elevations tried for a machine [deg]: from higher up it looks flat."""
+
+TURN, OFF_AXES = 10.0, 12.0
+"""Step of the azimuths that are tried, and their least distance from an axis [deg]: along it another one is a point."""
 
 APART, LONG = 0.08, 0.6
 """Distance of two joints on the screen from which on they are apart, as a share of the machine's extent; share of its
@@ -124,9 +126,16 @@ def eye_for(points: Floats, links: Floats) -> Eye:
     points, links = (each[:: -(-len(each) // MOST) or 1] / extent for each in (points, links))
     points = np.unique((points / SAME).round(), axis=0) * SAME
     links = links[np.linalg.norm(links[:, 1] - links[:, 0], axis=1) > SAME]
-    azimuths = [turn for turn in np.arange(-175.0, 185.0, TURN) if abs((turn + 45.0) % 90.0 - 45.0) >= OFF_AXES]
-    eyes = [Eye(up, float(turn)) for up in ELEVATIONS for turn in azimuths]
-    return max(eyes, key=lambda eye: round(_score(eye, points, links), 9))
+    return best_of(ELEVATIONS, -175.0, lambda eye: _score(eye, points, links))
+
+
+def best_of(
+    elevations: Sequence[float], first: float, score: Callable[[Eye], float], order: tuple[int, int, int] = (0, 1, 2)
+) -> Eye:
+    """The eye with the highest score, at some elevations and at azimuths all round from a first one [deg]."""
+    azimuths = [turn for turn in np.arange(first, 185.0, TURN) if abs((turn + 45.0) % 90.0 - 45.0) >= OFF_AXES]
+    eyes = [Eye(up, float(turn), order) for up in elevations for turn in azimuths]
+    return max(eyes, key=lambda eye: round(score(eye), 9))
 
 
 def _score(eye: Eye, points: Floats, links: Floats) -> float:

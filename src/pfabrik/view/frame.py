@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,9 +14,10 @@ from ..drawing import SMALL, new_figure, require_flat
 from ..skeleton import Skeleton, skeleton_of
 from ..workspace.space import POSITIONS
 from ..workspace.workspace_table import for_people, in_words, labels
-from .canvas import checked_size
+from .canvas import LETTER, checked_size
 from .eye import Eye
 from .looks import Look, dress
+from .raster import Raster
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,9 +27,8 @@ if TYPE_CHECKING:
 TICKS, ROOM = 5, 26.0
 """Numbers of an axis at most, and the room of each along an edge in space [points]."""
 
-TICK, NUMBER_OFF, NAME_OFF, LETTER = 3.5, 5.5, 8.5, 0.58
-"""Length of a tick, and the distances of numbers and of names beyond them from an edge [points]; width of a letter as
-a share of its height."""
+TICK, NUMBER_OFF, NAME_OFF = 3.5, 5.5, 9.0
+"""Length of a tick, and the distances of numbers and of names beyond them from an edge [points]."""
 
 POINT = 4.0
 """Length of an edge below which it is seen as a point, and has no numbers [points]."""
@@ -46,6 +46,9 @@ PADS = (46.0, 34.0, 40.0, 10.0)
 """Room for numbers and names to the left, to the right, below and above [points]."""
 
 
+PLANE_SIZE = (6.4, 4.8)
+"""Of a new figure of a workspace in a plane [inches]."""
+
 FREE_EDGE = 0.1
 """Around axes [inches]: those of one scale are shrunk after their place was found."""
 
@@ -59,8 +62,7 @@ def axes_for(ax: Axes | None, size: tuple[float, float], look: Look) -> Axes:
     MissingLibrary : matplotlib is not installed.
     """
     if ax is None:
-        figure = new_figure(*checked_size(size))
-        figure.set_facecolor(look.paper)
+        figure = new_figure(*checked_size(size), look.paper)
         figure.set_layout_engine("constrained", w_pad=FREE_EDGE, h_pad=FREE_EDGE)
         ax = figure.add_subplot()
     require_method("ax", ax, "tick_params", "matplotlib axes, or None")
@@ -132,6 +134,22 @@ def fit(axes: Any, points: Floats, pads: tuple[float, float, float, float] = PAD
     axes.set(xlim=(first[0], first[0] + unit * size[0]), ylim=(first[1], first[1] + unit * size[1]))
     axes.set_aspect("equal", adjustable="datalim")
     axes.axis("off")
+
+
+def draw_image(axes: Any, raster: Raster, rgb: Any, alpha: Any, zorder: float) -> None:
+    """Draw pixels in colours (rows, columns, 3), as opaque as `alpha` says, (rows, columns); axes keep their ends."""
+    ends = axes.get_xlim(), axes.get_ylim()
+    image = np.dstack([np.broadcast_to(rgb, (*alpha.shape, 3)), alpha])
+    axes.imshow(image, origin="lower", extent=raster.extent, interpolation="antialiased", zorder=zorder)
+    axes.set(xlim=ends[0], ylim=ends[1], aspect="equal")
+
+
+def draw_lines(axes: Any, lines: Sequence[Floats], colour: str, width: float, zorder: float, **style: Any) -> Any:
+    """Draw lines (n, 2) each, so wide [points]."""
+    from matplotlib.collections import LineCollection
+
+    style = {"colors": colour, "linewidths": width, "capstyle": "round", "zorder": zorder, **style}
+    return axes.add_collection(LineCollection(lines, **style), autolim=False)
 
 
 def dense(line: Floats) -> Floats:

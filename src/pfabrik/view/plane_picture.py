@@ -14,7 +14,7 @@ from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.space import POSITIONS
 from ..workspace.workspace_table import labels, shown
 from .border_parts import patches_of
-from .canvas import number_axes, wrapped
+from .canvas import draw_title, number_axes
 from .frame import machine_of, title_of
 from .looks import Look
 from .slices import DASHED, area_of, loops_of, outline_of, stretches_of
@@ -54,7 +54,7 @@ def plot_plane(region: Region, axes: Any, shape: Inscribed | None, look: Look) -
         axes.plot(*shown(region, outline_of(shape)).T, color=look.ink, **DASHED)
     width = axes.figure.bbox.width / axes.figure.dpi
     _draw_key(axes, groups, look, is_below=width < BESIDE)
-    axes.set_title(wrapped(title_of(region), width, SMALL + 1), fontsize=SMALL + 1, color=look.ink)
+    draw_title(axes, title_of(region), look)
     _make_room(axes)
     number_axes(axes)
 

@@ -12,10 +12,11 @@ from ..motion.singularities import Singularity
 from ..workspace.parts import connected
 from ..workspace.region import Region
 from ..workspace.singular import signed_at
+from ..workspace.surface import face_normals, sizes_of
 from ..workspace.workspace_table import for_people, labels
-from .canvas import checked_size, wrapped
+from .canvas import checked_size, draw_title, wrapped
 from .eye import Eye, View, eye_of, upright
-from .frame import axes_for, box_of, draw_box, fit
+from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit
 from .looks import SINGULAR, Look, Theme, look_of
 from .raster import lines_between, rasterised
 from .slices import area_of, cut_mesh, draw_slice, loops_of, plane_across
@@ -23,7 +24,6 @@ from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_o
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from ..workspace.singular import SingularityMap
 
@@ -44,8 +44,8 @@ MAP, MEASURE, LEVELS = "cividis", "parallel measure", 14
 HIGHEST = 0.98
 """Share of the points whose measure has a colour of its own; above, all have the last one."""
 
-PLANE_SIZE, SIZE = (6.4, 4.8), (9.6, 4.8)
-"""Of a figure in a plane, and of one in space with slices [inches]."""
+SIZE = (9.6, 4.8)
+"""Of a figure in space with slices [inches]."""
 
 SPACE, BAR = (0.0, 0.01, 0.49, 0.91), (0.93, 0.2, 0.012, 0.56)
 SLICES_IN = {"left": 0.55, "right": 0.9, "top": 0.86, "bottom": 0.11, "hspace": 0.25, "wspace": 0.12}
@@ -121,7 +121,7 @@ def plot_singular_map(
     if len(region.names) == 3 and len(region.faces):
         return _plot_in_space(found, vertices, faces, ax, (view, size), look, title)
     axes: Any = axes_for(ax, size or PLANE_SIZE, look)
-    _title(axes, title, look)
+    draw_title(axes, title, look)
     if not len(found.points):
         axes.axis("off")
         return axes  # type: ignore[no-any-return]
@@ -145,17 +145,6 @@ def plot_singular_map(
     return axes  # type: ignore[no-any-return]
 
 
-def _title(axes: Any, title: str, look: Look) -> None:
-    width = axes.figure.bbox.width / axes.figure.dpi
-    axes.set_title(wrapped(title, width, SMALL + 1), fontsize=SMALL + 1, color=look.ink)
-
-
-def _bare(width: float, height: float, look: Look, layout: str | None = None) -> Figure:
-    figure = new_figure(width, height, layout=layout)
-    figure.set_facecolor(look.paper)
-    return figure
-
-
 def _plot_slices(
     found: SingularityMap,
     vertices: Floats,
@@ -167,15 +156,18 @@ def _plot_slices(
 ) -> Axes:
     """Slices of the measure alone: where nothing is singular there is no locus to see; a small figure has one slice."""
     width, height = checked_size(size or SIZE)
-    figure = _bare(width, height, look, "constrained")
-    is_small = width < ROOMY[0] or height < ROOMY[1]
-    panels = figure.subplots(1 if is_small else 2, 1 if is_small else 2, squeeze=False).ravel().tolist()
+    figure, across = new_figure(width, height, look.paper), 2 if _is_roomy(width, height) else 1
+    panels = figure.subplots(across, across, squeeze=False).ravel().tolist()
     words = "\n".join(wrapped(text, width, SMALL) for text in (title, _least_in_words(found)))
     figure.suptitle(words, fontsize=SMALL, color=look.ink)
     drawn = _draw_slices(panels, found, vertices, faces, order, look)
     if drawn is not None:
         _dress_bar(figure.colorbar(drawn, ax=panels, shrink=0.8, pad=0.02), look)
     return panels[0]  # type: ignore[no-any-return]
+
+
+def _is_roomy(width: float, height: float) -> bool:
+    return width >= ROOMY[0] and height >= ROOMY[1]
 
 
 def _least_at(found: SingularityMap) -> Floats:
@@ -226,13 +218,10 @@ def without_specks(vertices: Floats, faces: Ints, step: Floats) -> tuple[Floats,
     d = faces.shape[1]
     pairs = np.concatenate([faces[:, (k, (k + 1) % d)] for k in range(d if d == 3 else 1)])
     _, sheet = np.unique(connected(len(vertices), pairs), return_inverse=True)
-    corners = (vertices / step)[faces]
-    if d == 3:
-        sizes = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    else:
-        sizes = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     of_faces = sheet[faces[:, 0]]
-    kept = faces[np.bincount(of_faces, sizes)[of_faces] >= (SMALLEST if d == 3 else SHORTEST)]
+    kept = faces[
+        np.bincount(of_faces, sizes_of((vertices / step)[faces]))[of_faces] >= (SMALLEST if d == 3 else SHORTEST)
+    ]
     return (_with_smooth_rim(vertices, kept) if d == 3 else vertices), kept
 
 
@@ -291,10 +280,7 @@ def _refined(grid: Floats) -> Floats:
 
 def _draw_curves(axes: Any, segments: Floats, area: Any) -> None:
     """Draw where the locus is in a plane, within an area."""
-    from matplotlib.collections import LineCollection
-
-    style: dict[str, Any] = {"colors": SINGULAR, "linewidths": WIDTH, "capstyle": "round", "zorder": 4}
-    curves = axes.add_collection(LineCollection(list(segments), **style), autolim=False)
+    curves = draw_lines(axes, list(segments), SINGULAR, WIDTH, 4)
     if area is not None:
         curves.set_clip_path(area, axes.transData)
 
@@ -316,61 +302,47 @@ def _plot_in_space(
         eye = eye_of(view, order)
     elif len(faces):
         both_sides = np.concatenate([faces, faces[:, ::-1]])
-        corners = points[both_sides]
-        slopes = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).argmax(axis=1)
+        slopes = np.abs(face_normals(points[both_sides])).argmax(axis=1)
         eye = best_eye(picked_faces(points, both_sides, slopes), order)
     else:
         eye = best_eye(picked_faces(region.vertices * scale, region.faces, region.face_limit), order)
-    if ax is not None:
-        axes: Any = axes_for(ax, SIZE, look)
-        _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
-        _title(axes, title, look)
-        return axes  # type: ignore[no-any-return]
-    if not len(faces):
+    if ax is None and not len(faces):
         return _plot_slices(found, vertices, faces, size, order, look, title)
-    width, height = checked_size(size or SIZE)
-    if width < ROOMY[0] or height < ROOMY[1]:
-        axes = _bare(width, height, look).add_axes(ALONE)
-        _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
-        _title(axes, title, look)
-        return axes  # type: ignore[no-any-return]
-    figure = _bare(width, height, look)
-    grid = figure.add_gridspec(2, 2, **SLICES_IN)
-    axes = figure.add_axes(SPACE)
+    width, height = SIZE if ax is not None else checked_size(size or SIZE)
+    has_slices = ax is None and _is_roomy(width, height)
+    figure: Any = new_figure(width, height, look.paper, layout=None) if ax is None else ax.figure
+    axes: Axes = figure.add_axes(SPACE if has_slices else ALONE) if ax is None else axes_for(ax, SIZE, look)
     _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
+    if not has_slices:
+        draw_title(axes, title, look)
+        return axes
+    grid = figure.add_gridspec(2, 2, **SLICES_IN)
     panels = [figure.add_subplot(grid[place // 2, place % 2]) for place in range(len(SLICES))]
     drawn = _draw_slices(panels, found, vertices, faces, order, look)
     if drawn is not None:
         _dress_bar(figure.colorbar(drawn, cax=figure.add_axes(BAR)), look)
     figure.text(0.0125, 0.97, title, fontsize=SMALL + 2, color=look.ink, ha="left", va="top")
-    return axes  # type: ignore[no-any-return]
+    return axes
 
 
 def _draw_locus(axes: Any, region: Region, points: Floats, faces: Ints, step: Floats, eye: Eye, look: Look) -> None:
     """The locus in the light, in the workspace as a pale solid."""
-    from matplotlib.collections import LineCollection
     from matplotlib.colors import to_rgb
 
     box = box_of(region, scale_of(region))
     fit(axes, eye.seen(box.corners)[:, :2])
-    ends = axes.get_xlim(), axes.get_ylim()
     hull = seen_solid(region, eye, HULL_PIXELS)
-    pale = np.zeros((*hull.limit.shape, 4))
-    pale[..., :3], pale[..., 3] = to_rgb(look.soft), HULL * (hull.limit >= 0)
-    axes.imshow(pale, origin="lower", extent=hull.raster.extent, interpolation="antialiased", zorder=2)
-    style: dict[str, Any] = {"colors": look.soft, "linewidths": HULL_LINE, "alpha": 0.8, "capstyle": "round"}
-    axes.add_collection(LineCollection(hull.lines, zorder=5, **style), autolim=False)
+    draw_image(axes, hull.raster, to_rgb(look.soft), HULL * (hull.limit >= 0), 2)
+    draw_lines(axes, hull.lines, look.soft, HULL_LINE, 5, alpha=0.8)
     if len(faces):
         raster = rasterised(eye.seen(points), faces, PIXELS, both_sides=True)
-        normal = (raster.weights[..., None] * corner_normals(points, faces, rounds=NORMAL_ROUNDS)[raster.face]).sum(
-            axis=2
-        )
+        normals = corner_normals(points, faces, rounds=NORMAL_ROUNDS)
+        normal = (raster.weights[..., None] * normals[raster.face]).sum(axis=2)
         normal *= np.where(normal @ eye.axes[2] < 0.0, -1.0, 1.0)[..., None]
-        image = np.dstack([in_the_light(normal, eye, np.array(to_rgb(SINGULAR))), 1.0 * (raster.face >= 0)])
-        axes.imshow(image, origin="lower", extent=raster.extent, interpolation="antialiased", zorder=3)
+        rgb = in_the_light(normal, eye, np.array(to_rgb(SINGULAR)))
+        draw_image(axes, raster, rgb, 1.0 * (raster.face >= 0), 3)
         rims = lines_between(np.minimum(raster.face, 0), raster, JUMP * float(step.max()))
-        axes.add_collection(LineCollection(rims, colors=RIM, linewidths=0.8, zorder=4), autolim=False)
-    axes.set(xlim=ends[0], ylim=ends[1], aspect="equal")
+        draw_lines(axes, rims, RIM, 0.8, 4)
     draw_box(axes, eye, box, look, [])
 
 
@@ -416,7 +388,6 @@ def _axis_across(vertices: Floats, faces: Ints, usual: int) -> int:
     """The coordinate along which the normals of a mesh have the least component; of nearly equal ones the usual one."""
     if not len(faces):
         return usual
-    corners = vertices[faces]
-    normals = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).sum(axis=0)
+    normals = np.abs(face_normals(vertices[faces])).sum(axis=0)
     shares = np.round(normals / normals.max(), 1)
     return usual if shares[usual] == shares.min() else int(2 - shares[::-1].argmin())

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints, Mask
-from .eye import Eye
+from ..workspace.surface import face_normals
+from .eye import USUAL, Eye, best_of
 from .raster import (
     Raster,
     counted_around,
@@ -23,9 +24,8 @@ from .raster import (
 if TYPE_CHECKING:
     from ..workspace.region import Region
 
-ELEVATIONS, AZIMUTHS = (20.0, 30.0, 40.0), tuple(range(-170, 190, 10))
-OFF_AXES, USUAL = 15.0, -58.0
-"""Directions that are tried for a solid, their least distance from an axis, and the usual azimuth [deg]."""
+ELEVATIONS = (20.0, 30.0, 40.0)
+"""Elevations that are tried for a solid [deg]."""
 
 SPREAD, TURN = 1.0, 0.1
 """Weights of how much the slopes seen differ, and of the turn from the usual azimuth [1/rad], against the sum of the
@@ -148,8 +148,7 @@ def _units(vectors: Floats) -> Floats:
 
 def corner_normals(points: Floats, faces: Ints, labels: Ints | None = None, rounds: int = 1) -> Floats:
     """Normals at the corners of faces (f, 3, 3), each the mean of those of one label around it, so many times."""
-    corners = points[faces]
-    flat: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = face_normals(points[faces])
     keys = faces if labels is None else faces * (int(labels.max()) + 1) + labels[:, None]
     place = np.unique(keys, return_inverse=True)[1].reshape(faces.shape)
     for _ in range(rounds):
@@ -316,18 +315,12 @@ def picked_faces(points: Floats, faces: Ints, labels: Ints) -> PickedFaces:
     """Faces picked at random, that directions are judged by."""
     chosen = np.random.default_rng(0).permutation(len(faces))[:JUDGED]
     corners = points[faces[chosen]]
-    normals = _units(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return PickedFaces(corners.mean(axis=1), normals, labels[chosen])
+    return PickedFaces(corners.mean(axis=1), _units(face_normals(corners)), labels[chosen])
 
 
 def best_eye(sample: PickedFaces, order: tuple[int, int, int]) -> Eye:
-    """The eye that shows most of a solid: of each label, and of different slopes, not far from the usual direction.
-
-    None looks along an axis, where another one is a point.
-    """
-    azimuths = [azimuth for azimuth in AZIMUTHS if abs((azimuth + 45.0) % 90.0 - 45.0) >= OFF_AXES]
-    eyes = [Eye(elevation, float(azimuth), order) for elevation in ELEVATIONS for azimuth in azimuths]
-    return max(eyes, key=lambda eye: round(_score(eye, sample), 9))
+    """The eye that shows most of a solid: of each label, and of different slopes, not far from the usual direction."""
+    return best_of(ELEVATIONS, -170.0, lambda eye: _score(eye, sample), order)
 
 
 def _score(eye: Eye, sample: PickedFaces) -> float:
@@ -336,5 +329,5 @@ def _score(eye: Eye, sample: PickedFaces) -> float:
         return -np.inf
     shares = np.bincount(sample.labels[seen]) / len(seen)
     slopes = 1.0 - float(np.linalg.norm(sample.normals[seen].mean(axis=0)))
-    turn = abs(np.radians((eye.azimuth - USUAL + 180.0) % 360.0 - 180.0))
+    turn = abs(np.radians((eye.azimuth - USUAL[1] + 180.0) % 360.0 - 180.0))
     return float(np.sqrt(shares).sum()) + SPREAD * slopes - TURN * float(turn)

@@ -11,9 +11,9 @@ from ..arrays import Floats, Ints, Mask
 from ..drawing import SMALL, new_figure
 from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.workspace_table import for_people
-from .canvas import checked_size, draw_triad, wrapped
+from .canvas import checked_size, draw_key, draw_title, draw_triad
 from .eye import Eye, View, eye_of, upright
-from .frame import PADS, axes_for, box_of, dense, draw_box, fit, machine_of, title_of
+from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit, machine_of, title_of
 from .looks import Look
 from .raster import counted_around
 from .slices import DASHED, draw_slice, edges_of, outline_of, plane_across
@@ -93,18 +93,13 @@ def plot_solid(
     eye = best_eye(sample, upright(region.names)) if view is None else eye_of(view, upright(region.names))
     first = seen_solid(region, eye, ACROSS)
     if ax is None and size is not None and (size[0] < ROOMY[0] or size[1] < ROOMY[1]):
-        figure = new_figure(*checked_size(size), layout=None)
-        figure.set_facecolor(look.paper)
-        ax = figure.add_axes(ALONE)
+        ax = new_figure(*checked_size(size), look.paper, layout=None).add_axes(ALONE)
     if ax is not None:
         axes: Any = axes_for(ax, (0.0, 0.0), look)
         _draw_solid(axes, first, colours, shape, look)
-        title = wrapped(title_of(region), axes.figure.bbox.width / axes.figure.dpi, SMALL + 1)
-        axes.set_title(title, fontsize=SMALL + 1, color=look.ink)
-        key = _key(groups, look)
-        while key["ncols"] > 1 and _legend(axes, key).get_window_extent().width > axes.get_window_extent().width:
-            key["ncols"] -= 1
-        _legend(axes, key)
+        draw_title(axes, title_of(region), look)
+        key = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), **_key(groups, look)}
+        draw_key(axes, axes.get_window_extent().width, key, min(len(key["handles"]), KEYS))
         return axes  # type: ignore[no-any-return]
     has_room = view is None and (size is None or size[0] >= ROOMY_FOR_TWO)
     below = _eye_below(sample, eye, colours.place) if has_room else None
@@ -123,12 +118,10 @@ def plot_solid(
     words = f"each face in the colour of {which}; + is {started}{inside}"
     under = top - 0.2 / figure.get_size_inches()[1]
     figure.text(left, under, words, fontsize=SMALL, color=look.soft, ha="left", va="top")
-    figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), **_key(groups, look))
+    key = _key(groups, look)
+    columns = min(len(key["handles"]), KEYS)
+    figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), ncols=columns, **key)
     return axes  # type: ignore[no-any-return]
-
-
-def _legend(axes: Any, key: dict[str, Any]) -> Any:
-    return axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), **key)
 
 
 def _key(groups: list[Group], look: Look) -> dict[str, Any]:
@@ -145,10 +138,8 @@ def _key(groups: list[Group], look: Look) -> dict[str, Any]:
         )
         for group in shown
     ]
-    return {
-        "handles": handles, "ncols": min(len(handles), KEYS), "frameon": False, "fontsize": SMALL,
-        "handlelength": 1.2, "columnspacing": 1.4, "labelcolor": look.ink,
-    }  # fmt: skip
+    letters = {"fontsize": SMALL, "labelcolor": look.ink}
+    return {"handles": handles, "frameon": False, "handlelength": 1.2, "columnspacing": 1.4, **letters}
 
 
 def _eye_below(sample: PickedFaces, eye: Eye, place: Ints) -> Eye | None:
@@ -175,8 +166,7 @@ def _panels(
     slice_wide = min((tall - 2.0 * SLICE_GAP - SLICE_BELOW) / float(shapes @ breadths), SLICE)
     lefts = np.cumsum([EDGE, wide + (GAP if wider else 0.0), wider + SLICE_LEFT])
     width, height = float(lefts[-1]) + slice_wide + 2.0 * EDGE, tall + bottom + TITLE
-    figure = new_figure(*checked_size(size or (width, height)), layout=None)
-    figure.set_facecolor(look.paper)
+    figure = new_figure(*checked_size(size or (width, height)), look.paper, layout=None)
 
     def panel(left: float, below: float, across: float, high: float) -> Any:
         return figure.add_axes((left / width, below / height, across / width, high / height), facecolor=look.paper)
@@ -215,24 +205,19 @@ def _machine_lines(region: Region) -> list[tuple[Floats, float]]:
     ]
 
 
-def draw_image(axes: Any, solid: SeenSolid, rgb: Floats, alpha: float = 1.0) -> None:
-    """Draw what each pixel shows, in the light: colours (n, 3) by limit."""
-    image = np.dstack([in_the_light(solid.normal, solid.eye, rgb[solid.limit]), alpha * (solid.limit >= 0)])
-    axes.imshow(image, origin="lower", extent=solid.raster.extent, interpolation="antialiased", zorder=2)
+def _draw_faces(axes: Any, solid: SeenSolid, colours: Colours) -> None:
+    """Draw each pixel in the colour of its limit, in the light, and the lines between."""
+    rgb = in_the_light(solid.normal, solid.eye, colours.rgb[colours.place][solid.limit])
+    draw_image(axes, solid.raster, rgb, 1.0 * (solid.limit >= 0), 2)
+    draw_lines(axes, solid.lines, EDGE_COLOUR, EDGE_WIDTH, 3)
 
 
 def _draw_solid(axes: Any, solid: SeenSolid, colours: Colours, shape: Inscribed | None, look: Look) -> None:
     """Draw a solid in its box, with the machine, a shape that fits in, and the names of its faces."""
-    from matplotlib.collections import LineCollection
-
     region, eye = solid.region, solid.eye
     lines = _machine_lines(region)
     fit(axes, _content(solid))
-    limits = axes.get_xlim(), axes.get_ylim()
-    draw_image(axes, solid, colours.rgb[colours.place])
-    axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
-    style: dict[str, Any] = {"colors": EDGE_COLOUR, "linewidths": EDGE_WIDTH, "capstyle": "round", "zorder": 3}
-    axes.add_collection(LineCollection(solid.lines, **style), autolim=False)
+    _draw_faces(axes, solid, colours)
     before, hidden = _draw_lines(axes, solid, lines, look)
     for edge in [] if shape is None else edges_of(shape):
         hidden |= _draw_hidden(axes, solid, dense(edge * solid.scale))
@@ -322,15 +307,9 @@ def _room(mask: Mask, covered: Mask, wide: int, tall: int) -> Ints | None:
 
 def _draw_second(axes: Any, solid: SeenSolid, colours: Colours, look: Look) -> None:
     """Draw the solid from below, with the directions of its coordinates."""
-    from matplotlib.collections import LineCollection
-
     left, right, low, high = solid.raster.extent
     fit(axes, np.array([[left, low], [right, high]]), (4.0, 4.0, 46.0, 4.0))
-    limits = axes.get_xlim(), axes.get_ylim()
-    draw_image(axes, solid, colours.rgb[colours.place])
-    axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
-    style: dict[str, Any] = {"colors": EDGE_COLOUR, "linewidths": EDGE_WIDTH, "capstyle": "round", "zorder": 3}
-    axes.add_collection(LineCollection(solid.lines, **style), autolim=False)
+    _draw_faces(axes, solid, colours)
     nothing = np.zeros(solid.limit.shape, bool)
     _name_faces(axes, solid, colours, nothing, nothing)
     below: dict[str, Any] = {"textcoords": "offset points", "annotation_clip": False, "ha": "center", "va": "top"}

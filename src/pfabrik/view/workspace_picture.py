@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from ..drawing import SMALL
 from ..workspace.space import TURNS
 from ..workspace.workspace_table import for_people
+from .canvas import draw_title
 from .eye import View
-from .frame import axes_for
+from .frame import PLANE_SIZE, axes_for
 from .looks import Look, Theme, look_of
 from .plane_picture import plot_plane
 from .solid_picture import plot_solid
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
 
     from ..workspace.inscribed import Inscribed
     from ..workspace.region import Region
-
-PLANE_SIZE = (6.4, 4.8)
-"""Of a new figure in a plane [inches]."""
 
 
 def plot_workspace(
@@ -53,7 +51,7 @@ def plot_workspace(
 def _say_nothing(region: Region, ax: Axes | None, size: tuple[float, float] | None, look: Look) -> Axes:
     """A picture in words: nothing is within reach, with what is fixed."""
     axes: Any = axes_for(ax, size or PLANE_SIZE, look)
-    axes.set_title(f"{region.mechanism.name}: nothing within reach", fontsize=SMALL + 1, color=look.ink)
+    draw_title(axes, f"{region.mechanism.name}: nothing within reach", look)
     axes.axis("off")
     held = {name: value for name, value in region._question.space.held.items() if name not in region.names and value}
     factors, units = for_people(["rad" if name in TURNS else region.mechanism.length_unit for name in held])

@@ -14,6 +14,7 @@ from ..cells import CsvWriter
 from ..checks import require_ending
 from ..errors import InvalidArgument
 from ..whole_files import whole_path
+from .surface import face_normals
 
 if TYPE_CHECKING:
     from .region import Region
@@ -46,7 +47,7 @@ def _as_npz(region: Region) -> bytes:
 def _as_stl(region: Region) -> bytes:
     """Binary STL: triangles with their normals, in the mechanism's unit."""
     corners = region.vertices[_triangles(region)]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = face_normals(corners)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
     rows = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -66,11 +66,7 @@ class BorderMesh(NamedTuple):
     @property
     def face_sizes(self) -> Floats:
         """Length or area of each face, (f,)."""
-        ends = self.vertices[self.faces]
-        sides = ends[:, 1:] - ends[:, :1]
-        if self.vertices.shape[1] == 2:
-            return np.asarray(np.linalg.norm(sides[:, 0], axis=1))
-        return np.asarray(0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1))
+        return sizes_of(self.vertices[self.faces])
 
     def error(self, step: Floats, close: float) -> float:
         """The most that `size` may be off, for a border whose features are as large as cells, (d,), or larger.
@@ -84,8 +80,7 @@ class BorderMesh(NamedTuple):
             return 0.0
         d, scaled = len(step), self._replace(vertices=self.vertices / step)
         ends, places = scaled.vertices[self.faces], np.arange(d)
-        along = ends[:, 1:] - ends[:, :1]
-        normals = along[:, 0, ::-1] * (1.0, -1.0) if d == 2 else np.cross(along[:, 0], along[:, 1])
+        normals = (ends[:, 1] - ends[:, 0])[:, ::-1] * (1.0, -1.0) if d == 2 else face_normals(ends)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
         sides = np.sort(np.stack([self.faces[:, np.roll(places, -k)[: d - 1]] for k in places], axis=1), axis=2)
         order = np.lexsort(sides.reshape(-1, d - 1).T).reshape(-1, 2)  # both faces beside each edge
@@ -106,6 +101,18 @@ class BorderMesh(NamedTuple):
         used[faces] = True
         place = np.cumsum(used) - 1
         return BorderMesh(self.vertices[used], place[faces], self.limits[used], self.inner[used])
+
+
+def face_normals(corners: Floats) -> Floats:
+    """Normals (f, 3) of triangles with corners (f, 3, 3), each as long as twice the area."""
+    return np.asarray(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+
+
+def sizes_of(corners: Floats) -> Floats:
+    """Areas (f,) of triangles with corners (f, 3, 3), or lengths of segments with ends (f, 2, 2)."""
+    if corners.shape[1] == 2:
+        return np.asarray(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1))
+    return np.asarray(0.5 * np.linalg.norm(face_normals(corners), axis=1))
 
 
 def mesh_of(lattice: Lattice, cells: Cells) -> BorderMesh:
