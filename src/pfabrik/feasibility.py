@@ -14,9 +14,6 @@ from .arrays import Floats, Ints, shaped
 from .closure.configurations import Configurations
 from .closure.link_distances import least_distances, pair_names
 from .closure.parasitic import has_parasitic_motion
-from .decomposition.leg_forms import LegForm, Rod
-from .decomposition.leg_table import LegTable
-from .derived import derived
 from .description.mechanism import Mechanism, checked_mechanism
 from .errors import UnsupportedMechanism, counted
 from .executors import Workers, slices
@@ -123,7 +120,7 @@ def feasibility(
         blocks = [(poses[block], configuration) for block in slices(len(poses))]
         with closing(Workers(executor, mechanism).results(_best_of_modes, blocks)) as results:
             margin, binding = (np.concatenate(parts) for parts in zip(*results, strict=True))
-    limits = _limits(model.legs)
+    limits = model.legs.measured_limits
     if mechanism.clearance is not None:
         limits += tuple((name, "clearance") for name in pair_names(mechanism))
     return Feasibility(shaped(margin, shape), shaped(binding, shape), limits)
@@ -163,7 +160,7 @@ def _lower_to_clearance(
     binding: Ints,
 ) -> None:
     """Lower margins (n,) that are not negative to those of the nearest links, and write their pairs into `binding`."""
-    first_pair, kept = len(_limits(model.legs)), np.flatnonzero(margin >= 0.0)
+    first_pair, kept = len(model.legs.measured_limits), np.flatnonzero(margin >= 0.0)
     for rows in np.split(kept, range(ROWS_AT_ONCE, len(kept), ROWS_AT_ONCE)):
         placed, is_reached = links_at_poses(model, poses[rows], start, sides)
         distances, pairs, _ = least_distances(placed)
@@ -194,25 +191,11 @@ def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> 
     from .kernels.legs.feasibility import feasibility as measure
 
     unsolved_poses, margins, bindings = poses[unsolved], np.empty(len(unsolved)), np.empty(len(unsolved), np.int64)
+    nothing = np.empty((0, 0))
 
     def run_unsolved(block: slice) -> None:
-        measure(legs.address, unsolved_poses[block], start_pose, sides, margins[block], bindings[block])
+        measure(legs.address, unsolved_poses[block], start_pose, sides, margins[block], bindings[block], nothing)
 
     in_blocks(run_unsolved, len(unsolved), ROWS_A_BLOCK)
     margin[unsolved], binding[unsolved] = margins, bindings
     return margin, binding
-
-
-@derived
-def _limits(table: LegTable) -> tuple[tuple[str, str], ...]:
-    """Limits in the order of the kernel: ranges and cones, then the reach of legs, then their closure."""
-    reach = tuple((_proximal_joint(form), "reach") for form in table.forms)
-    closed = tuple((form.elements[0].joint.name if form.elements else "", "not closed") for form in table.forms)
-    return table.limits + reach + closed
-
-
-def _proximal_joint(form: LegForm) -> str:
-    """The proximal joint of a leg, or its first one."""
-    proximal = form.proximal if isinstance(form, Rod) else None
-    items = (proximal,) if proximal is not None else form.elements
-    return items[0].joint.name if items else ""

@@ -13,6 +13,7 @@ Motion        home_coordinates, displacements, joint_centres, placed, end_effect
               tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
               parallel_signs
+Varied        varied, VariedMachine, MachineAt
 """
 
 from .closure.configurations import Configurations
@@ -42,15 +43,18 @@ from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
 from .motion.mobility import generic_of, internal_rates
 from .motion.singularities import parallel_signs
+from .varied import MachineAt, VariedMachine, varied
 
 __all__ = [
     "BodyInertia",
     "Configurations",
     "JointPath",
     "JointRates",
+    "MachineAt",
     "Model",
     "Readout",
     "Task",
+    "VariedMachine",
     "actuator_units",
     "column_joints",
     "columns",
@@ -77,4 +81,5 @@ __all__ = [
     "task_of",
     "tilt_axis",
     "tree_of",
+    "varied",
 ]

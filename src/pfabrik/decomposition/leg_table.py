@@ -133,11 +133,25 @@ class LegTable:
         rods = (legs["kind"] == K.ROD) & (legs["frame"] == 0)
         return bool(np.all([rods, twists, *aimed]) and self.task["rotations"][0] in (0, 3))
 
+    @cached_property
+    def measured_limits(self) -> tuple[tuple[str, str], ...]:
+        """The limits that feasibility measures: ranges and cones, then the reach of legs, then their closure."""
+        reach = tuple((_proximal_joint(form), "reach") for form in self.forms)
+        closed = tuple((form.elements[0].joint.name if form.elements else "", "not closed") for form in self.forms)
+        return self.limits + reach + closed
+
     def task_within(self, farthest: float) -> Records:
         """The task, with the motion of what it leaves open limited to `farthest` [L or rad]."""
         task = self.task.copy()
         task["farthest"] = farthest
         return task
+
+
+def _proximal_joint(form: LegForm) -> str:
+    """The proximal joint of a leg, or its first one."""
+    proximal = form.proximal if isinstance(form, Rod) else None
+    items = (proximal,) if proximal is not None else form.elements
+    return items[0].joint.name if items else ""
 
 
 def leg_table(mechanism: Mechanism) -> LegTable:
@@ -224,7 +238,7 @@ def _coordinate(home: RecordedHome, leg: int, element: ElementaryJoint, place: i
     key = element.joint.name, element.place
     coordinate = next(c for c in home.mechanism.coordinates if (c.joint.name, c.place) == key)
     unit = home.scalar(1.0) if coordinate.kind == "angle" else home.length
-    lo, hi = deviations(coordinate.bounds, home.coordinate(coordinate), unit)
+    lo, hi = deviations(home.bounds(coordinate), home.coordinate(coordinate), unit)
     return {
         "leg": leg,
         "place": place,
@@ -268,13 +282,13 @@ def _cone(home: RecordedHome, forms: Sequence[LegForm], joint: Joint) -> dict[st
                 or end.name not in other_joints
             ):
                 raise NoLeg(reason)
-            half_angle = joint.cone.half_angle
+            axis, half_angle = home.cone(joint)
             return {
                 "leg": leg,
                 "place": place,
-                "axis": home.vector(*joint.cone.axis) * sign((ends[1] - ends[0]) @ line),
+                "axis": axis * sign((ends[1] - ends[0]) @ line),
                 "half_angle": half_angle,
-                "least_cosine": math.cos(half_angle + TOLERANCES.limit),
+                "least_cosine": math.cos(joint.cone.half_angle + TOLERANCES.limit),
             }
     raise NoLeg(reason)
 

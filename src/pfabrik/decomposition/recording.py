@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
@@ -9,16 +10,16 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import Floats, Ints, Records
-from ..description.geometry import AT_POINTS, AT_REFERENCE, home_numbers
+from ..description.geometry import AT_POINTS, AT_REFERENCE, home_numbers, limit_numbers
 from ..description.home_mobility import ends_of_default_axes
 from ..description.joint_coordinates import JointCoordinate
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from .tape import Recorded, Scalar, Tape, Vector, length, square_to
+from .tape import Recorded, Scalar, Tape, Vector, largest, length, square_to
 
 
 class RecordedHome:
-    """The numbers of a mechanism at home, on a tape: centres are in its length unit, points in L.
+    """The numbers of a mechanism at home, and its limits, on a tape: centres are in its length unit, points in L.
 
     Attributes
     ----------
@@ -27,7 +28,9 @@ class RecordedHome:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self.tape = Tape(home_numbers(mechanism).tolist())
+        numbers = home_numbers(mechanism).tolist()
+        self.tape = Tape(numbers + limit_numbers(mechanism))
+        self._at_limits = len(numbers)
         self._numbers = {joint.name: number for number, joint in enumerate(mechanism.joints)}
         self.length = self.tape.scalar(0)
 
@@ -68,6 +71,22 @@ class RecordedHome:
         if coordinate.joint.along is not None:
             return length(self._span_along(coordinate.joint))
         return self.tape.scalar(AT_POINTS + 9 * len(self._numbers) + coordinate.column)
+
+    def bounds(self, coordinate: JointCoordinate) -> tuple[Scalar | float, Scalar | float]:
+        """The bounds of a coordinate [length or rad], as of `JointCoordinate.bounds`."""
+        at = self._at_limits + 2 * coordinate.column
+        low, high = (
+            self.tape.scalar(at + k) if math.isfinite(limit) else limit for k, limit in enumerate(coordinate.limits)
+        )
+        if coordinate.joint.along is None:
+            return low, high
+        return largest([low, self.scalar(0.0)]) if isinstance(low, Scalar) else 0.0, high
+
+    def cone(self, joint: Joint) -> tuple[Vector, Scalar]:
+        """The axis and the half angle of a joint's cone [rad]."""
+        n = len(self.mechanism.coordinates)
+        at = self._at_limits + 2 * n + 4 * self._numbers[joint.name]
+        return self.tape.vector(at), self.tape.scalar(at + 3)
 
     @property
     def reference_point(self) -> Vector:
@@ -182,7 +201,7 @@ class Recording:
         return np.array(self._tape.values)
 
     @cached_property
-    def _layouts(self) -> list[tuple[str, int, np.dtype[np.void], int]]:
+    def layouts(self) -> list[tuple[str, int, np.dtype[np.void], int]]:
         """Of each array its name, length and type, and where it starts [bytes]."""
         layouts, start = [], 0
         for name, (records, _) in self._parts.items():
@@ -192,4 +211,4 @@ class Recording:
 
     def arrays(self, words: Floats) -> dict[str, Records]:
         """The arrays of records, by name, whose numbers are in a row."""
-        return {name: np.ndarray(n, dtype, words, start) for name, n, dtype, start in self._layouts}
+        return {name: np.ndarray(n, dtype, words, start) for name, n, dtype, start in self.layouts}

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..noted_numbers import Number, sqrt
+
 UNIT_SLACK = 4 * sys.float_info.epsilon
 """How far the norm of a vector may be from 1 and still count as 1: the rounding of one division by the norm. Dividing
 again would move the last digit, and a saved mechanism would not load as its equal."""
@@ -52,7 +54,7 @@ def numbers(value: Any, depth: int = 2) -> Any:
         value = value.tolist()
     if _is_list(value) and depth > 0:
         return tuple(numbers(item, depth - 1) for item in value)
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if isinstance(value, Number | bool) or not isinstance(value, Real):
         return value
     try:
         return float(value)
@@ -65,6 +67,9 @@ def unit_vector(value: Any) -> Any:
     vector = numbers(value)
     if not (isinstance(vector, tuple) and len(vector) == 3 and all(isinstance(part, float) for part in vector)):
         return vector
+    if any(isinstance(part, Number) for part in vector):
+        norm = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+        return tuple(part / norm for part in vector)
     if not all(map(math.isfinite, vector)) or abs(math.hypot(*vector) - 1.0) <= UNIT_SLACK:
         return vector
     largest = max(map(abs, vector)) or 1.0

@@ -135,7 +135,7 @@ def number_faults(place: str, value: Any, count: int) -> Iterator[Fault]:
         yield Fault(place, shown(value), what)
     elif not all(map(math.isfinite, numbers)):
         yield Fault(place, shown(value), f"{what}, finite")
-    elif max(map(abs, numbers)) > LARGEST_NUMBER:
+    elif max(abs(float(number)) for number in numbers) > LARGEST_NUMBER:
         yield Fault(place, shown(value), f"{what}, at most {LARGEST_NUMBER:g} in magnitude")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import fields
 from typing import NamedTuple
@@ -92,6 +93,25 @@ def numbers_with(mechanism: Mechanism, geometry: Geometry) -> Floats:
 def with_geometry(mechanism: Mechanism, geometry: Geometry) -> Mechanism:
     """The description with other numbers, unchecked for faults and for mobility."""
     return with_numbers(mechanism, numbers_with(mechanism, geometry))
+
+
+def described_numbers(mechanism: Structure) -> list[float]:
+    """The reference point, and all numbers of the joints as they are described, as in `home_numbers` from there on.
+
+    Where the description leaves axes or values to be computed, there are zeros, or what is computed.
+    """
+    joints, nowhere, none = mechanism.joints, (math.nan,) * 3, (0.0,) * 3
+    axes = [joint.axes or (joint.axis or none, none) for joint in joints]
+    parts = [mechanism.reference_point, *(joint.at or nowhere for joint in joints), *(v for pair in axes for v in pair)]
+    return [*(x for part in parts for x in part), *(coordinate.home for coordinate in mechanism.coordinates)]
+
+
+def limit_numbers(mechanism: Structure) -> list[float]:
+    """The limits of all coordinates, two each, infinite where there are none; then of all joints the cone's axis and
+    half angle, zeros where there is none."""
+    limits = [bound for coordinate in mechanism.coordinates for bound in coordinate.limits]
+    cones = [joint.cone for joint in mechanism.joints]
+    return limits + [x for cone in cones for x in ((*cone.axis, cone.half_angle) if cone else (0.0,) * 4)]
 
 
 _FIELDS = tuple(each.name for each in fields(Mechanism) if each.name not in ("joints", "reference_point"))

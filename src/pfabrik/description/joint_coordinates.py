@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..tolerances import TOLERANCES
 from .joints import KINDS, Coordinate, Joint, Range
 
@@ -46,8 +44,8 @@ class JointCoordinate:
         """Its range [rad or length], infinite where there is no limit."""
         if self.joint.range is None:
             return -math.inf, math.inf
-        low, high = np.reshape(self.joint.range, (-1, 2))[self.place].tolist()
-        return low, high
+        pair: Any = self.joint.range if len(KINDS[self.joint.type].coordinates) == 1 else self.joint.range[self.place]
+        return pair[0], pair[1]
 
     @property
     def bounds(self) -> Range:
@@ -61,10 +59,10 @@ class JointCoordinate:
         return low, high
 
 
-def deviations(bounds: Range, home: Any, unit: Any) -> tuple[Any, Any]:
+def deviations(bounds: tuple[Any, Any], home: Any, unit: Any) -> tuple[Any, Any]:
     """Bounds as deviations from home, in a unit [length or rad], with room for answers that are put inside.
 
-    Home and unit are numbers, or recorded as `decomposition.tape` does, and so then are the deviations.
+    All are numbers, or recorded as `decomposition.tape` does, and so then are the deviations.
     """
     low, high = ((bound - home) / unit for bound in bounds)
     lacking = max(TOLERANCES.inside - 0.5 * (high - low), 0.0)

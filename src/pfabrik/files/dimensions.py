@@ -13,6 +13,7 @@ from typing import Any
 
 from ..description.leg_points import WORDS
 from ..errors import Fault, counted, near_miss
+from ..noted_numbers import Number, atan2, cos, power, radians, sin, sqrt, tan
 
 TEXTS = (
     *("name", "type", "connects", "along", "chain", "fixed_to", "base", "end_effector", "units", "task", "schema"),
@@ -30,7 +31,7 @@ _OPERATORS: dict[type, Callable[[float, float], float]] = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-    ast.Pow: math.pow,
+    ast.Pow: power,
 }
 
 
@@ -121,7 +122,7 @@ def number_of(said: Any, values: Mapping[str, float], angle_unit: str, later: tu
         except (ArithmeticError, ValueError):  # a fraction of 0; a power that is not real is a ValueError
             raise NoNumber(f"'{said}', which has no finite value") from None
     else:
-        value = float(said) if abs(said) < 1e300 else math.inf
+        value = said if isinstance(said, Number) else float(said) if abs(said) < 1e300 else math.inf
     if math.isinf(value):
         raise NoNumber(f"'{said}', which has no finite value")
     return value
@@ -129,13 +130,13 @@ def number_of(said: Any, values: Mapping[str, float], angle_unit: str, later: tu
 
 def _functions(angle_unit: str) -> dict[str, tuple[int, Callable[..., float]]]:
     """Functions by name, with the number of their arguments; angles in the unit of the file."""
-    into, out = (math.radians, math.degrees) if angle_unit == "deg" else (float, float)
+    into, out = (radians(1.0), math.degrees(1.0)) if angle_unit == "deg" else (1.0, 1.0)
     return {
-        "sqrt": (1, math.sqrt),
-        "sin": (1, lambda angle: math.sin(into(angle))),
-        "cos": (1, lambda angle: math.cos(into(angle))),
-        "tan": (1, lambda angle: math.tan(into(angle))),
-        "atan2": (2, lambda y, x: out(math.atan2(y, x))),
+        "sqrt": (1, sqrt),
+        "sin": (1, lambda angle: sin(angle * into)),
+        "cos": (1, lambda angle: cos(angle * into)),
+        "tan": (1, lambda angle: tan(angle * into)),
+        "atan2": (2, lambda y, x: atan2(y, x) * out),
     }
 
 

@@ -10,6 +10,7 @@ from ..description.coercion import numbers, truths
 from ..description.form_faults import is_numbers
 from ..description.joints import DRIVE_FIELDS, KINDS, Coordinate, driven_places
 from ..errors import InvalidArgument, near_miss
+from ..noted_numbers import radians
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "µm": 1e-6}
 METRES |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
@@ -41,7 +42,7 @@ def in_radians(field: str, value: Any, joint_type: Any, actuated: Any, unit: str
     fits = isinstance(parts, tuple) and all(
         is_numbers(part, 2) if field == "range" else isinstance(part, float) for part in parts
     )
-    return converted(read, kinds, math.radians) if fits else value
+    return converted(read, kinds, radians) if fits else value
 
 
 def measured(field: str, joint_type: Any, actuated: Any) -> tuple[Coordinate, ...]:
@@ -55,7 +56,7 @@ def measured(field: str, joint_type: Any, actuated: Any) -> tuple[Coordinate, ..
 def angle_in_radians(value: Any, unit: str) -> Any:
     """An angle of a file in radians; any value but a number stays as it is."""
     read = numbers(value)
-    return math.radians(read) if unit == "deg" and isinstance(read, float) else value
+    return radians(read) if unit == "deg" and isinstance(read, float) else value
 
 
 def converted(value: Any, kinds: Sequence[Coordinate], convert: Callable[[float], float]) -> Any:

@@ -20,8 +20,9 @@ from .home import measure_home
 from .lattice import join, number_points
 from .legs.answer import answer
 from .legs.blocks import answer_blocks
-from .legs.feasibility import feasibility
+from .legs.feasibility import feasibility, read_targets
 from .legs.margin_blocks import margins_in_blocks
+from .noted_steps import evaluate
 from .passes import plan as P
 from .passes.solve import solve_by_passes
 from .platform.answer_rows import answer_rows, mark_near, step_rows
@@ -81,7 +82,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (evaluate_poses, tuple(_values("i i F3 F2 F2 f2 f2 f3"))),
     (jacobians, tuple(_values("i F3 i f3"))),
     (rates, (*_values("i i"), _FIRST_ORDER_PLAN, *_values("F2"), _FIRST_ORDER)),
-    (feasibility, tuple(_values("i F3 F3 F2 f1 i1"))),
+    (feasibility, tuple(_values("i F3 F3 F2 f1 i1 f2"))),
+    (read_targets, tuple(_values("i F3 F3 f2"))),
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i F2 i b i1 f2 f3 f2 f2 f2"))),
@@ -91,6 +93,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_chains, (*_values("i i i b F3 F2 f2"), Rows(*_values("i1 i2 f3 f2 f2")))),
     (measure_home, tuple(_values("f1 i f1 i1"))),
     (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
+    (evaluate, tuple(_values("I2 I2 I2 i F1 F2 F2 f2 f3"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),
     (join, tuple(_values("I2 i1"))),
     (place_ends, tuple(_values("F3 I2 F3 f3"))),

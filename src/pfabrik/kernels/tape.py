@@ -60,10 +60,10 @@ def perform(operation: int, values: Any, a: int, b: int, out: int) -> None:
             values[out + i] = values[a + i] / values[b] if values[b] != 0.0 else 0.0
     elif operation == V_MAXIMUM:
         for i in range(3):
-            values[out + i] = values[a + i] if values[a + i] >= values[b + i] else values[b + i]
+            values[out + i] = max(values[a + i], values[b + i])
     elif operation == V_MINIMUM:
         for i in range(3):
-            values[out + i] = values[a + i] if values[a + i] <= values[b + i] else values[b + i]
+            values[out + i] = min(values[a + i], values[b + i])
     elif operation == AT_MOST:
         values[out] = 1.0 if values[a] <= values[b] else 0.0
     elif operation == BELOW:
@@ -77,7 +77,7 @@ def perform(operation: int, values: Any, a: int, b: int, out: int) -> None:
     elif operation == DIVIDE:
         values[out] = values[a] / values[b] if values[b] != 0.0 else 0.0
     elif operation == MAXIMUM:
-        values[out] = values[a] if values[a] >= values[b] else values[b]
+        values[out] = max(values[a], values[b])
     elif operation == MAGNITUDE:
         values[out] = abs(values[a])
     elif operation == SIGN:
@@ -85,8 +85,7 @@ def perform(operation: int, values: Any, a: int, b: int, out: int) -> None:
     elif operation == ANGLE:
         values[out] = math.atan2(values[a], values[b])
     elif operation == LARGEST:
-        larger = values[a] if values[a] >= values[a + 1] else values[a + 1]
-        values[out] = larger if larger >= values[a + 2] else values[a + 2]
+        values[out] = max(values[a], values[a + 1], values[a + 2])
     elif operation == SAME:
         is_same = values[a] == values[b] and values[a + 1] == values[b + 1] and values[a + 2] == values[b + 2]
         values[out] = 1.0 if is_same else 0.0

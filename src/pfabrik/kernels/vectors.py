@@ -138,6 +138,5 @@ def wrap_into(angle: float, lo: float, hi: float) -> float:
     if hi - lo <= 2.0 * math.pi:
         return wrap(angle, 0.5 * (lo + hi))
     angle = wrap(angle, 0.0)
-    if angle > hi + ON_BOUND:
-        return angle - 2.0 * math.pi
-    return angle + 2.0 * math.pi if angle < lo - ON_BOUND else angle
+    raised = where(angle < lo - ON_BOUND, angle + 2.0 * math.pi, angle)
+    return where(angle > hi + ON_BOUND, angle - 2.0 * math.pi, raised)

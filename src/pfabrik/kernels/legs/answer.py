@@ -78,14 +78,20 @@ def place_legs(legs: Records, frames: Floats, sides: Floats, values: Floats, lin
 @routine
 def put_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows: Floats) -> float:
     """Fill the constraints of all legs; the largest of them, infinite if one is not a number."""
-    owner = 0
-    for k in range(legs.shape[0]):
-        owner = owner if legs[k]["proximal"] == SHARED else k
-        leg_rows(legs, k, owner, frames, values, lines, rows)
+    put_leg_rows(legs, frames, values, lines, rows)
     worst = 0.0
     for i in range(rows.shape[0]):
         worst = max(worst, abs(rows[i])) if abs(rows[i]) < math.inf else math.inf
     return worst
+
+
+@routine
+def put_leg_rows(legs: Records, frames: Floats, values: Floats, lines: Floats, rows: Floats) -> None:
+    """Fill the constraints of all legs."""
+    owner = 0
+    for k in range(legs.shape[0]):
+        owner = owner if legs[k]["proximal"] == SHARED else k
+        leg_rows(legs, k, owner, frames, values, lines, rows)
 
 
 @routine

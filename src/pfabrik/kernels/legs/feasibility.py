@@ -10,12 +10,25 @@ from ...arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..quaternions import difference, turn_about_z, yaw_difference
 from ..search_constants import NEARLY_CLOSED
-from ..vectors import angle_between, copy_row, scale, vec
-from .answer import complete_pose, deviation, new_completion, put_rows
+from ..vectors import angle_between, copy_row, scale, vec, where
+from .answer import Completion, complete_pose, deviation, new_completion, put_rows
 from .complete_poses import put_pose, read_target, tilt_to, turn_pose
 from .endings import pointing_error
 from .leg_constants import KEPT, MORE_PARTS, PARTS
-from .records import BASE_END, BASE_LINE, CROSS, HINGE, PLATFORM_END, PLATFORM_LINE, SLIDE, open_table
+from .records import (
+    BASE_END,
+    BASE_LINE,
+    CROSS,
+    FROM_BASE,
+    HINGE,
+    PLATFORM_END,
+    PLATFORM_LINE,
+    Q_PROXIMAL,
+    REDUNDANT,
+    SLIDE,
+    Table,
+    open_table,
+)
 
 
 @routine
@@ -26,7 +39,22 @@ def relative_margin(distance: float, half_range: float) -> float:
     """
     if half_range > KEPT:
         return distance / half_range
-    return 0.0 if abs(distance) <= KEPT else math.copysign(math.inf, distance)
+    return where(abs(distance) <= KEPT, 0.0, math.copysign(math.inf, distance))
+
+
+@routine
+def range_margins(coordinate: Record, values: Floats) -> tuple[float, float]:
+    """Relative margins of a coordinate from both ends of its range."""
+    lo, hi, value = coordinate["lo"], coordinate["hi"], deviation(coordinate, values)
+    return relative_margin(value - lo, 0.5 * (hi - lo)), relative_margin(hi - value, 0.5 * (hi - lo))
+
+
+@routine
+def cone_margin(cone: Record, values: Floats) -> float:
+    """Relative margin of a line from the edge of its cone."""
+    leg_values, place = values[cone["leg"]], cone["place"]
+    angle = angle_between(vec(cone["axis"]), (leg_values[place], leg_values[place + 1], leg_values[place + 2]))
+    return relative_margin(cone["half_angle"] - angle, cone["half_angle"])
 
 
 @routine
@@ -37,14 +65,11 @@ def least_margin(limited: Records, cones: Records, values: Floats) -> tuple[floa
     """
     least, binding = math.inf, -1
     for i in range(limited.shape[0]):
-        lo, hi, value = limited[i]["lo"], limited[i]["hi"], deviation(limited[i], values)
-        below, above = relative_margin(value - lo, 0.5 * (hi - lo)), relative_margin(hi - value, 0.5 * (hi - lo))
+        below, above = range_margins(limited[i], values)
         if min(below, above) < least - KEPT:
             least, binding = min(below, above), 2 * i + (1 if above < below - KEPT else 0)
     for i in range(cones.shape[0]):
-        leg_values, place = values[cones[i]["leg"]], cones[i]["place"]
-        angle = angle_between(vec(cones[i]["axis"]), (leg_values[place], leg_values[place + 1], leg_values[place + 2]))
-        margin = relative_margin(cones[i]["half_angle"] - angle, cones[i]["half_angle"])
+        margin = cone_margin(cones[i], values)
         if margin < least - KEPT:
             least, binding = margin, 2 * limited.shape[0] + i
     return least, binding
@@ -58,12 +83,18 @@ def feasibility(
     sides: Floats,
     margins: Floats,
     bindings: Ints,
+    completed: Floats,
 ) -> None:
-    """Fill the least margin of each target (n, 4, 4) [length], and the index of its limit.
+    """Fill the least margin of each target (n, 4, 4) [length], the index of its limit, and what it was measured at.
 
     After the limits of `least_margin` come two more for each leg: first for all legs, that the leg reaches (minus the
     gap, as a share of the rod); then for all legs, that it closes (minus the largest constraint, or the angle by which
     crossed hinges miss their direction). NaN and -1 if a target is no pose.
+
+    Parameters
+    ----------
+    completed : (n, 12 + legs): the rows of the pose that a target was completed to [length], then the coordinates of
+        implicit joints [L or rad]; without rows, none are written.
     """
     table = open_table(machine)
     scratch, legs, task, limited, cones = new_completion(table), table.legs, table.task, table.limited, table.cones
@@ -99,13 +130,36 @@ def feasibility(
                     margin = reach_margin(legs[k], scratch.values[k])
                     if margin < -NEARLY_CLOSED and margin < least - KEPT:
                         least, binding = margin, n_limits + k
-                    margin = -max(
-                        largest_constraint(legs, scratch.rows, k), largest_pointing_error(legs[k], scratch.values[k])
-                    )
+                    margin = closing_margin(legs, k, scratch.rows, scratch.values)
                     if margin < -NEARLY_CLOSED and margin < least - KEPT:
                         least, binding = margin, n_limits + n_legs + k
             if parts == 1 or least > margins[row]:
                 margins[row], bindings[row] = least, binding
+                if completed.shape[0] > 0:
+                    put_completed(table, scratch, completed[row])
+
+
+@routine
+def put_completed(table: Table, scratch: Completion, to: Floats) -> None:
+    """Fill the pose and the coordinates at which legs were placed last."""
+    for i in range(3):
+        for j in range(4):
+            to[4 * i + j] = scratch.frames[FROM_BASE, i, j] * (table.task[0]["length"] if j == 3 else 1.0)
+    for k in range(table.legs.shape[0]):
+        to[12 + k] = scratch.values[k, Q_PROXIMAL] if table.legs[k]["kind"] == REDUNDANT else 0.0
+
+
+@search
+def read_targets(machine: int, targets: Floats, begins: Floats, completed: Floats) -> None:
+    """Fill the rows of the poses [length] of targets that set all of a pose; NaN if a target is none."""
+    table = open_table(machine)
+    task, pose = table.task[0], np.zeros((4, 4))
+    for row in range(targets.shape[0]):
+        is_pose = read_target(targets[row], begins[0], task, pose)
+        for i in range(3):
+            for j in range(4):
+                part = pose[i, j] * (task["length"] if j == 3 else 1.0)
+                completed[row, 4 * i + j] = part if is_pose else math.nan
 
 
 @routine
@@ -133,6 +187,12 @@ def interpolate_target(target: Floats, start: Floats, share: float, task: Record
 def reach_margin(leg: Record, values: Floats) -> float:
     """Minus the gap that a rod leaves where its proximal joint does not reach, as a share of its length."""
     return -abs(values[SLIDE]) / leg["length"] if leg["has_proximal"] == 1 else 0.0
+
+
+@routine
+def closing_margin(legs: Records, k: int, rows: Floats, values: Floats) -> float:
+    """Minus the largest constraint of a leg, or the angle by which its crossed hinges miss their direction."""
+    return -max(largest_constraint(legs, rows, k), largest_pointing_error(legs[k], values[k]))
 
 
 @routine

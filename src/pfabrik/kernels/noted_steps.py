@@ -1,0 +1,219 @@
+"""Expressions of numbers at many rows, and their slopes: steps of arithmetic, a block of rows at a time.
+
+A step takes values out of rows of a block, and writes its result into one. Slopes are carried forward along the same
+steps: d f(x, y) = f_x dx + f_y dy, for all columns of what the inputs depend on.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ._jit import routine, search
+
+# Of a and b: a + b, a - b, a * b, a / b, the larger, the smaller, |a|, |a| with the sign of b, the angle of (b, a), a
+# to the power b; of a: its root, sine, cosine, tangent, the whole number below it.
+ADD, SUBTRACT, MULTIPLY, DIVIDE, LARGER, SMALLER, MAGNITUDE, COPYSIGN, ANGLE, POWER = range(10)
+ROOT, SINE, COSINE, TANGENT, FLOOR = range(10, 15)
+# 1 if true, else 0: a < b, a <= b, a == b. Of a, b and c: b if a is 1, else c.
+BELOW, AT_MOST, EQUAL, CHOOSE = range(15, 19)
+
+BLOCK = 64
+"""Rows of a block."""
+
+
+@routine
+def put_values(operation: int, a: Floats, b: Floats, c: Floats, n: int, out: Floats) -> None:
+    """Fill the result of a step at n rows."""
+    if operation == MULTIPLY:
+        for i in range(n):
+            out[i] = a[i] * b[i]
+    elif operation == ADD:
+        for i in range(n):
+            out[i] = a[i] + b[i]
+    elif operation == SUBTRACT:
+        for i in range(n):
+            out[i] = a[i] - b[i]
+    elif operation == DIVIDE:
+        for i in range(n):
+            out[i] = a[i] / b[i]
+    elif operation == CHOOSE:
+        for i in range(n):
+            first, second = b[i], c[i]
+            out[i] = first if a[i] == 1.0 else second
+    elif operation == BELOW:
+        for i in range(n):
+            out[i] = 1.0 if a[i] < b[i] else 0.0
+    elif operation == AT_MOST:
+        for i in range(n):
+            out[i] = 1.0 if a[i] <= b[i] else 0.0
+    elif operation == EQUAL:
+        for i in range(n):
+            out[i] = 1.0 if a[i] == b[i] else 0.0
+    elif operation == LARGER:
+        for i in range(n):
+            first, second = a[i], b[i]
+            out[i] = first if first >= second else second
+    elif operation == SMALLER:
+        for i in range(n):
+            first, second = a[i], b[i]
+            out[i] = first if first <= second else second
+    elif operation == MAGNITUDE:
+        for i in range(n):
+            out[i] = abs(a[i])
+    elif operation == ROOT:
+        for i in range(n):
+            out[i] = math.sqrt(a[i])
+    else:
+        put_functions(operation, a, b, n, out)
+
+
+@routine
+def put_functions(operation: int, a: Floats, b: Floats, n: int, out: Floats) -> None:
+    """Fill the result of a step that the library of C computes."""
+    if operation == ANGLE:
+        for i in range(n):
+            out[i] = math.atan2(a[i], b[i])
+    elif operation == COPYSIGN:
+        for i in range(n):
+            out[i] = math.copysign(a[i], b[i])
+    elif operation == SINE:
+        for i in range(n):
+            out[i] = math.sin(a[i])
+    elif operation == COSINE:
+        for i in range(n):
+            out[i] = math.cos(a[i])
+    elif operation == TANGENT:
+        for i in range(n):
+            out[i] = math.tan(a[i])
+    elif operation == FLOOR:
+        for i in range(n):
+            out[i] = float(math.floor(a[i]))
+    elif operation == POWER:
+        for i in range(n):
+            out[i] = a[i] ** b[i]
+
+
+@routine
+def put_partials(operation: int, a: Floats, b: Floats, value: Floats, n: int, x: Floats, y: Floats) -> None:
+    """Fill the derivatives of a step by its operands, of a choice by what is chosen from; 0 of a root or angle of 0."""
+    for i in range(n):
+        x[i], y[i] = 0.0, 0.0
+    if operation == MULTIPLY:
+        for i in range(n):
+            x[i], y[i] = b[i], a[i]
+    elif operation in (ADD, SUBTRACT):
+        sign = 1.0 if operation == ADD else -1.0
+        for i in range(n):
+            x[i], y[i] = 1.0, sign
+    elif operation == DIVIDE:
+        for i in range(n):
+            x[i] = 1.0 / b[i]
+            y[i] = -value[i] / b[i]
+    elif operation == CHOOSE:
+        for i in range(n):
+            x[i] = a[i]
+            y[i] = 1.0 - a[i]
+    elif operation in (LARGER, SMALLER):
+        for i in range(n):
+            x[i] = 1.0 if value[i] == a[i] else 0.0
+            y[i] = 1.0 - x[i]
+    elif operation == MAGNITUDE:
+        for i in range(n):
+            x[i] = math.copysign(1.0, a[i])
+    elif operation == COPYSIGN:
+        for i in range(n):
+            x[i] = math.copysign(1.0, a[i]) * math.copysign(1.0, b[i])
+    elif operation == ROOT:
+        for i in range(n):
+            x[i] = 0.5 / value[i] if value[i] > 0.0 else 0.0
+    elif operation == ANGLE:
+        for i in range(n):
+            square = a[i] * a[i] + b[i] * b[i]
+            over = 1.0 / square if square > 0.0 else 0.0
+            x[i], y[i] = b[i] * over, -a[i] * over
+    elif operation == SINE:
+        for i in range(n):
+            x[i] = math.cos(a[i])
+    elif operation == COSINE:
+        for i in range(n):
+            x[i] = -math.sin(a[i])
+    elif operation == TANGENT:
+        for i in range(n):
+            x[i] = 1.0 + value[i] * value[i]
+    elif operation == POWER:
+        for i in range(n):
+            x[i] = b[i] * a[i] ** (b[i] - 1.0) if b[i] != 0.0 else 0.0
+            y[i] = value[i] * math.log(a[i]) if a[i] > 0.0 else 0.0
+
+
+@routine
+def add_slopes(partial: Floats, x: Floats, first: int, last: int, n: int, out: Floats) -> None:
+    """Add a derivative times the slopes of an operand in its columns."""
+    for column in range(first, last):
+        own, to = x[column], out[column]
+        for i in range(n):
+            to[i] += partial[i] * own[i]
+
+
+@search
+def evaluate(
+    steps: Ints,
+    hulls: Ints,
+    outputs: Ints,
+    n_values: int,
+    uniform: Floats,
+    varying: Floats,
+    tangents: Floats,
+    out: Floats,
+    slopes: Floats,
+) -> None:
+    """Fill expressions and their slopes.
+
+    Parameters
+    ----------
+    steps : (k, 5): operation, places of its operands and of its result among the values.
+    hulls : (inputs + k, 6): the columns from and to which an input, or a step's result, has slopes; then those of the
+        two operands by which the step has derivatives.
+    outputs : (r, 3): the place of each expression among the values, the columns from and to which it has slopes.
+    n_values : how many places there are.
+    uniform, varying : the inputs: those that are the same at all rows, (u,), then the others, (n, v).
+    tangents : slopes of the inputs (u + v, c).
+    out, slopes : (n, r), (n, r, c).
+    """
+    n_uniform, n_columns, n_inputs = uniform.shape[0], tangents.shape[1], tangents.shape[0]
+    V, P = np.zeros((n_values, BLOCK)), np.zeros((2, BLOCK))
+    D = np.zeros((n_values * n_columns, BLOCK)).reshape(n_values, n_columns, BLOCK)
+    for start in range(0, out.shape[0], BLOCK):
+        n = min(BLOCK, out.shape[0] - start)
+        for k in range(n_uniform):
+            for i in range(n):
+                V[k, i] = uniform[k]
+        for k in range(n_inputs - n_uniform):
+            for i in range(n):
+                V[n_uniform + k, i] = varying[start + i, k]
+        for k in range(n_inputs if n_columns > 0 else 0):
+            for column in range(hulls[k, 0], hulls[k, 1]):
+                for i in range(n):
+                    D[k, column, i] = tangents[k, column]
+        for k in range(steps.shape[0]):
+            operation, a, b, c, to = steps[k, 0], steps[k, 1], steps[k, 2], steps[k, 3], steps[k, 4]
+            put_values(operation, V[a], V[b], V[c], n, V[to])
+            hull = hulls[n_inputs + k]
+            if n_columns > 0 and hull[0] < hull[1]:
+                put_partials(operation, V[a], V[b], V[to], n, P[0], P[1])
+                for column in range(hull[0], hull[1]):
+                    for i in range(n):
+                        D[to, column, i] = 0.0
+                add_slopes(P[0], D[b if operation == CHOOSE else a], hull[2], hull[3], n, D[to])
+                add_slopes(P[1], D[c if operation == CHOOSE else b], hull[4], hull[5], n, D[to])
+        for r in range(outputs.shape[0]):
+            at, first, last = outputs[r, 0], outputs[r, 1], outputs[r, 2]
+            for i in range(n):
+                out[start + i, r] = V[at, i]
+            for column in range(n_columns):
+                is_sloped = first <= column and column < last
+                for i in range(n):
+                    slopes[start + i, r, column] = D[at, column, i] if is_sloped else 0.0

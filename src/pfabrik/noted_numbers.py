@@ -1,0 +1,352 @@
+"""Formulas: numbers that note how they were computed, so that it can be computed again, with slopes, compiled.
+
+A `Number` is a float to all code that reads it, and keeps what it was computed from. Code that asks something of one,
+`if length > 0`, makes a *decision*: with other inputs the expressions hold as long as all decisions come out alike.
+What is chosen by `kernels.vectors.where` instead is part of the expression. Numbers that are `open` differ between the
+rows that an expression is evaluated at: nothing can be decided by them.
+"""
+
+from __future__ import annotations
+
+import builtins
+import math
+import operator
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from types import FunctionType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from .arrays import Floats, Mask
+from .kernels import noted_steps as K
+
+
+class Trace:
+    """What numbers were computed from.
+
+    Attributes
+    ----------
+    steps : operation and operands of every number, by its place; an input has neither.
+    decisions : numbers that were asked if they are not 0, by place, with what was answered.
+    """
+
+    def __init__(self) -> None:
+        self.steps: list[tuple[int, tuple[Number | float, ...]]] = []
+        self.decisions: dict[int, tuple[Number, bool]] = {}
+        self._made: dict[tuple[Any, ...], Number] = {}
+
+    def input(self, value: float, is_open: bool = False) -> Number:
+        """An input, at the value that it has while this is noted."""
+        self.steps.append((INPUT, ()))
+        return Number(value, self, len(self.steps) - 1, is_open)
+
+    def number(self, operation: int, *operands: Number | float) -> Number | float:
+        """The result of a step, the same number each time."""
+        key = operation, *(each.place if isinstance(each, Number) else float(each).hex() for each in operands)
+        if key not in self._made:
+            value = _value(operation, *map(float, operands))
+            self.steps.append((operation, operands))
+            is_open = any(isinstance(each, Number) and each.is_open for each in operands)
+            self._made[key] = Number(value, self, len(self.steps) - 1, is_open)
+        return self._made[key]
+
+
+INPUT = -1
+
+
+class Number(float):
+    """A number with its place in a trace; `is_open` where it differs between rows."""
+
+    __slots__ = ("is_open", "place", "trace")
+
+    trace: Trace
+    place: int
+    is_open: bool
+
+    def __new__(cls, value: float, trace: Trace, place: int, is_open: bool) -> Number:
+        made = float.__new__(cls, value)
+        made.trace, made.place, made.is_open = trace, place, is_open
+        return made
+
+    def __bool__(self) -> bool:
+        if self.is_open:
+            raise TypeError("a decision by a number that differs between rows")
+        answer = float(self) != 0.0
+        self.trace.decisions[self.place] = self, answer
+        return answer
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return float, (float(self),)
+
+    __hash__ = float.__hash__
+
+    def __add__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else _step(K.ADD, self, other)
+
+    def __sub__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else _step(K.SUBTRACT, self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return _step(K.SUBTRACT, other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return 0.0 if _is(other, 0.0) else self if _is(other, 1.0) else _step(K.MULTIPLY, self, other)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self if _is(other, 1.0) else _step(K.DIVIDE, self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return 0.0 if _is(other, 0.0) else _step(K.DIVIDE, other, self)
+
+    def __pow__(self, other: Any, modulo: None = None) -> Any:
+        return self * self if _is(other, 2.0) else _step(K.POWER, self, other)
+
+    def __rpow__(self, other: Any, modulo: None = None) -> Any:
+        return _step(K.POWER, other, self)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> Any:
+        return self * -1.0
+
+    def __pos__(self) -> Any:
+        return self
+
+    def __abs__(self) -> Any:
+        return _step(K.MAGNITUDE, self)
+
+    def __lt__(self, other: Any) -> Any:
+        return _step(K.BELOW, self, other)
+
+    def __le__(self, other: Any) -> Any:
+        return _step(K.AT_MOST, self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return _step(K.BELOW, other, self)
+
+    def __ge__(self, other: Any) -> Any:
+        return _step(K.AT_MOST, other, self)
+
+    def __eq__(self, other: Any) -> Any:
+        return _step(K.EQUAL, self, other)
+
+    def __ne__(self, other: Any) -> Any:
+        return 1.0 - self.__eq__(other) if isinstance(other, int | float) else NotImplemented
+
+
+def _is(value: Any, constant: float) -> bool:
+    return not isinstance(value, Number) and isinstance(value, int | float) and value == constant
+
+
+def _step(operation: int, *operands: Any) -> Any:
+    """A step, or what Python answers where an operand is no number."""
+    if not all(isinstance(each, int | float) for each in operands):
+        return NotImplemented
+    trace = next(each.trace for each in operands if isinstance(each, Number))
+    return trace.number(operation, *operands)
+
+
+_PLAIN: dict[int, Callable[..., Any]] = {
+    K.ADD: operator.add,
+    K.SUBTRACT: operator.sub,
+    K.MULTIPLY: operator.mul,
+    K.DIVIDE: operator.truediv,
+    K.LARGER: max,
+    K.SMALLER: min,
+    K.MAGNITUDE: abs,
+    K.COPYSIGN: math.copysign,
+    K.ANGLE: math.atan2,
+    K.POWER: math.pow,
+    K.ROOT: math.sqrt,
+    K.SINE: math.sin,
+    K.COSINE: math.cos,
+    K.TANGENT: math.tan,
+    K.FLOOR: math.floor,
+    K.BELOW: operator.lt,
+    K.AT_MOST: operator.le,
+    K.EQUAL: operator.eq,
+    K.CHOOSE: lambda condition, first, second: first if condition == 1.0 else second,
+}
+
+
+def _value(operation: int, *operands: float) -> float:
+    """The result of a step; NaN where there is none: an expression only has one at other values of its inputs."""
+    try:
+        return float(_PLAIN[operation](*operands))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+def lifted(operation: int) -> Callable[..., Any]:
+    """A function of floats, for numbers that note how they were computed too."""
+
+    def function(*operands: Any) -> Any:
+        is_noted = any(isinstance(each, Number) for each in operands)
+        return _step(operation, *operands) if is_noted else _PLAIN[operation](*operands)
+
+    return function
+
+
+sqrt, sin, cos, tan, atan2, power, copysign, floor = map(
+    lifted, (K.ROOT, K.SINE, K.COSINE, K.TANGENT, K.ANGLE, K.POWER, K.COPYSIGN, K.FLOOR)
+)
+
+
+def radians(angle: Any) -> Any:
+    """`math.radians`, to the last bit."""
+    return angle * (math.pi / 180.0)
+
+
+def _fold(operation: int, *numbers: Any) -> Any:
+    """The largest or the smallest number."""
+    first, *rest = numbers
+    for each in rest:
+        first = lifted(operation)(first, each)
+    return first
+
+
+def where(condition: Any, a: Any, b: Any) -> Any:
+    """`kernels.vectors.where`."""
+    if isinstance(condition, Number):
+        return a if a is b else _step(K.CHOOSE, condition, a, b)
+    return a if condition else b
+
+
+_MATH = SimpleNamespace(
+    sqrt=sqrt, sin=sin, cos=cos, tan=tan, atan2=atan2, copysign=copysign, floor=floor,
+    pi=math.pi, inf=math.inf, nan=math.nan,
+)  # fmt: skip
+_PARTS = {
+    "math": _MATH,
+    "where": where,
+    "max": partial(_fold, K.LARGER),
+    "min": partial(_fold, K.SMALLER),
+    "float": lambda value: value,
+}
+
+
+@cache
+def of_numbers(function: Any) -> Any:
+    """A part of kernels that computes with numbers: the same text, with the functions that it calls like it."""
+    parts: dict[str, Any] = {"__builtins__": builtins} | _PARTS
+    for name in set(function.__code__.co_names).intersection(function.__globals__).difference(_PARTS):
+        part = function.__globals__[name]
+        parts[name] = of_numbers(part) if isinstance(part, FunctionType) else part
+    return FunctionType(function.__code__, parts, function.__name__)
+
+
+class Formulas:
+    """Numbers of a trace as steps for `kernels.noted_steps.evaluate`.
+
+    Parameters
+    ----------
+    outputs : numbers, or constants.
+    inputs : the numbers that are given, those that are the same at all rows first; what they were computed from counts
+        no more.
+    n_uniform : how many are the same at all rows.
+    depends : mask (inputs, columns) of the columns in which inputs have slopes.
+    """
+
+    def __init__(self, outputs: Sequence[Any], inputs: Sequence[Any], n_uniform: int, depends: Mask) -> None:
+        given = {number.place: k for k, number in enumerate(inputs)}
+        order = _ordered(outputs, given)
+        parts = [each for number in order for each in number.trace.steps[number.place][1]]
+        constants = list(dict.fromkeys(_name(each) for each in [*outputs, *parts] if not isinstance(each, Number)))
+        self._constants = np.array([float.fromhex(str(name)) for name in constants])
+        self._n_uniform = n_uniform
+        shift = [k if k < n_uniform else k + len(constants) for k in range(len(inputs))]
+        at: dict[int | str, int] = {name: n_uniform + k for k, name in enumerate(constants)}
+        hulls = [NOWHERE * 3] * (len(inputs) + len(constants))
+        hull_of: dict[int | str, tuple[int, int]] = dict.fromkeys(constants, NOWHERE)
+        for place, k in given.items():
+            at[place], hull_of[place] = shift[k], _hull(np.flatnonzero(depends[k]).tolist())
+            hulls[shift[k]] = (*hull_of[place], *NOWHERE, *NOWHERE)
+        last = {_name(each): k for k, number in enumerate(order) for each in number.trace.steps[number.place][1]}
+        last |= {_name(each): len(order) for each in outputs}
+        free: list[int] = []
+        steps, n_inputs = [], len(hulls)
+        n_values = n_inputs
+        for k, number in enumerate(order):
+            operation, operands = number.trace.steps[number.place]
+            names = [_name(each) for each in operands]
+            to = free.pop() if free else n_values
+            n_values = max(n_values, to + 1)
+            steps.append((operation, *([at[name] for name in names] + [0, 0])[:3], to))
+            x, y = ([hull_of[name] for name in _with_slopes(operation, names)] + [NOWHERE, NOWHERE])[:2]
+            at[number.place], hull_of[number.place] = to, _union(x, y)
+            hulls.append((*_union(x, y), *x, *y))
+            free += [at[name] for name in dict.fromkeys(names) if last[name] == k and at[name] >= n_inputs]
+        self._steps, self._hulls = np.array(steps, np.int64).reshape(-1, 5), np.array(hulls, np.int64).reshape(-1, 6)
+        self._outputs = np.array([(at[name], *hull_of[name]) for name in map(_name, outputs)], np.int64).reshape(-1, 3)
+        self._n_values = n_values
+
+    def __call__(self, uniform: Floats, varying: Floats, tangents: Floats) -> tuple[Floats, Floats]:
+        """Values (n, r) of the expressions, and their slopes (n, r, c).
+
+        Parameters
+        ----------
+        uniform, varying : the inputs: those that are the same at all rows, then the others (n, v).
+        tangents : slopes of the inputs in all columns (inputs, c); without columns, none are computed.
+        """
+        n, n_columns, m = len(varying), tangents.shape[1], self._n_uniform
+        given = np.concatenate([uniform, self._constants])
+        own = np.concatenate([tangents[:m], np.zeros((len(self._constants), n_columns)), tangents[m:]])
+        values, slopes = np.empty((n, len(self._outputs))), np.empty((n, len(self._outputs), n_columns))
+        K.evaluate(self._steps, self._hulls, self._outputs, self._n_values, given, varying, own, values, slopes)
+        return values, slopes
+
+
+NOWHERE = (0, 0)
+"""The columns of a number without slopes."""
+
+_STEPS = (K.FLOOR, K.BELOW, K.AT_MOST, K.EQUAL)
+"""Operations whose results are constant but for jumps."""
+
+
+def _name(number: Number | float) -> int | str:
+    """A number's place, or a constant's digits, which tell -0 from 0."""
+    return number.place if isinstance(number, Number) else float(number).hex()
+
+
+def uniform_parts(outputs: Sequence[Any]) -> list[Number]:
+    """The numbers that are the same at all rows and that those which differ are computed from, or that are outputs."""
+    found: dict[int, Number] = {}
+    seen: set[int] = set()
+    waiting = [each for each in outputs if isinstance(each, Number)]
+    while waiting:
+        number = waiting.pop()
+        if number.place in seen:
+            continue
+        seen.add(number.place)
+        if number.is_open:
+            waiting += [each for each in number.trace.steps[number.place][1] if isinstance(each, Number)]
+        else:
+            found[number.place] = number
+    return [found[place] for place in sorted(found)]
+
+
+def _ordered(outputs: Sequence[Any], given: dict[int, int]) -> list[Number]:
+    """All numbers that outputs are computed from and that are not given, in the order of their places."""
+    found: dict[int, Number] = {}
+    waiting = [each for each in outputs if isinstance(each, Number)]
+    while waiting:
+        number = waiting.pop()
+        if number.place not in given and number.place not in found:
+            found[number.place] = number
+            waiting += [each for each in number.trace.steps[number.place][1] if isinstance(each, Number)]
+    return [found[place] for place in sorted(found)]
+
+
+def _with_slopes(operation: int, names: list[int | str]) -> list[int | str]:
+    """The operands, at most two, by which a step has derivatives."""
+    return [] if operation in _STEPS else names[1:] if operation == K.CHOOSE else names
+
+
+def _hull(columns: list[int]) -> tuple[int, int]:
+    return (columns[0], columns[-1] + 1) if columns else NOWHERE
+
+
+def _union(x: tuple[int, int], y: tuple[int, int]) -> tuple[int, int]:
+    spans = [span for span in (x, y) if span != NOWHERE]
+    return (min(first for first, _ in spans), max(last for _, last in spans)) if spans else NOWHERE

@@ -1,0 +1,108 @@
+"""The legs of a table at a pose, as expressions: routines of `kernels.legs`, run on numbers that note their steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..decomposition.leg_table import LegTable
+from ..decomposition.recording import WORD
+from ..kernels import tape, vectors
+from ..kernels.legs import answer, feasibility, frames
+from ..kernels.legs import records as K
+from ..kernels.search_constants import NEARLY_CLOSED
+from ..noted_numbers import Number, Trace, of_numbers, where
+
+
+class PlacedLegs:
+    """The legs of a table at a pose, as expressions.
+
+    Attributes
+    ----------
+    pose, q : numbers that are given: the rows of the pose [length], the coordinates of implicit joints [L or rad].
+    implicit : the legs of these.
+    twist : numbers that are zero, by which expressions have slopes by the pose: velocity [length], angular velocity.
+    margins, limits : the margins that can bind, and their limits.
+    reach : the margins of the reach of legs among them.
+    actuators : values of the actuators [length or rad].
+    rows : the constraints [L or rad].
+    """
+
+    def __init__(self, trace: Trace, table: LegTable, words: list[Any], length: Number) -> None:
+        recording: Any = table.recording
+        records = {name: _records(getattr(table, name), words, start) for name, _, _, start in recording.layouts}
+        legs, task = records["legs"], records["task"][0]
+        n = len(legs)
+        home = [[float(i == j) for j in range(3)] + [float(task["reference"][i]) * float(length)] for i in range(3)]
+        self.pose = [trace.input(x, is_open=True) for row in home for x in row]
+        self.twist = [trace.input(0.0, is_open=True) for _ in range(6)]
+        self.implicit = [k for k in range(n) if legs[k]["implicit"] == 1 and legs[k]["mirror_of"] < 0]
+        self.q = [trace.input(float(legs[k]["side"]), is_open=True) for k in self.implicit]
+        sides = [leg["side"] for leg in legs]
+        for k, q in zip(self.implicit, self.q, strict=True):
+            sides[k] = q
+        placed = frames.new_frames(table.legs).astype(object)
+        values, lines, rows = (np.zeros(shape).astype(object) for shape in ((n, K.N_VALUES), (n, 3), task["rows"]))
+        of_numbers(frames.set_frames)(self._moved(length), task, placed)
+        of_numbers(answer.place_legs)(legs, placed, sides, values, lines)
+        of_numbers(answer.put_leg_rows)(legs, placed, values, lines, rows)
+        measured = zip(table.measured_limits, _margins(records, values, rows), strict=True)
+        binding = [(limit, margin) for limit, margin in measured if isinstance(margin, Number) or margin < math.inf]
+        self.limits, self.margins = tuple(limit for limit, _ in binding), [margin for _, margin in binding]
+        self.reach = [m for m, (_, bound) in zip(self.margins, self.limits, strict=True) if bound == "reach"]
+        self.rows = rows.tolist()
+        deviation = of_numbers(answer.deviation)
+        driven = sorted(records["driven"], key=lambda each: each["column"])
+        self.actuators = [each["home"] + deviation(each, values) * each["unit"] for each in driven]
+
+    def _moved(self, length: Number) -> Any:
+        """The pose [L], moved by the twist."""
+        pose, cross = np.array(self.pose, object).reshape(3, 4), of_numbers(vectors.cross)
+        moved = np.zeros((4, 4)).astype(object)
+        for j in range(3):
+            across = cross(tuple(self.twist[3:]), tuple(pose[:, j]))
+            moved[:3, j] = [x + dx for x, dx in zip(pose[:, j], across, strict=True)]
+        moved[:3, 3] = [(x + dx) / length for x, dx in zip(pose[:, 3], self.twist[:3], strict=True)]
+        return moved
+
+
+def _margins(records: dict[str, Any], values: Any, rows: Any) -> Iterator[Any]:
+    """Margins in the order of `LegTable.measured_limits`; infinite where a leg reaches, and where it closes."""
+    legs = records["legs"]
+    for coordinate in records["limited"]:
+        yield from of_numbers(feasibility.range_margins)(coordinate, values)
+    for cone in records["cones"]:
+        yield of_numbers(feasibility.cone_margin)(cone, values)
+    reach = [of_numbers(feasibility.reach_margin)(leg, own) for leg, own in zip(legs, values, strict=True)]
+    closed = [of_numbers(feasibility.closing_margin)(legs, k, rows, values) for k in range(len(legs))]
+    for margin in (*reach, *closed):
+        yield where(margin < -NEARLY_CLOSED, margin, math.inf)
+
+
+def replayed(table: LegTable, given: Sequence[Any]) -> list[Any]:
+    """The words of a table's records, with what the table's tape computes from given numbers."""
+    recording: Any = table.recording
+    values: list[Any] = [*given, *recording.values[len(given) :].tolist()]
+    perform = of_numbers(tape.perform)
+    for operation, a, b, out, _ in recording.steps.tolist():
+        perform(operation, values, a, b, out)
+    words: list[Any] = recording.words.tolist()
+    for word, place, size in recording.writes.tolist():
+        words[word : word + size] = values[place : place + size]
+    return words
+
+
+def _records(array: Any, words: list[Any], start: int) -> Any:
+    """An array of records as mappings whose numbers are among the words, from a place [bytes] on."""
+    made = np.empty(len(array), object)
+    for row, record in enumerate(array):
+        made[row] = {}
+        for field, (kind, offset, *_) in array.dtype.fields.items():
+            first, size = (start + row * array.dtype.itemsize + offset) // WORD, kind.itemsize // WORD
+            parts = np.empty(size, object)
+            parts[:] = np.ravel(record[field]).tolist() if kind.base.kind == "i" else words[first : first + size]
+            made[row][field] = parts.reshape(kind.shape) if kind.shape else parts[0]
+    return made
