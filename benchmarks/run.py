@@ -18,6 +18,7 @@ from calls import calls
 from chains import chain_rows
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
+from dynamics import dynamics
 from in_c import IS_THERE, InC
 from in_placo import peer
 from kept_apart import kept_apart
@@ -71,7 +72,8 @@ no passive joint and no limit; forward kinematics here closes all loops in all j
 Starts are answers up to 0.01 L and 0.01 rad away. Targets of chains are those of smooth bends, and the same 1.5 reaches
 farther out; the engine in joint coordinates answers a few of them. PlaCo is a C++ solver of tasks with closed loops
 (benchmarks/in_placo.py); its rows are left out where it is not installed, as are those of the viewer without headless
-Chromium. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes
+Chromium. Forces of a motion close the loops and share them among the actuators; Pinocchio (benchmarks/dynamics.py), as
+the baseline where it is installed, has the open tree's, with rates of all joints as given. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes
 are for all of it, not for a pose; first answers count the processor's time. The viewer's motions are timed in a page
 of Chromium, which draws without a graphics card, from the motion of the mouse until the answer has been drawn."""
 
@@ -208,6 +210,7 @@ def main() -> None:
         *proofs(runs),
         *kept_apart(runs),
         *maps(rng, min(runs, 5), 2000 if given.quick else 10_000),
+        *dynamics(np.random.default_rng(4), min(runs, 5), 500 if given.quick else 2000),
         *viewer(min(runs, 5)),
         *([] if given.quick else start_up(5)),
     ]

@@ -338,6 +338,43 @@ def test_motors_are_at_a_limit_of_torque_all_the_way(name: str, friction: tuple[
     assert {what for _, what in timed.held_back} == {"torque"}
 
 
+@pytest.mark.parametrize("name", ["servo_hexapod", "linear_delta", "five_bar"])
+def test_the_time_by_torque_is_that_of_toppra(name: str) -> None:
+    """Of rows that inverse dynamics gives at every place of its grid, beside limits of speed."""
+    pytest.importorskip("toppra", reason="no toppra here: its wheels are for Linux")
+    import toppra
+
+    machine = heavy(name, (0.05, 0.0))
+    track = pf.track(machine, followed(name, 2).pose)
+    most = 1.5 * np.abs(pf.inverse_dynamics(track, twists=np.zeros(3 if name == "five_bar" else 6)).actuators).max()
+    rubs = np.full(len(machine.actuator_names), 0.05)
+    curve = curve_of(track)
+    grid = curve.grid(600)
+    path = toppra.SplineInterpolator(curve.s, track.actuators[curve.steps], bc_type="natural")
+    reached = pf.solve_fk(heavy(name), path.eval(grid), start=track.q[curve.step_of(grid)])
+
+    class OfTorque(toppra.constraint.LinearConstraint):  # type: ignore[misc]
+        def compute_constraint_params(self, path: Any, gridpoints: Floats) -> tuple[Any, ...]:
+            rates, bends = path.evald(gridpoints), path.evaldd(gridpoints)
+            rest, push, speed = (
+                pf.inverse_dynamics(reached, twists=twists, accelerations=accelerations, at="actuators").actuators
+                for twists, accelerations in ((0 * rates, None), (0 * rates, rates), (rates, bends))
+            )
+            bound = np.concatenate([np.eye(len(rubs)), -np.eye(len(rubs))])
+            dry = rest + rubs * np.sign(rates)
+            return push - rest, speed - rest, dry, bound, np.full(2 * len(rubs), most), None, None
+
+    torque = OfTorque()
+    torque.identical = True
+    speeds = toppra.constraint.JointVelocityConstraint(np.array([[-1.0, 1.0]] * len(rubs)) * 8 * limits(name)["speed"])
+    algorithm = toppra.algorithm.TOPPRA([speeds, torque], path, gridpoints=grid)
+    _, pace, _ = algorithm.compute_parameterization(0.0, 0.0)
+    expected = (2.0 * np.diff(grid) / (pace[1:] + pace[:-1])).sum()
+    timed = pf.time_path(track, torque=most, speed=8 * limits(name)["speed"])
+    assert timed.duration == pytest.approx(expected, rel=2e-3)
+    assert sum(share for (_, what), share in timed.held_back.items() if what == "torque") > 0.9
+
+
 def test_a_mass_on_a_slide_moves_in_the_time_of_its_closed_form() -> None:
     track = slide()
     joint = dataclasses.replace(track.mechanism.joint("x"), max_torque=8.0, friction=(2.0, 0.0))
