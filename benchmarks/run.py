@@ -73,8 +73,9 @@ Starts are answers up to 0.01 L and 0.01 rad away. Targets of chains are those o
 farther out; the engine in joint coordinates answers a few of them. PlaCo is a C++ solver of tasks with closed loops
 (benchmarks/in_placo.py); its rows are left out where it is not installed, as are those of the viewer without headless
 Chromium. Forces of a motion close the loops and share them among the actuators; Pinocchio (benchmarks/dynamics.py), as
-the baseline where it is installed, has the open tree's, with rates of all joints as given. The platform with 40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes
-are for all of it, not for a pose; first answers count the processor's time. The viewer's motions are timed in a page
+the baseline where it is installed, has those of the open tree, with the rates of all joints as given. The platform with
+40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of it, not for a
+pose; first answers count the processor's time. The viewer's motions are timed in a page
 of Chromium, which draws without a graphics card, from the motion of the mouse until the answer has been drawn."""
 
 
