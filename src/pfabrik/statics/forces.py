@@ -21,6 +21,7 @@ from ..tolerances import TOLERANCES
 from .geometric_stiffness import geometric_stiffness
 from .joint_balance import (
     COMPONENTS,
+    ROWS_A_BLOCK,
     Balance,
     Pairs,
     about_centres,
@@ -244,13 +245,18 @@ class Forces(Printed):
 
     def _geometric_stiffness(self) -> tuple[Pairs, Floats]:
         """Motions, and the stiffness by these of the forces as the geometry changes, (n, d, d)."""
-        mechanism, q, (centres, reference) = self._mechanism, self._coordinates, self._places
-        first, (_, asked, loads, gravity, _) = JointRates(model_of(mechanism), q), self._question
+        mechanism, q, (_, asked, loads, gravity, _) = self._mechanism, self._coordinates, self._question
+        centres, reference = self._places
         arms = (centres - reference[:, None]) / mechanism.characteristic_length
-        pulling = acting(mechanism, q, asked.wrenches, loads, gravity)
-        return pairs_at(mechanism, first), geometric_stiffness(
-            mechanism, first, arms, self._balance.wrenches[..., 0], pulling
-        )
+        found = []
+        for start in range(0, max(len(q), 1), ROWS_A_BLOCK):
+            rows = slice(start, start + ROWS_A_BLOCK)
+            first, pulling = JointRates(model_of(mechanism), q[rows]), self._balance.wrenches[rows, ..., 0]
+            acting_on = acting(mechanism, q[rows], asked.wrenches[rows], loads, gravity)
+            of_load = geometric_stiffness(mechanism, first, arms[rows], pulling, acting_on)
+            found.append((*pairs_at(mechanism, first), of_load))
+        twists, rates, of_loads = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return Pairs(twists, rates), of_loads
 
     @cached_property
     def _is_unknown(self) -> Mask:
