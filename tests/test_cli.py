@@ -255,7 +255,7 @@ def test_what_is_printed_asks_for_no_joints_that_it_does_not_show(line: str, mon
 @pytest.mark.slow
 def test_a_mode_beyond_limits_says_which() -> None:
     _, below = pf.assembly_modes(FIVE_BAR, np.radians([-20, 20]))
-    assert as_sentence(below) == "exceeded: assembled, but beyond limits: min of p2; max of p4"
+    assert as_sentence(below) == "exceeded: assembled, but beyond limits: p2 min; p4 max"
 
 
 def test_a_list_that_was_cut_says_so() -> None:

@@ -11,7 +11,7 @@ import pytest
 from command import pfabrik, told, write_files
 
 GOLDEN = Path(__file__).with_name("golden")
-CHANCE = re.compile(r"^\d+ starts;.*|\s+\d+(?=\s+(nothing|min of|max of|cone of))", re.MULTILINE)
+CHANCE = re.compile(r"^\d+ starts;.*|\s+\d+(?=\s+(nothing|\S[^\n]* (min|max|cone))$)", re.MULTILINE)
 """What random starts decide: how many there were, and how many of them ended in a mode."""
 
 

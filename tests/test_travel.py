@@ -327,7 +327,7 @@ def test_a_turn_stops_where_struts_come_too_near() -> None:
     (reach,) = pf.travel(pf.solve_ik(mechanism, home), about=Z)
     assert reach.distance == pytest.approx(brentq(room, 1.2, 2.4, xtol=1e-13), abs=1e-7)
     assert {joint for joint, _ in stops(reach)} == {"BC1–BC4", "BC2–BC5", "BC3–BC6"}
-    assert "BC1–BC4 too near" in reach.why
+    assert "BC1–BC4 clearance" in reach.why
     (free,) = pf.travel(pf.solve_ik(mechanism.with_clearance(None), home), about=Z)
     assert free.distance > reach.distance + 0.1
 

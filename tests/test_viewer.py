@@ -293,10 +293,10 @@ def test_modes_are_listed_and_taken(shown: Callable[..., pf.Viewer]) -> None:
     viewer = shown("five_bar")
     viewer._searches.find_modes("working")
     until(lambda: len(viewer._stage.modes) == 4)
-    until(lambda: viewer._stage.panel._modes.options[2] == "2: beyond min of p4; max of p5")
+    until(lambda: viewer._stage.panel._modes.options[2] == "2: beyond p4 min; p5 max")
     viewer._take_mode(1)
     until(lambda: viewer.solution.status == pf.Status.EXCEEDED)
-    until(lambda: "min of p4" in viewer._stage.panel._status.content)
+    until(lambda: "p4 min" in viewer._stage.panel._status.content)
 
 
 def test_the_border_of_the_workspace_is_shown_on_request(shown: Callable[..., pf.Viewer]) -> None:

@@ -636,8 +636,8 @@ def test_a_border_is_where_links_are_as_near_as_they_may_be() -> None:
     groups = groups_of(found)
     of_links = [group for group in groups if group.is_links]
     assert {group.colour for group in of_links} <= set(LINK_COLOURS) and of_links
-    assert all("too near" in group.name and not group.is_motors for group in of_links)
-    assert "too near" in found._repr_html_()
+    assert all("clearance" in group.name and not group.is_motors for group in of_links)
+    assert "clearance" in found._repr_html_()
 
 
 @pytest.mark.slow

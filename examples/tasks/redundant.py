@@ -67,7 +67,7 @@ for lean in (70, 80, 90):
         q[machine.coordinate_names.index(name)] = np.radians(lean)
     each = pf.solve_ik(machine, target, start=q)
     (joint, bound), margin = min(pf.margins(each).items(), key=lambda item: item[1])
-    print(f"{lean} deg: parallel {pf.singularity(each).parallel:.3f}, {margin:.0%} left to the {bound} of {joint}")
+    print(f"{lean} deg: parallel {pf.singularity(each).parallel:.3f}, {margin:.0%} left to {joint} {bound}")
 
 # ## Along a path
 #

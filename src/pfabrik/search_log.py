@@ -8,6 +8,7 @@ from math import hypot
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
+from .answers.words import limit_name
 from .closure.attempts import Attempt
 from .closure.configurations import Configurations
 from .closure.link_distances import too_near
@@ -80,7 +81,7 @@ class SearchLog(Printed):
             lacking = f"{beyond * self.solution.mechanism.characteristic_length:.4g}"
             unit = self.solution.mechanism.length_unit
             return f"in the working mode of the start {joint} come too near at the target, by {lacking} {unit}"
-        return f"in the working mode of the start the target is beyond '{bound}' of {joint}, by {beyond:.4g}"
+        return f"in the working mode of the start the target is beyond {limit_name(joint, bound)}, by {beyond:.4g}"
 
 
 def search_log(

@@ -212,13 +212,13 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
 
 
 def short_names(limits: Iterable[ActiveLimit]) -> str:
-    """Active limits for a cell of a table: ``B3 max; C1 cone; BC1–BC3 too near``."""
+    """Active limits for a cell of a table: ``B3 max; C1 cone; BC1–BC3 clearance``."""
     return "; ".join(dict.fromkeys(limit_name(name_of(limit), limit.bound) for limit in limits))
 
 
 def limit_name(joint: str, bound: str) -> str:
-    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 too near``."""
-    return f"{joint} {'too near' if bound == 'clearance' else bound}".strip()
+    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 clearance``."""
+    return f"{joint} {bound}".strip()
 
 
 BOUND_NOTES = {
@@ -249,11 +249,11 @@ def is_exceeded(limit: ActiveLimit, mechanism: Mechanism) -> bool:
 
 
 def by_bound(limits: Iterable[ActiveLimit]) -> str:
-    """Limits grouped by bound: ``max of B1, B2; cone of C1``."""
+    """Limits grouped by bound: ``B1, B2 max; C1 cone``."""
     names: dict[str, dict[str, None]] = {}
     for limit in limits:
         names.setdefault(limit.bound, {})[name_of(limit)] = None
-    return "; ".join(f"{bound} of {', '.join(joints)}" for bound, joints in names.items())
+    return "; ".join(limit_name(", ".join(joints), bound) for bound, joints in names.items())
 
 
 def answer_table(answer: Answer, counts: dict[str, int]) -> ResultTable:

@@ -124,7 +124,7 @@ def _groups_of_links(region: Region) -> list[Group]:
         for pair, colour in zip(pairs[:n_alone], LINK_COLOURS, strict=False)
     ]
     if pairs[n_alone:]:
-        name = f"{len(pairs) - n_alone} other pairs too near"
+        name = f"{len(pairs) - n_alone} other clearances"
         groups.append(_group(region, name, LINK_COLOURS[-1], pairs[n_alone:], False))
     return [group._replace(is_links=True) for group in groups]
 
