@@ -11,10 +11,10 @@ import click
 import pfabrik as pf
 
 from .arguments import FINITE, MECH, Triple, load
-from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, require_picture, whole_file
 from .printing import json_option, print_result
 from .statics import Loads, carrying, weighed
-from .track import at_lines_of, check_pictures, limiting
+from .track import at_lines_of, limiting
 
 if TYPE_CHECKING:
     from ..dynamics.efforts import Efforts
@@ -56,7 +56,7 @@ def effort(
     """
     refuse_both_on_stdout(output, as_json)
     check_outputs([("-o", output), ("--plot", plot)], [path, Path(mech)], as_json=as_json)
-    check_pictures(plot, None)
+    require_picture(plot)
     mechanism = load(mech)
     limits = limits_of(mechanism)
     mechanism = weighed(mechanism, loads)
@@ -75,9 +75,8 @@ def effort(
         if handle is not None:
             write(found, handle)
     if plot is not None:
-        from ..view.save_picture import save_picture
-
-        save_picture(found.plot(), plot, dpi=150)
+        with picture(plot):
+            found.plot()
         click.echo(f"wrote {plot}", err=True)
     print_result(as_json, found, to_stderr=output == STANDARD)
     return int(any(found.reason))

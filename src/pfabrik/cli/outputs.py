@@ -19,6 +19,7 @@ import click
 from ..checks import require_ending
 from ..errors import InvalidArgument
 from ..extras import require
+from ..view.save_picture import PICTURES
 from ..whole_files import whole_path
 from .options import Decorator, together
 from .printing import note
@@ -92,6 +93,13 @@ def require_format(path: Path, known: Sequence[str]) -> None:
         values = [(each.opts[0], context.params.get(each.name or "")) for each in context.command.params]
         option = next(name for name, value in values if value == path or (isinstance(value, tuple) and path in value))
         raise click.UsageError(f"{option}{str(error).removeprefix(error.argument)}") from error
+
+
+def require_picture(path: Path | None, known: Sequence[str] = PICTURES) -> None:
+    """Stop before the work begins where a picture or film that is wanted cannot be written."""
+    if path is not None:
+        require_format(path, known)
+        require("pictures", "matplotlib", "plot")
 
 
 def is_same_file(path: Path, other: Path, standard: TextIO) -> bool:
@@ -267,10 +275,9 @@ def picture(path: Path, drawn: PictureOptions | None = None) -> Iterator[None]:
 
     It is cropped to what is drawn, unless a size is asked for.
     """
-    from ..view.save_picture import PICTURES, save_picture
+    from ..view.save_picture import save_picture
 
-    require_format(path, PICTURES)
-    require("pictures", "matplotlib", "plot")
+    require_picture(path)
     import matplotlib
     from matplotlib import pyplot
 

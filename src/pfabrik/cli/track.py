@@ -13,8 +13,8 @@ import click
 import pfabrik as pf
 
 from ..errors import counted, near_miss
-from ..extras import require
 from ..telling import telling
+from ..view.save_picture import FILMS
 from .arguments import FINITE, MECH, Triple, by_name, load, note_left_out, positive, projecting
 from .options import actuators, named_values, together
 from .outputs import (
@@ -26,7 +26,7 @@ from .outputs import (
     picture,
     pictured,
     refuse_both_on_stdout,
-    require_format,
+    require_picture,
     whole_file,
 )
 from .printing import json_option, note, print_json, print_result, print_text
@@ -94,7 +94,8 @@ def track(
         raise click.UsageError("MECH and PATH are both standard input: give a file for one of them")
     outputs = [("-o", output), ("--plot", picture_path), ("--animate", film_path)]
     check_outputs(outputs, [path, Path(mech)], as_json=as_json)
-    check_pictures(picture_path, film_path)
+    require_picture(picture_path)
+    require_picture(film_path, FILMS)
     if not is_drawn:
         note_no_picture("--plot", "--animate")
     mechanism = load(mech)
@@ -116,16 +117,6 @@ def track(
     if summary.worst():
         print_text(summary.worst(), to_stderr=True)
     return 0 if summary.is_well else 1
-
-
-def check_pictures(picture_path: Path | None, film_path: Path | None) -> None:
-    """Stop before the work begins where a picture or film cannot be written."""
-    from ..view.save_picture import FILMS, PICTURES
-
-    for path, endings in ((picture_path, PICTURES), (film_path, FILMS)):
-        if path is not None:
-            require_format(path, endings)
-            require("pictures", "matplotlib", "plot")
 
 
 def blocks_of(

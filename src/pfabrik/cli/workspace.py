@@ -14,15 +14,14 @@ import click
 import pfabrik as pf
 
 from ..cells import is_finite
-from ..extras import require
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, TargetOptions, Triple, answered, load, numbers_of, rpy_option, targeted
 from .options import completing, named_values, together
-from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured, require_format
+from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured, require_format, require_picture
 from .printing import json_option, note, print_result
 
 if TYPE_CHECKING:
-    from ..workspace.inscribed import Inscribed, Kind
+    from ..workspace.inscribed import Kind
 
 
 @dataclass(frozen=True)
@@ -127,11 +126,12 @@ def workspace(
     from ..workspace.saving import ENDINGS
 
     check_outputs([("-o", path) for path in outputs], [Path(mech)], as_json=as_json)
+    pictures = [path for path in outputs if path.suffix.lower() in PICTURES]
     for path in outputs:
         require_format(path, (*ENDINGS, *PICTURES))
-        if path.suffix.lower() in PICTURES:
-            require("pictures", "matplotlib", "plot")
-    if not any(path.suffix.lower() in PICTURES for path in outputs):
+    for path in pictures:
+        require_picture(path)
+    if not pictures:
         note_no_picture("a picture")
     mechanism = load(mech)
     others: dict[str, Any] = {"orientation": "any"} if any_orientation else {}
@@ -145,7 +145,12 @@ def workspace(
             raise
         raise click.UsageError(f"--largest{str(error).removeprefix(error.argument)}") from error
     for path in outputs:
-        write(found, path, shape, drawn)
+        if path in pictures:
+            with picture(path, drawn):
+                found.plot(shape=shape, **drawn.in_space)
+        else:
+            found.save(path)
+        click.echo(f"wrote {path}", err=True)
     print_result(as_json, found, {} if shape is None else {"largest": shape})
     return 0 if len(found.faces) else 1
 
@@ -241,13 +246,3 @@ def point(space: pf.Workspace, words: str) -> list[float]:
     """A point [length or rad] from words such as ``0,0,200``."""
     numbers = zip(numbers_of("--centre", words, [len(space.names)]), space.units, strict=True)
     return [math.radians(number) if unit == "rad" else number for number, unit in numbers]
-
-
-def write(space: pf.Workspace, path: Path, shape: Inscribed | None, drawn: PictureOptions) -> None:
-    """Write a mesh, or a picture, whole or not at all."""
-    if path.suffix.lower() in PICTURES:
-        with picture(path, drawn):
-            space.plot(shape=shape, **drawn.in_space)
-    else:
-        space.save(path)
-    click.echo(f"wrote {path}", err=True)

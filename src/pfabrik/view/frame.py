@@ -91,6 +91,13 @@ def machine_of(region: Region) -> Skeleton | None:
     return None if is_small else skeleton
 
 
+def machine_lines(region: Region) -> list[Floats]:
+    """The lines (n, 3) of the machine that a workspace is drawn with [length]; none where it is drawn alone."""
+    skeleton = machine_of(region)
+    lines = [] if skeleton is None else [*(line.outline for line in skeleton.parts), *skeleton.rails]
+    return [line for line in lines if len(line) > 1]
+
+
 class Box(NamedTuple):
     """The ends of a box in space.
 

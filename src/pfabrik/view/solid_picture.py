@@ -13,7 +13,7 @@ from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.workspace_table import for_people
 from .canvas import checked_size, draw_key, draw_title, draw_triad
 from .eye import Eye, View, eye_of, upright
-from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit, machine_of, title_of
+from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit, machine_lines, title_of
 from .looks import Look
 from .raster import counted_around
 from .slices import DASHED, draw_slice, edges_of, outline_of, plane_across
@@ -191,18 +191,7 @@ def _aspect(solid: SeenSolid) -> float:
 def _content(solid: SeenSolid) -> Floats:
     """Points (n, 2) of the picture: the box, and the machine."""
     corners = box_of(solid.region, solid.scale).corners
-    lines = [line for line, _ in _machine_lines(solid.region)]
-    return solid.eye.seen(np.concatenate([corners, *lines]))[:, :2]
-
-
-def _machine_lines(region: Region) -> list[tuple[Floats, float]]:
-    """Lines (n, 3) of the machine, and the width of each [points]."""
-    skeleton = machine_of(region)
-    if skeleton is None:
-        return []
-    return [
-        (line, MACHINE_WIDTH) for line in [*(line.outline for line in skeleton.parts), *skeleton.rails] if len(line) > 1
-    ]
+    return solid.eye.seen(np.concatenate([corners, *machine_lines(solid.region)]))[:, :2]
 
 
 def _draw_faces(axes: Any, solid: SeenSolid, colours: Colours) -> None:
@@ -215,7 +204,7 @@ def _draw_faces(axes: Any, solid: SeenSolid, colours: Colours) -> None:
 def _draw_solid(axes: Any, solid: SeenSolid, colours: Colours, shape: Inscribed | None, look: Look) -> None:
     """Draw a solid in its box, with the machine, a shape that fits in, and the names of its faces."""
     region, eye = solid.region, solid.eye
-    lines = _machine_lines(region)
+    lines = machine_lines(region)
     fit(axes, _content(solid))
     _draw_faces(axes, solid, colours)
     before, hidden = _draw_lines(axes, solid, lines, look)
@@ -225,7 +214,7 @@ def _draw_solid(axes: Any, solid: SeenSolid, colours: Colours, shape: Inscribed 
     if ((home >= region.bounds[0] * solid.scale) & (home <= region.bounds[1] * solid.scale)).all():
         _mark(axes, eye.seen(home)[:2], is_hidden=_is_hidden(solid))
         hidden |= solid.raster.mask_of(eye.seen(home[None]))
-    draw_box(axes, eye, box_of(region, solid.scale), look, [eye.seen(dense(line))[:, :2] for line, _ in lines])
+    draw_box(axes, eye, box_of(region, solid.scale), look, [eye.seen(dense(line))[:, :2] for line in lines])
     _name_faces(axes, solid, colours, before, hidden)
 
 
@@ -241,15 +230,15 @@ def _mark(axes: Any, place: Floats, *, is_hidden: bool) -> None:
         axes.plot(*place, "+", color=colour, markersize=size, markeredgewidth=width, zorder=order)
 
 
-def _draw_lines(axes: Any, solid: SeenSolid, lines: list[tuple[Floats, float]], look: Look) -> tuple[Mask, Mask]:
-    """Draw lines of space whole before the solid, dotted in it and behind; masks of the pixels of both."""
+def _draw_lines(axes: Any, solid: SeenSolid, lines: list[Floats], look: Look) -> tuple[Mask, Mask]:
+    """Draw lines of the machine whole before the solid, dotted in it and behind; masks of the pixels of both."""
     before, hidden = np.zeros((2, *solid.limit.shape), bool)
-    for line, width in lines:
+    for line in lines:
         points = dense(line)
         is_hidden = solid.hides(points)
         seen = np.where(is_hidden[:, None], np.nan, solid.eye.seen(points)[:, :2])
-        axes.plot(*seen.T, color=look.paper, linewidth=width + HALO, zorder=3.5, solid_capstyle="butt")
-        axes.plot(*seen.T, color=look.soft, linewidth=width, zorder=4, solid_capstyle="round")
+        axes.plot(*seen.T, color=look.paper, linewidth=MACHINE_WIDTH + HALO, zorder=3.5, solid_capstyle="butt")
+        axes.plot(*seen.T, color=look.soft, linewidth=MACHINE_WIDTH, zorder=4, solid_capstyle="round")
         before |= solid.raster.mask_of(seen)
         hidden |= _draw_hidden(axes, solid, np.where(is_hidden[:, None], points, np.nan))
     return before, hidden

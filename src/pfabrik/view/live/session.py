@@ -110,11 +110,6 @@ class Session:
                 self._past.pop()
                 self._gesture = None
 
-    @property
-    def can_undo(self) -> bool:
-        """True if there is a step that can be undone."""
-        return bool(self._past)
-
     def undo(self) -> None:
         """Go back to before the last gesture, if there was one."""
         if self._past:
