@@ -218,7 +218,7 @@ def _prefixed(text: str, program: Program) -> str:
     """C text with the prefix pfk in the names that it declares."""
     names = {*program.items, *re.findall(r"(?m)^#define (\w+)", text), "real", "integer", "arena", "checked"}
     names -= {"take"} if "take" not in program.items else set()
-    pattern = re.compile(rf"\b({'|'.join(sorted(map(re.escape, names), key=len, reverse=True))})\b")
+    own = {name: own_name(name) for name in names}
     pieces = re.split(r"(/\*.*?\*/|^#include[^\n]*|^#error[^\n]*)", text, flags=re.DOTALL | re.MULTILINE)
-    pieces[::2] = [pattern.sub(lambda match: own_name(match[1]), piece) for piece in pieces[::2]]
+    pieces[::2] = [re.sub(r"\w+", lambda word: own.get(word[0], word[0]), piece) for piece in pieces[::2]]
     return re.sub(r"\b(INFINITY|NAN)\b", r"(pfk_real)\1", "".join(pieces))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,7 @@ class File:
         value = self.tolerances.get((module.partition(".")[2], name), value)
         own, short = name.lstrip("_"), module.rpartition(".")[2].upper()
         plain = [own] if len(own) > 1 else []  # a variable may have a letter as its name
-        for wanted in (*plain, f"{own}_{short}", *(f"{own}_{short}_{k}" for k in range(2, 99))):
+        for wanted in chain(plain, [f"{own}_{short}"], (f"{own}_{short}_{k}" for k in range(2, 99))):
             if wanted not in RESERVED and (wanted not in self.items or same(self._constants.get(wanted), value)):
                 break
         if wanted not in self.items:

@@ -5,7 +5,22 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 from functools import cache
+from types import FunctionType
 from typing import Any
+
+from .values import tree_of
+
+STRANGE = (
+    ast.ListComp,
+    ast.SetComp,
+    ast.DictComp,
+    ast.GeneratorExp,
+    ast.Lambda,
+    ast.FunctionDef,
+    ast.NamedExpr,
+    ast.Starred,
+)
+"""What brings variables of its own, or sets them within an expression."""
 
 State = tuple[frozenset[str], frozenset[str]] | None
 """Names that are set on every way to a place, and on some way; None where no way leads."""
@@ -62,6 +77,7 @@ class Flow:
         self.arguments = {a.arg for a in function.args.args}
         self.constants = {name: value for name, value in constants.items() if name not in self.arguments}
         body = ast.Module(function.body, [])
+        self.strange = [part for part in ast.walk(body) if isinstance(part, STRANGE)]
         changed = [s.target for s in ast.walk(body) if isinstance(s, ast.AugAssign)]
         self.local = self.arguments | names_in(body, ast.Store)
         self.read = names_in(body, ast.Load).union(*map(names_in, changed))
@@ -170,6 +186,12 @@ class Flow:
         breaks, continues = self._jumps.pop()
         last = meet([end, *continues])
         return meet([*breaks, *([last] if ends else []), *([] if runs else [state])])
+
+
+@cache
+def flow_of(function: FunctionType) -> Flow:
+    """Facts about a function's variables, found once for all types that it is translated for."""
+    return Flow(tree_of(function), function.__globals__)
 
 
 def meet(states: list[State]) -> State:

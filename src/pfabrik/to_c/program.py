@@ -9,22 +9,10 @@ from typing import Any
 
 from .c_file import File
 from .expressions import ANNOTATED
-from .flow import Flow
+from .flow import flow_of
 from .statements import Statements
 from .types import NOTHING, Unsupported
 from .values import RESERVED, c_name, comment, comments_of, short_path, source_of, tree_of
-
-STRANGE = (
-    ast.ListComp,
-    ast.SetComp,
-    ast.DictComp,
-    ast.GeneratorExp,
-    ast.Lambda,
-    ast.FunctionDef,
-    ast.NamedExpr,
-    ast.Starred,
-)
-"""What brings variables of its own, or sets them within an expression."""
 
 INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}
 
@@ -41,7 +29,7 @@ class Function(Statements):
         function = source.function
         self.globals, self.file = function.__globals__, function.__code__.co_filename
         self.node, self.path, self.comments = tree_of(function), short_path(self.file), comments_of(self.file)
-        self.flow = Flow(self.node, self.globals)
+        self.flow = flow_of(function)
         self.name = ""
         self.gives: Any = None
         self.types: dict[str, Any] = {}
@@ -52,9 +40,8 @@ class Function(Statements):
         node, takes = self.node, self.node.args
         if len(takes.args) != len(self.arguments) or takes.defaults or takes.kwonlyargs or takes.vararg or takes.kwarg:
             raise self.refused(node.lineno, f"{node.name}: another number of arguments, or arguments with defaults")
-        for part in ast.walk(ast.Module(node.body, [])):
-            if isinstance(part, STRANGE):
-                raise self.fault(part, f"{type(part).__name__} is not in the subset")
+        for part in self.flow.strange:
+            raise self.fault(part, f"{type(part).__name__} is not in the subset")
         for name in self.flow.unset:
             raise self.fault(name, "read before it is assigned")
         if self.flow.perhaps_unset:
@@ -92,12 +79,10 @@ class Function(Statements):
         if len(head) > 118:
             head = f"{kind}{gives}{self.name}(\n" + textwrap.fill(f"{', '.join(takes)})", 116, **INDENTED)
         described = comment(f"{ast.get_docstring(self.node) or ''}\n[{self.path}:{self.node.lineno}]")
-        unused = [f"    (void){c_name(name)};" for name in self.parameters if not self._mentions(c_name(name))]
+        body = re.sub(r"/\*.*?\*/", "", "\n".join(self.lines))
+        used = set(re.findall(r"(?<![.>\w])\w+", body))
+        unused = [f"    (void){c_name(name)};" for name in self.parameters if c_name(name) not in used]
         return f"{described}{head} {{\n" + "\n".join([*unused, *self.lines]) + "\n}\n"
-
-    def _mentions(self, name: str) -> bool:
-        pattern = re.compile(rf"(?<![.>])\b{name}\b")
-        return any(pattern.search(re.sub(r"/\*.*?\*/", "", line)) for line in self.lines)
 
 
 class Program(File):

@@ -53,7 +53,7 @@ class Struct:
     """A NamedTuple, by address."""
 
     cls: Any
-    items: tuple[Any, ...]
+    items: tuple[Any, ...] = field(hash=False)  # long, and looked up at every call
 
 
 def type_of(value: Any, records: dict[Any, str]) -> Any:

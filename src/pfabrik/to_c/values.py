@@ -146,11 +146,12 @@ class Value:
 def effects(values: list[Value]) -> dict[str, Any]:
     """Reads and writes of several expressions together."""
     return {
-        "reads": NONE.union(*(v.reads for v in values)),
-        "writes": NONE.union(*(v.writes for v in values)),
+        "reads": NONE.union(*[v.reads for v in values if v.reads]),
+        "writes": NONE.union(*[v.writes for v in values if v.writes]),
     }
 
 
 def conflict(values: list[Value]) -> bool:
     """True if the order of evaluation could matter: one writes what another reads or writes."""
-    return any(a.writes & (b.reads | b.writes) for a in values for b in values if a is not b)
+    writing = [v for v in values if v.writes]
+    return any(a.writes & (b.reads | b.writes) for a in writing for b in values if a is not b)
