@@ -28,12 +28,12 @@ class Trace:
     Attributes
     ----------
     steps : operation and operands of every number, by its place; an input has neither.
-    decisions : numbers that were asked if they are not 0, by place, with what was answered.
+    decisions : comparisons that were asked for, by place: 1 where they held, or 0.
     """
 
     def __init__(self) -> None:
         self.steps: list[tuple[int, tuple[Number | float, ...]]] = []
-        self.decisions: dict[int, tuple[Number, bool]] = {}
+        self.decisions: dict[int, Number] = {}
         self._made: dict[tuple[Any, ...], Number] = {}
 
     def input(self, value: float, is_open: bool = False) -> Number:
@@ -72,9 +72,10 @@ class Number(float):
     def __bool__(self) -> bool:
         if self.is_open:
             raise TypeError("a decision by a number that differs between rows")
-        answer = float(self) != 0.0
-        self.trace.decisions[self.place] = self, answer
-        return answer
+        operation = self.trace.steps[self.place][0]
+        asked: Any = self if operation in _TRUTHS else self.trace.number(K.EQUAL, self, 0.0)
+        self.trace.decisions[asked.place] = asked
+        return float(self) != 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:
         return float, (float(self),)
@@ -236,6 +237,10 @@ def of_numbers(function: Any) -> Any:
     return FunctionType(function.__code__, parts, function.__name__)
 
 
+NOTHING = np.empty((1, 0))
+"""No inputs that differ between rows, at one row."""
+
+
 class Formulas:
     """Numbers of a trace as steps for `kernels.noted_steps.evaluate`.
 
@@ -280,28 +285,30 @@ class Formulas:
         self._steps, self._hulls = np.array(steps, np.int64).reshape(-1, 5), np.array(hulls, np.int64).reshape(-1, 6)
         self._outputs = np.array([(at[name], *hull_of[name]) for name in map(_name, outputs)], np.int64).reshape(-1, 3)
         self._n_values = n_values
+        self._without_slopes = np.zeros((n_inputs, 0))
 
-    def __call__(self, uniform: Floats, varying: Floats, tangents: Floats) -> tuple[Floats, Floats]:
-        """Values (n, r) of the expressions, and their slopes (n, r, c).
+    def __call__(self, uniform: Floats, varying: Floats = NOTHING, tangents: Floats | None = None) -> Any:
+        """Values (n, r) of the expressions; with tangents, also their slopes (n, r, c).
 
         Parameters
         ----------
         uniform, varying : the inputs: those that are the same at all rows, then the others (n, v).
-        tangents : slopes of the inputs in all columns (inputs, c); without columns, none are computed.
+        tangents : slopes of the inputs in all columns (inputs, c).
         """
-        n, n_columns, m = len(varying), tangents.shape[1], self._n_uniform
-        given = np.concatenate([uniform, self._constants])
-        own = np.concatenate([tangents[:m], np.zeros((len(self._constants), n_columns)), tangents[m:]])
-        values, slopes = np.empty((n, len(self._outputs))), np.empty((n, len(self._outputs), n_columns))
+        n, r, m = len(varying), len(self._outputs), self._n_uniform
+        given, own = np.concatenate([uniform, self._constants]), self._without_slopes
+        if tangents is not None:
+            own = np.concatenate([tangents[:m], np.zeros((len(self._constants), tangents.shape[1])), tangents[m:]])
+        values, slopes = np.empty((n, r)), np.empty((n, r, own.shape[1]))
         K.evaluate(self._steps, self._hulls, self._outputs, self._n_values, given, varying, own, values, slopes)
-        return values, slopes
+        return values if tangents is None else (values, slopes)
 
 
 NOWHERE = (0, 0)
 """The columns of a number without slopes."""
 
-_STEPS = (K.FLOOR, K.BELOW, K.AT_MOST, K.EQUAL)
-"""Operations whose results are constant but for jumps."""
+_TRUTHS = (K.BELOW, K.AT_MOST, K.EQUAL)
+"""Operations whose results are 1 or 0."""
 
 
 def _name(number: Number | float) -> int | str:
@@ -340,7 +347,7 @@ def _ordered(outputs: Sequence[Any], given: dict[int, int]) -> list[Number]:
 
 def _with_slopes(operation: int, names: list[int | str]) -> list[int | str]:
     """The operands, at most two, by which a step has derivatives."""
-    return [] if operation in _STEPS else names[1:] if operation == K.CHOOSE else names
+    return [] if operation in (K.FLOOR, *_TRUTHS) else names[1:] if operation == K.CHOOSE else names
 
 
 def _hull(columns: list[int]) -> tuple[int, int]:

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ._jit import routine, search
+from ._jit import kernel, routine
+from .legs.columns import arctangent
 
 # Of a and b: a + b, a - b, a * b, a / b, the larger, the smaller, |a|, |a| with the sign of b, the angle of (b, a), a
 # to the power b; of a: its root, sine, cosine, tangent, the whole number below it.
@@ -75,7 +76,7 @@ def put_functions(operation: int, a: Floats, b: Floats, n: int, out: Floats) -> 
     """Fill the result of a step that the library of C computes."""
     if operation == ANGLE:
         for i in range(n):
-            out[i] = math.atan2(a[i], b[i])
+            out[i] = arctangent(a[i], b[i])
     elif operation == COPYSIGN:
         for i in range(n):
             out[i] = math.copysign(a[i], b[i])
@@ -150,15 +151,39 @@ def put_partials(operation: int, a: Floats, b: Floats, value: Floats, n: int, x:
 
 
 @routine
-def add_slopes(partial: Floats, x: Floats, first: int, last: int, n: int, out: Floats) -> None:
-    """Add a derivative times the slopes of an operand in its columns."""
-    for column in range(first, last):
-        own, to = x[column], out[column]
-        for i in range(n):
-            to[i] += partial[i] * own[i]
+def put_slopes(
+    x: Floats, X: Floats, x0: int, x1: int, y: Floats, Y: Floats, y0: int, y1: int, n: int, out: Floats
+) -> None:
+    """Fill the slopes of a step at n rows from its derivatives x and y by two operands, whose slopes are X and Y.
+
+    The slopes of a number are a row of n for each column; an operand has slopes in its columns from x0 to x1, or from
+    y0 to y1, if any.
+    """
+    if y0 == y1 or (x0 == y0 and x1 == y1):
+        for column in range(x0, x1):
+            own, other, to = X[n * column :], Y[n * column :], out[n * column :]
+            if y0 == y1:
+                for i in range(n):
+                    to[i] = x[i] * own[i]
+            else:
+                for i in range(n):
+                    to[i] = x[i] * own[i] + y[i] * other[i]
+    else:
+        for column in range(min(x0, y0) if x0 < x1 else y0, max(x1, y1)):
+            to = out[n * column :]
+            for i in range(n):
+                to[i] = 0.0
+            if x0 <= column and column < x1:
+                own = X[n * column :]
+                for i in range(n):
+                    to[i] += x[i] * own[i]
+            if y0 <= column and column < y1:
+                other = Y[n * column :]
+                for i in range(n):
+                    to[i] += y[i] * other[i]
 
 
-@search
+@kernel
 def evaluate(
     steps: Ints,
     hulls: Ints,
@@ -184,36 +209,38 @@ def evaluate(
     out, slopes : (n, r), (n, r, c).
     """
     n_uniform, n_columns, n_inputs = uniform.shape[0], tangents.shape[1], tangents.shape[0]
-    V, P = np.zeros((n_values, BLOCK)), np.zeros((2, BLOCK))
-    D = np.zeros((n_values * n_columns, BLOCK)).reshape(n_values, n_columns, BLOCK)
-    for start in range(0, out.shape[0], BLOCK):
-        n = min(BLOCK, out.shape[0] - start)
+    width = max(1, min(BLOCK, out.shape[0]))
+    V, P, D = np.empty(n_values * width), np.empty(2 * width), np.empty(n_values * n_columns * width)
+    for block in range((out.shape[0] + width - 1) // width):
+        start = block * width
+        n = min(width, out.shape[0] - start)
+        m = n * n_columns
         for k in range(n_uniform):
+            row = V[k * n :]
             for i in range(n):
-                V[k, i] = uniform[k]
+                row[i] = uniform[k]
         for k in range(n_inputs - n_uniform):
+            row = V[(n_uniform + k) * n :]
             for i in range(n):
-                V[n_uniform + k, i] = varying[start + i, k]
+                row[i] = varying[start + i, k]
         for k in range(n_inputs if n_columns > 0 else 0):
             for column in range(hulls[k, 0], hulls[k, 1]):
+                row = D[k * m + column * n :]
                 for i in range(n):
-                    D[k, column, i] = tangents[k, column]
+                    row[i] = tangents[k, column]
         for k in range(steps.shape[0]):
             operation, a, b, c, to = steps[k, 0], steps[k, 1], steps[k, 2], steps[k, 3], steps[k, 4]
-            put_values(operation, V[a], V[b], V[c], n, V[to])
+            put_values(operation, V[a * n :], V[b * n :], V[c * n :], n, V[to * n :])
             hull = hulls[n_inputs + k]
             if n_columns > 0 and hull[0] < hull[1]:
-                put_partials(operation, V[a], V[b], V[to], n, P[0], P[1])
-                for column in range(hull[0], hull[1]):
-                    for i in range(n):
-                        D[to, column, i] = 0.0
-                add_slopes(P[0], D[b if operation == CHOOSE else a], hull[2], hull[3], n, D[to])
-                add_slopes(P[1], D[c if operation == CHOOSE else b], hull[4], hull[5], n, D[to])
+                put_partials(operation, V[a * n :], V[b * n :], V[to * n :], n, P, P[width:])
+                x, y = (b, c) if operation == CHOOSE else (a, b)
+                put_slopes(P, D[x * m :], hull[2], hull[3], P[width:], D[y * m :], hull[4], hull[5], n, D[to * m :])
         for r in range(outputs.shape[0]):
             at, first, last = outputs[r, 0], outputs[r, 1], outputs[r, 2]
             for i in range(n):
-                out[start + i, r] = V[at, i]
+                out[start + i, r] = V[at * n + i]
             for column in range(n_columns):
                 is_sloped = first <= column and column < last
                 for i in range(n):
-                    slopes[start + i, r, column] = D[at, column, i] if is_sloped else 0.0
+                    slopes[start + i, r, column] = D[at * m + column * n + i] if is_sloped else 0.0

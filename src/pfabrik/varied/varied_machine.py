@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,7 +31,7 @@ from ..kernels.home import measure_home
 from ..kernels.legs.feasibility import feasibility, read_targets
 from ..kernels.search_constants import CLOSED, NEARLY_CLOSED
 from ..model import model_of
-from ..noted_numbers import Formulas, Trace, uniform_parts
+from ..noted_numbers import NOTHING, Formulas, Trace, uniform_parts
 from ..platform.table import kernel_table, table_handle
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
@@ -42,8 +42,6 @@ STEP = 1e-6
 
 MOST_NOTED = 8
 """How many expressions of one machine, for other outcomes of decisions, are kept."""
-
-NOTHING = np.empty((1, 0))
 
 
 def varied(mechanism: Mechanism, names: str | Sequence[str] | None = None) -> VariedMachine:
@@ -111,21 +109,23 @@ class VariedMachine:
         Raises
         ------
         InvalidMechanism
-            No machine has these dimensions, with every fault; limits that home exceeds are none.
+            The file's expressions have no values there; limits that home exceeds are no fault.
         UnsupportedMechanism
             Its legs or limits are others than those of the machine as described.
         """
-        given = array("values", values, f"{len(self.names)}", "finite values", f": {', '.join(self.names)}")
+        given = np.asarray(values, float)
+        if given.shape != (len(self.names),) or not math.isfinite(given.sum()):
+            given = array("values", values, f"{len(self.names)}", "finite values", f": {', '.join(self.names)}")
         for noted in self._noted:
-            numbers = noted.at(given)
-            if numbers is not None:
-                return MachineAt(noted, given, numbers)
+            found = noted.at(given)
+            if found is not None:
+                return found
         noted = NotedMachine(self.mechanism, self.names, given)
-        numbers = noted.at(given)
-        if numbers is None or noted.legs.limits != self.limits:
+        found = noted.at(given)
+        if found is None or noted.legs.limits != self.limits:
             raise UnsupportedMechanism(self.mechanism.name, ["its legs are others with these dimensions"], "varied")
         self._noted = [noted, *self._noted[: MOST_NOTED - 1]]
-        return MachineAt(noted, given, numbers)
+        return found
 
 
 class NotedMachine:
@@ -142,9 +142,9 @@ class NotedMachine:
         numbered = source.sketch_with(dict(zip(names, given, strict=True)))
         numbers = described_numbers(numbered)
         centres = [x for x in numbers[AT_POINTS - 1 :][: 3 * len(sketch.joints)] if not math.isnan(float(x))]
-        if not _radius(np.array(centres, float)):
+        if not _radii(np.array([centres], float))[0]:
             centres += numbers[:3]
-        self._size = 0.0 if _radius(np.array(centres, float)) else sketch.characteristic_length
+        self._size = 0.0 if _radii(np.array([centres], float))[0] else sketch.characteristic_length
         length = trace.input(sketch.characteristic_length)
         words = replayed(self.table, [length, *numbers, *limit_numbers(numbered)])
         self.legs = legs = PlacedLegs(trace, self.table, words, length)
@@ -155,26 +155,23 @@ class NotedMachine:
         self._programs: dict[tuple[str, int, bool], Formulas] = {}
         self.uniform = uniform_parts([*legs.margins, *legs.rows, *legs.actuators])
         self._centres = Formulas(centres, given, p, np.ones((p, p), bool))
-        self._decided = np.array([answer for _, answer in trace.decisions.values()], bool)
-        parts: list[list[Any]] = [[number for number, _ in trace.decisions.values()], numbers[:3], self.uniform]
+        self._decided = np.array(list(trace.decisions.values()), float)
+        parts: list[list[Any]] = [list(trace.decisions.values()), [length], numbers[:3], self.uniform]
         recording: Any = self.table.recording
         self.written = [word + k for word, _, size in recording.writes.tolist() for k in range(size)]
-        parts += [[words[word] for word in self.written]] if self.table.is_completed else []
+        parts.append([words[word] for word in self.written] if self.table.is_completed else [])
         self._spans = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
         outputs = [number for part in parts for number in part]
         self._uniform = Formulas(outputs, [*given, length], p + 1, np.ones((p + 1, p), bool))
 
-    def at(self, values: Floats) -> list[Floats] | None:
-        """L, the reference point, what is the same at all poses, and words; None if a decision comes out otherwise."""
-        length = self._size
-        if not length:
-            centres, _ = self._centres(values, NOTHING, np.empty((len(values), 0)))
-            length = _radius(centres[0])
-        found, _ = self._uniform(np.append(values, length), NOTHING, np.empty((len(values) + 1, 0)))
-        decided, reference, uniform, *words = (found[0, a:b] for a, b in self._spans)
-        if not np.array_equal(decided != 0.0, self._decided) or not np.isfinite(reference).all():
+    def at(self, values: Floats) -> MachineAt | None:
+        """The machine at values of the dimensions; None if a decision comes out otherwise there."""
+        length = self._size or _radii(self._centres(values))[0]
+        found = self._uniform(np.append(values, length))[0]
+        decided, *parts = (found[a:b] for a, b in self._spans)
+        if not (decided == self._decided).all() or not math.isfinite(found.sum()):
             return None
-        return [np.array([length]), reference, uniform, *words]
+        return MachineAt(self, values, *parts)
 
     def slopes_at(self, values: Floats, length: float) -> tuple[Floats, Floats]:
         """Slopes of the reference point, and of what is the same at all poses, by the dimensions: (3, p), (m, p)."""
@@ -182,12 +179,11 @@ class NotedMachine:
         tangents = np.eye(p + 1, p)
         if not self._size:
             centres, moved = self._centres(values, NOTHING, np.eye(p))
-            for k, direction in enumerate(moved[0].T):
-                step = STEP * length / (np.abs(direction).max() or 1.0)
-                more, less = (_radius(centres[0] + sense * step * direction) for sense in (1.0, -1.0))
-                tangents[p, k] = (more - less) / (2.0 * step)
+            steps = STEP * length / np.maximum(np.abs(moved[0]).max(axis=0), STEP)
+            ends = _radii(np.concatenate([centres + (moved[0] * step).T for step in (steps, -steps)]))
+            tangents[p] = (ends[:p] - ends[p:]) / (2.0 * steps)
         _, slopes = self._uniform(np.append(values, length), NOTHING, tangents)
-        (_, _), (a, b), (c, d), *_ = self._spans
+        _, _, (a, b), (c, d), _ = self._spans
         return slopes[0, a:b], slopes[0, c:d]
 
     def program(self, name: str, by_dimensions: int, by_pose: bool) -> Formulas:
@@ -207,21 +203,55 @@ class NotedMachine:
         return self._programs[key]
 
 
-def _radius(centres: Floats) -> float:
-    """The radius of the smallest sphere around points in a row, (3 n,)."""
-    n = len(centres) // 3
-    numbers = np.zeros(4 + 9 * n)
-    numbers[4 : 4 + 3 * n] = centres
-    measure_home(numbers, n, np.empty(6 * n + 8), np.empty(N_PLACES, int))
-    return float(numbers[0])
+def _radii(centres: Floats) -> Floats:
+    """Radii of the smallest spheres around points, of which each row (3 n,) has all."""
+    n = centres.shape[1] // 3
+    numbers, scratch, places, radii = np.zeros(4 + 9 * n), np.empty(6 * n + 8), np.empty(N_PLACES, int), []
+    for row in centres:
+        numbers[4 : 4 + 3 * n] = row
+        measure_home(numbers, n, scratch, places)
+        radii.append(numbers[0])
+    return np.array(radii)
+
+
+AT_REST = np.zeros(6)
+"""The twist that numbers of a pose have slopes by."""
+
+
+class Placed(NamedTuple):
+    """What expressions gave at n poses, views of one array.
+
+    Attributes
+    ----------
+    values, rows, reach : what was asked for, the constraints, and the margins of the reach of legs.
+    slopes, row_slopes : of the first two.
+    completed : the poses.
+    """
+
+    values: Floats
+    rows: Floats
+    reach: Floats
+    slopes: Floats
+    row_slopes: Floats
+    completed: Floats
+
+    @classmethod
+    def of(cls, found: Any, legs: PlacedLegs, completed: Floats) -> Placed:
+        """Split what expressions gave."""
+        values, slopes = found if isinstance(found, tuple) else (found, found)
+        end = values.shape[1] - len(legs.reach)
+        n = end - len(legs.rows)
+        return cls(values[:, :n], values[:, n:end], values[:, end:], slopes[:, :n], slopes[:, n:end], completed)
 
 
 class MachineAt:
     """A varied machine at values of its dimensions; poses are targets (n, 4, 4) [length], reached in home's mode."""
 
-    def __init__(self, noted: NotedMachine, values: Floats, numbers: list[Floats]) -> None:
-        self._noted, self._values = noted, values
-        (self._length,), self._reference, self._uniform, *self._words = numbers
+    def __init__(
+        self, noted: NotedMachine, values: Floats, length: Floats, reference: Floats, uniform: Floats, written: Floats
+    ) -> None:
+        self._noted, self._values, self._length, self._reference = noted, values, float(length[0]), reference
+        self._uniform, self._written = uniform, written
 
     @property
     def home_pose(self) -> Floats:
@@ -235,15 +265,15 @@ class MachineAt:
 
         Finite where legs do not reach, infinite for the reach and the closure of legs that do; NaN of what is no pose.
         """
-        return self._evaluated("margins", poses)[0]
+        return self._evaluated("margins", poses).values
 
     def actuators(self, poses: Floats) -> Floats:
         """Values of the actuators (n, n_a) [length or rad]; where a leg does not reach, those that come nearest."""
-        return self._evaluated("actuators", poses)[0]
+        return self._evaluated("actuators", poses).values
 
     def inverse_jacobians(self, poses: Floats) -> Floats:
         """Derivatives (n, n_a, 6) of the actuators by velocity [length] and angular velocity of the end effector."""
-        return self._evaluated("actuators", poses, by_pose=True)[1]
+        return self._evaluated("actuators", poses, by_pose=True).slopes
 
     def slopes(self, poses: Floats) -> Floats:
         """Derivatives (n, r, p) of the margins by the dimensions; what a task leaves open moves so that legs close.
@@ -252,14 +282,17 @@ class MachineAt:
         """
         noted, p = self._noted, len(self._values)
         reference, moved = noted.slopes_at(self._values, self._length)
-        if not noted.table.is_completed:
-            return self._evaluated("margins", poses, moved=moved)[1]
-        _, slopes, rows, row_slopes, completed = self._evaluated("margins", poses, by_pose=True, moved=moved)
-        open_motions, begun = self._open_motions(completed, reference)
+        placed = self._evaluated("margins", poses, moved=moved)
+        is_closed = (np.abs(placed.rows) <= NEARLY_CLOSED).all(axis=1)
+        is_begun = noted.table.is_completed and reference[noted.table.task["axes"][0] == 0].any()
+        if not is_begun and (np.abs(placed.row_slopes[is_closed]) * np.abs(self._values) <= NEARLY_CLOSED).all():
+            return placed.slopes
+        placed = self._evaluated("margins", poses, by_pose=True, moved=moved)
+        slopes, row_slopes = placed.slopes, placed.row_slopes
+        open_motions, begun = self._open_motions(placed.completed, reference)
         by_open = row_slopes[:, :, p:] @ open_motions
-        is_closed = np.abs(rows).max(axis=1, initial=0.0) <= NEARLY_CLOSED
         left = row_slopes[is_closed, :, :p] + by_open[is_closed] @ begun
-        dx = np.zeros((len(rows), *begun.shape))
+        dx = np.zeros((len(slopes), *begun.shape))
         dx[is_closed] = begun - np.linalg.pinv(by_open[is_closed], TOLERANCES.rank) @ left
         return np.asarray(slopes[:, :, :p] + slopes[:, :, p:] @ open_motions @ dx)
 
@@ -290,44 +323,43 @@ class MachineAt:
         begun[: len(placed)] = reference[placed]
         return np.stack(columns, axis=2) if columns else np.zeros((len(completed), 6 + n_q, 0)), begun
 
-    def _evaluated(
-        self, name: str, poses: Floats, by_pose: bool = False, moved: Floats | None = None
-    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Formulas of the legs at targets, and their slopes; the constraints, and theirs; what was completed.
-
-        Slopes are by dimensions, where these move what is the same at all poses, and by the pose.
-        """
-        noted = self._noted
-        p, n_q = 0 if moved is None else moved.shape[1], len(noted.legs.implicit)
-        program, m = noted.program(name, p, by_pose), len(self._uniform)
-        tangents = np.zeros((m + 18 + n_q, p + (6 + n_q if by_pose else 0)))
-        if moved is not None:
-            tangents[:m, :p] = moved
-        if by_pose:
-            tangents[m : m + 6, p : p + 6], tangents[m + 18 :, p + 6 :] = np.eye(6), np.eye(n_q)
-        uniform, legs = np.append(self._uniform, np.zeros(6)), noted.legs
+    def _evaluated(self, name: str, poses: Floats, by_pose: bool = False, moved: Floats | None = None) -> Placed:
+        """Expressions of the legs at targets, with slopes: by dimensions, where these move what is the same at all
+        poses, then by the pose."""
+        noted, legs, m = self._noted, self._noted.legs, len(self._uniform)
+        program = noted.program(name, 0 if moved is None else moved.shape[1], by_pose)
+        tangents = None
+        if moved is not None or by_pose:
+            p, n_q = 0 if moved is None else moved.shape[1], len(legs.q)
+            tangents = np.zeros((m + 18 + n_q, p + (6 + n_q if by_pose else 0)))
+            if moved is not None:
+                tangents[:m, :p] = moved
+            if by_pose:
+                tangents[m : m + 6, p : p + 6], tangents[m + 18 :, p + 6 :] = np.eye(6), np.eye(n_q)
+        uniform = np.concatenate([self._uniform, AT_REST])
         targets, begin = np.require(poses, float, ["C", "W"]), self.home_pose[None]
         if noted.is_coupled:
             completed = self._completed(targets, begin)
         else:
             completed = np.empty((len(targets), 12))
             read_targets(table_handle(noted.table).address, targets, begin, completed)
-        values, slopes = program(uniform, completed, tangents)
-        n = values.shape[1] - len(legs.rows) - len(legs.reach)
-        end = n + len(legs.rows)
+        found = program(uniform, completed, tangents)
+        placed = Placed.of(found, legs, completed)
         if noted.table.is_completed and not noted.is_coupled:
-            is_open = (np.abs(values[:, n:end]) > CLOSED).any(axis=1) & (values[:, end:] == math.inf).all(axis=1)
+            is_open = (np.abs(placed.rows) > CLOSED).any(axis=1) & (placed.reach == math.inf).all(axis=1)
             if is_open.any():
                 completed[is_open] = self._completed(targets[is_open], begin)
-                values[is_open], slopes[is_open] = program(uniform, completed[is_open], tangents)
-        return values[:, :n], slopes[:, :n], values[:, n:end], slopes[:, n:end], completed
+                again = program(uniform, completed[is_open], tangents)
+                for to, part in zip(found, again, strict=True) if tangents is not None else [(found, again)]:
+                    to[is_open] = part
+        return placed
 
     def _completed(self, targets: Floats, begin: Floats) -> Floats:
         """Poses and coordinates of implicit joints that targets are completed to, in rows (n, 12 + implicit)."""
         noted, table = self._noted, self._noted.table
         recording: Any = table.recording
         words = recording.words.copy()
-        words[noted.written] = self._words[0]
+        words[noted.written] = self._written
         arrays = recording.arrays(words)
         handle = Handle(kernel_table(table)._replace(**{name: arrays[name] for name in arrays if name != "aimed"}))
         completed, margins = np.full((len(targets), 12 + len(table.legs)), math.nan), np.empty(len(targets))
