@@ -13,7 +13,7 @@ Motion        home_coordinates, displacements, joint_centres, placed, end_effect
               tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
               parallel_signs
-Varied        varied, VariedMachine, MachineAt
+Varied        varied, VariedMachine, MachineAt; VariedGeometry
 """
 
 from .closure.configurations import Configurations
@@ -43,7 +43,7 @@ from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
 from .motion.mobility import generic_of, internal_rates
 from .motion.singularities import parallel_signs
-from .varied import MachineAt, VariedMachine, varied
+from .varied import MachineAt, VariedGeometry, VariedMachine, varied
 
 __all__ = [
     "BodyInertia",
@@ -54,6 +54,7 @@ __all__ = [
     "Model",
     "Readout",
     "Task",
+    "VariedGeometry",
     "VariedMachine",
     "actuator_units",
     "column_joints",

@@ -17,6 +17,7 @@ from ..derived import derived
 from ..description.geometry import Geometry, geometry_of, with_geometry
 from ..description.mechanism import Joint, Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnknownName
+from ..kinematics import VariedGeometry
 from ..rotations import from_rotvec
 from .parameter_kinds import KINDS, Candidates, tied
 from .shifts import Shift, ShiftedGeometry, with_own_axes
@@ -97,7 +98,7 @@ class Parameters:
         }
         like = with_own_axes(drawn, explicit) if explicit else drawn
         before = geometry_of(like)
-        after = self._shifted.at(values[None, n:], _stacked([before]))
+        after = self._shifted.at(values[None, n:], Geometry(*(array[None] for array in before)))
         moved = with_geometry(like, Geometry(*(array[0] for array in after)))
         joints = [
             _with_cone(joint, before.axes[j], after.axes[0, j], self._turn(values[n:], j))
@@ -145,15 +146,11 @@ class Parameters:
     def _geometries(self, values: Floats) -> Geometry:
         """Geometries at values (b, p), every array with the batch in front."""
         n = len(self._dimensions)
-        source = self.mechanism.__dict__.get("_source")
-        if n == 0 or source is None:
-            return self._shifted.at(values)
-        rows: dict[bytes, Geometry] = {}
-        for row in values[:, :n]:
-            if row.tobytes() not in rows:
-                sketch = source.sketch_with(dict(zip(self._dimensions, row.tolist(), strict=True)))
-                rows[row.tobytes()] = geometry_of(sketch)
-        return self._shifted.at(values[:, n:], _stacked([rows[row.tobytes()] for row in values[:, :n]]))
+        return self._shifted.at(values[:, n:], self._drawn.at(np.ascontiguousarray(values[:, :n])) if n else None)
+
+    @cached_property
+    def _drawn(self) -> VariedGeometry:
+        return VariedGeometry(self.mechanism, self._dimensions)
 
 
 def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies"] | None = None) -> Parameters:
@@ -256,10 +253,6 @@ def _with_cone(joint: Joint, before: Floats, after: Floats, turn: Floats) -> Joi
         return joint
     axis = from_rotvec(turn) @ np.array(joint.cone.axis)
     return replace(joint, cone=replace(joint.cone, axis=tuple(axis.tolist())))
-
-
-def _stacked(geometries: Sequence[Geometry]) -> Geometry:
-    return Geometry(*(np.stack(arrays) for arrays in zip(*geometries, strict=True)))
 
 
 def _read_only(array: Any) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -98,20 +98,33 @@ def with_geometry(mechanism: Mechanism, geometry: Geometry) -> Mechanism:
 def described_numbers(mechanism: Structure) -> list[float]:
     """The reference point, and all numbers of the joints as they are described, as in `home_numbers` from there on.
 
-    Where the description leaves axes or values to be computed, there are zeros, or what is computed.
+    What is computed from others, axes left out and values of a joint that is along two others, is zero.
     """
     joints, nowhere, none = mechanism.joints, (math.nan,) * 3, (0.0,) * 3
-    axes = [joint.axes or (joint.axis or none, none) for joint in joints]
-    parts = [mechanism.reference_point, *(joint.at or nowhere for joint in joints), *(v for pair in axes for v in pair)]
-    return [*(x for part in parts for x in part), *(coordinate.home for coordinate in mechanism.coordinates)]
+    axes = [axis for joint in joints for axis in joint.axes or (joint.axis or none, none)]
+    parts = [mechanism.reference_point, *(joint.at or nowhere for joint in joints), *axes]
+    return [x for part in [*parts, *map(_described_home, joints)] for x in part]
+
+
+def _described_home(joint: Joint) -> tuple[float, ...]:
+    n = len(KINDS[joint.type].coordinates)
+    if n not in (1, 2) or joint.along is not None:
+        return (0.0,) * n
+    return joint.home if isinstance(joint.home, tuple) else (joint.home,)
 
 
 def limit_numbers(mechanism: Structure) -> list[float]:
     """The limits of all coordinates, two each, infinite where there are none; then of all joints the cone's axis and
     half angle, zeros where there is none."""
-    limits = [bound for coordinate in mechanism.coordinates for bound in coordinate.limits]
     cones = [joint.cone for joint in mechanism.joints]
+    limits = [bound for joint in mechanism.joints for bound in _limits(joint)]
     return limits + [x for cone in cones for x in ((*cone.axis, cone.half_angle) if cone else (0.0,) * 4)]
+
+
+def _limits(joint: Joint) -> tuple[Any, ...]:
+    if joint.range is None:
+        return (-math.inf, math.inf) * len(KINDS[joint.type].coordinates)
+    return tuple(bound for pair in joint.range for bound in (pair if isinstance(pair, tuple) else (pair,)))
 
 
 _FIELDS = tuple(each.name for each in fields(Mechanism) if each.name not in ("joints", "reference_point"))

@@ -1,5 +1,6 @@
 """Machines at other values of their dimensions, without making a mechanism: margins, actuators and their slopes."""
 
+from .noted_reading import VariedGeometry
 from .varied_machine import MachineAt, VariedMachine, varied
 
-__all__ = ["MachineAt", "VariedMachine", "varied"]
+__all__ = ["MachineAt", "VariedGeometry", "VariedMachine", "varied"]

@@ -22,7 +22,7 @@ from ..closure.parasitic import has_parasitic_motion
 from ..decomposition.leg_forms import NoLeg
 from ..decomposition.leg_table import leg_table
 from ..derived import derived
-from ..description.geometry import AT_POINTS, described_numbers, limit_numbers
+from ..description.geometry import AT_POINTS
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import UnknownName, UnsupportedMechanism
 from ..kernels.enclosing import N_PLACES
@@ -31,10 +31,11 @@ from ..kernels.home import measure_home
 from ..kernels.legs.feasibility import feasibility, read_targets
 from ..kernels.search_constants import CLOSED, NEARLY_CLOSED
 from ..model import model_of
-from ..noted_numbers import NOTHING, Formulas, Trace, uniform_parts
+from ..noted_numbers import NOTHING, Formulas, uniform_parts
 from ..platform.table import kernel_table, table_handle
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
+from .noted_reading import NotedReading
 from .placed_legs import PlacedLegs, replayed
 
 STEP = 1e-6
@@ -132,21 +133,18 @@ class NotedMachine:
     """The expressions of a varied machine; they hold as long as decisions come out as when they were noted."""
 
     def __init__(self, mechanism: Mechanism, names: Sequence[str], values: Floats) -> None:
-        source, own = mechanism.__dict__["_source"], dict(zip(names, values.tolist(), strict=True))
-        sketch, trace, p = source.sketch_with(own), Trace(), len(names)
+        reading, p = NotedReading(mechanism, names, values), len(names)
+        sketch, trace, given, numbers = reading.sketch, reading.trace, reading.given, reading.numbers
         try:
             self.table = leg_table(sketch)
         except NoLeg as reason:
             raise UnsupportedMechanism(mechanism.name, [str(reason)], "varied") from None
-        given = [trace.input(value) for value in own.values()]
-        numbered = source.sketch_with(dict(zip(names, given, strict=True)))
-        numbers = described_numbers(numbered)
         centres = [x for x in numbers[AT_POINTS - 1 :][: 3 * len(sketch.joints)] if not math.isnan(float(x))]
         if not _radii(np.array([centres], float))[0]:
             centres += numbers[:3]
         self._size = 0.0 if _radii(np.array([centres], float))[0] else sketch.characteristic_length
         length = trace.input(sketch.characteristic_length)
-        words = replayed(self.table, [length, *numbers, *limit_numbers(numbered)])
+        words = replayed(self.table, [length, *numbers, *reading.limits])
         self.legs = legs = PlacedLegs(trace, self.table, words, length)
         model = model_of(mechanism)
         self.is_coupled = self.table.is_completed and not (
