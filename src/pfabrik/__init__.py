@@ -72,6 +72,8 @@ _NAMES = {
     "decomposition.decompose": ("SubChain", "decompose"),
     "description.legs": ("Leg",),
     "description.mechanism": ("Cone", "Joint", "Mass", "Mechanism", "Shape"),
+    "design.design": ("design",),
+    "design.result": ("Design", "Designs"),
     "dynamics.efforts": ("Efforts",),
     "dynamics.identification": ("BaseParameter", "Identification"),
     "dynamics.identify": ("identify",),
@@ -116,12 +118,15 @@ _NAMES = {
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 # Modules that are themselves public.
-_MODULES = ("errors", "interop", "passes")
+_MODULES = {"errors": "errors", "interop": "interop", "keep": "design.keep", "passes": "passes"}
 
 __all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
     from . import errors as errors, interop as interop, passes as passes
+    from .design import keep as keep
+    from .design.design import design as design
+    from .design.result import Design as Design, Designs as Designs
     from .actuation.actuation import Actuation as Actuation, actuation as actuation
     from .answers.differential import (
         Mobility as Mobility,
@@ -221,7 +226,7 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        return importlib.import_module(f".{name}", __name__)
+        return importlib.import_module(f".{_MODULES[name]}", __name__)
     if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)

@@ -60,6 +60,8 @@ class _Source(Protocol):
 
     def read_with(self, values: Mapping[str, float]) -> Mechanism: ...
 
+    def value_of(self, expression: str, values: Mapping[str, float]) -> float: ...
+
 
 Limit: TypeAlias = Range | tuple[Range, Range] | Cone | None
 

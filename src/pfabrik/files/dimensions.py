@@ -9,6 +9,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 from ..description.leg_points import WORDS
@@ -114,7 +115,7 @@ def number_of(said: Any, values: Mapping[str, float], angle_unit: str, later: tu
         if len(said) > LONGEST:
             raise NoNumber(f"an expression of {len(said)} characters")
         try:
-            value = _computed(ast.parse(said.strip(), mode="eval").body, values, _functions(angle_unit), later)
+            value = _computed(_parsed(said.strip()), values, _functions(angle_unit), later)
         except NoNumber as reason:
             raise NoNumber(f"'{said}': {reason}") from None
         except (SyntaxError, RecursionError, MemoryError):
@@ -126,6 +127,11 @@ def number_of(said: Any, values: Mapping[str, float], angle_unit: str, later: tu
     if math.isinf(value):
         raise NoNumber(f"'{said}', which has no finite value")
     return value
+
+
+@cache
+def _parsed(text: str) -> ast.expr:
+    return ast.parse(text, mode="eval").body
 
 
 def _functions(angle_unit: str) -> dict[str, tuple[int, Callable[..., float]]]:

@@ -23,8 +23,8 @@ from ..description.leg_joints import count_joints
 from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, ChainJoint, Leg, read_chain
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
-from ..errors import Fault, InvalidMechanism, near_miss
-from .dimensions import dimension_values, with_numbers
+from ..errors import Fault, InvalidArgument, InvalidMechanism, near_miss
+from .dimensions import NoNumber, dimension_values, number_of, with_numbers
 from .units import angle_in_radians, in_radians
 
 DESCRIBED = ("name", "base", "end_effector", "reference_point", "task", "ignore", "clearance")
@@ -100,6 +100,16 @@ class Source:
     def sketch_with(self, values: Mapping[str, float]) -> Structure:
         """The description with other values of some dimensions, without the checks of a mechanism."""
         return _read(_with_numbers(self._table_with(values))[0], Structure)
+
+    def value_of(self, expression: str, values: Mapping[str, float]) -> float:
+        """The value of an expression of dimensions, with other values of some; InvalidArgument if it has none."""
+        faults: list[Fault] = []
+        unit = str(_units(self.table).get("angle", "deg"))
+        known = dimension_values(self._table_with(values)["dimensions"], unit, faults)
+        try:
+            return number_of(expression, known, unit, ())
+        except NoNumber as reason:
+            raise InvalidArgument("expression", str(reason), f"one of {', '.join(known)}") from None
 
     def _table_with(self, values: Mapping[str, float]) -> Table:
         return self.table | {"dimensions": self.table["dimensions"] | dict(values)}

@@ -158,6 +158,9 @@ class NotedMachine:
         recording: Any = self.table.recording
         self.written = [word + k for word, _, size in recording.writes.tolist() for k in range(size)]
         parts.append([words[word] for word in self.written] if self.table.is_completed else [])
+        ends = [reading.limits[2 * drive.column + end] for drive in mechanism.drives for end in (0, 1)]
+        self.is_ended = np.isfinite(np.array(ends, float))
+        parts.append([end for end, is_one in zip(ends, self.is_ended.tolist(), strict=True) if is_one])
         self._spans = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
         outputs = [number for part in parts for number in part]
         self._uniform = Formulas(outputs, [*given, length], p + 1, np.ones((p + 1, p), bool))
@@ -181,7 +184,7 @@ class NotedMachine:
             ends = _radii(np.concatenate([centres + (moved[0] * step).T for step in (steps, -steps)]))
             tangents[p] = (ends[:p] - ends[p:]) / (2.0 * steps)
         _, slopes = self._uniform(np.append(values, length), NOTHING, tangents)
-        _, _, (a, b), (c, d), _ = self._spans
+        _, _, (a, b), (c, d), *_ = self._spans
         return slopes[0, a:b], slopes[0, c:d]
 
     def program(self, name: str, by_dimensions: int, by_pose: bool) -> Formulas:
@@ -246,10 +249,29 @@ class MachineAt:
     """A varied machine at values of its dimensions; poses are targets (n, 4, 4) [length], reached in home's mode."""
 
     def __init__(
-        self, noted: NotedMachine, values: Floats, length: Floats, reference: Floats, uniform: Floats, written: Floats
+        self,
+        noted: NotedMachine,
+        values: Floats,
+        length: Floats,
+        reference: Floats,
+        uniform: Floats,
+        written: Floats,
+        ends: Floats,
     ) -> None:
         self._noted, self._values, self._length, self._reference = noted, values, float(length[0]), reference
-        self._uniform, self._written = uniform, written
+        self._uniform, self._written, self._ends = uniform, written, ends
+
+    @property
+    def characteristic_length(self) -> float:
+        """L: the radius of the smallest sphere about the centres of all joints at home [length]."""
+        return self._length
+
+    @property
+    def ranges(self) -> Floats:
+        """Lowest and highest values of the actuators, (n_a, 2) [length or rad]; infinite where they have no end."""
+        ranges = np.tile([-np.inf, np.inf], len(self._noted.is_ended) // 2)
+        ranges[self._noted.is_ended] = self._ends
+        return ranges.reshape(-1, 2)
 
     @property
     def home_pose(self) -> Floats:

@@ -1,0 +1,1 @@
+"""Dimensions for what a machine must do, found by counterexample."""
