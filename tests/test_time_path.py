@@ -386,6 +386,51 @@ def test_a_mass_on_a_slide_moves_in_the_time_of_its_closed_form() -> None:
     assert timed.duration == pytest.approx(peak / faster + peak / slower, rel=1e-4)
 
 
+def on_seven_struts() -> pf.Mechanism:
+    base = np.array([(500.0 * x, 400.0 * y, z) for x in (-1, 1) for y in (-1, 1) for z in (0.0, 600.0)][:7])
+    ends = base * [0.12, 0.15, 0.0] + np.where(base[:, 2:] == 0.0, 1.0, -1.0) * [0.0, 0.0, 40.0] + [0.0, 0.0, 300.0]
+    return pf.Mechanism.from_legs("U-P*-S", base=base, platform=ends, stroke=(10, 2000), reference_point=(0, 0, 300))
+
+
+@pytest.mark.parametrize("name", ["four struts", "seven struts"])
+def test_redundant_motors_share_what_a_linear_programme_finds_no_timing_beats(name: str) -> None:
+    """The least share of their limits by which any forces of the actuators move the machine is 1 all the way."""
+    machine = closure.planar_4rpr() if name == "four struts" else on_seven_struts()
+    machine = machine.without_limits().with_masses(
+        pf.Mass(body, 0.5, machine.reference_point, [500.0] * 3) for body in machine.bodies[1:]
+    )
+    drive: dict[str, Any] = {"rotor_inertia": 0.3, "friction": (0.5, 1.0), "max_torque": 40.0}
+    machine = machine._with_joints(
+        dataclasses.replace(joint, **drive) if joint.actuated else joint for joint in machine.joints
+    )
+    t = np.linspace(0.0, 1.0, 81)
+    z = 20 * t * (name == "seven struts")
+    turns = np.stack([0.005 * z, 0 * t, 0.2 * t], axis=1)
+    shifts = np.stack([30 * np.sin(3 * t), 20 * t, z], axis=1)
+    timed = pf.time_path(pf.track(machine, pf.pose(machine.reference_point + shifts, rotvec=turns)))
+    efforts, spatial = pf.inverse_dynamics(timed), slice(0, 6) if name == "seven struts" else [0, 1, 5]
+    assert np.abs(efforts.actuators[:-1]).max() < 40.0 * (1 + 1e-5)
+    rates = pf.inverse_jacobian(timed.solution)[..., spatial]
+    n, shares = len(machine.actuator_names), []
+    bounds = np.block([[np.eye(n), -np.full((n, 1), 40.0)], [-np.eye(n), -np.full((n, 1), 40.0)]])
+    for row in np.linspace(1, len(timed.times) - 2, 60).astype(int):
+        works = np.c_[rates[row].T, np.zeros(rates.shape[2])]
+        best = linprog(
+            np.eye(n + 1)[n],
+            A_eq=works,
+            b_eq=works[:, :n] @ efforts.actuators[row],
+            A_ub=bounds,
+            b_ub=np.zeros(2 * n),
+            bounds=(None, None),
+        )
+        shares.append(best.fun)
+    assert max(shares) < 1.0 + 1e-5
+    assert np.mean(np.array(shares) > 0.99) > 0.95
+    assert all(" and " in who and what == "torque" for who, what in timed.held_back)
+    with pytest.raises(InvalidArgument, match=r"0.1, where '\w[^']* and [^']*' has to exert"):
+        pf.time_path(timed._track, torque=0.1)
+
+
 def test_limits_of_torque_that_no_timing_keeps_are_refused() -> None:
     machine = heavy("five_bar")
     track = pf.track(machine, followed("five_bar", 1).pose)

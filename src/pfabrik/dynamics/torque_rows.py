@@ -7,10 +7,9 @@ from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints
-from ..errors import InvalidArgument, UnsupportedMechanism
+from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..statics.loads import BodyLoads, has_reason
-from ..statics.transmission import is_redundantly_actuated
 from .drives import Drives
 from .inverse_dynamics import inverse_dynamics
 from .mass_matrix import mass_matrix
@@ -20,7 +19,7 @@ def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: B
     """What torques along a path are made of, at places s, side by side, (n, n_a (n_a + 2)), in SI units; no friction.
 
     With actuators q(s) these are M (q' s'' + q'' s'^2) + h s'^2 + rest: the mass matrix M, what the motion itself takes
-    at a speed of 1, h, and the torques at rest.
+    at a speed of 1, h, and the torques at rest; of redundant actuators, the least.
 
     Parameters
     ----------
@@ -29,13 +28,9 @@ def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: B
 
     Raises
     ------
-    UnsupportedMechanism : more actuators than motions, whose torques do not follow from these alone.
     InvalidArgument : places at which there are no torques, with the reason.
     """
     mechanism = solution.mechanism
-    if is_redundantly_actuated(mechanism):
-        reason = "there are more actuators than motions, and torques do not follow from these alone"
-        raise UnsupportedMechanism(mechanism.name, [reason], "timed by torque")
 
     def torques(rates: Floats | None) -> Floats:
         found = inverse_dynamics(solution, twists=rates, at="actuators", gravity=gravity, loads=loads)

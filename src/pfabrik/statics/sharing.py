@@ -7,15 +7,22 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..tolerances import TOLERANCES
 
-ROUNDS = 5000
-"""Projections by which forces come within limits: far from corners tens do."""
+MOST_STEPS, MOST_HALVINGS = 60, 40
+"""Newton's steps, of which some ten suffice, and the halvings of each."""
+
+GIVE = 1e-10
+"""How far work may give way per force: with it there is an answer where no forces within limits do the work."""
 
 
 def within_limits(forces: Floats, rates: Floats, limits: Floats) -> tuple[Floats, Floats, Mask]:
     """The forces (n, n_a) within limits that do the same work on all motions, nearest to the middle of the limits.
 
-    Projected in turn on the forces that do the work and on those within limits (Dykstra's algorithm), the middle comes
-    to the point of both that is nearest to it. Where a limit is infinite, it is the allowed force nearest to 0.
+    Where a limit is infinite, the middle is the allowed force nearest to 0. Forces t = clip(middle + U y) do the work
+    U't = U'forces, with U an orthonormal basis of what motions ask of actuators, where the convex function
+
+        sum h(middle + U y) - y . U'forces,    h' = clip,
+
+    is least: by Newton's steps, for it is a parabola wherever the same forces are at a limit.
 
     Parameters
     ----------
@@ -25,22 +32,41 @@ def within_limits(forces: Floats, rates: Floats, limits: Floats) -> tuple[Floats
 
     Returns
     -------
-    The forces; how far the nearest that do the work are beyond limits, signed, (n, n_a); and a mask of rows with forces
-    that are not, (n,): others keep those given.
+    The forces, those that are nearest to the limits where none are within; how far they are beyond, signed, (n, n_a);
+    and a mask of rows with forces within, (n,).
     """
     low, high = limits.T
-    is_bounded = np.isfinite(limits).all(axis=1)
     with np.errstate(invalid="ignore"):
-        middle = np.where(is_bounded, 0.5 * (low + high), np.clip(0.0, low, high))
-    working = rates @ np.linalg.pinv(rates, rcond=TOLERANCES.singular)
-    found, owed = np.tile(middle, (len(forces), 1)), np.zeros(forces.shape)
-    size = np.maximum(np.abs(forces).max(axis=1, initial=0.0), np.abs(middle).max(initial=0.0))
-    on, is_within = forces, np.zeros(len(forces), bool)
-    for _ in range(ROUNDS):
-        on = found + (working @ (forces - found)[..., None])[..., 0]
-        found = np.clip(on + owed, low, high)
-        owed = owed + on - found
-        is_within = np.abs(on - found).max(axis=1, initial=0.0) <= TOLERANCES.rank * size
-        if is_within.all():
+        middle = np.where(np.isfinite(limits).all(axis=1), 0.5 * (low + high), np.clip(0.0, low, high))
+    left, sizes, _ = np.linalg.svd(rates, full_matrices=False)
+    basis = left * (sizes > TOLERANCES.singular * sizes[:, :1])[:, None]
+    asked = np.einsum("nad,na->nd", basis, forces)
+    y = np.zeros(asked.shape)
+
+    def at(y: Floats) -> tuple[Floats, Floats, Floats]:
+        """The forces before limits and within them, (n, n_a), and the function, (n,)."""
+        free = middle + np.einsum("nad,nd->na", basis, y)
+        kept = np.clip(free, low, high)
+        return free, kept, (kept * (free - 0.5 * kept)).sum(axis=1) - (y * (asked - 0.5 * GIVE * y)).sum(axis=1)
+
+    free, kept, value = at(y)
+    for _ in range(MOST_STEPS):
+        slope = np.einsum("nad,na->nd", basis, kept) - asked + GIVE * y
+        inner = basis * ((free > low) & (free < high))[..., None]
+        bend = np.swapaxes(inner, -1, -2) @ inner + GIVE * np.eye(y.shape[1])
+        step = -np.linalg.solve(bend, slope[..., None])[..., 0]
+        falls, share = (slope * step).sum(axis=1), np.ones(len(y))
+        for _ in range(MOST_HALVINGS):
+            free, kept, lower = at(y + share[:, None] * step)
+            is_steep = lower > value + 1e-4 * share * falls + 1e-15 * np.abs(value)
+            if not is_steep.any():
+                break
+            share[is_steep] *= 0.5
+        y, value = y + share[:, None] * step, lower
+        if (np.abs(step).max(axis=1, initial=0.0) * share <= 1e-14 * (1.0 + np.abs(y).max(axis=1, initial=0.0))).all():
             break
-    return np.where(is_within[:, None], on, forces), on - found, is_within
+    on = kept + np.einsum("nad,nd->na", basis, asked - np.einsum("nad,na->nd", basis, kept))
+    beyond = on - np.clip(on, low, high)
+    size = np.maximum(np.abs(forces).max(axis=1, initial=0.0), np.abs(middle).max(initial=0.0))
+    is_within = np.abs(beyond).max(axis=1, initial=0.0) <= TOLERANCES.speed * size
+    return on, beyond, is_within

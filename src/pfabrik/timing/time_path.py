@@ -24,7 +24,7 @@ from ..statics.loads import BodyLoads
 from ..tolerances import TOLERANCES
 from .curve import Curve, curve_of, largest_between, refuse_crossings
 from .timed import Timed, What
-from .torque_path import TorquePath
+from .torque_path import TorqueParts, TorquePath
 
 MOST_SAMPLES = 10_000_000
 
@@ -65,7 +65,8 @@ def time_path(
     torque : float or mapping of str to float, optional
         The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
         `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
-        are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline.
+        are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline. Redundant
+        actuators share what they do in any way that keeps their limits: at these are several at once.
     loads : mapping of str to tuple, optional
         For torques, as in `inverse_dynamics`.
     gravity : array (3,), optional
@@ -80,7 +81,7 @@ def time_path(
         a range, by the number of the step; one that does not move; no limit at all; more than ten million samples. With
         limits of torque, bodies without a mass, and limits that are exceeded at rest.
     UnsupportedMechanism
-        Limits of torque of a machine with more actuators than motions.
+        Limits of torque of a machine with so many redundant actuators that what they do together has over 500 limits.
     """
     require_type("track", track, Track, "a Track, as `track` returns")
     mechanism = track.mechanism
@@ -135,7 +136,7 @@ def _torques(
     values, slopes, _ = (x[:, :n] for x in curve.at(s))
     steps = curve.step_of(s)
     solution = solve_fk(mechanism, values, start=track[steps])
-    return TorquePath(mechanism, s, torque_rows(solution, slopes, gravity, loads, steps))
+    return TorquePath(solution, s, torque_rows(solution, slopes, gravity, loads, steps), limits)
 
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
@@ -184,8 +185,8 @@ def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
         parts = limits.path.at(s, slopes_of, bends_of)
         by_push, by_speed = _beside(slopes_of, parts.by_push), _beside(bends_of, parts.by_speed)
         rest, viscous = _beside(rest, parts.rest), _beside(viscous, parts.viscous)
-        most = _beside(most, np.broadcast_to(limits.torques, slopes_of.shape))
-        _refuse_heavy(curve, s, parts.rest, limits)
+        most = _beside(most, parts.most)
+        _refuse_heavy(curve, s, parts, limits.path)
     x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
     for _ in range(ROUNDS):
         low, high = np.minimum(-most - held, 0.0), np.maximum(most - held, 0.0)
@@ -206,13 +207,14 @@ def _beside(one: Floats, other: Floats) -> Floats:
     return np.ascontiguousarray(np.hstack([one, other]))
 
 
-def _refuse_heavy(curve: Curve, s: Floats, rest: Floats, limits: _Limits) -> None:
+def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath) -> None:
     """Refuse limits of torque that a machine exceeds while it rests on the path, or begins to move."""
-    over = np.abs(rest) >= limits.torques
-    if limits.path is not None and over.any():
-        place = int(np.argmax((np.abs(rest) / limits.torques).max(axis=0)))
-        name, most = limits.path.names[place], np.abs(rest[:, place]).max()
-        found = f"{limits.torques[place]:.6g}, where '{name}' has to exert {most:.6g} at rest"
+    over = np.abs(parts.rest) >= parts.most
+    if over.any():
+        share = np.abs(parts.rest) / parts.most
+        place = int(np.argmax(share.max(axis=0)))
+        limit = path.limits[place]
+        found = f"{limit:.6g}, where '{path.names[place]}' has to exert {limit * share[:, place].max():.6g} at rest"
         steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
@@ -254,9 +256,9 @@ def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, 
     shares = [np.abs(rates[:, :n]) / limits.speeds, np.abs(gains) / limits.accelerations]
     kinds: list[tuple[str, What]] = [*((name, "speed") for name in names), *((name, "acceleration") for name in names)]
     if limits.path is not None:
-        torques = limits.path.at(where, slopes[:, :n], bends[:, :n]).torques(pace, pushes[cell])
-        shares.append(np.abs(torques) / limits.torques)
-        kinds += [(name, "torque") for name in names]
+        parts = limits.path.at(where, slopes[:, :n], bends[:, :n])
+        shares.append(np.abs(parts.torques(pace, pushes[cell])) / parts.most)
+        kinds += [(name, "torque") for name in limits.path.names]
     used = np.concatenate([*shares, platform[:, None] / limits.platform], axis=1)
     return Timed(
         mechanism=track.mechanism,

@@ -54,7 +54,8 @@ class Timed(Printed):
     binding : array of int (n,)
         Index of that limit in `limits`.
     limits : tuple of tuple of str
-        Pairs (actuator, "speed", "acceleration" or "torque") of all actuators, and ("platform", "speed").
+        Pairs (actuator, "speed", "acceleration" or "torque") of all actuators, and ("platform", "speed"). Redundant
+        actuators are at their limits of torque several at once: "A1 and A3".
     """
 
     mechanism: Mechanism

@@ -6,25 +6,30 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..answers.solution import Solution
 from ..arrays import Floats
-from ..description.mechanism import Mechanism
 from ..dynamics.drives import Drives
 from ..files.units import metres_of
+from ..kinematics import actuator_units
+from ..statics.shared_limits import facets_of, minors_along
+from ..statics.transmission import is_redundantly_actuated
 from .curve import Spline
 
 
 class TorqueParts(NamedTuple):
-    """Torques t = by_push s'' + by_speed s'^2 + viscous s' + rest at places s of a path, (n, n_a) each [N m, N].
+    """Torques t = by_push s'' + by_speed s'^2 + viscous s' + rest at places s of a path, (n, m) each [N m, N].
 
     Attributes
     ----------
     rest : of weight and loads, and of dry friction on the way.
+    most : their limits.
     """
 
     by_push: Floats
     by_speed: Floats
     viscous: Floats
     rest: Floats
+    most: Floats
 
     def torques(self, speeds: Floats, pushes: Floats) -> Floats:
         """The torques at s' and s'', (n,) each."""
@@ -33,22 +38,44 @@ class TorqueParts(NamedTuple):
 
 
 class TorquePath:
-    """The torques of a path, of what `torque_rows` says at places s (n,).
+    """The torques of a path, of what `torque_rows` says at places s (n,), and their limits (n_a,).
 
     Attributes
     ----------
-    names : of the actuators.
+    names : of the actuators; where they are redundant, of those that are at their limits together.
+    limits : of the first of these [N m, N].
     """
 
-    def __init__(self, mechanism: Mechanism, s: Floats, rows: Floats) -> None:
-        self.names = mechanism.actuator_names
+    def __init__(self, solution: Solution, s: Floats, rows: Floats, limits: Floats) -> None:
+        mechanism = solution.mechanism
+        self.names, self.limits, self._limits, self._motions = mechanism.actuator_names, limits, limits, 0
+        if is_redundantly_actuated(mechanism):
+            minors, self._motions = minors_along(solution, "timed by torque")
+            rows = np.hstack([rows, minors])
+            meeting = [others for others, _ in facets_of(minors[:1], len(limits), self._motions)]
+            self.names = tuple(" and ".join(mechanism.actuator_names[i] for i in others) for others in meeting)
+            self.limits = limits[[others[0] for others in meeting]]
         self._spline, self._drives = Spline.through(s, rows), Drives(mechanism, metres_of(mechanism.length_unit))
+        self._work = self._drives.si * actuator_units(mechanism)  # of a unit of force, by what the minors are in
 
     def at(self, s: Floats, slopes: Floats, bends: Floats) -> TorqueParts:
         """The torques at s (n,), where the actuators have these first and second derivatives, (n, n_a)."""
         n_a, drives = slopes.shape[1], self._drives
-        masses, by_speed, rest = np.split(self._spline.at(s)[0], [n_a**2, n_a**2 + n_a], axis=1)
+        ends = np.cumsum([n_a**2, n_a, n_a])
+        masses, by_speed, rest, minors = np.split(self._spline.at(s)[0], ends, axis=1)
         masses = masses.reshape(-1, n_a, n_a)
         by_push, more = (np.einsum("nab,nb->na", masses, x * drives.si) for x in (slopes, bends))
         dry, viscous = drives.friction.T
-        return TorqueParts(by_push, by_speed + more, viscous * slopes * drives.si, rest + dry * np.sign(slopes))
+        most = np.broadcast_to(self._limits, slopes.shape)
+        own = TorqueParts(by_push, by_speed + more, viscous * slopes * drives.si, rest + dry * np.sign(slopes), most)
+        return self._together(own, minors) if self._motions else own
+
+    def _together(self, own: TorqueParts, minors: Floats) -> TorqueParts:
+        """What redundant actuators do together, and the most of it."""
+        shares = [share * self._work for _, share in facets_of(minors, len(self._limits), self._motions)]
+        with np.errstate(invalid="ignore"):
+            most = [np.where(share == 0.0, 0.0, np.abs(share) * self._limits).sum(axis=1) for share in shares]
+        push, speed, viscous, rest = (
+            np.stack([(share * part).sum(axis=1) for share in shares], axis=1) for part in own[:4]
+        )
+        return TorqueParts(push, speed, viscous, rest, np.stack(most, axis=1))
