@@ -15,6 +15,7 @@ from click.testing import CliRunner
 import pfabrik as pf
 from pfabrik.cli import main
 from pfabrik.description.body_inertias import inertias_of
+from pfabrik.errors import InvalidArgument
 from pfabrik.files import dumps, loads
 from test_dynamics import weighed
 
@@ -185,6 +186,16 @@ def test_the_command_says_what_motors_exert_along_a_path(tmp_path: Path) -> None
     assert found["actuators"][1] == pytest.approx([0.5 * 9.81 / 3] * 3)
     assert "counted as none: carriage1" in done.stderr
     assert CliRunner().invoke(main, words).exit_code == 2
+    written, by_hand = tmp_path / "written.csv", tmp_path / "by_hand.csv"
+    assert CliRunner().invoke(main, [*words, "--load", "platform=0.5,0,0,0", "-o", str(written)]).exit_code == 0
+    machine = pf.load("linear_delta")
+    weightless = machine.with_masses(pf.Mass(body, 0.0) for body in machine.bodies[1:])
+    loads = {"platform": (0.5, [0.0, 0.0, 0.0])}
+    track = pf.track(weightless, [[0.0, 0.0, 5.0]] * 3, times=[0.0, 0.1, 0.2])
+    pf.inverse_dynamics(track, loads=loads).to_csv(by_hand)
+    assert by_hand.read_text() == written.read_text()
+    with pytest.raises(InvalidArgument, match="no path with times"):
+        pf.inverse_dynamics(track[0], twists=[0, 0, 0], loads=loads).to_csv(by_hand)
 
 
 SHAPES: dict[str, tuple[dict[str, Any], str]] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import click
 
@@ -17,7 +17,6 @@ from .statics import Loads, carrying, weighed
 from .track import at_lines_of, limiting
 
 if TYPE_CHECKING:
-    from ..dynamics.efforts import Efforts
     from ..paths import path as paths
     from .track import LimitsOf
 
@@ -73,7 +72,7 @@ def effort(
             motion = at_its_times(mechanism, read, sample_time)
         found = pf.inverse_dynamics(motion, loads=loads, gravity=gravity)
         if handle is not None:
-            write(found, handle)
+            found.write(handle)
     if plot is not None:
         with picture(plot):
             found.plot()
@@ -88,23 +87,3 @@ def at_its_times(mechanism: pf.Mechanism, path: paths.Path, sample_time: float |
         raise click.UsageError("the path has no times: give --sample-time, or a limit to time it by, such as --speed")
     times = path.times if sample_time is None else None
     return pf.track(mechanism, path.targets, times=times, sample_time=sample_time)
-
-
-def write(found: Efforts, handle: TextIO) -> None:
-    """Write a row for each time: what actuators exert [N m, N], their rates [deg/s, length/s] and power [W], the energy
-    given so far [J], and why there are no forces, where there are none."""
-    import numpy as np
-
-    from ..cells import CsvWriter
-    from ..kinematics import readouts
-
-    shown = readouts(found._mechanism)
-    rates = [each.display(column) for each, column in zip(shown, found.rates.T, strict=True)]
-    times, energy = np.asarray(found.times, float), np.asarray(found.energy, float)
-    numbers = np.column_stack([times, found.actuators, *rates, found.power, energy])
-    writer = CsvWriter(handle)
-    header = [f"effort_{each.name}" for each in shown]
-    header += [f"rate_{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
-    writer.writerow(["t", *header, *(f"power_{each.name}" for each in shown), "energy", "reason"])
-    for row, reason in zip((numbers + 0.0).tolist(), found.reason, strict=True):
-        writer.writerow([*row, reason])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
 from ..arrays import Floats, Mask, as_plain
+from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..extras import require
@@ -17,6 +19,7 @@ from ..kinematics import readouts
 from ..printed import Printed, ResultTable, plain
 from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
+from ..whole_files import whole_path
 from .drives import Drives
 
 if TYPE_CHECKING:
@@ -117,6 +120,38 @@ class Efforts(Printed):
         """Its fields, with power and energy, as plain numbers, lists and texts, ready for JSON."""
         return {**super().to_dict(), "power": as_plain(self.power), "energy": as_plain(self.energy)}
 
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write a row for each time: what actuators exert [N m, N], their rates [deg/s, length/s] and power [W], the
+        energy given so far [J], and why there are no forces, where there are none.
+
+        The file appears whole or not at all.
+
+        Raises
+        ------
+        InvalidArgument
+            Configurations that are no path with times.
+        """
+        self._require_times()
+        with whole_path(path) as part, part.open("w", newline="", encoding="utf-8") as handle:
+            self.write(handle)
+
+    def write(self, handle: TextIO) -> None:
+        """Write the columns of `to_csv` to an open file."""
+        times, shown = self._require_times(), readouts(self._mechanism)
+        rates = [each.display(column) for each, column in zip(shown, self.rates.T, strict=True)]
+        numbers = np.column_stack([times, self.actuators, *rates, self.power, np.asarray(self.energy)])
+        writer = CsvWriter(handle)
+        header = [f"effort_{each.name}" for each in shown]
+        header += [f"rate_{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
+        writer.writerow(["t", *header, *(f"power_{each.name}" for each in shown), "energy", "reason"])
+        for row, reason in zip((numbers + 0.0).tolist(), self.reason, strict=True):
+            writer.writerow([*row, reason])
+
+    def _require_times(self) -> Floats:
+        if self.times is None:
+            raise InvalidArgument("efforts", "no path with times", "those of a `track` with times, or of `time_path`")
+        return self.times
+
     def plot(self) -> Figure:
         """Forces, speeds and power of the actuators over time, one curve each; a Matplotlib figure.
 
@@ -125,8 +160,7 @@ class Efforts(Printed):
         InvalidArgument
             Configurations that are no path with times.
         """
-        if self.times is None:
-            raise InvalidArgument("efforts", "no path with times", "those of a `track` with times, or of `time_path`")
+        times = self._require_times()
         require("pictures", "matplotlib", "plot")
         from matplotlib.figure import Figure
 
@@ -139,7 +173,7 @@ class Efforts(Printed):
             figure.subplots(3, 1, sharex=True), labels, (self.actuators, moves, self.power), strict=True
         ):
             for each, column in zip(shown, values.T, strict=True):
-                axes.plot(self.times, column, label=each.name)
+                axes.plot(times, column, label=each.name)
             axes.set_ylabel(label)
         axes.set_xlabel("time [s]")
         handles, names = axes.get_legend_handles_labels()
