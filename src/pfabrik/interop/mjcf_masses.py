@@ -33,6 +33,7 @@ def read_masses(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Iterat
     by_geoms, groups = said.get("inertiafromgeom", "auto"), said.get("inertiagrouprange", "0 5").split()
     given = {body.get("name") for body in root.iter("body") if body.find("inertial") is not None}
     try:
+        total = float(said.get("settotalmass", "-1"))
         counted = range(int(groups[0]), int(groups[1]) + 1) if by_geoms != "false" else ()
         heavy = [geom for geom in geoms_of(root, set()) if geom.weighs and int(geom.group) in counted]
         meshes = [geom for geom in heavy if geom.kind not in (*PRIMITIVES, *UNBOUNDED)]
@@ -44,13 +45,15 @@ def read_masses(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Iterat
         reason = str(error).replace("\n", " ").strip()
         notes.append(Note(f"masses are left out, for MuJoCo does not compile the geoms ({reason})"))
         return
-    is_scaled = bool(meshes) and float(said.get("settotalmass", "-1")) > 0.0
+    mass = float(whole.body_mass[1:].sum())
+    scale = total / mass if min(total, mass) > 0.0 else 1.0
     by_inertial = {index for index in range(1, whole.nbody) if by_geoms != "true" and model.body(index) in given}
-    of_meshes = sorted({*range(1, whole.nbody)} if is_scaled else with_meshes - by_inertial - {0})
+    of_meshes = sorted({*range(1, whole.nbody)} if meshes and total > 0.0 else with_meshes - by_inertial - {0})
     note_names(notes, "masses that follow from meshes are not read, of", map(model.body, of_meshes))
     for index in sorted((by_inertial | {*whole.geom_bodyid.tolist()}) - {0, *of_meshes}):
         frame = frame_on(model, index, whole.body_ipos[index], whole.body_iquat[index])
-        yield placed_mass(model.body(index), float(whole.body_mass[index]), frame, np.diag(whole.body_inertia[index]))
+        inertia = scale * np.diag(whole.body_inertia[index])
+        yield placed_mass(model.body(index), scale * float(whole.body_mass[index]), frame, inertia)
 
 
 def _compiled(root: ET.Element, model: MjcfModel, geoms: Iterable[Geom]) -> Any:

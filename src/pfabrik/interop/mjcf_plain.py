@@ -15,7 +15,7 @@ from .urdf_links import UrdfJoint, UrdfLinks
 from .xml_reading import fault, number, number_text
 
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
-BY_GEOMS = ("inertiafromgeom", "inertiagrouprange", "settotalmass")
+BY_GEOMS = ("inertiafromgeom", "inertiagrouprange")
 WEIGHING = ("mass", "density", "shellinertia", "group")
 KEPT: dict[str, tuple[str, ...]] = {
     "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq", *BY_GEOMS),
