@@ -11,7 +11,7 @@ Graph         tree_of, column_joints, columns; passive_series; links_of
 Masses        inertias_of, BodyInertia
 Motion        home_coordinates, displacements, joint_centres, placed, end_effector_pose; joint_path, JointPath
               tilt_axis
-First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; actuator_units, rate_units
+First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops; actuator_units, rate_units
               parallel_signs
 Varied        varied, VariedMachine, MachineAt; VariedGeometry
 """
@@ -27,6 +27,7 @@ from .description.readouts import Readout, readout, readouts
 from .description.task import Task, task_of
 from .engine import engine_of
 from .model import Model, model_of
+from .motion.cut_loops import cut_loops
 from .motion.determined import require_determined
 from .motion.displacements import (
     actuator_units,
@@ -59,6 +60,7 @@ __all__ = [
     "actuator_units",
     "column_joints",
     "columns",
+    "cut_loops",
     "cycle_basis",
     "displacements",
     "end_effector_pose",

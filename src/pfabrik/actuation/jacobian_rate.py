@@ -11,15 +11,16 @@ Lengths are in L.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats
-from ..dynamics.asked_motion import shown_of, task_axes
-from ..dynamics.moving_machine import MovingMachine, weights_of
+from ..dynamics.asked_motion import in_lengths
+from ..dynamics.moving_rows import MovingRows, weights_of
 from ..errors import UnsupportedMechanism
-from ..kinematics import JointPath, actuator_units, generic_of
+from ..kinematics import JointPath, generic_of
 from ..rotations import CROSSED, turning
 from ..tolerances import TOLERANCES
 from .task_path import Coordinates, TaskPath
@@ -43,18 +44,17 @@ def jacobian_rates(coordinates: Coordinates, solution: Solution, rates: Floats) 
     _refuse(coordinates)
     units = np.where(coordinates.is_angle, 1.0, length)
     found = np.full((len(rates), len(mechanism.actuator_names), len(units)), np.nan)
+    at = "task" if isinstance(coordinates, TaskPath) else coordinates.names
     known = np.flatnonzero(~np.isnan(solution._coordinates).any(axis=1))
     for start in range(0, len(known), ROWS_A_BLOCK):
         rows = known[start : start + ROWS_A_BLOCK]
-        moving = MovingMachine(mechanism, weights_of({}), solution._configurations.coordinates_at(rows))
-        of = _second_order(coordinates, moving, solution._rows.poses[rows])
+        q, poses = solution._configurations.coordinates_at(rows), solution._rows.poses[rows]
+        of = _second_order(coordinates, MovingRows(mechanism, weights_of([], []), np.zeros(3), at, q, poses))
         own = rates[rows] / units
         size = np.abs(own).max(axis=1, initial=0.0)[:, None]
         size[size == 0.0] = 1.0
         for place, one in enumerate(np.eye(len(units))):
-            change = (of(own + size * one) - of(own - size * one)) / (4.0 * size)
-            found[rows, :, place] = change * actuator_units(mechanism) / units[place]
-        found[rows[moving.first.is_singular]] = np.nan
+            found[rows, :, place] = (of(own + size * one) - of(own - size * one)) / (4.0 * size * units[place])
     return found
 
 
@@ -72,34 +72,22 @@ def _refuse(coordinates: Coordinates) -> None:
             raise UnsupportedMechanism(mechanism.name, ["its platform tilts as it yaws"], PURPOSE)
 
 
-def _second_order(coordinates: Coordinates, moving: MovingMachine, poses: Floats) -> Callable[[Floats], Floats]:
+def _second_order(coordinates: Coordinates, rows: MovingRows) -> Callable[[Floats], Floats]:
     """Accelerations of the actuators (n, n_a) by rates (n, k) of coordinates that do not accelerate."""
-    of_task = isinstance(coordinates, TaskPath)
-    shown = shown_of(moving, "task" if of_task else coordinates.names, poses)
-    following, first = shown.following(moving), moving.first
+    units = in_lengths(coordinates.mechanism, rows.at)
 
     def accelerations(rates: Floats) -> Floats:
-        twist_of = _turned(coordinates, poses, rates) if isinstance(coordinates, TaskPath) else None
-        wanted = rates if twist_of is None else _along(coordinates, poses, twist_of[0])
-        u = (following @ wanted[..., None])[..., 0]
-        drift = moving.drift(u)
-        least = moving.least_accelerations(drift)
-        gains = -(shown.by_rates @ least[..., None])[..., 0]
-        if twist_of is not None:
-            twist, change = twist_of
-            spin = (first.twists @ u[..., None])[:, 3:, 0]
-            about, z = spin - twist[:, 3:], poses[:, :3, 2]
+        if not isinstance(coordinates, TaskPath):
+            return replace(rows, rates=rates * units).efforts().gains
+        twist, change = (each[:, : len(units)] * units for each in _turned(coordinates, rows.poses, rates))
+        moving = replace(rows, rates=twist)
+        if len(units) > 3:
+            spin, z = moving.efforts(["twists"]).twists[:, 3:], rows.poses[:, :3, 2]
+            about = spin - twist[:, 3:]
             change[:, 3:] += (about * z).sum(axis=1)[:, None] * np.cross(spin, z)  # it turns about its own axis too
-            gains += _along(coordinates, poses, change)
-            gains -= np.einsum("nki,ni->nk", shown.by_twist, moving.end_drift(u, drift))
-        return np.asarray((least + (following @ gains[..., None])[..., 0])[:, first.actuated])
+        return replace(moving, gains=change).efforts().gains
 
     return accelerations
-
-
-def _along(coordinates: Coordinates, poses: Floats, twists: Floats) -> Floats:
-    """Components of twists (n, 6) that a task sets, (n, m)."""
-    return np.asarray(np.einsum("nki,ni->nk", task_axes(coordinates.mechanism, poses), twists))
 
 
 def _turned(coordinates: TaskPath, poses: Floats, rates: Floats) -> tuple[Floats, Floats]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,49 +11,20 @@ from ..arrays import Floats, Mask
 from ..checks import names_of
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
-from ..kinematics import actuator_units, cycle_basis, joint_path, task_of
+from ..kinematics import actuator_units, joint_path, task_of
 from ..rotations import to_rotvec
-from ..tolerances import TOLERANCES
-from .moving_machine import MovingMachine
 
 NEIGHBOURS = 5
 """Steps of a path through which a polynomial gives the rates and accelerations of one: of the fourth degree."""
 
 
-class Shown(NamedTuple):
-    """What joint rates show of a motion, at n configurations, lengths in L.
-
-    Attributes
-    ----------
-    by_rates : k components by joint rates, (n, k, c).
-    by_twist : the same by the end effector's twist, (n, k, 6); 0 for coordinates of joints.
-    is_length : True for lengths, False for angles, (k,).
-    """
-
-    by_rates: Floats
-    by_twist: Floats
-    is_length: Mask
-
-    def following(self, moving: MovingMachine) -> Floats:
-        """The least joint rates that make each component, (n, c, k)."""
-        pairs = moving.first.pairs
-        return np.asarray(pairs @ np.linalg.pinv(self.by_rates @ pairs, rcond=TOLERANCES.singular))
-
-
-def shown_of(moving: MovingMachine, at: str | Sequence[str], poses: Floats) -> Shown:
-    """The components that `at` names: those of the task, of the actuators, of some joints; or "path", of all."""
-    n, mechanism = len(poses), moving.mechanism
+def axes_of(mechanism: Mechanism, at: str | tuple[str, ...], poses: Floats) -> Floats:
+    """The components of the end effector's twist that `at` names, at poses (n, 4, 4), (n, k, 6); those of coordinates
+    are none of these."""
     if at == "task":
-        return _of_twist(moving, task_axes(mechanism, poses))
-    if at == "path":
-        whole = np.tile(np.eye(3 if mechanism.end_effector_is_joint else 6, 6), (n, 1, 1))
-        of_pose, of_actuators = _of_twist(moving, whole), shown_of(moving, "actuators", poses)
-        by_rates, by_twist = (np.concatenate(both, axis=1) for both in zip(of_pose[:2], of_actuators[:2], strict=True))
-        return Shown(by_rates, by_twist, np.append(of_pose.is_length, of_actuators.is_length))
-    columns = np.array(moving.first.actuated) if at == "actuators" else joint_path(mechanism, at).columns
-    by_rates = cycle_basis(mechanism).rates.T[columns]
-    is_length = np.array([mechanism.coordinates[column].kind == "length" for column in columns], bool)
-    return Shown(np.tile(by_rates, (n, 1, 1)), np.zeros((n, len(columns), 6)), is_length)
+        return task_axes(mechanism, poses)
+    whole = (3 if mechanism.end_effector_is_joint else 6) if at == "path" else 0
+    return np.tile(np.eye(whole, 6), (len(poses), 1, 1))
 
 
 def task_axes(mechanism: Mechanism, poses: Floats) -> Floats:
@@ -70,8 +40,13 @@ def task_axes(mechanism: Mechanism, poses: Floats) -> Floats:
     return axes
 
 
-def _of_twist(moving: MovingMachine, axes: Floats) -> Shown:
-    return Shown(axes @ moving.first.twists, axes, np.asarray(axes[:, :, :3].any(axis=(0, 2))))
+def are_lengths(mechanism: Mechanism, at: str | tuple[str, ...]) -> Mask:
+    """True for the components of "task", "actuators" or named joints that are lengths, False for angles, (k,)."""
+    if at == "task":
+        axes = task_axes(mechanism, np.eye(4)[None])[0]
+        return np.asarray(axes[:, :3].any(axis=1))
+    drives = mechanism.drives if at == "actuators" else joint_path(mechanism, at).coordinates
+    return np.array([each.kind == "length" for each in drives], bool)
 
 
 def checked_at(mechanism: Mechanism, at: Any) -> str | tuple[str, ...]:
@@ -116,17 +91,10 @@ def motion_of(track: Track) -> tuple[Floats, Floats]:
     return first / span[:, None], 2.0 * second / span[:, None] ** 2
 
 
-def in_lengths(mechanism: Mechanism, at: str) -> Floats:
-    """Units of the numbers that `motion_of` and arguments have, in L: of twists, of actuators, or of both."""
-    twist = np.repeat([mechanism.characteristic_length, 1.0], 3)[: 3 if mechanism.end_effector_is_joint else 6]
-    return {"task": twist, "actuators": actuator_units(mechanism), "path": np.append(twist, actuator_units(mechanism))}[
-        at
-    ]
-
-
-def is_missed(shown: Shown, rates: Floats, wanted: Floats) -> Mask:
-    """True where joint rates (n, c) do not make a motion (n, k), as at a serial singularity, (n,)."""
-    missed = (shown.by_rates @ rates[..., None])[..., 0] - wanted
-    return np.asarray(
-        np.abs(missed).max(axis=1, initial=0.0) > TOLERANCES.alignment * np.abs(wanted).max(axis=1, initial=0.0)
-    )
+def in_lengths(mechanism: Mechanism, at: str | tuple[str, ...]) -> Floats:
+    """Units in L of the numbers that `motion_of` and arguments have: of twists, of actuators, of both, or of joints."""
+    length, actuators = mechanism.characteristic_length, actuator_units(mechanism)
+    twist = np.repeat([length, 1.0], 3)[: 3 if mechanism.end_effector_is_joint else 6]
+    if at in ("task", "path"):
+        return twist if at == "task" else np.append(twist, actuators)
+    return actuators if at == "actuators" else np.where(are_lengths(mechanism, at), length, 1.0)

@@ -28,21 +28,21 @@ class Drives:
         self.forces = ["N" if length else "N m" for length in is_length]
         self.si = np.where(is_length, metres, 1.0)
         self.units = np.where(is_length, mechanism.characteristic_length, 1.0 / metres)
-        self.limits = np.array([_of(drive, "max_torque") or np.inf for drive in mechanism.drives])
-        rotors = [(_of(drive, "rotor_inertia") or 0.0) * (_of(drive, "gear") or 1.0) ** 2 for drive in mechanism.drives]
+        self.limits = np.array([of_drive(drive, "max_torque") or np.inf for drive in mechanism.drives])
+        rotors = [(of_drive(drive, "rotor_inertia") or 0.0) * (of_drive(drive, "gear") or 1.0) ** 2 for drive in mechanism.drives]
         self.inertia = np.array(rotors)
-        self.friction = np.array([_of(drive, "friction") or (0.0, 0.0) for drive in mechanism.drives])
+        self.friction = np.array([of_drive(drive, "friction") or (0.0, 0.0) for drive in mechanism.drives])
 
-    def loads(self, rates: Floats, gains: Floats) -> Floats:
-        """What rotors and friction resist with at rates and accelerations (n, n_a) of the machine, in N and N m."""
-        return np.asarray(-(self.inertia * gains * self.si + self.rubbed(rates)))
+    def taken(self, rates: Floats, gains: Floats) -> Floats:
+        """What rotors and friction take at rates and accelerations (n, n_a) of the machine, in N and N m."""
+        return np.asarray(self.inertia * gains * self.si + self.rubbed(rates))
 
     def rubbed(self, rates: Floats) -> Floats:
         """What friction takes at rates (n, n_a) of the machine, in N and N m."""
         return self.friction[:, 0] * np.sign(rates) + self.friction[:, 1] * rates * self.si
 
 
-def _of(drive: Any, name: str) -> Any:
+def of_drive(drive: Any, name: str) -> Any:
     """What is said of a driven coordinate, of a joint that has one or two."""
     value = getattr(drive.joint, name)
     return value[drive.place] if len(drive.joint.driven) == 2 and value is not None else value

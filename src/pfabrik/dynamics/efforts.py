@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from ..arrays import Floats, Mask, as_plain
+from ..arrays import Floats, as_plain
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
@@ -21,6 +21,7 @@ from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from ..whole_files import whole_path
 from .drives import Drives
+from .reactions import Reactions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,8 +59,7 @@ class Efforts(Printed):
     reason: str | Reasons
     _mechanism: Mechanism = field(repr=False)
     _drives: Drives = field(repr=False)
-    _reactions: Floats = field(repr=False)
-    _is_open: Mask = field(repr=False)
+    _reactions: Reactions = field(repr=False)
 
     @cached_property
     def power(self) -> Floats:
@@ -81,14 +81,13 @@ class Efforts(Printed):
         Moments are about the points that `Forces.reactions` has. NaN where `reason` says why, and where `undetermined`
         does.
         """
-        return FrozenMapping(
-            {joint.name: self._reactions[..., place, :] for place, joint in enumerate(self._mechanism.joints)}
-        )
+        found = self._reactions.transmitted[0]
+        return FrozenMapping({joint.name: found[..., place, :] for place, joint in enumerate(self._mechanism.joints)})
 
     @property
     def undetermined(self) -> str:
         """Which of the reactions the motion does not determine, in words; empty if it determines all."""
-        return open_in_words(self._mechanism, self._is_open)
+        return open_in_words(self._mechanism, self._reactions.transmitted[1])
 
     def table(self) -> ResultTable:
         """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""

@@ -23,12 +23,9 @@ from .asked_motion import NEIGHBOURS
 from .drives import Drives
 from .effort_fit import EffortFit
 from .identification import Identification
-from .inverse_dynamics import TimedMotion, _asked, _Block, _resting, lacking_masses, loads_of
+from .inverse_dynamics import TimedMotion, asked_motion, lacking_masses, loads_of, resting_bodies, rows_of
 from .regressor import BodyScales, EffortRows, effort_rows
 from .unknowns import FRICTION, ROTOR, Unknowns
-
-ROWS_A_BLOCK = 64
-"""Rows whose matrices are in memory at once, ten columns a body."""
 
 LEAST_SIZE = 0.1
 """Size of a body at least, to compare its moments with [L]: of one without joints apart."""
@@ -90,7 +87,7 @@ def identify(
     InvalidArgument or UnknownName
         A motion that `inverse_dynamics` refuses; efforts of another shape; no body or actuator of a name; no row left.
     """
-    asked = _asked(motion, twists, accelerations, at)
+    asked = asked_motion(motion, twists, accelerations, at)
     mechanism, n = asked.solution.mechanism, len(asked.rates)
     metres, names = metres_of(mechanism.length_unit), mechanism.actuator_names
     drives, carried = Drives(mechanism, metres), checked_loads(mechanism, loads)
@@ -99,22 +96,17 @@ def identify(
     wanted = _bodies(mechanism, bodies)
     lacking = [Mass(body, 0.0) for body in lacking_masses(mechanism, metres) if body in wanted]
     whole = mechanism.with_masses([*mechanism.masses, *lacking])
-    weights, others = loads_of(whole, metres, carried)
+    weights = loads_of(whole, metres, carried)
     has_values = np.isfinite(np.concatenate([measured, asked.solution._coordinates], axis=1))
     is_used: Mask = np.asarray(has_values.all(axis=1))
     if asked.at == "path":
         is_used[: NEIGHBOURS // 2] = is_used[-(NEIGHBOURS // 2) :] = False
-    rows, parts = np.flatnonzero(is_used), []
+    rows = np.flatnonzero(is_used)
     scales = _scales(whole, metres, wanted, measured[rows])
-    for start in range(0, len(rows), ROWS_A_BLOCK):
-        places = rows[start : start + ROWS_A_BLOCK]
-        block = _Block(asked, places, weights, others, checked_gravity(gravity) / metres, metres)
-        parts.append(effort_rows(mechanism, block, drives, scales))
-    if not any(part.is_good.any() for part in parts):
+    moved = effort_rows(rows_of(asked, rows, weights, checked_gravity(gravity)), scales)
+    if not moved.is_good.any():
         raise InvalidArgument("motion", "no row with efforts that the actuators hold", "some, away from singularities")
-    is_good = np.concatenate([part.is_good for part in parts])
-    joined: Any = (np.concatenate(each)[is_good] for each in zip(*parts, strict=True))
-    rows, moved = rows[is_good], EffortRows(*joined)
+    rows, moved = rows[moved.is_good], EffortRows(*(each[moved.is_good] for each in moved))
     kinds = (*(FRICTION if friction else ()), *([ROTOR] if rotors else []))
     unknowns = Unknowns(whole, metres, scales, kinds, _typical(kinds, measured[rows] / drives.units, moved))
     return Identification(unknowns, EffortFit(unknowns, moved, measured[rows], rows, n, known))
@@ -131,7 +123,7 @@ def _efforts(efforts: Any, shape: tuple[int, ...], names: Sequence[str]) -> Floa
 
 def _bodies(mechanism: Mechanism, given: Any) -> tuple[str, ...]:
     """The bodies to identify: those given, or all that move."""
-    moving = tuple(body for body in mechanism.bodies if body not in _resting(mechanism))
+    moving = tuple(body for body in mechanism.bodies if body not in resting_bodies(mechanism))
     if given is None:
         return moving
     names = names_of("bodies", given)

@@ -9,12 +9,10 @@ import numpy as np
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
 from ..files.units import metres_of
-from ..kinematics import actuator_units, generic_of
 from ..statics.loads import BodyLoads, checked_loads
-from .asked_motion import checked_at, shown_of
-from .drives import Drives
-from .inverse_dynamics import ROWS_A_BLOCK, loads_of
-from .moving_machine import MovingMachine
+from .asked_motion import are_lengths, checked_at
+from .inverse_dynamics import loads_of
+from .moving_rows import MovingRows
 
 
 def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: BodyLoads | None = None) -> Floats:
@@ -47,24 +45,12 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     """
     mechanism = checked_solution(solution).mechanism
     at, metres = checked_at(mechanism, at), metres_of(mechanism.length_unit)
-    weights, drives = loads_of(mechanism, metres, checked_loads(mechanism, loads))[0], Drives(mechanism, metres)
-    length, rows = mechanism.characteristic_length, solution._rows
+    weights, rows = loads_of(mechanism, metres, checked_loads(mechanism, loads)), solution._rows
     known = np.flatnonzero(~np.isnan(solution._coordinates).any(axis=1))
-    found: Floats | None = None
-    for start in range(0, len(known), ROWS_A_BLOCK):
-        places = known[start : start + ROWS_A_BLOCK]
-        moving = MovingMachine(mechanism, weights, solution._configurations.coordinates_at(places))
-        shown = shown_of(moving, at, rows.poses[places])
-        following = shown.following(moving)
-        if generic_of(mechanism).mobility.idle:
-            motions, mobility = moving.free_responses(moving.first.unseen)
-            following = following - motions @ (mobility @ moving.inertia_along(motions, following))
-        own = following[:, moving.first.actuated] * (drives.si * actuator_units(mechanism))[:, None]
-        matrix = moving.inertia_along(following, following) * (length * metres) ** 2
-        matrix += np.einsum("nak,nam,a->nkm", own, own, drives.inertia)
-        matrix[moving.first.is_singular] = np.nan
-        found = np.full((len(rows.status), *matrix.shape[1:]), np.nan) if found is None else found
-        units = np.where(shown.is_length, length * metres, 1.0)
-        found[places] = matrix / (units[:, None] * units)
-    found = np.full((len(rows.status), 0, 0), np.nan) if found is None else found
-    return found.reshape(*solution.shape, *found.shape[1:])
+    q = solution._configurations.coordinates_at(known)
+    found = MovingRows(mechanism, weights, np.zeros(3), at, q, rows.poses[known]).efforts(["matrices"])
+    length = mechanism.characteristic_length * metres
+    units = np.where(are_lengths(mechanism, at), length, 1.0)
+    matrices = np.full((len(rows.status), len(units), len(units)), np.nan)
+    matrices[known] = found.matrices * length**2 / (units[:, None] * units)
+    return matrices.reshape(*solution.shape, *matrices.shape[1:])

@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..description.mechanism import Mechanism
+from ..files.units import metres_of
+from ..kernels.dynamics.moving import FREE_PART
 from ..kinematics import BodyInertia
-from ..statics.joint_balance import balance_at
 from .drives import Drives
-from .inverse_dynamics import _Block
-from .moving_machine import MovingMachine, Weights
+from .moving_rows import MovingRows, Probes
 
 PARTS = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 """The parameters of a body: x, y and z are its first moments."""
@@ -85,20 +84,16 @@ class EffortRows(NamedTuple):
     is_good: Mask
 
 
-def effort_rows(mechanism: Mechanism, block: _Block, drives: Drives, scales: BodyScales) -> EffortRows:
-    """Efforts of a block of rows, and how they depend on the parameters of bodies."""
-    first, (rates, gains) = block.moving.first, block.of_actuators()
-    held = balance_at(mechanism, first, block.carried[..., None])
-    described = held.actuators[..., 0] - drives.loads(rates, gains) * drives.units
+def effort_rows(rows: MovingRows, scales: BodyScales) -> EffortRows:
+    """Efforts of rows, and how they depend on the parameters of bodies."""
+    drives = Drives(rows.mechanism, metres_of(rows.mechanism.length_unit))
     places = scales.points[:, None] + scales.sizes[:, None, None] * _PLACES
     bodies = tuple(body for body in scales.bodies for _ in _PLACES)
-    points = Weights(bodies, np.ones(len(bodies)), places.reshape(-1, 3), np.zeros((len(bodies), 3, 3)))
-    moving = MovingMachine(mechanism, points, block.q)
-    resisted = moving.resistance(block.rates, block.gains, block.drift, block.pull) * block.scale
+    found = rows.efforts(["motions", "probes"], Probes(bodies, places.reshape(-1, 3)))
     of_places = np.linalg.inv(ten_of(np.ones(10), _PLACES, np.zeros((10, 3, 3))))
-    wrenches = np.einsum("pk,nbki->nbpi", of_places, resisted.reshape(len(rates), len(scales.bodies), 10, 6))
-    carried = np.einsum("bj,nbi->njib", moving.paths, wrenches.reshape(len(rates), -1, 6))
-    columns = balance_at(mechanism, first, carried).actuators
-    is_good = held.is_held[:, 0] & ~held.is_singular & ~block.is_missed
-    motions = np.asarray(first.pairs[:, first.actuated])
-    return EffortRows(described, columns, rates * drives.si, gains * drives.si, motions, is_good)
+    by_places = found.probes.reshape(*found.rates.shape, len(scales.bodies), 10)
+    columns = (by_places @ of_places.T).reshape(*found.rates.shape, len(bodies)) * drives.units[:, None]
+    is_good = (found.marks & ~FREE_PART) == 0
+    return EffortRows(
+        found.actuators * drives.units, columns, found.rates * drives.si, found.gains * drives.si, found.motions, is_good
+    )

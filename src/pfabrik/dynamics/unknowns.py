@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..description.joints import Joint
 from ..description.mechanism import Mass, Mechanism
 from ..kinematics import BodyInertia, inertias_of
-from .drives import Drives, _of
+from .drives import Drives, of_drive
 from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
 from .regressor import PARTS, POWERS, BodyScales, EffortRows, body_of, ten_of
 
@@ -45,7 +45,7 @@ class Unknowns:
     @cached_property
     def gears(self) -> Floats:
         """Gear ratios, (n_a,)."""
-        return np.array([_of(drive, "gear") or 1.0 for drive in self.mechanism.drives])
+        return np.array([of_drive(drive, "gear") or 1.0 for drive in self.mechanism.drives])
 
     @cached_property
     def names(self) -> tuple[str, ...]:

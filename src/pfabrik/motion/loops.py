@@ -102,7 +102,7 @@ class _Builder:
 
     def _add_joint(self, joint: Joint) -> None:
         """Add a joint's unit motions, in the order from its first body to its second."""
-        first, motions = self.columns[joint.name].start, _motions(self.mechanism, joint)
+        first, motions = self.columns[joint.name].start, unit_motions(self.mechanism, joint)
         self.units[joint.name] = list(range(len(self.records), len(self.records) + len(motions)))
         point = np.zeros(3) if joint.at is None else np.array(joint.at) / self.length
         self.records += [(kind, axis, point, first + place) for place, (kind, axis) in enumerate(motions)]
@@ -172,7 +172,7 @@ class _Builder:
         }
 
 
-def _motions(mechanism: Mechanism, joint: Joint) -> list[tuple[int, Any]]:
+def unit_motions(mechanism: Mechanism, joint: Joint) -> list[tuple[int, Any]]:
     """The unit motions of a joint and their axes, in the order from its first body to its second."""
     if joint.type == "fixed":
         return []

@@ -1,0 +1,1 @@
+"""Forces of motion: loops closed in rates, and masses along a tree."""
