@@ -11,8 +11,8 @@ Graph         tree_of, column_joints, columns; passive_series; links_of
 Masses        inertias_of, BodyInertia
 Motion        home_coordinates, displacements, joint_centres, placed, end_effector_pose; joint_path, JointPath
               tilt_axis
-First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops; actuator_units, rate_units
-              parallel_signs
+First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
+              actuator_units, rate_units; parallel_signs
 Varied        varied, VariedMachine, MachineAt; VariedGeometry
 """
 

@@ -29,7 +29,10 @@ class Drives:
         self.si = np.where(is_length, metres, 1.0)
         self.units = np.where(is_length, mechanism.characteristic_length, 1.0 / metres)
         self.limits = np.array([of_drive(drive, "max_torque") or np.inf for drive in mechanism.drives])
-        rotors = [(of_drive(drive, "rotor_inertia") or 0.0) * (of_drive(drive, "gear") or 1.0) ** 2 for drive in mechanism.drives]
+        rotors = [
+            (of_drive(drive, "rotor_inertia") or 0.0) * (of_drive(drive, "gear") or 1.0) ** 2
+            for drive in mechanism.drives
+        ]
         self.inertia = np.array(rotors)
         self.friction = np.array([of_drive(drive, "friction") or (0.0, 0.0) for drive in mechanism.drives])
 

@@ -12,6 +12,7 @@ from ..answers.solution import Solution
 from ..answers.tracked import Track
 from ..arguments import as_floats
 from ..arrays import Floats, Mask
+from ..batch import take
 from ..checks import names_of, require_known
 from ..description.mechanism import Mass, Mechanism
 from ..errors import InvalidArgument
@@ -106,7 +107,7 @@ def identify(
     moved = effort_rows(rows_of(asked, rows, weights, checked_gravity(gravity)), scales)
     if not moved.is_good.any():
         raise InvalidArgument("motion", "no row with efforts that the actuators hold", "some, away from singularities")
-    rows, moved = rows[moved.is_good], EffortRows(*(each[moved.is_good] for each in moved))
+    rows, moved = rows[moved.is_good], take(moved, moved.is_good)
     kinds = (*(FRICTION if friction else ()), *([ROTOR] if rotors else []))
     unknowns = Unknowns(whole, metres, scales, kinds, _typical(kinds, measured[rows] / drives.units, moved))
     return Identification(unknowns, EffortFit(unknowns, moved, measured[rows], rows, n, known))

@@ -154,7 +154,15 @@ def inverse_dynamics(
     reasons_here = in_shape(reasons, shape)
     reactions = Reactions(rows, known, values[0], shape)
     return Efforts(
-        exerted, rates, gains, asked.times, is_redundantly_actuated(mechanism), reasons_here, mechanism, drives, reactions
+        exerted,
+        rates,
+        gains,
+        asked.times,
+        is_redundantly_actuated(mechanism),
+        reasons_here,
+        mechanism,
+        drives,
+        reactions,
     )
 
 

@@ -50,7 +50,9 @@ def weights_of(parts: Sequence[tuple[str, BodyInertia]], acting: Sequence[tuple[
     centres, inertias = ([getattr(each, name) for _, each in parts] for name in ("centre", "inertia"))
     vectors = np.reshape(centres, (-1, 3)).astype(float), np.reshape(inertias, (-1, 3, 3)).astype(float)
     points, loads = (np.reshape([each[k] for each in acting], (-1, w)).astype(float) for k, w in ((2, 3), (1, 6)))
-    return Weights(tuple(body for body, _ in parts), masses, *vectors, tuple(body for body, *_ in acting), points, loads)
+    return Weights(
+        tuple(body for body, _ in parts), masses, *vectors, tuple(body for body, *_ in acting), points, loads
+    )
 
 
 class Probes(NamedTuple):
@@ -108,9 +110,16 @@ class MovingRows:
             for x in (self.rates, self.gains)
         )
         shapes = {
-            **{"actuators": (n_a,), "rates": (n_a,), "gains": (n_a,), "marks": ()},
-            **{"wrenches": (len(moving.frames) + len(moving.loaded), 6), "resting": (n_a,), "matrices": (k, k)},
-            **{"probes": (n_a, len(probes.bodies)), "twists": (6,), "motions": (n_a, int(moving.counts[SHOWN]))},
+            "actuators": (n_a,),
+            "rates": (n_a,),
+            "gains": (n_a,),
+            "marks": (),
+            "wrenches": (len(moving.frames) + len(moving.loaded), 6),
+            "resting": (n_a,),
+            "matrices": (k, k),
+            "probes": (n_a, len(probes.bodies)),
+            "twists": (6,),
+            "motions": (n_a, int(moving.counts[SHOWN])),
         }
         found = Efforts(**{
             name: np.full((n if place < 4 or name in requests else 0, *shape), 0 if name == "marks" else np.nan)
@@ -127,9 +136,7 @@ class MovingRows:
         in_blocks(run, n, ROWS_A_BLOCK)
         length, units = mechanism.characteristic_length, actuator_units(mechanism)
         scale = length**2 * metres_of(mechanism.length_unit)
-        return found._replace(
-            rates=found.rates * units, gains=found.gains * units, wrenches=found.wrenches * scale
-        )
+        return found._replace(rates=found.rates * units, gains=found.gains * units, wrenches=found.wrenches * scale)
 
     def _components(self, axes: Floats, values: Floats) -> Floats:
         """Those of twists that the task sets; else the values as they are."""
@@ -149,9 +156,14 @@ def _table(rows: MovingRows, probes: Probes) -> Moving:
     drives, counts = Drives(mechanism, metres_of(mechanism.length_unit)), generic_of(mechanism).mobility
     length, metres = mechanism.characteristic_length, metres_of(mechanism.length_unit)
     shown, by_coordinate = counts.platform + counts.internal, drives.si * actuator_units(mechanism)
-    of_drives = rows.effort_units, drives.inertia * by_coordinate, drives.friction[:, 0], drives.friction[:, 1] * by_coordinate
+    of_drives = (
+        rows.effort_units,
+        drives.inertia * by_coordinate,
+        drives.friction[:, 0],
+        drives.friction[:, 1] * by_coordinate,
+    )
     least_mass = TOLERANCES.implied * weights.masses.sum()
-    fields = cut._asdict()
+    fields, twists = cut._asdict(), 3 if mechanism.end_effector_is_joint else 6
     frames, places = fields.pop("frames"), fields.pop("places")
 
     def integers(values: Any) -> Any:
@@ -161,9 +173,7 @@ def _table(rows: MovingRows, probes: Probes) -> Moving:
         **fields,
         actuated=integers(places[q] for q in actuated),
         asked=integers(places[q] for q in asked),
-        counts=integers((
-            3 if mechanism.end_effector_is_joint else 6, counts.mobility, shown, rows.at == "task", rows.at == "actuators"
-        )),
+        counts=integers((twists, counts.mobility, shown, rows.at == "task", rows.at == "actuators")),
         frames=integers(frames[body] for body in weights.bodies),
         masses=weights.masses,
         centres=weights.centres / length,

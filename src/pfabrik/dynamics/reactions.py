@@ -39,9 +39,11 @@ class Reactions:
         """Force [N] and moment about their centres [N m], (..., joints, 6), and where that is not determined."""
         mechanism, weights = self.rows.mechanism, self.rows.weights
         found = self.rows.efforts(["wrenches"])
-        metres, length = metres_of(mechanism.length_unit), mechanism.characteristic_length
+        metres = metres_of(mechanism.length_unit)
         drives, paths = Drives(mechanism, metres), tree_of(mechanism).paths
-        by_body = np.array([paths[body] for body in (*weights.bodies, *weights.loaded)]).reshape(-1, len(mechanism.joints))
+        by_body = np.array([paths[body] for body in (*weights.bodies, *weights.loaded)]).reshape(
+            -1, len(mechanism.joints)
+        )
         given = self.exerted[self.places] - drives.taken(found.rates, found.gains)
         reactions = np.full((len(self.exerted), len(mechanism.joints), 6), np.nan)
         is_open = np.zeros(reactions.shape, bool)

@@ -95,5 +95,10 @@ def effort_rows(rows: MovingRows, scales: BodyScales) -> EffortRows:
     columns = (by_places @ of_places.T).reshape(*found.rates.shape, len(bodies)) * drives.units[:, None]
     is_good = (found.marks & ~FREE_PART) == 0
     return EffortRows(
-        found.actuators * drives.units, columns, found.rates * drives.si, found.gains * drives.si, found.motions, is_good
+        found.actuators * drives.units,
+        columns,
+        found.rates * drives.si,
+        found.gains * drives.si,
+        found.motions,
+        is_good,
     )

@@ -6,8 +6,8 @@ its own, and is cut behind them.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import BALL
 from ..kernels.dynamics.moving import BASE, END, FIRST
 from .displacements import columns
-from .loops import unit_motions
+from .loops import connected, unit_motions
 
 
 class CutLoops(NamedTuple):
@@ -46,136 +46,149 @@ class CutLoops(NamedTuple):
     groups: Ints
 
 
+class _Unit(NamedTuple):
+    """A unit motion beyond a frame; axis and point at home [L]."""
+
+    kind: int
+    frame: int
+    coordinate: int
+    sense: int
+    axis: Floats
+    point: Floats
+
+    @property
+    def width(self) -> int:
+        return 3 if self.kind == BALL else 1
+
+
+class _Cut(NamedTuple):
+    """A cut between two frames, its number of conditions, and the signs of V and of unit motions in them."""
+
+    one: int
+    other: int
+    rows: int
+    of_end: int
+    signs: dict[int, int]
+    point: Floats
+
+
 @derived
 def cut_loops(mechanism: Mechanism, kept: tuple[int, ...]) -> CutLoops:
     """The trees and cuts of a mechanism; the coordinates `kept` have columns."""
-    return _Trees(mechanism, kept).built()
+    frames, units, cuts = _grown(mechanism, set(kept))
+    members = connected([set(cut.signs) for cut in cuts])
+    groups = [(sorted({unit for k in group for unit in cuts[k].signs}), group) for group in members]
+    bound = {unit for own, _ in groups for unit in own}
+    groups.append(([unit for unit in range(len(units)) if unit not in bound], []))
+    firsts: dict[int, int] = {}
+    rows: list[list[int]] = []
+    visits: list[tuple[int, int]] = []
+    points, bounds, n_columns = [], [(0, 0, 0)], 0
+    for own, group in groups:
+        for unit in own:
+            firsts[unit] = n_columns
+            n_columns += units[unit].width
+        for cut in (cuts[k] for k in group):
+            rows.append([*cut[:4], len(visits)])
+            points.append(cut.point)
+            visits += [(firsts[k] + i, sign) for k, sign in sorted(cut.signs.items()) for i in range(units[k].width)]
+        bounds.append((n_columns, len(rows), sum(row[2] for row in rows)))
+    end, way = mechanism.end_effector_body, []
+    for index, forward in tree_of(mechanism).way(end):
+        way += _units(mechanism, mechanism.joints[index], 0, forward)
+    return CutLoops(
+        frames=frames,
+        places={units[k].coordinate + i: first + i for k, first in firsts.items() for i in range(units[k].width)},
+        units=_ints(
+            ([unit.kind, unit.frame, unit.coordinate, firsts[k], unit.sense] for k, unit in enumerate(units)), 5
+        ),
+        axes=_vectors(unit.axis for unit in units),
+        points=_vectors(unit.point for unit in units),
+        way=_ints(([unit.kind, 0, unit.coordinate, 0, unit.sense] for unit in way), 5),
+        way_axes=_vectors(unit.axis for unit in way),
+        way_points=_vectors(unit.point for unit in way),
+        end=np.array(mechanism.reference_point) / mechanism.characteristic_length,
+        cuts=_ints([*rows, [0, 0, 0, 0, len(visits)]], 5),
+        cut_points=_vectors(points),
+        visits=_ints(visits, 2),
+        groups=_ints(bounds, 3),
+    )
 
 
-class _Trees:
-    def __init__(self, mechanism: Mechanism, kept: Collection[int]) -> None:
-        self.mechanism, self.columns, self.length = mechanism, columns(mechanism), mechanism.characteristic_length
-        self.frames = {mechanism.base: BASE, mechanism.end_effector_body: END}
-        self.units: list[list[int]] = []  # without their columns
-        self.vectors: list[tuple[Floats, Floats]] = []
+def _grown(mechanism: Mechanism, kept: set[int]) -> tuple[dict[str, int], list[_Unit], list[_Cut]]:
+    """Frames of the bodies, the unit motions that lead to them, and the cuts between them."""
 
-        def is_cut_ball(joint: Joint) -> bool:
-            return joint.type == "spherical" and not set(range(*self.columns[joint.name].indices(2**31))) & set(kept)
+    def is_cut_ball(joint: Joint) -> bool:
+        own = columns(mechanism)[joint.name]
+        return joint.type == "spherical" and not kept & set(range(own.start, own.stop))
 
-        roots = {body: body for body in mechanism.bodies}
+    trees = {body: {body} for body in mechanism.bodies}
+    _join(trees, mechanism.base, mechanism.end_effector_body)
+    waiting: list[Joint] = []
+    cut: list[Joint] = []
+    for joint in sorted(mechanism.joints, key=lambda joint: (not joint.is_rigid, is_cut_ball(joint))):
+        (waiting if _join(trees, *joint.connects) else cut).append(joint)
+    frames, units = {mechanism.base: BASE, mechanism.end_effector_body: END}, []
 
-        def root(body: str) -> str:
-            while roots[body] != body:
-                body = roots[body]
-            return body
-
-        roots[root(mechanism.end_effector_body)] = root(mechanism.base)
-        grown, cut = [], []
-        for joint in sorted(mechanism.joints, key=lambda joint: (not joint.is_rigid, is_cut_ball(joint))):
-            one, other = map(root, joint.connects)
-            (cut if one == other else grown).append(joint)
-            roots[one] = other
-        while grown:
-            joint = next(joint for joint in grown if set(joint.connects) & set(self.frames))
-            grown.remove(joint)
-            forward = joint.connects[0] in self.frames
-            before, after = joint.connects if forward else joint.connects[::-1]
-            self.frames[after] = self._grow(joint, self.frames[before], forward)
-        self.cuts = []
-        for joint in cut:
-            one, other = (self.frames[body] for body in joint.connects)
-            is_ball = is_cut_ball(joint)
-            point = np.zeros(3) if joint.at is None else np.array(joint.at) / self.length
-            self.cuts.append((one if is_ball else self._grow(joint, one, True), other, 3 if is_ball else 6, point))
-
-    def _grow(self, joint: Joint, frame: int, forward: bool) -> int:
-        """Add a joint's unit motions beyond a frame; the frame they lead to."""
-        units, vectors = _units(self.mechanism, joint, forward)
-        for unit in units:
-            self.units.append([unit[0], frame, *unit[1:]])
-            frame = FIRST + len(self.units) - 1
-        self.vectors += vectors
+    def beyond(joint: Joint, frame: int, forward: bool) -> int:
+        for unit in _units(mechanism, joint, frame, forward):
+            units.append(unit._replace(frame=frame))
+            frame = FIRST + len(units) - 1
         return frame
 
-    def _way(self, frame: int) -> tuple[int, dict[int, int]]:
-        """The root of a frame, and the unit motions on the way to it."""
-        way = {}
-        while frame >= FIRST:
-            way[frame - FIRST] = 1
-            frame = self.units[frame - FIRST][1]
-        return frame, way
-
-    def built(self) -> CutLoops:
-        conditions = []
-        for one, other, rows, point in self.cuts:
-            (first, back), (second, out) = self._way(one), self._way(other)
-            signs = {unit: (unit in out) - (unit in back) for unit in {**back, **out}}
-            signs = {unit: sign for unit, sign in signs.items() if sign}
-            conditions.append((one, other, rows, int(second == END) - int(first == END), signs, point))
-        groups: list[tuple[set[int], list[int]]] = []
-        for number, condition in enumerate(conditions):
-            touching = [group for group in groups if group[0] & set(condition[4])]
-            groups = [group for group in groups if group not in touching]
-            members = sorted([number, *(m for group in touching for m in group[1])])
-            groups.append((set(condition[4]).union(*(group[0] for group in touching)), members))
-        groups.sort(key=lambda group: group[1])
-        bound = set().union(*(group[0] for group in groups))
-        groups.append(({unit for unit in range(len(self.units)) if unit not in bound}, []))
-        firsts: dict[int, int] = {}
-        n = rows = 0
-        table, cuts, visits, points = [(0, 0, 0)], [], [], []
-        for members, numbers in groups:
-            for unit in sorted(members):
-                firsts[unit] = n
-                n += self._width(unit)
-            for number in numbers:
-                one, other, count, of_end, signs, point = conditions[number]
-                cuts.append((one, other, count, of_end, len(visits)))
-                points.append(point)
-                visits += [(firsts[k] + i, signs[k]) for k in sorted(signs) for i in range(self._width(k))]
-                rows += count
-            table.append((n, len(cuts), rows))
-        places = {self.units[k][2] + i: first + i for k, first in firsts.items() for i in range(self._width(k))}
-        units = [(kind, parent, q, firsts[k], sense) for k, (kind, parent, q, sense) in enumerate(self.units)]
-        way, vectors = [], []
-        for index, forward in tree_of(self.mechanism).way(self.mechanism.end_effector_body):
-            own, of_own = _units(self.mechanism, self.mechanism.joints[index], forward)
-            way += [(kind, 0, q, 0, sense) for kind, q, sense in own]
-            vectors += of_own
-        return CutLoops(
-            frames=self.frames,
-            places=places,
-            units=_ints(units, 5),
-            axes=_floats(axis for axis, _ in self.vectors),
-            points=_floats(point for _, point in self.vectors),
-            way=_ints(way, 5),
-            way_axes=_floats(axis for axis, _ in vectors),
-            way_points=_floats(point for _, point in vectors),
-            end=np.array(self.mechanism.reference_point) / self.length,
-            cuts=_ints([*cuts, (0, 0, 0, 0, len(visits))], 5),
-            cut_points=_floats(points),
-            visits=_ints(visits, 2),
-            groups=_ints(table, 3),
-        )
-
-    def _width(self, unit: int) -> int:
-        return 3 if self.units[unit][0] == BALL else 1
+    while waiting:
+        joint = next(joint for joint in waiting if set(joint.connects) & set(frames))
+        waiting.remove(joint)
+        forward = joint.connects[0] in frames
+        before, after = joint.connects if forward else joint.connects[::-1]
+        frames[after] = beyond(joint, frames[before], forward)
+    cuts = []
+    for joint in cut:
+        one, other = (frames[body] for body in joint.connects)
+        one, rows = (one, 3) if is_cut_ball(joint) else (beyond(joint, one, True), 6)
+        (first, back), (second, out) = _way(units, one), _way(units, other)
+        signs = {unit: 1 if unit in out else -1 for unit in back ^ out}
+        cuts.append(_Cut(one, other, rows, int(second == END) - int(first == END), signs, _centre(mechanism, joint)))
+    return frames, units, cuts
 
 
-def _units(mechanism: Mechanism, joint: Joint, forward: bool) -> tuple[list[list[int]], list[tuple[Floats, Floats]]]:
-    """Kind, coordinate and sense of a joint's unit motions as they are passed, and axis and point of each [L]."""
+def _join(trees: dict[str, set[str]], one: str, other: str) -> bool:
+    """Join the trees of two bodies; False if they are one."""
+    if trees[one] is trees[other]:
+        return False
+    trees[one] |= trees[other]
+    trees.update(dict.fromkeys(trees[other], trees[one]))
+    return True
+
+
+def _way(units: Sequence[_Unit], frame: int) -> tuple[int, set[int]]:
+    """The root of a frame, and the unit motions on the way to it."""
+    way = set()
+    while frame >= FIRST:
+        way.add(frame - FIRST)
+        frame = units[frame - FIRST].frame
+    return frame, way
+
+
+def _units(mechanism: Mechanism, joint: Joint, frame: int, forward: bool) -> list[_Unit]:
+    """A joint's unit motions in the order in which they are passed."""
     if joint.is_rigid:
-        return [], []
-    first = columns(mechanism)[joint.name].start
-    point = np.zeros(3) if joint.at is None else np.array(joint.at) / mechanism.characteristic_length
-    motions = [(kind, first + k, np.array(axis)) for k, (kind, axis) in enumerate(unit_motions(mechanism, joint))]
-    motions = motions if forward else motions[::-1]
-    return [[kind, q, 1 if forward else -1] for kind, q, _ in motions], [(axis, point) for *_, axis in motions]
+        return []
+    first, point, sense = columns(mechanism)[joint.name].start, _centre(mechanism, joint), 1 if forward else -1
+    units = [
+        _Unit(kind, frame, first + k, sense, np.array(axis), point)
+        for k, (kind, axis) in enumerate(unit_motions(mechanism, joint))
+    ]
+    return units[::sense]
 
 
-def _ints(rows: list, width: int) -> Ints:
-    return np.array(rows, np.int64).reshape(-1, width)
+def _centre(mechanism: Mechanism, joint: Joint) -> Floats:
+    return np.zeros(3) if joint.at is None else np.array(joint.at) / mechanism.characteristic_length
 
 
-def _floats(vectors) -> Floats:
+def _ints(rows: Iterable[Any], width: int) -> Ints:
+    return np.array(list(rows), np.int64).reshape(-1, width)
+
+
+def _vectors(vectors: Iterable[Floats]) -> Floats:
     return np.array(list(vectors), float).reshape(-1, 3)

@@ -109,7 +109,7 @@ class _Builder:
 
     def build(self, groups: list[list[int]] | None = None) -> K.Loops:
         """The table; groups of paths, in their order, are those that share joints unless they are given."""
-        groups = _connected([{k for k, _ in path} for path in self.paths]) if groups is None else groups
+        groups = connected([{k for k, _ in path} for path in self.paths]) if groups is None else groups
         order = [path for group in groups for path in group]
         visits = [visit for path in order for visit in self.paths[path]]
         starts = _starts(len(self.paths[path]) for path in order)
@@ -201,7 +201,7 @@ def _slides(
     return slides
 
 
-def _connected(sets: Sequence[set[int]]) -> list[list[int]]:
+def connected(sets: Sequence[set[int]]) -> list[list[int]]:
     """Indices of the sets, grouped so that sets of different groups share no element."""
     groups: list[tuple[set[int], list[int]]] = []
     for number, elements in enumerate(sets):

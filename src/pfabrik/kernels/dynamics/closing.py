@@ -14,7 +14,6 @@ from ..vectors import add, cross, vec
 from .moving import FROM, LEAST, MOTIONS, OF_END, ROWS, VISITS, Moving, Scratch
 from .placing import point_of
 
-
 FREE, GONE = -1, -2
 """Slots of columns that are not eliminated yet, and of those that are."""
 

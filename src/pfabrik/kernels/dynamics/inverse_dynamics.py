@@ -41,7 +41,13 @@ REGULAR = 1e3
 
 @search
 def inverse_dynamics(
-    machine: int, scratch_address: int, coordinates: Floats, axes: Floats, rates: Floats, gains: Floats, results: Efforts
+    machine: int,
+    scratch_address: int,
+    coordinates: Floats,
+    axes: Floats,
+    rates: Floats,
+    gains: Floats,
+    results: Efforts,
 ) -> None:
     """Fill efforts at joint coordinates (n, columns of q), in L.
 
@@ -297,7 +303,7 @@ def invert(own: Scratch, A: Floats, inverse: Floats) -> bool:
         for j in range(n):
             inverse[i, j] = square[i, n + j]
             other += inverse[i, j] * inverse[i, j]
-    return one * other < REGULAR * REGULAR
+    return one * other < REGULAR**2 and other < REGULAR**4
 
 
 @routine
@@ -313,7 +319,7 @@ def put_least(moving: Moving, own: Scratch) -> None:
             for j in range(table.shape[1]):
                 table[i, j] = table[i, j] / sizes[i] if sizes[i] > least else 0.0
     orthogonalise_rows(table, width, width + k, sizes)
-    fill_map(table, width, width + k, n, least * sizes[0] if n > 0 else 0.0, sizes, own.following)
+    fill_map(table, width, width + k, n, least * max(least, sizes[0]) if n > 0 else 0.0, sizes, own.following)
     orthogonalise_rows(table, twists, width, sizes)
     fill_map(table, twists, width + k, n, least, sizes, own.by_actuators)
 

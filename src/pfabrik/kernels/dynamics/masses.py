@@ -1,7 +1,7 @@
 """Masses in motion: twists and accelerations along the trees, and the wrenches that masses resist with.
 
-With the screws s_k and rates u_k of the columns, a frame has V = V_before + s u and A = A_before + s u' + V_before x s u
-at a point that rests. The axes of a ball are those of the base; its centre moves with the frame before it. A mass m with
+With the screws s and rates u of its columns, a frame has V = V_before + s u, A = A_before + s u' + V_before x s u, at a
+point that rests. The axes of a ball are those of the base; its centre moves with the frame before it. A mass m with
 its centre at r, and inertia I about it, resists with the force f = m (g - a_r), and the moment r x f - I w' - w x I w.
 """
 
@@ -114,7 +114,9 @@ def carry_masses(moving: Moving, own: Scratch, wrenches: Floats, moves: bool) ->
             put(wrenches[k, 3:], moment)
     for k in range(moving.loaded.shape[0]):
         force = vec(moving.loads[k])
-        moment = add(vec(moving.loads[k, 3:]), cross(point_of(own, moving.loaded[k], vec(moving.load_points[k])), force))
+        moment = add(
+            vec(moving.loads[k, 3:]), cross(point_of(own, moving.loaded[k], vec(moving.load_points[k])), force)
+        )
         carry(own, moving.loaded[k], force, moment)
         if is_asked:
             put(wrenches[b + k], force)

@@ -70,7 +70,7 @@ are asked for and nothing else."""
 
 LEAST, LEAST_MASS, ALIGNED = 0, 1, 2
 """Places in Moving.limits: a singular value that counts as none, the least inertia of a free part [kg L²], and the share
-of a number that is rounding."""
+that is rounding."""
 
 
 class Efforts(NamedTuple):
@@ -130,8 +130,7 @@ class Scratch(NamedTuple):
     by_actuators: Floats  # (shown, n_a)
     z: Floats  # (shown,)
     wanted: Floats  # (k,)
-    efforts: Floats  # (n_a,)
-    mass: Floats  # (shown, shown)
+    efforts: Floats  # (n_a,): by points
     product: Floats  # (shown, k)
 
 
@@ -140,18 +139,36 @@ def new_scratch(moving: Moving, k: int) -> Scratch:
     frames, b, n_a = FIRST + len(moving.units), len(moving.frames), len(moving.actuated)
     columns, rows, groups = int(moving.groups[-1, 0]), int(moving.groups[-1, 2]), len(moving.groups) - 1
     twists, motions, shown = (int(x) for x in moving.counts[:3])
-    shapes: dict[str, tuple[int, ...]] = {
-        "T": (frames, 3, 4), "reference": (3,), "screws": (columns, 6), "rows": (rows, columns + 6),
-        "pivot_of": (rows,), "pivots": (rows,), "n_pivots": (groups,), "slots": (columns,),
-        "left": (rows, 6 + columns), "left_of": (rows,), "left_pivot": (6 + columns,), "pivots_left": (rows,), "order": (6 + columns,),
-        "opened": (rows,), "parameters": (6 + columns, motions), "by_motions": (columns, motions),
-        "shown": (twists + n_a, motions), "u": (columns,), "du": (columns,), "V": (6 + columns,),
-        "dV": (6 + columns,), "twists": (frames, 6), "gains": (frames, 6), "carried": (frames, 6), "arms": (b, 3),
-        "turned": (b, 3, 3), "h": (columns,), "work": (motions,), "idle": (motions - shown, motions - shown + 1),
-        "inertia": (motions - shown, motions - shown), "coupling": (motions - shown, shown), "asked": (k, shown), "table": (shown, twists + n_a + k + shown), "sizes": (shown,),
-        "square": (shown, 2 * shown), "following": (shown, k), "by_actuators": (shown, n_a), "z": (shown,),
-        "wanted": (k,), "efforts": (n_a,), "mass": (shown, shown), "product": (shown, k),
-    }  # fmt: skip
+    idle, width, n = motions - shown, 6 + columns, twists + n_a
+    parts: tuple[tuple[str, tuple[int, ...]], ...] = (
+        ("pivot_of pivots left_of pivots_left opened", (rows,)),
+        ("rows left", (rows, width)),
+        ("n_pivots", (groups,)),
+        ("slots u du h", (columns,)),
+        ("screws", (columns, 6)),
+        ("left_pivot order V dV", (width,)),
+        ("twists gains carried", (frames, 6)),
+        ("T", (frames, 3, 4)),
+        ("parameters", (width, motions)),
+        ("by_motions", (columns, motions)),
+        ("shown", (n, motions)),
+        ("work", (motions,)),
+        ("idle", (idle, idle + 1)),
+        ("inertia", (idle, idle)),
+        ("coupling", (idle, shown)),
+        ("sizes z", (shown,)),
+        ("square", (shown, 2 * shown)),
+        ("table", (shown, n + k + shown)),
+        ("by_actuators", (shown, n_a)),
+        ("efforts", (n_a,)),
+        ("asked", (k, motions)),
+        ("following product", (shown, k)),
+        ("wanted", (k,)),
+        ("reference", (3,)),
+        ("arms", (b, 3)),
+        ("turned", (b, 3, 3)),
+    )
+    shapes = {name: shape for names, shape in parts for name in names.split()}
     whole = {"pivot_of", "pivots", "n_pivots", "slots", "left_of", "left_pivot", "pivots_left", "order"}
     return Scratch(**{name: np.zeros(shape, np.int64 if name in whole else float) for name, shape in shapes.items()})
 
