@@ -10,6 +10,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.arrays import Floats
+from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName, UnsupportedMechanism
 from pfabrik.kinematics import VariedMachine, varied
 from pfabrik.rotations import from_rotvec
 
@@ -61,3 +62,83 @@ def test_least_margins_are_those_of_the_machine_made_anew(name: str) -> None:
         assert all(named[row] == found.limits[found.binding[row]] for row in np.flatnonzero(alone))
         counts += np.count_nonzero(found.margin > 0.0), np.count_nonzero(found.margin < 0.0)
     assert counts.min() > 5
+
+
+@pytest.mark.parametrize("name", [path.stem for path in TEMPLATES])
+def test_slopes_are_those_of_differences(name: str) -> None:
+    """Of two central differences the extrapolated one is the oracle, where both agree: not at kinks and dead points."""
+    values, machine = drawn(name, 11)
+    ours, poses = all_varied(name), poses_near_home(machine, 11, 30)
+    slopes, worst, asked = ours.at(values).slopes(poses), 0.0, 0
+    for k, value in enumerate(values):
+        differences = []
+        for step in (2e-4 * abs(value), 1e-4 * abs(value)):
+            ends = []
+            for sense in (1.0, -1.0):
+                moved = values.copy()
+                moved[k] += sense * step
+                ends.append(ours.at(moved).margins(poses))
+            finite = np.where(np.isinf(ends[0]) | np.isinf(ends[1]), np.nan, ends)
+            differences.append((finite[0] - finite[1]) / (2.0 * step) * value)
+        coarse, fine = differences
+        smooth = np.abs(coarse - fine) < 1e-5
+        expected, found = ((4.0 * fine - coarse) / 3.0)[smooth], (slopes[:, :, k] * value)[smooth]
+        worst, asked = max(worst, float(np.abs(found - expected).max())), asked + int(smooth.sum())
+    assert worst < 1e-7 and asked > 0.7 * slopes.size * np.isfinite(ours.at(values).margins(poses)).mean()
+
+
+@pytest.mark.parametrize("name", ["6-UPS", "6-RUS", "delta", "5-bar", "3-RRR", "3-PRS"])
+def test_actuators_and_their_jacobians(name: str) -> None:
+    values, machine = drawn(name, 5)
+    at, poses = all_varied(name).at(values), poses_near_home(machine, 5, 40, 0.2)
+    answer = pf.solve_ik(machine, poses)
+    reached = (answer.status == pf.Status.REACHED) & (pf.feasibility(machine, poses).margin > 0.0)
+    assert reached.sum() > 5
+    size = machine.characteristic_length
+    np.testing.assert_allclose(at.actuators(poses)[reached], answer.actuators[reached], rtol=1e-9, atol=1e-9 * size)
+    if machine.task == machine.whole_task:
+        jacobians, completed = at.inverse_jacobians(poses), poses[reached]
+        for column in range(6 if not machine.end_effector_is_joint else 3):
+            step, ends = 1e-5 * (size if column < 3 else 1.0), []
+            for sense in (1.0, -1.0):
+                moved, twist = completed.copy(), sense * step * np.eye(6)[column]
+                moved[:, :3, 3] += twist[:3]
+                moved[:, :3, :3] = from_rotvec(twist[3:]) @ moved[:, :3, :3]
+                ends.append(at.actuators(moved))
+            differences = (ends[0] - ends[1]) / (2.0 * step)
+            np.testing.assert_allclose(jacobians[reached, :, column], differences, rtol=1e-6, atol=1e-7 * size)
+
+
+def test_limits_that_home_exceeds_are_numbers() -> None:
+    machine = template("6-UPS")
+    with pytest.raises(InvalidMechanism):
+        machine.with_dimensions(longest=180.0)
+    at = varied(machine, "longest").at([180.0])
+    home = at.home_pose[None]
+    struts = np.linalg.norm(machine.joint("C1").at - np.array(machine.joint("A1").at))
+    own = [k for k, limit in enumerate(varied(machine, "longest").limits) if limit == ("B1", "max")]
+    expected = (180.0 - struts) / (0.5 * (180.0 - machine.dimensions["shortest"]))
+    np.testing.assert_allclose(at.margins(home)[0, own], expected, rtol=1e-12)
+    by_longest = 2.0 * (struts - machine.dimensions["shortest"]) / (180.0 - machine.dimensions["shortest"]) ** 2
+    np.testing.assert_allclose(at.slopes(home)[0, own, 0], by_longest, rtol=1e-12)
+
+
+def test_a_decision_that_comes_out_otherwise_has_expressions_noted_anew() -> None:
+    machine = pf.load(next(path for path in TEMPLATES if path.stem == "3-RRS"))
+    ours, poses = varied(machine), poses_near_home(machine, 3)
+    values = np.array([machine.dimensions[name] for name in ours.names])
+    expected, other = ours.at(values).margins(poses), varied(machine, ours.names[::-1])
+    other._noted[0]._decided = b""
+    np.testing.assert_allclose(other.at(values[::-1]).margins(poses), expected, atol=1e-12)
+
+
+def test_what_cannot_be_varied_is_told() -> None:
+    with pytest.raises(UnknownName):
+        varied(template("delta"), "elbow")
+    with pytest.raises(InvalidArgument, match="finite values"):
+        varied(template("delta"), ["arm", "rod"]).at([90.0])
+    with pytest.raises(InvalidMechanism):
+        varied(template("delta"), "rod").at([100.0])  # shorter than what it bridges at home
+    with pytest.raises(UnsupportedMechanism, match="no legs in closed form"):
+        varied(pf.load("snake60"), ())
+    assert np.isnan(all_varied("6-UPS").at(drawn("6-UPS", 0)[0]).margins(np.zeros((1, 4, 4)))).all()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -115,12 +116,11 @@ class VariedMachine:
             Its legs or limits are others than those of the machine as described.
         """
         given = np.asarray(values, float)
-        if given.shape != (len(self.names),) or not math.isfinite(given.sum()):
-            given = array("values", values, f"{len(self.names)}", "finite values", f": {', '.join(self.names)}")
-        for noted in self._noted:
+        for noted in self._noted if given.shape == (len(self.names),) else []:
             found = noted.at(given)
             if found is not None:
                 return found
+        given = array("values", values, f"{len(self.names)}", "finite values", f": {', '.join(self.names)}")
         noted = NotedMachine(self.mechanism, self.names, given)
         found = noted.at(given)
         if found is None or noted.legs.limits != self.limits:
@@ -153,7 +153,7 @@ class NotedMachine:
         self._programs: dict[tuple[str, int, bool], Formulas] = {}
         self.uniform = uniform_parts([*legs.margins, *legs.rows, *legs.actuators])
         self._centres = Formulas(centres, given, p, np.ones((p, p), bool))
-        self._decided = np.array(list(trace.decisions.values()), float)
+        self._decided = np.array(list(trace.decisions.values()), float).tobytes()
         parts: list[list[Any]] = [list(trace.decisions.values()), [length], numbers[:3], self.uniform]
         recording: Any = self.table.recording
         self.written = [word + k for word, _, size in recording.writes.tolist() for k in range(size)]
@@ -168,9 +168,11 @@ class NotedMachine:
     def at(self, values: Floats) -> MachineAt | None:
         """The machine at values of the dimensions; None if a decision comes out otherwise there."""
         length = self._size or _radii(self._centres(values))[0]
-        found = self._uniform(np.append(values, length))[0]
-        decided, *parts = (found[a:b] for a, b in self._spans)
-        if not (decided == self._decided).all() or not math.isfinite(found.sum()):
+        given = np.empty(len(values) + 1)
+        given[:-1], given[-1] = values, length
+        found = self._uniform(given)[0]
+        decided, *parts = [found[a:b] for a, b in self._spans]
+        if decided.tobytes() != self._decided or not math.isfinite(np.add.reduce(found)):
             return None
         return MachineAt(self, values, *parts)
 
@@ -273,7 +275,7 @@ class MachineAt:
         ranges[self._noted.is_ended] = self._ends
         return ranges.reshape(-1, 2)
 
-    @property
+    @cached_property
     def home_pose(self) -> Floats:
         """The pose of the end effector at home, (4, 4) [length]."""
         pose = np.eye(4)
@@ -357,7 +359,7 @@ class MachineAt:
             if by_pose:
                 tangents[m : m + 6, p : p + 6], tangents[m + 18 :, p + 6 :] = np.eye(6), np.eye(n_q)
         uniform = np.concatenate([self._uniform, AT_REST])
-        targets, begin = np.require(poses, float, ["C", "W"]), self.home_pose[None]
+        targets, begin = np.ascontiguousarray(poses, float), self.home_pose[None]
         if noted.is_coupled:
             completed = self._completed(targets, begin)
         else:
@@ -365,7 +367,7 @@ class MachineAt:
             read_targets(table_handle(noted.table).address, targets, begin, completed)
         found = program(uniform, completed, tangents)
         placed = Placed.of(found, legs, completed)
-        if noted.table.is_completed and not noted.is_coupled:
+        if noted.table.is_completed and not noted.is_coupled and not np.abs(placed.rows).max(initial=0.0) <= CLOSED:
             is_open = (np.abs(placed.rows) > CLOSED).any(axis=1) & (placed.reach == math.inf).all(axis=1)
             if is_open.any():
                 completed[is_open] = self._completed(targets[is_open], begin)
