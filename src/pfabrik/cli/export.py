@@ -143,7 +143,7 @@ def export(
         raise click.UsageError(f"--parts is of {', '.join(NAMED)}")
     for path in outputs.values():
         refuse_existing(path, force)
-    check_outputs([(_option(form), path) for form, path in outputs.items()], [Path(mech)])
+    check_outputs([(f"--{form}" if form in FILES else "-o", path) for form, path in outputs.items()], [Path(mech)])
     mechanism = load(mech)
     for form, path in outputs.items():
         file = "FILE" if path == STANDARD else path.name
@@ -159,10 +159,6 @@ def export(
         for line in ("build it in a workspace, and try it:", *commands(mechanism, node, name)):
             click.echo(line, err=True)
     return 0
-
-
-def _option(form: str) -> str:
-    return f"--{form}" if form in FILES else "-o"
 
 
 def _check_settings(forms: Sequence[str], name: str | None, joints: tuple[str, ...]) -> None:

@@ -17,7 +17,7 @@ from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_exist
 from .printing import complain, json_option, note, print_json, printing_result
 
 if TYPE_CHECKING:
-    from ..interop import Choice, Imported, NoEndEffector
+    from ..interop import Choice, Imported
 
 DEFAULTS: tuple[object, ...] = ("qpos0", "m", (), [])
 """Values of options that need not be said."""
@@ -60,10 +60,12 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
     try:
         model = imported(file, **choices)
     except pf.interop.NoEndEffector as error:
+        lines = [commands(each, file, choices) for each in error.choices]
+        every = list(zip(error.choices, lines, strict=True))
         if as_json:
-            print_json({"choices": [choice_as_object(each, file, choices) for each in error.choices]})
-        elif error.choices:
-            click.echo(listing(error, file, choices), err=True)
+            print_json({"choices": [{**dataclasses.asdict(each), "commands": way} for each, way in every]})
+        elif every:
+            click.echo("\n\n".join("\n".join([str(each), *way]) for each, way in every) + "\n", err=True)
         raise
     except pf.errors.PfabrikError as error:
         for remark in getattr(error, "__notes__", []):
@@ -91,12 +93,6 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
     return 0
 
 
-def listing(error: NoEndEffector, file: Path, given: Mapping[str, Any]) -> str:
-    """The choices that there are, each with commands that make a mechanism of it."""
-    parts = ["\n".join([str(each), *commands(each, file, given)]) for each in error.choices]
-    return "\n\n".join(parts) + "\n"
-
-
 def commands(choice: Choice, file: Path, given: Mapping[str, Any]) -> list[str]:
     """The command that makes a mechanism of a choice, with the options that were given; none of a refused one."""
     if not choice.options:
@@ -111,11 +107,6 @@ def commands(choice: Choice, file: Path, given: Mapping[str, Any]) -> list[str]:
         else:
             words += [option, ",".join(value) if isinstance(value, list) else str(value)]
     return [shlex.join([*words, "-o", f"{choice.base}-{choice.end_effector}.toml".replace("/", "_")])]
-
-
-def choice_as_object(choice: Choice, file: Path, given: Mapping[str, Any]) -> dict[str, object]:
-    """A choice, with its command."""
-    return {**dataclasses.asdict(choice), "commands": commands(choice, file, given)}
 
 
 def as_object(model: Imported, text: str) -> dict[str, object]:

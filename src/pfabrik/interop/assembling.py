@@ -28,7 +28,7 @@ from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .notes import Note, note_names, noting
 from .opened import OpenMechanism
-from .simplify import combined, merged_balls, merged_bodies, with_cones
+from .simplify import combined, merged_balls, merged_bodies
 from .straighten import straighten
 
 SHOWN = 0.01
@@ -107,9 +107,10 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
     rigid, stands_for = merged_bodies(merged_balls(structure.joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
-    simple = with_cones(combined(exact, {opened.base, opened.end_effector}, notes), opened.cones)
+    simple = combined(exact, {opened.base, opened.end_effector}, notes)
+    limited = [dataclasses.replace(each, cone=opened.cones.get(each.name, each.cone)) for each in simple]
     collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
-    return Assembled(_mechanism(opened, simple, reference, notes), gap * loops.length, collision)
+    return Assembled(_mechanism(opened, limited, reference, notes), gap * loops.length, collision)
 
 
 def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> tuple[ClosedHome, OpenMechanism]:

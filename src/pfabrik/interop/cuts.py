@@ -45,7 +45,8 @@ class CutTree:
 
 def cut_tree(mechanism: Structure) -> CutTree:
     """The tree of a mechanism's bodies; balls are cut first, and motors last."""
-    worst_first = edges_of(sorted(mechanism.joints, key=_ease_of_cutting))
+    ease = {joint: 0 if joint.driven else 2 if joint.type == "spherical" else 1 for joint in mechanism.joints}
+    worst_first = edges_of(sorted(mechanism.joints, key=ease.__getitem__))
     closing = {worst_first[index].joint for index in spanning_tree(worst_first, mechanism.base).closing}
     uncut = [joint for joint in mechanism.joints if joint not in closing]
     branches: list[Branch] = []
@@ -60,9 +61,3 @@ def cut_tree(mechanism: Structure) -> CutTree:
             parent, body = joint.connects
             branches.append(Branch(joint, parent, unique(f"{body}:{joint.name}", taken), double_of=body))
     return CutTree(tuple(branches), tuple(cuts))
-
-
-def _ease_of_cutting(joint: Joint) -> int:
-    if joint.driven:
-        return 0
-    return 2 if joint.type == "spherical" else 1

@@ -277,7 +277,9 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
         elements[name].extend(_drawn(points[name], origins[name], physics))
         elements[name].extend(_thick(mechanism, name, origins[name], metres))
     for half in halves_of(mechanism):
-        elements[half.body].append(_half(half, origins[half.body], metres))
+        ends = number_text((half.ends * metres - origins[half.body]).ravel())
+        capsule = {"name": half.name, "type": "capsule", "fromto": ends, "size": repr(half.radius * metres)}
+        ET.SubElement(elements[half.body], "geom", capsule | UNTOUCHED)
     for site, body_name, point in _sites(mechanism, tree, names, metres):
         place = number_text(point - origins[body_name])
         ET.SubElement(elements[body_name], "site", name=site, pos=place, size=repr(2.0 * THICKNESS * physics.length))
@@ -361,12 +363,6 @@ def _thick(mechanism: Mechanism, body: str, origin: Floats, metres: float) -> It
             size = size * [shape.diameter or 0.0, shape.thickness]
         kind = "cylinder" if shape.kind == "disc" else shape.kind
         yield ET.Element("geom", {"type": kind, **attributes, "size": number_text(size), **UNTOUCHED})
-
-
-def _half(half: Half, origin: Floats, metres: float) -> ET.Element:
-    """The part of a strut that moves with one body, as a geom."""
-    ends, radius = number_text((half.ends * metres - origin).ravel()), repr(half.radius * metres)
-    return ET.Element("geom", {"name": half.name, "type": "capsule", "fromto": ends, "size": radius, **UNTOUCHED})
 
 
 def _inertial(inertia: BodyInertia, share: float, origin: Floats) -> ET.Element:

@@ -179,7 +179,8 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     note_names(notes, "initial positions are left out, of", begun)
     named = {*driven, *asked, *(joint.name for joint in joints if joint.limits is not None or joint.mimic is not None)}
     kept_first = sorted(joints, key=lambda joint: 0 if joint.name in named else CUT_LAST.get(joint.type, 0))
-    grown = spanning_tree([_edge(joint) for joint in kept_first], base)
+    ends = [(joint.parent, joint.child) for joint in kept_first]
+    grown = spanning_tree([Edge(Joint("", "fixed", pair), pair) for pair in ends], base)
     apart = [link for link in links if link not in grown.paths]
     if apart:
         found = f"links that no joint connects with '{base}' ({', '.join(apart[:5])})"
@@ -196,11 +197,6 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     used = {joint.name for joint, _ in hanging}
     loops = [closing(joint, frames) for joint in joints if joint.name not in used]
     return tree.closed_by(loops, asked)
-
-
-def _edge(joint: UrdfJoint) -> Edge:
-    links = (joint.parent, joint.child)
-    return Edge(Joint(joint.name, "fixed", links), links)
 
 
 def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..description.graph import Edge, Tree, spanning_tree, welded
-from ..description.joints import Cone, Joint, JointType
+from ..description.joints import Joint, JointType
 from ..tolerances import TOLERANCES
 from .notes import Note, note_names
 from .opened import Loop, OpenMechanism
@@ -92,11 +92,6 @@ def merged_balls(joints: Sequence[Joint]) -> list[Joint]:
         merged[balls[0].name] = dataclasses.replace(balls[0], type=kind, axis=axis)
     replaced = [merged.get(joint.name, joint) for joint in joints]
     return [joint for joint in replaced if joint is not None]
-
-
-def with_cones(joints: Sequence[Joint], cones: Mapping[str, Cone]) -> list[Joint]:
-    """The joints with their cones, by name."""
-    return [dataclasses.replace(each, cone=cones[each.name]) if each.name in cones else each for each in joints]
 
 
 def combined(joints: Sequence[Joint], kept: set[str], notes: list[Note]) -> list[Joint]:

@@ -92,7 +92,8 @@ def rasterised(seen: Floats, faces: Ints, width: int, margin: int = 2, *, both_s
     columns, rows = (np.ceil(span / pixel).astype(np.int64) + 2 * margin + 1).tolist()
     low = low - margin * pixel
     placed = np.concatenate([(seen[:, :2] - low) / pixel, seen[:, 2:]], axis=1)
-    area = _area(placed, faces)
+    a, b, c = (placed[faces[:, k], :2] for k in range(3))
+    area = cross(b - a, c - a)  # twice that on the screen; negative where a face turns away
     drawn = np.flatnonzero((np.abs(area) if both_sides else area) > FLAT)
     corners, area = placed[faces[drawn]], area[drawn]
     first = np.ceil(corners[:, :, :2].min(axis=1)).astype(np.int64)
@@ -118,12 +119,6 @@ def rasterised(seen: Floats, faces: Ints, width: int, margin: int = 2, *, both_s
     face[filled] = drawn[face[filled]]
     shape = (rows, columns)
     return Raster(face.reshape(shape), depth.reshape(shape), weights.reshape(*shape, 3), low, pixel)
-
-
-def _area(points: Floats, faces: Ints) -> Floats:
-    """Twice the area of faces (f, 3) on the screen; negative where they turn away."""
-    a, b, c = points[faces[:, 0], :2], points[faces[:, 1], :2], points[faces[:, 2], :2]
-    return cross(b - a, c - a)
 
 
 def _weights(corners: Floats, area: Floats, at: NDArray[Any]) -> Floats:

@@ -159,7 +159,7 @@ def _panels(
     content, pads = np.ptp(_content(first), axis=0), np.array([PADS[0] + PADS[1], PADS[2] + PADS[3]]) / 72.0
     tall = float(np.clip((WIDEST - pads[0]) * content[1] / content[0] + pads[1], SHORTEST, TALLEST))
     wide = min(float(content[0] / content[1]) * (tall - pads[1]) + pads[0], WIDEST)
-    wider = 0.0 if second is None else min(_aspect(second) * tall, SECOND)
+    wider = 0.0 if second is None else min(second.limit.shape[1] / second.limit.shape[0] * tall, SECOND)
     spans = np.ptp(first.region.bounds * first.scale, axis=0)[list(first.eye.order)]
     shapes = np.array([spans[1] / spans[0], spans[2] / spans[0], spans[2] / spans[1]])  # all at one scale
     breadths = np.array([spans[0], spans[0], spans[1]]) / max(spans[0], spans[1])
@@ -181,11 +181,6 @@ def _panels(
         for low, breadth, high in zip(lows, breadths, talls, strict=True)
     ]
     return figure, main, beside, slices
-
-
-def _aspect(solid: SeenSolid) -> float:
-    rows, columns = solid.limit.shape
-    return float(columns / rows)
 
 
 def _content(solid: SeenSolid) -> Floats:
