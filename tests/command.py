@@ -26,10 +26,10 @@ from pfabrik.cli import main
 from pfabrik.files import dumps
 
 
-def pfabrik(line: str | Sequence[str]) -> Result:
-    """Run a command line without its first word; a Python exception fails the test."""
-    words = shlex.split(line, comments=True) if isinstance(line, str) else list(line)
-    result = CliRunner().invoke(main, words)
+def pfabrik(line: str | Sequence[object], given: str | None = None) -> Result:
+    """Run a command line without its first word, with standard input if given; a Python exception fails the test."""
+    words = shlex.split(line, comments=True) if isinstance(line, str) else [*map(str, line)]
+    result = CliRunner().invoke(main, words, input=given)
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result
 

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import pfabrik as pf
+from command import pfabrik
 from in_mujoco import Model
-from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import NoEndEffector, from_mjcf, from_urdf
 from rounded_files import LINKAGES, model_text, planar_four_bar
@@ -23,7 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"
 
 
 def run(*words: str) -> tuple[int, str, str]:
-    result = CliRunner().invoke(main, list(words))
+    result = pfabrik(words)
     return result.exit_code, result.stdout, result.stderr
 
 

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import pfabrik as pf
+from command import pfabrik
 from in_mujoco import Model, agrees, mujoco, notes_of
-from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.interop import Imported, Loop, NoEndEffector, OpenMechanism, assemble, from_mjcf, from_urdf, verify
 
@@ -512,7 +511,7 @@ def test_a_model_opens_no_file_but_its_own(tmp_path: Path, monkeypatch: pytest.M
 
 
 def run(*words: str) -> tuple[int, str, str]:
-    result = CliRunner().invoke(main, list(words))
+    result = pfabrik(words)
     return result.exit_code, result.stdout, result.stderr
 
 

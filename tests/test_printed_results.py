@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import pfabrik as pf
-from pfabrik.cli import main
+from command import pfabrik
 from pfabrik.overview import Overview
 from pfabrik.printed import ResultTable
 
@@ -23,7 +22,7 @@ def test_a_track_says_what_the_command_says(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("x,y,z\n0,0,-200\n10,0,-200\n0,0,-900\n", encoding="utf-8")
     delta = pf.load("delta")
-    said = CliRunner().invoke(main, ["track", "delta", str(path)])
+    said = pfabrik(["track", "delta", str(path)])
     lines = pf.track(delta, pf.read_path(path, delta).targets).table().lines
     assert list(lines) == re.sub(r" \(line \d+\)", "", said.stdout + said.stderr).splitlines()
     assert "2 reached, 1 projected; first at target 3; farthest" in lines[0]
@@ -31,7 +30,7 @@ def test_a_track_says_what_the_command_says(tmp_path: Path) -> None:
 
 
 def test_an_overview_says_what_the_command_says() -> None:
-    assert CliRunner().invoke(main, ["info", "delta"]).stdout == f"{Overview(pf.load('delta'))}\n"
+    assert pfabrik(["info", "delta"]).stdout == f"{Overview(pf.load('delta'))}\n"
 
 
 def test_forces_of_a_batch_show_the_largest_of_each_actuator() -> None:

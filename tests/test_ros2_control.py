@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import pfabrik as pf
+from command import pfabrik
 from machines import machine
-from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.motion.joint_path import joint_path
 
@@ -112,14 +111,14 @@ def test_the_command_writes_tensors_and_packages_and_never_over_files(tmp_path: 
     for option, place in (("--torch", "a.py"), ("--jax", "b.py"), ("--numpy", "c.py"), ("--ros2-control", "leg")):
         names = ["--joints", "pitch_joint,roll_joint"] if option == "--numpy" else joints
         line = ["export", "g1_ankle", option, str(tmp_path / place), *names]
-        result = CliRunner().invoke(main, line)
+        result = pfabrik(line)
         assert result.exit_code == 0, result.output
         assert (tmp_path / place).exists()
-        again = CliRunner().invoke(main, line)
+        again = pfabrik(line)
         assert again.exit_code != 0 and "exists already" in again.output
     written = text.read_bytes()
     line = ["export", "g1_ankle", "--numpy", str(text), "--force", "--joints", "pitch_joint", "--joints", "roll_joint"]
-    assert CliRunner().invoke(main, line).exit_code == 0 and text.read_bytes() == written
+    assert pfabrik(line).exit_code == 0 and text.read_bytes() == written
     for line, said in (
         (["export", "g1_ankle"], "expected a FORMAT"),
         (["export", "g1_ankle", "c", *joints, "--joints", "x"], "--joints once with all names"),
@@ -128,5 +127,5 @@ def test_the_command_writes_tensors_and_packages_and_never_over_files(tmp_path: 
         (["export", "g1_ankle", "--torch", str(tmp_path / "d.py"), "--name", "x"], "torch has none"),
         (["export", "g1_ankle", "--ros2-control", str(tmp_path / "other")], "needs --joints"),
     ):
-        result = CliRunner().invoke(main, line)
+        result = pfabrik(line)
         assert result.exit_code == 2 and said in result.output, result.output

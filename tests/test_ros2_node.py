@@ -16,14 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 import machines
 import pfabrik as pf
 from checks import actuator_units
+from command import pfabrik
 from exported import KEEP, STRICT, home_of
-from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.export.source import targets_around_home
 from pfabrik.files.units import metres_of
@@ -285,19 +284,19 @@ def test_names_stand_in_a_package_as_they_are(tmp_path: Path) -> None:
 
 def test_the_command_writes_a_package_and_says_how_to_run_it(tmp_path: Path) -> None:
     line = ["export", "five_bar", "--ros2-node", str(tmp_path / "rig_node")]
-    result = CliRunner().invoke(main, line)
+    result = pfabrik(line)
     assert result.exit_code == 0 and "ros2 launch rig_node rig.launch.py" in result.output
     assert "colcon build --packages-select rig_node" in result.output and "ros2 topic pub" in result.output
-    again = CliRunner().invoke(main, line)
+    again = pfabrik(line)
     assert again.exit_code == 2 and "exists already" in again.output
     elsewhere = ["--ros2-node", str(tmp_path / "x")]
-    refused = [CliRunner().invoke(main, ["export", "panda", *rest]).output for rest in (["c"], elsewhere)]
+    refused = [pfabrik(["export", "panda", *rest]).output for rest in (["c"], elsewhere)]
     assert refused[0] == refused[1] and not (tmp_path / "x").exists()
     for rest, said in (
         ([*elsewhere, "--joints", "p1"], "not of --ros2-node"),
         (["--ros2-control", str(tmp_path / "x")], "for poses of a platform use --ros2-node"),
     ):
-        result = CliRunner().invoke(main, ["export", "five_bar", *rest])
+        result = pfabrik(["export", "five_bar", *rest])
         assert result.exit_code == 2 and said in result.output, result.output
     with pytest.raises(InvalidArgument, match="lower-case"):
         pf.export_ros2_node(machine("five_bar"), tmp_path / "x", name="Rig")

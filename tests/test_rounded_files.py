@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import pfabrik as pf
+from command import pfabrik
 from in_mujoco import Model, notes_of
 from oracles import any_values
-from pfabrik.cli import main
 from pfabrik.errors import UnknownName
 from pfabrik.interop import Imported, from_mjcf, to_mjcf, verify
 from pfabrik.interop.digits import digits_of
@@ -165,11 +164,11 @@ def test_nearly_free_motions_are_named_with_how_hard_the_loops_resist(tmp_path: 
     assert pf.mobility(spoiled(1e-5)).mobility == 0
     path = tmp_path / "machine.toml"
     pf.save(spoiled(1e-5), path)
-    shown = CliRunner().invoke(main, ["info", str(path)]).output
+    shown = pfabrik(["info", str(path)]).output
     assert "nearly free" in shown and "not counted as a motion" in shown
-    value = json.loads(CliRunner().invoke(main, ["info", str(path), "--json"]).output)["mobility"]["nearly_free"][0]
+    value = json.loads(pfabrik(["info", str(path), "--json"]).output)["mobility"]["nearly_free"][0]
     assert value["singular_value"] == pf.mobility(pf.load(path)).nearly_free[0].singular_value
-    assert "the loops hardly resist a motion of" in CliRunner().invoke(main, ["check", str(path)]).output
+    assert "the loops hardly resist a motion of" in pfabrik(["check", str(path)]).output
 
 
 def test_the_referee_says_how_far_it_went_and_fails_where_that_is_too_near(tmp_path: Path) -> None:
@@ -187,7 +186,7 @@ def test_the_referee_says_how_far_it_went_and_fails_where_that_is_too_near(tmp_p
     assert not held
     path = tmp_path / "near.toml"
     pf.save(near, path)
-    run = CliRunner().invoke(main, ["verify", str(path), "--poses", "6"])
+    run = pfabrik(["verify", str(path), "--poses", "6"])
     assert run.exit_code == 1
     assert "too near to home to say anything" in run.output
 
@@ -198,16 +197,16 @@ def test_the_original_file_is_the_referee_too(tmp_path: Path) -> None:
     original.write_text(model_text(linkage, 7))
     pf.save(dataclasses.replace(imported(linkage, str(original)).mechanism, task=("rotation",)), machine)
     ask = ["verify", str(machine), "--poses", "8", "--original", str(original)]
-    run = CliRunner().invoke(main, ask)
+    run = pfabrik(ask)
     assert run.exit_code == 0, run.output
     assert "original file                agrees" in run.output
-    against = json.loads(CliRunner().invoke(main, [*ask, "--json"]).output)["original"]
+    against = json.loads(pfabrik([*ask, "--json"]).output)["original"]
     assert 1e-12 < against["rotation_difference"] < 1e-4
     longer = spherical_three_legs()
     turned = np.cross(longer.hinges[1].axis, [0.0, 0.0, 1.0])
     longer.hinges[1] = longer.hinges[1]._replace(axis=longer.hinges[1].axis + 1e-2 * turned)
     original.write_text(model_text(longer, 7))
-    other = CliRunner().invoke(main, ask)
+    other = pfabrik(ask)
     assert other.exit_code == 1
     assert "original file                does not agree" in other.output
     original.write_text(model_text(linkage, 7).replace('"m1"', '"motor"'))

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import pfabrik as pf
-from pfabrik.cli import main
+from command import pfabrik
 from pfabrik.paths.follow import follow_parts
 from pfabrik.paths.path import Path as Targets
 from test_track import CIRCLES, arm, circle, turned_by
@@ -117,12 +117,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
         monkeypatch.setattr(f"pfabrik.paths.{module}.MOST_STEPS", 200)
     monkeypatch.setattr(importlib.import_module("pfabrik.cli.track"), "MOST_TARGETS", 200)
 
-    def run(*line: object, given: str | None = None) -> Result:
-        result = CliRunner().invoke(main, [str(word) for word in line], input=given)
-        assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-        return result
-
-    return run
+    return lambda *line, given=None: pfabrik(line, given)
 
 
 def rows_of(text: str) -> list[dict[str, str]]:
