@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,12 +11,11 @@ from ..arrays import Floats, Ints
 from ..drawing import SMALL, new_figure
 from ..motion.singularities import Singularity
 from ..workspace.parts import connected
-from ..workspace.region import Region
 from ..workspace.singular import signed_at
 from ..workspace.surface import face_normals, sizes_of
 from ..workspace.workspace_table import for_people, labels
 from .canvas import checked_size, draw_title, wrapped
-from .eye import Eye, View, eye_of, upright
+from .eye import View, eye_of, upright
 from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit
 from .looks import SINGULAR, Look, Theme, look_of
 from .raster import lines_between, rasterised
@@ -116,10 +116,11 @@ def plot_singular_map(
     """
     look, region = look_of(theme), found.workspace
     vertices, faces = without_specks(found.locus_vertices, found.locus_faces, found.step)
+    found = replace(found, locus_vertices=vertices, locus_faces=faces)
     what = "parallel singularities" if len(faces) else "no parallel singularity"
     title = f"{region.mechanism.name}: {what} within reach"
     if len(region.names) == 3 and len(region.faces):
-        return _plot_in_space(found, vertices, faces, ax, (view, size), look, title)
+        return _plot_in_space(found, ax, view, size, look, title)
     axes: Any = axes_for(ax, size or PLANE_SIZE, look)
     draw_title(axes, title, look)
     if not len(found.points):
@@ -145,22 +146,14 @@ def plot_singular_map(
     return axes  # type: ignore[no-any-return]
 
 
-def _plot_slices(
-    found: SingularityMap,
-    vertices: Floats,
-    faces: Ints,
-    size: tuple[float, float] | None,
-    order: tuple[int, int, int],
-    look: Look,
-    title: str,
-) -> Axes:
+def _plot_slices(found: SingularityMap, size: tuple[float, float] | None, look: Look, title: str) -> Axes:
     """Slices of the measure alone: where nothing is singular there is no locus to see; a small figure has one slice."""
     width, height = checked_size(size or SIZE)
     figure, across = new_figure(width, height, look.paper), 2 if _is_roomy(width, height) else 1
     panels = figure.subplots(across, across, squeeze=False).ravel().tolist()
     words = "\n".join(wrapped(text, width, SMALL) for text in (title, _least_in_words(found)))
     figure.suptitle(words, fontsize=SMALL, color=look.ink)
-    drawn = _draw_slices(panels, found, vertices, faces, order, look)
+    drawn = _draw_slices(panels, found, look)
     if drawn is not None:
         _dress_bar(figure.colorbar(drawn, ax=panels, shrink=0.8, pad=0.02), look)
     return panels[0]  # type: ignore[no-any-return]
@@ -287,17 +280,39 @@ def _draw_curves(axes: Any, segments: Floats, area: Any) -> None:
 
 def _plot_in_space(
     found: SingularityMap,
-    vertices: Floats,
-    faces: Ints,
     ax: Axes | None,
-    asked: tuple[View | None, tuple[float, float] | None],
+    view: View | None,
+    size: tuple[float, float] | None,
     look: Look,
     title: str,
 ) -> Axes:
     """Draw the locus in the workspace, and slices beside it; on axes that are given, without slices."""
-    region, (view, size) = found.workspace, asked
+    if ax is None and not len(found.locus_faces):
+        return _plot_slices(found, size, look, title)
+    width, height = SIZE if ax is not None else checked_size(size or SIZE)
+    has_slices = ax is None and _is_roomy(width, height)
+    figure: Any = new_figure(width, height, look.paper, layout=None) if ax is None else ax.figure
+    axes: Axes = figure.add_axes(SPACE if has_slices else ALONE) if ax is None else axes_for(ax, SIZE, look)
+    _draw_locus(axes, found, view, look)
+    if not has_slices:
+        draw_title(axes, title, look)
+        return axes
+    grid = figure.add_gridspec(2, 2, **SLICES_IN)
+    panels = [figure.add_subplot(grid[place // 2, place % 2]) for place in range(len(SLICES))]
+    drawn = _draw_slices(panels, found, look)
+    if drawn is not None:
+        _dress_bar(figure.colorbar(drawn, cax=figure.add_axes(BAR)), look)
+    figure.text(0.0125, 0.97, title, fontsize=SMALL + 2, color=look.ink, ha="left", va="top")
+    return axes
+
+
+def _draw_locus(axes: Any, found: SingularityMap, view: View | None, look: Look) -> None:
+    """The locus in the light, in the workspace as a pale solid, from a direction or from where most of it is seen."""
+    from matplotlib.colors import to_rgb
+
+    region, faces = found.workspace, found.locus_faces
     scale, order = scale_of(region), upright(region.names)
-    points = vertices * scale
+    points = found.locus_vertices * scale
     if view is not None:
         eye = eye_of(view, order)
     elif len(faces):
@@ -306,30 +321,7 @@ def _plot_in_space(
         eye = best_eye(picked_faces(points, both_sides, slopes), order)
     else:
         eye = best_eye(picked_faces(region.vertices * scale, region.faces, region.face_limit), order)
-    if ax is None and not len(faces):
-        return _plot_slices(found, vertices, faces, size, order, look, title)
-    width, height = SIZE if ax is not None else checked_size(size or SIZE)
-    has_slices = ax is None and _is_roomy(width, height)
-    figure: Any = new_figure(width, height, look.paper, layout=None) if ax is None else ax.figure
-    axes: Axes = figure.add_axes(SPACE if has_slices else ALONE) if ax is None else axes_for(ax, SIZE, look)
-    _draw_locus(axes, region, points, faces, found.step * scale, eye, look)
-    if not has_slices:
-        draw_title(axes, title, look)
-        return axes
-    grid = figure.add_gridspec(2, 2, **SLICES_IN)
-    panels = [figure.add_subplot(grid[place // 2, place % 2]) for place in range(len(SLICES))]
-    drawn = _draw_slices(panels, found, vertices, faces, order, look)
-    if drawn is not None:
-        _dress_bar(figure.colorbar(drawn, cax=figure.add_axes(BAR)), look)
-    figure.text(0.0125, 0.97, title, fontsize=SMALL + 2, color=look.ink, ha="left", va="top")
-    return axes
-
-
-def _draw_locus(axes: Any, region: Region, points: Floats, faces: Ints, step: Floats, eye: Eye, look: Look) -> None:
-    """The locus in the light, in the workspace as a pale solid."""
-    from matplotlib.colors import to_rgb
-
-    box = box_of(region, scale_of(region))
+    box = box_of(region, scale)
     fit(axes, eye.seen(box.corners)[:, :2])
     hull = seen_solid(region, eye, HULL_PIXELS)
     draw_image(axes, hull.raster, to_rgb(look.soft), HULL * (hull.limit >= 0), 2)
@@ -341,16 +333,15 @@ def _draw_locus(axes: Any, region: Region, points: Floats, faces: Ints, step: Fl
         normal *= np.where(normal @ eye.axes[2] < 0.0, -1.0, 1.0)[..., None]
         rgb = in_the_light(normal, eye, np.array(to_rgb(SINGULAR)))
         draw_image(axes, raster, rgb, 1.0 * (raster.face >= 0), 3)
-        rims = lines_between(np.minimum(raster.face, 0), raster, JUMP * float(step.max()))
+        rims = lines_between(np.minimum(raster.face, 0), raster, JUMP * float((found.step * scale).max()))
         draw_lines(axes, rims, RIM, 0.8, 4)
     draw_box(axes, eye, box, look, [])
 
 
-def _draw_slices(
-    panels: list[Any], found: SingularityMap, vertices: Floats, faces: Ints, order: tuple[int, int, int], look: Look
-) -> Any:
+def _draw_slices(panels: list[Any], found: SingularityMap, look: Look) -> Any:
     """Draw the measure in planes across the locus; what a colour bar is of, or None."""
-    region = found.workspace
+    region, vertices, faces = found.workspace, found.locus_vertices, found.locus_faces
+    order, scale = upright(region.names), scale_of(region)
     factors = np.array(for_people(region.units)[0])
     axis = _axis_across(vertices / found.step, faces, order[2])
     heights = vertices[np.unique(faces), axis] if len(faces) else region.vertices[:, axis]
@@ -359,7 +350,6 @@ def _draw_slices(
     highest, drawn = _highest(np.abs(found._signed)), None
     for panel, plane in zip(panels, planes, strict=True):
         area = draw_slice(panel, region, plane, look)
-        scale = scale_of(region)
         step = float((np.ptp(region.bounds, axis=0) * scale)[plane.across].max()) / ACROSS / scale[plane.across]
         low, high = region.bounds[:, plane.across]
         counts = np.maximum(np.ceil((high - low) / step).astype(np.int64), 1) + 1
