@@ -193,24 +193,25 @@ class Panel:
         if steps < 2:
             return
         with self._gui.add_folder("Path"):
-            playing = self._gui.add_checkbox("Play", initial_value=False)
-            playing.on_update(_of_users(lambda event: self._actions.play(event.target.value)))
+            self._switch("Play", False, None, self._actions.play)
             self._step = self._gui.add_slider("step", 1, steps, 1, 1)
             self._heard(self._step, lambda step: self._actions.take_step(int(step)))
 
     def _add_switches(self, mechanism: Mechanism, limits: bool | None) -> None:
-        self._borders = {
-            WORKSPACE: self._gui.add_checkbox("workspace", False, hint="What is reached at this orientation"),
-            LOCUS: self._gui.add_checkbox("singularities", False, hint="Parallel ones, at this orientation"),
-        }
-        for name, switch in self._borders.items():
-            switch.on_update(_of_users(partial(_tell_switch, partial(self._actions.show_border, name))))
+        show, hint = self._actions.show_border, "Parallel ones, at this orientation"
+        reached = self._switch("workspace", False, "What is reached at this orientation", partial(show, WORKSPACE))
+        self._borders = {WORKSPACE: reached, LOCUS: self._switch("singularities", False, hint, partial(show, LOCUS))}
         if mechanism.shapes:
-            solids = self._gui.add_checkbox("solids", True, hint="Shapes of links, and the least distance between them")
-            solids.on_update(_of_users(partial(_tell_switch, self._actions.show_solids)))
+            hint = "Shapes of links, and the least distance between them"
+            self._switch("solids", True, hint, self._actions.show_solids)
         if limits is not None:
-            keep = self._gui.add_checkbox("limits", limits, hint="Whether answers keep the limits of joints")
-            keep.on_update(_of_users(partial(_tell_switch, self._actions.keep_limits)))
+            self._switch("limits", limits, "Whether answers keep the limits of joints", self._actions.keep_limits)
+
+    def _switch(self, label: str, value: bool, hint: str | None, change: Callable[[bool], None]) -> Any:
+        """A switch that tells what the user sets it to."""
+        switch = self._gui.add_checkbox(label, value, hint=hint)
+        switch.on_update(_of_users(lambda event: change(event.target.value)))
+        return switch
 
     def _add_modes(self) -> None:
         with self._gui.add_folder("Modes", expand_by_default=False):
@@ -231,10 +232,6 @@ class Panel:
 
 def _tell_coordinate(change: Callable[[int, float], None], place: int, shown: Readout, value: float) -> None:
     change(place, shown.coordinate(float(np.clip(value, *shown.limits))))
-
-
-def _tell_switch(change: Callable[[bool], None], event: Any) -> None:
-    change(event.target.value)
 
 
 def _of_users(listen: Callable[[Any], None]) -> Callable[[Any], None]:
