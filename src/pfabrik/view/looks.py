@@ -8,8 +8,7 @@ from typing import Any, Literal, TypeAlias
 from ..checks import require_choice
 from ..description.joints import JointType
 
-BASE, PLATFORM, LINK, EDGE = "#c8c8c8", "#79b4d9", "#4d4d4d", "#1a1a1a"
-ACTUATED, PASSIVE = "#1a1a1a", "#ffffff"
+EDGE = "#1a1a1a"
 HELD = "#d55e00"
 """Colour of what is at a limit or not on its target, and of nothing else."""
 
@@ -102,11 +101,6 @@ def dress(axes: Any, look: Look) -> None:
     axes.spines[:].set_color(look.ink)
     for text in (axes.title, axes.xaxis.label, axes.yaxis.label):
         text.set_color(look.ink)
-
-
-def of_a_body(role: str) -> str:
-    """The colour of a body in the viewer: the base, the platform, or a link between them."""
-    return {"base": BASE, "platform": PLATFORM}.get(role, LINK)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -22,7 +22,7 @@ from ...drawn_parts import Part, role_of
 from ...kinematics import links_of
 from ...rotations import shortest_turns, to_quaternion, to_rotvec
 from ...skeleton import Mark, Skeleton, skeleton_of
-from ..looks import ACHIEVED, ACTUATED, ASKED, EDGE, HELD, of_a_body, rgb
+from ..looks import ACHIEVED, ASKED, EDGE, HELD, rgb
 
 if TYPE_CHECKING:
     import viser
@@ -33,8 +33,8 @@ Colour = tuple[int, int, int]
 RADIUS = 0.0125
 """Of a usual bar [L]."""
 
-PASSIVE, BASE = "#8f8f8f", "#9f9f9f"
-"""Of joints that nobody drives, and of the base: darker than on paper, as light is added to them."""
+PASSIVE, BODIES = "#8f8f8f", {"base": "#9f9f9f", "platform": "#79b4d9", "link": "#4d4d4d"}
+"""Colours of joints that nobody drives, and of bodies by role: darker than on paper, as light is added to them."""
 
 JOINT = 0.034
 """Size of a joint [L]."""
@@ -168,7 +168,7 @@ class Scene:
         ends = np.asarray(found.points) / self._length
         words = f"{float(found.distance):.3g} {solution.mechanism.length_unit}"
         label = self._scene.add_label(f"{MACHINE}/distance/words", words, position=cast(Any, ends.mean(axis=0)))
-        colour = HELD if found.distance <= (solution.mechanism.clearance or 0.0) else ACTUATED
+        colour = HELD if found.distance <= (solution.mechanism.clearance or 0.0) else EDGE
         self._distance = (self._add_lines("distance/line", ends[None].astype(np.float32), colour, 4.0), label)
         self.show_solids(self._shows_solids)
 
@@ -230,13 +230,12 @@ class Scene:
 
 
 def _colour_of(part: Part) -> Colour:
-    return rgb(BASE if part.role == "base" else of_a_body(part.role))
+    return rgb(BODIES[part.role])
 
 
 def _colour_of_solid(mechanism: Mechanism, solid: SolidMesh) -> Colour:
     """Dark for the two links that are nearest to each other, orange where they stop it or overlap, else of its body."""
-    of_body = of_a_body(role_of(mechanism, solid.body))
-    return rgb(HELD if solid.is_stopped else ACTUATED if solid.is_nearest else of_body)
+    return rgb(HELD if solid.is_stopped else EDGE if solid.is_nearest else BODIES[role_of(mechanism, solid.body)])
 
 
 def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:
@@ -245,7 +244,7 @@ def _of_kind(skeleton: Skeleton, kind: str) -> list[Mark]:
 
 def _colours(marks: list[Mark]) -> Any:
     """Of joints: orange where a limit holds, dark where they are actuated, light elsewhere."""
-    names = (HELD if mark.held_by else ACTUATED if mark.joint.actuated else PASSIVE for mark in marks)
+    names = (HELD if mark.held_by else EDGE if mark.joint.actuated else PASSIVE for mark in marks)
     return np.array([rgb(name) for name in names], np.uint8)
 
 
