@@ -120,22 +120,17 @@ class Canvas:
             self.axes.set(xlabel=f"{self._direction(0)} [{unit}]", ylabel=f"{self._direction(1)} [{unit}]")
             self.axes.update_datalim([low, high])
             self.axes.autoscale_view()
-        size = _size(self.axes)
-        above = self._draw_key(key, size[0])
+        above = self._draw_key(key, _size(self.axes)[0])
         triad = self._triad_box
         below = 0.0 if self.is_plane else float(max(triad[3] - triad[1], SMALL + 2.0 * BAR_OFF)) + STRIP_FREE
-        room = np.array([[EDGE_FREE + beside, EDGE_FREE + below], [EDGE_FREE + beside, EDGE_FREE + above]])
-        spans = np.maximum(high - low, END_ON * (float(np.ptp(points, axis=0).max()) or 1.0))
-        per_point = float(np.max(spans / np.maximum(size - room.sum(axis=0), 0.1 * size))) or 1.0
-        spare = 0.5 * (size * per_point - room.sum(axis=0) * per_point - (high - low))
-        start = low - room[0] * per_point - spare
-        self.axes.set_aspect("equal")
-        self.axes.set(xlim=(start[0], start[0] + size[0] * per_point), ylim=(start[1], start[1] + size[1] * per_point))
+        seen_on_end = 0.5 * np.maximum(END_ON * (float(np.ptp(points, axis=0).max()) or 1.0) - (high - low), 0.0)
+        pads = EDGE_FREE + np.array([beside, beside, below, above])
+        start, end, point = fit(self.axes, low - seen_on_end, high + seen_on_end, pads)
         if self.is_plane:
             number_axes(self.axes)
             return
-        draw_triad(self.axes, self.eye, self.look, start + (EDGE_FREE - triad[:2]) * per_point)
-        corner = start + [size[0] * per_point, 0.0] + np.array([-EDGE_FREE, EDGE_FREE + SMALL + BAR_OFF]) * per_point
+        draw_triad(self.axes, self.eye, self.look, start + (EDGE_FREE - triad[:2]) * point)
+        corner = np.array([end[0] - EDGE_FREE * point, start[1] + (EDGE_FREE + SMALL + BAR_OFF) * point])
         draw_scale_bar(self.axes, self.look, corner, float((high - low).max()) or 1.0, unit)
 
     def _draw_key(self, key: Sequence[Artist], width: float) -> float:
@@ -235,6 +230,22 @@ def usual_size(points: Floats, eye: Eye, *, is_plane: bool) -> tuple[float, floa
     shape = np.maximum(spans / (float(spans.max()) or 1.0), LEAST) * SIDE
     width, height = (shape + (NUMBERS if is_plane else (0.0, 2.0 * STRIP / 72.0))).tolist()
     return width, height
+
+
+def fit(axes: Any, low: Floats, high: Floats, pads: Any) -> tuple[Floats, Floats, float]:
+    """Set the ends of axes, at one scale, so that a box (2,) is in the middle: both ends, and the size of a point.
+
+    Parameters
+    ----------
+    pads : room to the left, to the right, below and above [points], (4,).
+    """
+    size, (left, right, below, above) = _size(axes), pads
+    free = np.maximum(size - [left + right, below + above], 0.1 * size)
+    point = float(np.max((high - low) / free)) or 1.0
+    first = 0.5 * (low + high) - 0.5 * point * (size + [left - right, below - above])
+    last = first + point * size
+    axes.set(xlim=(first[0], last[0]), ylim=(first[1], last[1]), aspect="equal")
+    return first, last, point
 
 
 def draw_key(axes: Any, width: float, key: dict[str, Any], columns: int) -> Any:

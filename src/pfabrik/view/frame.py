@@ -14,7 +14,7 @@ from ..drawing import SMALL, new_figure, require_flat
 from ..skeleton import Skeleton, skeleton_of
 from ..workspace.space import POSITIONS
 from ..workspace.workspace_table import for_people, in_words, labels
-from .canvas import LETTER, checked_size
+from .canvas import LETTER, checked_size, fit
 from .eye import Eye
 from .looks import Look, dress
 from .raster import Raster
@@ -129,16 +129,9 @@ def box_of(region: Region, scale: Floats) -> Box:
     return Box(low, high, np.array(for_people(region.units)[0]) / scale, labels(region))
 
 
-def fit(axes: Any, points: Floats, pads: tuple[float, float, float, float] = PADS) -> None:
-    """Set the ends of axes, at one scale, so that points (n, 2) are in the middle, with room around [points]."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    box, root = axes.get_position(), axes.get_figure(root=True)
-    size = np.array([box.width, box.height]) * root.get_size_inches() * 72.0
-    left, right, below, above = pads
-    free = np.maximum(size - [left + right, below + above], 0.2 * size)
-    unit = float(np.max((high - low) / free)) or 1.0
-    first = 0.5 * (low + high) - 0.5 * unit * (size + [left - right, below - above])
-    axes.set(xlim=(first[0], first[0] + unit * size[0]), ylim=(first[1], first[1] + unit * size[1]))
+def fit_bare(axes: Any, points: Floats, pads: tuple[float, float, float, float] = PADS) -> None:
+    """Show points (n, 2) in the middle of axes without lines and numbers, with room around [points]."""
+    fit(axes, points.min(axis=0), points.max(axis=0), pads)
     axes.set_aspect("equal", adjustable="datalim")
     axes.axis("off")
 

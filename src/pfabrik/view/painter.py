@@ -12,7 +12,7 @@ from ..description.joints import JointType
 from ..skeleton import Line, Skeleton
 from ..tolerances import TOLERANCES
 from .canvas import Canvas
-from .crossings import far_to_near
+from .crossings import cross, far_to_near
 from .eye import SAME
 from .looks import HELD, MARKERS, Look
 
@@ -117,16 +117,11 @@ def _silhouette(canvas: Canvas, vertices: Floats) -> Floats:
     for places in (np.lexsort(flat.T[::-1]), np.lexsort(flat.T[::-1])[::-1]):  # one half, then the other
         chain: list[int] = []
         for place in places.tolist():
-            while len(chain) > 1 and _turn(*flat[[*chain[-2:], place]]) <= 0.0:
-                chain.pop()
+            while len(chain) > 1 and cross(flat[chain[-1]] - flat[chain[-2]], flat[place] - flat[chain[-1]]) <= 0.0:
+                chain.pop()  # where one turns right
             chain.append(place)
         border += chain[:-1]
     return vertices[border]
-
-
-def _turn(a: Floats, b: Floats, c: Floats) -> float:
-    """Above zero where one turns left at b, from a to c."""
-    return float((b - a)[0] * (c - b)[1] - (b - a)[1] * (c - b)[0])
 
 
 def _strokes(skeleton: Skeleton, look: Look) -> list[Stroke]:

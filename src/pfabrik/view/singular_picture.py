@@ -16,7 +16,7 @@ from ..workspace.surface import face_normals, sizes_of
 from ..workspace.workspace_table import for_people, labels
 from .canvas import checked_size, draw_title, wrapped
 from .eye import View, eye_of, upright
-from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit
+from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit_bare
 from .looks import SINGULAR, Look, Theme, look_of
 from .raster import lines_between, rasterised
 from .slices import area_of, cut_mesh, draw_slice, loops_of, plane_across
@@ -322,7 +322,7 @@ def _draw_locus(axes: Any, found: SingularityMap, view: View | None, look: Look)
     else:
         eye = best_eye(picked_faces(region.vertices * scale, region.faces, region.face_limit), order)
     box = box_of(region, scale)
-    fit(axes, eye.seen(box.corners)[:, :2])
+    fit_bare(axes, eye.seen(box.corners)[:, :2])
     hull = seen_solid(region, eye, HULL_PIXELS)
     draw_image(axes, hull.raster, to_rgb(look.soft), HULL * (hull.limit >= 0), 2)
     draw_lines(axes, hull.lines, look.soft, HULL_LINE, 5, alpha=0.8)

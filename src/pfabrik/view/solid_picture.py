@@ -13,7 +13,7 @@ from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.workspace_table import for_people
 from .canvas import checked_size, draw_key, draw_title, draw_triad
 from .eye import Eye, View, eye_of, upright
-from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit, machine_lines, title_of
+from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit_bare, machine_lines, title_of
 from .looks import Look
 from .raster import counted_around
 from .slices import DASHED, draw_slice, edges_of, outline_of, plane_across
@@ -200,7 +200,7 @@ def _draw_solid(axes: Any, solid: SeenSolid, colours: Colours, shape: Inscribed 
     """Draw a solid in its box, with the machine, a shape that fits in, and the names of its faces."""
     region, eye = solid.region, solid.eye
     lines = machine_lines(region)
-    fit(axes, _content(solid))
+    fit_bare(axes, _content(solid))
     _draw_faces(axes, solid, colours)
     before, hidden = _draw_lines(axes, solid, lines, look)
     for edge in [] if shape is None else edges_of(shape):
@@ -292,7 +292,7 @@ def _room(mask: Mask, covered: Mask, wide: int, tall: int) -> Ints | None:
 def _draw_second(axes: Any, solid: SeenSolid, colours: Colours, look: Look) -> None:
     """Draw the solid from below, with the directions of its coordinates."""
     left, right, low, high = solid.raster.extent
-    fit(axes, np.array([[left, low], [right, high]]), (4.0, 4.0, 46.0, 4.0))
+    fit_bare(axes, np.array([[left, low], [right, high]]), (4.0, 4.0, 46.0, 4.0))
     _draw_faces(axes, solid, colours)
     nothing = np.zeros(solid.limit.shape, bool)
     _name_faces(axes, solid, colours, nothing, nothing)
