@@ -1,8 +1,9 @@
 # Needs make and Python >= 3.11; everything else is installed into .venv, inside this folder.
 PYTHON ?= python3
 BIN := .venv/bin
-# Without a word of what the wheel of a robot, which tests read without running it, would need to run.
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-warn-conflicts
+# Without a word of what the wheel of a robot, which tests read without running it, would need to run; Python compiles
+# what it imports, which is a small part of what is installed.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-warn-conflicts --no-compile
 # What a run of the machines needs, and with it what tests and checks need.
 READY := .venv/.ready
 STAMP := .venv/.installed
@@ -16,32 +17,36 @@ export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 # Tests start many processes, and pytest rewrites every assertion: compiled files are kept, whatever the user's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo reproduce docs test test-processors test-tensors test-fast test-interpreted campaign check bench web clean
+.PHONY: prepared demo reproduce docs test test-processors test-tensors test-fast test-interpreted campaign check bench web clean
 
 demo: $(READY) $(MODULE)
 	@$(BIN)/pfabrik demo
 
+# What tests and checks need is installed while kernels compile.
+prepared: $(READY)
+	@$(MAKE) --no-print-directory --jobs=2 $(STAMP) $(MODULE)
+
 # The experiments of the paper, next to what it printed: a report, pictures and CSV files in out/.
-reproduce: $(STAMP) $(MODULE)
+reproduce: prepared
 	@$(BIN)/python -m paper
 
 # The documentation as a site, in site/; no page needs the network. Machines are exported and notebooks run for it; it
 # stops at a link that leads nowhere.
-docs: $(STAMP) $(MODULE)
+docs: prepared
 	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@$(BIN)/python docs/build_site.py
 	@$(BIN)/zensical build --clean --strict
 
 # In parallel.
-test: $(STAMP) $(MODULE)
+test: prepared
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 # The programs of the pages again, with the linear algebra of other processors.
-test-processors: $(STAMP) $(MODULE)
+test-processors: prepared
 	@for core in Haswell Zen Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
 		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal tests/test_docs.py tests/test_transcripts.py || exit 1; done
 
-test-fast: $(STAMP) $(MODULE)
+test-fast: prepared
 	@$(BIN)/python -m pytest -m "not slow and not campaign"
 
 # Files of tensors in PyTorch and JAX, which are large: in an environment of their own.
@@ -55,7 +60,7 @@ test-interpreted: $(STAMP)
 	@PFABRIK_KERNELS=python $(BIN)/python -m pytest -m "not slow and not campaign" --cov --cov-report=term
 
 # Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
-campaign: $(STAMP) $(MODULE)
+campaign: prepared
 	@PFABRIK_HYPOTHESIS=explore $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or hypothesis"
 
 check: $(STAMP)
@@ -69,7 +74,7 @@ check: $(STAMP)
 web: $(READY)
 	@$(BIN)/python building/compile_web.py
 
-bench: $(STAMP) $(MODULE)
+bench: prepared
 	@$(BIN)/python benchmarks/run.py
 
 clean:
