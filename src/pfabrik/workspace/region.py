@@ -51,7 +51,7 @@ class Region:
         most.setflags(write=False)
         return most
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Area or volume [`size_unit`]; of a tilt and a length, say, their product."""
         return self._mesh.size

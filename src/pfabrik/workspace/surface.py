@@ -61,7 +61,9 @@ class BorderMesh(NamedTuple):
         if not len(self.faces):
             return np.zeros(0)
         ends = (self.vertices - self.vertices.mean(axis=0))[self.faces]
-        return np.asarray(np.linalg.det(ends)) / (2.0 if self.vertices.shape[1] == 2 else 6.0)
+        if self.vertices.shape[1] == 2:
+            return np.asarray(0.5 * (ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 0, 1] * ends[:, 1, 0]))
+        return np.asarray(np.einsum("fi,fi->f", ends[:, 0], np.cross(ends[:, 1], ends[:, 2])) / 6.0)
 
     @property
     def face_sizes(self) -> Floats:
