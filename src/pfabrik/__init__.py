@@ -124,9 +124,6 @@ __all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
     from . import errors as errors, interop as interop, passes as passes
-    from .design import keep as keep
-    from .design.design import design as design
-    from .design.result import Design as Design, Designs as Designs
     from .actuation.actuation import Actuation as Actuation, actuation as actuation
     from .answers.differential import (
         Mobility as Mobility,
@@ -167,6 +164,9 @@ if TYPE_CHECKING:
         Mechanism as Mechanism,
         Shape as Shape,
     )
+    from .design import keep as keep
+    from .design.design import design as design
+    from .design.result import Design as Design, Designs as Designs
     from .dynamics.efforts import Efforts as Efforts
     from .dynamics.identification import BaseParameter as BaseParameter
     from .dynamics.identification import Identification as Identification

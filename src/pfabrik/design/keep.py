@@ -21,6 +21,20 @@ from ..statics.forces import forces as forces_of
 from ..statics.stiffness import stiffness as stiffness_of
 from .candidate import IMPOSSIBLE, Candidate
 
+__all__ = [
+    "Requirement",
+    "accuracy",
+    "clearance",
+    "factors",
+    "force",
+    "margin",
+    "relation",
+    "singularity",
+    "speed",
+    "stiffness",
+    "stroke",
+]
+
 DEFAULT_SINGULARITY = 0.05
 """Least measure of a singularity that is asked for by default: L of travel moves an actuator by at most 20 L."""
 

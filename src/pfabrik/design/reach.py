@@ -63,7 +63,10 @@ class Reach:
             moved = np.concatenate([shift, np.zeros(3)])
             region = dataclasses.replace(self.region, low=self.region.low + moved, high=self.region.high + moved)
             return certify(mechanism, region, **asked)
-        return certify(mechanism, track(mechanism, self.at(mechanism)), **asked) if self.is_track else None
+        if not self.is_track:
+            return None
+        path: Any = track(mechanism, self.at(mechanism))
+        return certify(mechanism, path, **asked)
 
     def at(self, mechanism: Mechanism) -> Floats:
         """The poses [length] of a machine that is built."""
