@@ -409,7 +409,7 @@ def test_redundant_motors_share_what_a_linear_programme_finds_no_timing_beats(na
     shifts = np.stack([30 * np.sin(3 * t), 20 * t, z], axis=1)
     timed = pf.time_path(pf.track(machine, pf.pose(machine.reference_point + shifts, rotvec=turns)))
     efforts, spatial = pf.inverse_dynamics(timed), slice(0, 6) if name == "seven struts" else [0, 1, 5]
-    assert np.abs(efforts.actuators[:-1]).max() < 40.0 * (1 + 1e-5)
+    assert np.abs(efforts.actuators[:-1]).max() < 40.0 * (1 + 1e-4)  # seven rates of six motions, each a spline's own
     rates = pf.inverse_jacobian(timed.solution)[..., spatial]
     n, shares = len(machine.actuator_names), []
     bounds = np.block([[np.eye(n), -np.full((n, 1), 40.0)], [-np.eye(n), -np.full((n, 1), 40.0)]])
