@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..answers.solution import Solution, checked_solution
 from ..answers.tracked import Track
 from ..arguments import array
-from ..arrays import Floats, shaped
+from ..arrays import Floats, Ints, shaped
 from ..checks import require_choice
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
@@ -20,6 +20,7 @@ from ..kinematics import BodyInertia, inertias_of, tree_of
 from ..statics.forces import GRAVITY
 from ..statics.loads import (
     BodyLoads,
+    Reasons,
     add_reason,
     checked_gravity,
     checked_loads,
@@ -35,8 +36,8 @@ from .efforts import Efforts
 from .moving_rows import MovingRows, Weights, weights_of
 from .reactions import Reactions
 
-FREE_PART_MOVES = "the loads move a part without inertia that neither the end effector nor an actuator holds"
-NOT_MADE_HERE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"
+LEFT_FREE = "the loads move a part without inertia that neither the end effector nor an actuator holds"
+NEVER_MADE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"
 
 
 @runtime_checkable
@@ -134,13 +135,7 @@ def inverse_dynamics(
     rows = rows_of(asked, known, weights, pull)
     is_redundant = is_redundantly_actuated(mechanism) and bool(np.isfinite(drives.limits).any())
     found = rows.efforts(["motions"] if is_redundant else [])
-    for mark, reason in (
-        (SINGULAR, GAINS_MOTION),
-        (NOT_MADE, NOT_MADE_HERE),
-        (FREE_PART, FREE_PART_MOVES),
-        (NOT_HELD, gives_way_in_words(mechanism)),
-    ):
-        add_reason(reasons, known[(found.marks & mark) > 0], reason)
+    reasons[known] = reasons_of(mechanism, found.marks)
     values = np.full((3, n, n_a), np.nan)
     values[:, known] = found.actuators, found.rates, found.gains
     if is_redundant:
@@ -164,6 +159,15 @@ def inverse_dynamics(
         drives,
         reactions,
     )
+
+
+def reasons_of(mechanism: Mechanism, marks: Ints) -> Reasons:
+    """Why rows with marks have no forces; empty where they have."""
+    reasons, gives_way = no_reasons(len(marks)), gives_way_in_words(mechanism)
+    of_marks = {SINGULAR: GAINS_MOTION, NOT_MADE: NEVER_MADE, FREE_PART: LEFT_FREE, NOT_HELD: gives_way}
+    for mark, reason in of_marks.items():
+        add_reason(reasons, (marks & mark) > 0, reason)
+    return reasons
 
 
 def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike | None, at: str) -> AskedMotion:

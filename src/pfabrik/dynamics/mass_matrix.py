@@ -10,7 +10,7 @@ from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats
 from ..files.units import metres_of
 from ..statics.loads import BodyLoads, checked_loads
-from .asked_motion import are_lengths, checked_at
+from .asked_motion import checked_at
 from .inverse_dynamics import loads_of
 from .moving_rows import MovingRows
 
@@ -48,9 +48,8 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     weights, rows = loads_of(mechanism, metres, checked_loads(mechanism, loads)), solution._rows
     known = np.flatnonzero(~np.isnan(solution._coordinates).any(axis=1))
     q = solution._configurations.coordinates_at(known)
-    found = MovingRows(mechanism, weights, np.zeros(3), at, q, rows.poses[known]).efforts(["matrices"])
-    length = mechanism.characteristic_length * metres
-    units = np.where(are_lengths(mechanism, at), length, 1.0)
-    matrices = np.full((len(rows.status), len(units), len(units)), np.nan)
-    matrices[known] = found.matrices * length**2 / (units[:, None] * units)
+    moving = MovingRows(mechanism, weights, np.zeros(3), at, q, rows.poses[known])
+    found = moving.efforts(["matrices"])
+    matrices = np.full((len(rows.status), *found.matrices.shape[1:]), np.nan)
+    matrices[known] = moving.in_si(found.matrices)
     return matrices.reshape(*solution.shape, *matrices.shape[1:])

@@ -18,7 +18,7 @@ from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
 from ..kinematics import BodyInertia, actuator_units, cut_loops, generic_of, joint_path, rate_units
 from ..tolerances import TOLERANCES
-from .asked_motion import axes_of, in_lengths
+from .asked_motion import are_lengths, axes_of, in_lengths
 from .drives import Drives
 
 ROWS_A_BLOCK = 64
@@ -137,6 +137,12 @@ class MovingRows:
         length, units = mechanism.characteristic_length, actuator_units(mechanism)
         scale = length**2 * metres_of(mechanism.length_unit)
         return found._replace(rates=found.rates * units, gains=found.gains * units, wrenches=found.wrenches * scale)
+
+    def in_si(self, matrices: Floats) -> Floats:
+        """Mass matrices in kg, kg m and kg m²."""
+        length = self.mechanism.characteristic_length * metres_of(self.mechanism.length_unit)
+        units = np.where(are_lengths(self.mechanism, self.at), length, 1.0)
+        return np.asarray(matrices * length**2 / (units[:, None] * units))
 
     def _components(self, axes: Floats, values: Floats) -> Floats:
         """Those of twists that the task sets; else the values as they are."""

@@ -9,10 +9,10 @@ from ..answers.solution import Solution
 from ..arrays import Floats, Ints
 from ..errors import InvalidArgument
 from ..files.units import metres_of
-from ..statics.loads import BodyLoads, has_reason
+from ..statics.loads import BodyLoads, add_reason, checked_gravity, checked_loads, has_reason
+from ..statics.transmission import NO_CONFIGURATION
 from .drives import Drives
-from .inverse_dynamics import inverse_dynamics
-from .mass_matrix import mass_matrix
+from .inverse_dynamics import AskedMotion, loads_of, reasons_of, rows_of
 
 
 def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: BodyLoads | None, steps: Ints) -> Floats:
@@ -31,15 +31,16 @@ def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: B
     InvalidArgument : places at which there are no torques, with the reason.
     """
     mechanism = solution.mechanism
-
-    def torques(rates: Floats | None) -> Floats:
-        found = inverse_dynamics(solution, twists=rates, at="actuators", gravity=gravity, loads=loads)
-        bad = np.flatnonzero(has_reason(np.ravel(found.reason)))
-        if len(bad):
-            words, rows = str(np.ravel(found.reason)[bad[0]]), np.unique(steps[bad])[:5].tolist()
-            raise InvalidArgument("track", f"no torques: {words}", "a path that its actuators hold", rows=rows)
-        return found.actuators
-
-    drives = Drives(mechanism, metres_of(mechanism.length_unit))
-    rest, masses = torques(None), mass_matrix(solution, "actuators", loads=loads)
-    return np.concatenate([masses.reshape(len(rest), -1), torques(slopes) - rest - drives.rubbed(slopes), rest], axis=1)
+    metres, n = metres_of(mechanism.length_unit), len(slopes)
+    weights, drives = loads_of(mechanism, metres, checked_loads(mechanism, loads)), Drives(mechanism, metres)
+    asked = AskedMotion(solution, None, "actuators", slopes, np.zeros(slopes.shape))
+    moving = rows_of(asked, np.arange(n), weights, checked_gravity(gravity))
+    found = moving.efforts(["resting", "matrices"])
+    reasons = reasons_of(mechanism, found.marks)
+    add_reason(reasons, np.isnan(moving.q).any(axis=1), NO_CONFIGURATION)
+    bad = np.flatnonzero(has_reason(reasons))
+    if len(bad):
+        rows = np.unique(steps[bad])[:5].tolist()
+        raise InvalidArgument("track", f"no torques: {reasons[bad[0]]}", "a path that its actuators hold", rows=rows)
+    moved = found.actuators - found.resting - drives.rubbed(slopes)
+    return np.concatenate([moving.in_si(found.matrices).reshape(n, -1), moved, found.resting], axis=1)

@@ -14,7 +14,17 @@ from .._jit import routine, search
 from ..closure.first_order import fill_map, orthogonalise_rows, orthonormalise_rows
 from ..vectors import Vec, copy_row, cross, dot, vec
 from .closing import add_share, close_gains, close_rates
-from .masses import carry_masses, carry_momenta, carry_none, carry_point, put_gains, put_opened, put_twists, put_work
+from .masses import (
+    add_gains,
+    carry_masses,
+    carry_momenta,
+    carry_none,
+    carry_point,
+    put_gains,
+    put_opened,
+    put_twists,
+    put_work,
+)
 from .moving import (
     ALIGNED,
     ALONE,
@@ -362,7 +372,7 @@ def put_motion(moving: Moving, own: Scratch, axes: Floats, rates: Floats, gains:
         for i in range(6 if k < first else 0):
             own.wanted[k] -= axes[k, i] * own.dV[i]
     marks |= follow(moving, own, own.wanted, own.dV, own.du)
-    put_gains(moving, own, own.dV, own.u, own.du)
+    add_gains(moving, own, own.dV, own.du)
     return marks
 
 

@@ -19,12 +19,19 @@ from .placing import point_of
 @routine
 def put_twists(moving: Moving, own: Scratch, V: Floats, u: Floats) -> None:
     """Fill the twists of all frames."""
+    spread(moving, own, V, u, own.twists)
+
+
+@routine
+def spread(moving: Moving, own: Scratch, V: Floats, u: Floats, twists: Floats) -> None:
+    """Fill twists of all frames by that of the end effector and by rates."""
     for i in range(6):
-        own.twists[BASE, i], own.twists[END, i] = 0.0, V[i]
+        twists[BASE, i], twists[END, i] = 0.0, V[i]
     for k in range(moving.units.shape[0]):
-        parts, before = twist_of(moving, own, k, u), own.twists[moving.units[k, PARENT]]
-        put(own.twists[FIRST + k], add(vec(before), parts[0]))
-        put(own.twists[FIRST + k, 3:], add(vec(before[3:]), parts[1]))
+        before, after = twists[moving.units[k, PARENT]], twists[FIRST + k]
+        v, w = twist_of(moving, own, k, u)
+        put(after, add(vec(before), v))
+        put(after[3:], add(vec(before[3:]), w))
 
 
 @inlined
@@ -55,6 +62,15 @@ def put_gains(moving: Moving, own: Scratch, dV: Floats, u: Floats, du: Floats) -
             a, b = add(a, add(cross(turning, v), cross(carrier, w))), add(b, cross(turning, w))
         put(own.gains[FIRST + k], add(vec(own.gains[parent]), a))
         put(own.gains[FIRST + k, 3:], add(vec(own.gains[parent, 3:]), b))
+
+
+@routine
+def add_gains(moving: Moving, own: Scratch, dV: Floats, du: Floats) -> None:
+    """Add accelerations of parameters and columns to those of all frames."""
+    spread(moving, own, dV, du, own.carried)
+    for k in range(own.gains.shape[0]):
+        for i in range(6):
+            own.gains[k, i] += own.carried[k, i]
 
 
 @routine

@@ -69,7 +69,7 @@ TWISTS, MOTIONS, SHOWN, DUTY, ALONE = 0, 1, 2, 3, 4
 are asked for and nothing else."""
 
 LEAST, LEAST_MASS, ALIGNED = 0, 1, 2
-"""Places in Moving.limits: a singular value that counts as none, the least inertia of a free part [kg L²], and the share
+"""Places in Moving.limits: a singular value that counts as none, the least inertia of a free part [kg L²], and a share
 that is rounding."""
 
 
