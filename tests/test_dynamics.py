@@ -306,7 +306,7 @@ def test_a_platform_on_legs_without_mass_is_newtons_and_eulers() -> None:
         moment = inertia @ dw + np.cross(w, inertia @ w) + np.cross(arm, force)
         jacobian = pf.inverse_jacobian(solutions[k])  # actuator rates per twist, of mm
         expected = np.linalg.solve(jacobian.T, np.concatenate([force, moment * 1e3]))
-        np.testing.assert_allclose(found.actuators[k], expected, rtol=1e-11, atol=1e-11)
+        np.testing.assert_allclose(found.actuators[k], expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["stewart", "delta", "nrpm", "rps"])

@@ -13,7 +13,7 @@ from ..batch import take
 from ..description.mechanism import Mechanism
 from ..files.units import metres_of
 from ..kernels.dynamics.inverse_dynamics import inverse_dynamics
-from ..kernels.dynamics.moving import SHOWN, Efforts, Moving, new_scratch
+from ..kernels.dynamics.moving import SHOWN, Exerted, MovingMachine, new_moving_scratch
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
 from ..kinematics import BodyInertia, actuator_units, cut_loops, generic_of, joint_path, rate_units
@@ -92,7 +92,7 @@ class MovingRows:
         length = self.mechanism.characteristic_length * metres_of(self.mechanism.length_unit)
         return np.array([length if drive.kind == "length" else length**2 for drive in self.mechanism.drives])
 
-    def efforts(self, requests: Sequence[str] = (), probes: Probes = NO_PROBES) -> Efforts:
+    def efforts(self, requests: Sequence[str] = (), probes: Probes = NO_PROBES) -> Exerted:
         """Forces of the actuators [N, N m], rates and accelerations [machine's units], and what is requested.
 
         NaN where loops gain a motion. Wrenches are force [N] times L, and moment about the reference point [N length],
@@ -103,7 +103,7 @@ class MovingRows:
         requests : of "wrenches", "resting", "matrices", "twists", "motions", with `probes` "probes" too.
         """
         mechanism, n = self.mechanism, len(self.q)
-        moving, axes = _table(self, probes), axes_of(mechanism, self.at, self.poses)
+        moving, axes = moving_of(self, probes), axes_of(mechanism, self.at, self.poses)
         units, k, n_a = in_lengths(mechanism, self.at), axes.shape[1] + len(moving.asked), len(moving.actuated)
         rates, gains = (
             np.zeros((n, k)) if x is None else self._components(axes, x[:, : len(units)] / units)
@@ -121,11 +121,11 @@ class MovingRows:
             "twists": (6,),
             "motions": (n_a, int(moving.counts[SHOWN])),
         }
-        found = Efforts(**{
+        found = Exerted(**{
             name: np.full((n if place < 4 or name in requests else 0, *shape), 0 if name == "marks" else np.nan)
             for place, (name, shape) in enumerate(shapes.items())
         })  # fmt: skip
-        machine, scratch = Handle(moving), Scratch(new_scratch, moving, k)
+        machine, scratch = Handle(moving), Scratch(new_moving_scratch, moving, k)
         coordinates = np.ascontiguousarray(self.q / rate_units(mechanism))
 
         def run(block: slice) -> None:
@@ -151,7 +151,7 @@ class MovingRows:
         )
 
 
-def _table(rows: MovingRows, probes: Probes) -> Moving:
+def moving_of(rows: MovingRows, probes: Probes = NO_PROBES) -> MovingMachine:
     """What the kernel reads."""
     mechanism, weights = rows.mechanism, rows.weights
     actuated = [drive.column for drive in mechanism.drives]
@@ -175,7 +175,7 @@ def _table(rows: MovingRows, probes: Probes) -> Moving:
     def integers(values: Any) -> Any:
         return np.array(list(values), np.int64)
 
-    return Moving(
+    return MovingMachine(
         **fields,
         actuated=integers(places[q] for q in actuated),
         asked=integers(places[q] for q in asked),

@@ -27,6 +27,12 @@ enum {
     PFK_NO_ACTUATORS = -2, /* not finite */
     PFK_OTHER_MODE = -3,   /* closed, but not in the working mode of home */
     PFK_PROJECTED = -4,    /* out of reach: the nearest feasible pose */
+#if EFFORT
+    PFK_GAINS_MOTION = -6, /* no forces: the loops let the machine move in more ways than elsewhere */
+    PFK_NEVER_MADE = -7,   /* no forces: it cannot move so, at a serial singularity */
+    PFK_LEFT_FREE = -8,    /* no forces: loads move a part without inertia that nothing holds */
+    PFK_GIVES_WAY = -9,    /* no forces: the end effector moves with all actuators locked */
+#endif
     PFK_BUDGET = -5        /* steps were spent before the search ended: the nearest feasible pose so far, if any */
 };
 
@@ -74,6 +80,15 @@ int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair);
 /* Fills the displacements from home of the bodies in the list at the top, at a whole pose: what is at x at home is at
    R x + p. Returns what pfk_limits does; where a leg is stretched, bodies are where it comes nearest. */
 int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES]);
+#endif
+#if EFFORT
+/* The force or torque of each actuator [N, N m] at a whole pose that moves with a twist, the velocity of the reference
+   point and the angular velocity, and with its change, the acceleration of that point and the angular one, in base
+   coordinates; of these counts what the task sets. Gravity in m/s2, such as {0, 0, -9.80665}. Rotors and friction are
+   included. Return codes are those of pfk_limits without its limits, or one that says why there are none; nothing is
+   written unless 0 is returned. */
+int pfk_effort(const pfk_pose *pose, const pfk_real twist[6], const pfk_real acceleration[6], const pfk_real gravity[3],
+               pfk_real effort[PFK_ACTUATORS]);
 #endif
 #if FK
 /* The pose at given actuators, by Newton's method from `pose`; `steps` may be 0, or is set to the number of its steps.
@@ -157,7 +172,7 @@ static void pfk_close(const pfk_real at[16], pfk_pose *pose)
 }
 
 #endif
-#if IK || FK || JOINTS
+#if IK || FK || JOINTS || EFFORT
 /* Numbers as kernels take them; those of the caller are only read where they are constants. */
 static pfk_Floats1 pfk_opened_row(const pfk_real *values, int n)
 {
@@ -217,6 +232,16 @@ const char *pfk_what(int code)
         return "out of reach: the nearest feasible pose";
     if (code == PFK_BUDGET)
         return "steps were spent before the search ended";
+#if EFFORT
+    if (code == PFK_GAINS_MOTION)
+        return "no forces: a constraint singularity";
+    if (code == PFK_NEVER_MADE)
+        return "no forces: the machine cannot move so here, at a serial singularity";
+    if (code == PFK_LEFT_FREE)
+        return "no forces: loads move a part without inertia that nothing holds";
+    if (code == PFK_GIVES_WAY)
+        return "no forces: the actuators do not hold the machine, at a parallel singularity";
+#endif
 #if LIMITS
     if (code > 0 && code <= PFK_LIMITS)
         return pfk_limit_words[code - 1];
@@ -324,6 +349,17 @@ int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES])
             bodies[i].p[j] *= PFK_SIZE;
     }
     return code;
+}
+
+#endif
+#if EFFORT
+int pfk_effort(const pfk_pose *pose, const pfk_real twist[6], const pfk_real acceleration[6], const pfk_real gravity[3],
+               pfk_real effort[PFK_ACTUATORS])
+{
+    pfk_real own[16];
+    return (int)pfk_put_exerted(&pfk_driving, &pfk_reaching, pfk_opened(pose, own), pfk_opened_row(twist, 6),
+                                pfk_opened_row(acceleration, 6), pfk_opened_row(gravity, 3),
+                                pfk_opened_row(effort, PFK_ACTUATORS));
 }
 
 #endif

@@ -12,16 +12,22 @@ import numpy as np
 from ..arrays import Records
 from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
+from ..dynamics.asked_motion import task_axes
+from ..dynamics.inverse_dynamics import loads_of
+from ..dynamics.moving_rows import MovingRows, moving_of
+from ..files.units import metres_of
 from ..kernels.clearance.convex import new_polytope
 from ..kernels.clearance.distance_constants import MOST_CORNERS
 from ..kernels.clearance.link_records import NO_LINKS
 from ..kernels.clearance.solids import KIND, WIDTH
 from ..kernels.controller.assembled import Assembling
+from ..kernels.controller.driven import Driving
 from ..kernels.controller.joints_in_series import Series
 from ..kernels.controller.links_on_bodies import LinksOnBodies
 from ..kernels.controller.projected import Projecting
 from ..kernels.controller.rates import Rating
 from ..kernels.controller.reached import Reaching
+from ..kernels.dynamics.moving import Exerted, new_moving_scratch
 from ..kernels.legs.answer import Completion, new_completion
 from ..kernels.platform.equations import LegEvaluation, new_leg_evaluation
 from ..kernels.platform.forward import NewtonScratch, new_newton_scratch
@@ -34,6 +40,7 @@ from ..platform.rotation import keeps_rotation
 from ..platform.seeds import seeds_of
 from ..platform.table import kernel_table
 from ..platform.tables import tables_of
+from .driven_bodies import frames_on_bodies
 from .machine_data import Machine
 from .moved_bodies import FIRST_MOVED, Motion, angles_needed
 
@@ -52,6 +59,7 @@ class ControllerTables(NamedTuple):
     rating: Rating | None
     series: Series | None
     projecting: Projecting | None
+    driving: Driving | None
 
 
 def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | None = None) -> ControllerTables:
@@ -76,7 +84,8 @@ def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | 
         series = _series(path)
     if "nearest" in parts:
         projecting = _projecting(model, reaching)
-    return ControllerTables(reaching, assembling, rating, series, projecting)
+    driving = _driving(machine) if "effort" in parts else None
+    return ControllerTables(reaching, assembling, rating, series, projecting, driving)
 
 
 def _reaching(machine: Machine, model: Model, parts: Sequence[str]) -> Reaching:
@@ -154,7 +163,7 @@ def _links_on_bodies(machine: Machine, parts: Sequence[str]) -> LinksOnBodies:
         limits.bodies,
         limits.pairs,
         limits.least,
-        np.zeros((FIRST_MOVED + len(motions) if links is not None or "bodies" in parts else 0, 4, 4)),
+        np.zeros((FIRST_MOVED + len(motions) if links is not None or machine.places_bodies(parts) else 0, 4, 4)),
         np.zeros_like(limits.home),
         new_polytope(MOST_CORNERS if limits.sizes[limits.pairs, KIND].any() else 0),
         np.zeros((2, 3)),
@@ -194,6 +203,43 @@ def _series(path: JointPath) -> Series:
         np.zeros((4, 4)),
         np.zeros((n, n + 1)),
         np.zeros(3 if mechanism.end_effector_is_joint else 6),
+    )
+
+
+WITHOUT_DOUBT = 1e-4
+"""Share of a number that is no rounding, of a float neither."""
+
+
+def _driving(machine: Machine) -> Driving:
+    mechanism, n_a = machine.mechanism, len(machine.driven)
+    metres, length = metres_of(mechanism.length_unit), mechanism.characteristic_length
+    weights, home = loads_of(mechanism, metres, {}), mechanism.home_pose[None]
+    rows = MovingRows(mechanism, weights, np.zeros(3), "task", np.zeros((1, len(mechanism.coordinates))), home)
+    moving, axes = moving_of(rows), task_axes(mechanism, home)[0]
+    moving = moving._replace(limits=np.append(moving.limits[:2], WITHOUT_DOUBT))
+    k, none = len(axes), np.zeros((0, 0, 0))
+    return Driving(
+        moving,
+        new_moving_scratch(moving, k),
+        np.array(frames_on_bodies(mechanism, machine.bodies), np.int64),
+        axes,
+        np.array([int(machine.rotations == 2)]),
+        np.zeros((k, 6)),
+        np.zeros(k),
+        np.zeros(k),
+        Exerted(
+            actuators=np.zeros((1, n_a)),
+            rates=np.zeros((1, n_a)),
+            gains=np.zeros((1, n_a)),
+            marks=np.zeros(1, np.int64),
+            wrenches=none,
+            resting=np.zeros((0, 0)),
+            matrices=none,
+            probes=none,
+            twists=np.zeros((0, 0)),
+            motions=none,
+        ),
+        np.array([length, length * metres]),
     )
 
 

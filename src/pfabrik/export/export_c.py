@@ -14,11 +14,12 @@ from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..motion.fitting_task import leaves_a_choice
 from ..whole_files import whole_path
+from .driven_bodies import unplaced_masses
 from .machine_data import Machine, fitting_path
 from .source import source
 from .static_data import Precision
 
-Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest", "bodies"]
+Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest", "bodies", "effort"]
 PARTS: tuple[Part, ...] = get_args(Part)
 _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -52,8 +53,9 @@ def export_c(
         number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
         number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
         "rates" the Jacobian, speeds of actuators, and torques of them and back; "nearest", with "ik" and "limits", the
-        nearest feasible pose to a target out of reach; "bodies" where every body is at a pose, for pictures. All that
-        the machine has but "bodies", if left out.
+        nearest feasible pose to a target out of reach; "bodies" where every body is at a pose, for pictures;
+        "effort" the forces of the actuators in motion, of a machine with masses. All that the machine has but these
+        two, if left out.
     name : str, optional
         Prefix of all names in the file; lower-case letters, digits and underscores.
     joints : str or sequence of str, optional
@@ -100,6 +102,8 @@ def c_source(
     if "nearest" in parts and machine.why_no_nearest:
         reason = f"{machine.why_no_nearest}: leave 'nearest' out of `parts` (--parts ik,limits,fk,rates)"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
+    if "effort" in parts and (reasons := unplaced_masses(machine.mechanism, machine.bodies)):
+        raise UnsupportedMechanism(mechanism.name, reasons, "exported with 'effort'")
     if "fk" in parts and machine.uncontrolled:
         left = counted(machine.uncontrolled, "freedom")
         reason = f"its actuators leave the end effector {left}: leave 'fk' out of `parts` (--parts ik,limits,rates)"
@@ -114,8 +118,8 @@ def c_source(
 
 
 def parts_of(machine: Machine) -> list[Part]:
-    """All parts of a machine's file but "bodies"."""
-    left_out = ("bodies", "nearest") if machine.why_no_nearest else ("bodies",)
+    """All parts of a machine's file but those that are named alone."""
+    left_out = ("bodies", "effort", *(["nearest"] if machine.why_no_nearest else []))
     return [part for part in PARTS if part not in left_out]
 
 

@@ -156,12 +156,16 @@ class Machine:
         """The links that the parts of a file keep apart: the clearance is one of its limits."""
         if "limits" not in parts:
             return None
-        return self._links_on_all if "bodies" in parts else self.links
+        return self._links_on_all if self.places_bodies(parts) else self.links
+
+    def places_bodies(self, parts: Sequence[str]) -> bool:
+        """True if a part needs the places of all bodies."""
+        return bool({"bodies", "effort"} & {*parts})
 
     def motions(self, parts: Sequence[str]) -> list[Motion]:
         """The motions of the bodies that the parts of a file place."""
         links = self.links_kept(parts)
-        if "bodies" in parts:
+        if self.places_bodies(parts):
             return self.bodies.motions
         return [] if links is None else links.motions
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..kernels.controller.assembled import assemble
+from ..kernels.controller.driven import put_exerted
 from ..kernels.controller.joints_in_series import put_joints, walk
 from ..kernels.controller.projected import project_target
 from ..kernels.controller.rates import put_rates
@@ -43,6 +44,8 @@ SINGLE = {
     ("kernels.clearance.distance_constants", "ROUNDING"): 1e-7,
     ("kernels.clearance.distance_constants", "FLAT"): 1e-7,
     ("kernels.clearance.distance_constants", "CLOSE"): 1e-6,
+    ("kernels.closure.first_order", "ORTHOGONAL"): 1e-6,
+    ("kernels.closure.first_order", "NEARLY"): 1e-3,
     ("kernels.controller.rates", "RANK"): 1e-5,
     ("kernels.controller.joints_in_series", "FITTED"): 1e-6,
     ("kernels.controller.joints_in_series", "NEARLY_FITTED"): 1e-5,
@@ -81,6 +84,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
         ("RATES", put_rates, (tables.rating, reaching, matrix, number, number)),
         ("JOINTS", walk, (tables.series, row)),
         ("TO_JOINTS", put_joints, (tables.series, assembling, reaching, row, row)),
+        ("EFFORT", put_exerted, (tables.driving, reaching, matrix, row, row, row, row)),
         ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number)),
     ]
     names = []
@@ -160,6 +164,11 @@ def _data(tables: ControllerTables, program: Program, text: str, precision: Prec
     if tables.series is not None:
         for name in ("motions", "end", "home", "units", "length"):
             data.constants(f"series.{name}", getattr(tables.series, name))
+    if tables.driving is not None:
+        for name in (each for each in tables.driving.moving._fields if each != "gravity"):
+            data.constants(f"driving.moving.{name}", getattr(tables.driving.moving, name))
+        for name in ("numbers", "axes", "tilts", "units"):
+            data.constants(f"driving.{name}", getattr(tables.driving, name))
     if projecting is not None:
         own = projecting.tables
         groups = ("projecting.tables", own), ("projecting.tables.plan", own.plan)

@@ -23,7 +23,7 @@ from .loops import connected, unit_motions
 
 
 class CutLoops(NamedTuple):
-    """The trees and cuts of a mechanism, as the fields of `kernels.dynamics.moving.Moving` are; lengths in L.
+    """The trees and cuts of a mechanism, as the fields of `kernels.dynamics.moving.MovingMachine` are; lengths in L.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ from __future__ import annotations
 from ...arrays import Floats
 from .._jit import inlined, routine
 from ..vectors import add, cross, vec
-from .moving import FROM, LEAST, MOTIONS, OF_END, ROWS, VISITS, Moving, Scratch
+from .moving import FROM, LEAST, MOTIONS, OF_END, ROWS, VISITS, MovingMachine, MovingScratch
 from .placing import point_of
 
 FREE, GONE = -1, -2
@@ -19,7 +19,7 @@ FREE, GONE = -1, -2
 
 
 @routine
-def close_rates(moving: Moving, own: Scratch) -> bool:
+def close_rates(moving: MovingMachine, own: MovingScratch) -> bool:
     """Fill all motions by columns and by parameters; False where the loops gain a motion."""
     for k in range(own.slots.shape[0]):
         own.slots[k] = FREE
@@ -50,7 +50,7 @@ def close_rates(moving: Moving, own: Scratch) -> bool:
 
 
 @routine
-def put_rows(moving: Moving, own: Scratch, group: int) -> None:
+def put_rows(moving: MovingMachine, own: MovingScratch, group: int) -> None:
     """Fill the conditions of a group's cuts."""
     rows, width, row = own.rows, own.rows.shape[1], moving.groups[group, 2]
     first = moving.groups[group, 0]
@@ -82,7 +82,7 @@ def put_rows(moving: Moving, own: Scratch, group: int) -> None:
 
 
 @routine
-def eliminate(moving: Moving, own: Scratch, group: int) -> None:
+def eliminate(moving: MovingMachine, own: MovingScratch, group: int) -> None:
     """Eliminate the columns of a group, the largest entry first, as far as they are larger than none."""
     rows, width = own.rows, own.rows.shape[1]
     first, last = moving.groups[group, 2], moving.groups[group + 1, 2]
@@ -114,7 +114,7 @@ def eliminate(moving: Moving, own: Scratch, group: int) -> None:
 
 
 @routine
-def bind(own: Scratch, n_left: int, n: int, count: int, least: float) -> bool:
+def bind(own: MovingScratch, n_left: int, n: int, count: int, least: float) -> bool:
     """Eliminate `count` of n parameters by the rows left; False where that many do not follow."""
     left = own.left
     for j in range(n):
@@ -143,7 +143,7 @@ def bind(own: Scratch, n_left: int, n: int, count: int, least: float) -> bool:
 
 
 @routine
-def put_motions(moving: Moving, own: Scratch, n: int) -> None:
+def put_motions(moving: MovingMachine, own: MovingScratch, n: int) -> None:
     """Fill the motions by parameters, and by columns."""
     motions, k = own.parameters, 0
     m = motions.shape[1]
@@ -169,7 +169,7 @@ def put_motions(moving: Moving, own: Scratch, n: int) -> None:
 
 
 @inlined
-def put_column(own: Scratch, first: int, last: int, row: int, column: Floats) -> None:
+def put_column(own: MovingScratch, first: int, last: int, row: int, column: Floats) -> None:
     """Fill the rate of an eliminated column by motions."""
     rows, width = own.rows, own.rows.shape[1]
     inverse = -1.0 / rows[row, own.pivot_of[row]]
@@ -189,7 +189,7 @@ def add_share(share: float, row: Floats, to: Floats) -> None:
 
 
 @routine
-def close_gains(moving: Moving, own: Scratch) -> None:
+def close_gains(moving: MovingMachine, own: MovingScratch) -> None:
     """Fill accelerations dV and du that close what is `opened`, with nothing in the parameters that are free."""
     opened, n = own.opened, 6
     for j in range(own.slots.shape[0]):

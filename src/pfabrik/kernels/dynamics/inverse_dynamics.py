@@ -37,11 +37,11 @@ from .moving import (
     SHOWN,
     SINGULAR,
     TWISTS,
-    Efforts,
-    Moving,
-    Scratch,
+    Exerted,
+    MovingMachine,
+    MovingScratch,
     open_moving,
-    open_scratch,
+    open_moving_scratch,
 )
 from .placing import place, put_screws
 
@@ -57,17 +57,17 @@ def inverse_dynamics(
     axes: Floats,
     rates: Floats,
     gains: Floats,
-    results: Efforts,
+    results: Exerted,
 ) -> None:
     """Fill efforts at joint coordinates (n, columns of q), in L.
 
     Parameters
     ----------
-    machine, scratch_address : see `Moving` and `new_scratch`.
+    machine, scratch_address : see `MovingMachine` and `new_moving_scratch`.
     axes : components of the end effector's twist that are asked for, (n, components, 6); then the columns `asked`.
     rates, gains : of these, and their accelerations, (n, k): of the reference point, and angular.
     """
-    moving, own = open_moving(machine), open_scratch(scratch_address)
+    moving, own = open_moving(machine), open_moving_scratch(scratch_address)
     for row in range(coordinates.shape[0]):
         if place(moving, own, coordinates[row]):
             put_screws(moving, own)
@@ -76,7 +76,7 @@ def inverse_dynamics(
 
 @routine
 def put_efforts(
-    moving: Moving, own: Scratch, axes: Floats, rates: Floats, gains: Floats, row: int, results: Efforts
+    moving: MovingMachine, own: MovingScratch, axes: Floats, rates: Floats, gains: Floats, row: int, results: Exerted
 ) -> int:
     """Fill the efforts of a row whose frames and screws are known; its marks."""
     if not close_rates(moving, own):
@@ -136,7 +136,7 @@ def put_efforts(
 
 
 @routine
-def put_all_work(moving: Moving, own: Scratch, wrenches: Floats) -> float:
+def put_all_work(moving: MovingMachine, own: MovingScratch, wrenches: Floats) -> float:
     """Fill the work of masses in motion and of other loads; the largest of what frames carry."""
     carry_none(own)
     carry_masses(moving, own, wrenches, True)
@@ -149,7 +149,7 @@ def put_all_work(moving: Moving, own: Scratch, wrenches: Floats) -> float:
 
 
 @routine
-def put_shown(moving: Moving, own: Scratch) -> None:
+def put_shown(moving: MovingMachine, own: MovingScratch) -> None:
     """Fill the twist of the end effector and the rates of actuators by motions, and put those that show first.
 
     By elimination of columns, the largest entry first.
@@ -197,7 +197,7 @@ def add_column(table: Floats, factor: float, source: int, to: int) -> None:
 
 
 @routine
-def let_idle_go(moving: Moving, own: Scratch) -> None:
+def let_idle_go(moving: MovingMachine, own: MovingScratch) -> None:
     """Factor the mass matrix of the idle motions, and take off the others what has momentum along these."""
     n, m = own.z.shape[0], own.work.shape[0]
     for i in range(m - n):
@@ -231,7 +231,7 @@ def let_idle_go(moving: Moving, own: Scratch) -> None:
 
 
 @routine
-def solve_idle(own: Scratch) -> None:
+def solve_idle(own: MovingScratch) -> None:
     """Solve for the last column of `idle` by the factors before it."""
     A = own.idle
     n = A.shape[0]
@@ -260,7 +260,7 @@ def add_motions(table: Floats, first: int, rates: Floats, to: Floats) -> None:
 
 
 @routine
-def put_following(moving: Moving, own: Scratch, axes: Floats) -> bool:
+def put_following(moving: MovingMachine, own: MovingScratch, axes: Floats) -> bool:
     """Fill the shown motions by what is asked for, and by actuators: the least rates; True where both are inverses."""
     n, first, twists = own.z.shape[0], axes.shape[0], moving.counts[TWISTS]
     drives = own.shown[twists:]
@@ -282,7 +282,7 @@ def put_following(moving: Moving, own: Scratch, axes: Floats) -> bool:
 
 
 @routine
-def invert(own: Scratch, A: Floats, inverse: Floats) -> bool:
+def invert(own: MovingScratch, A: Floats, inverse: Floats) -> bool:
     """Fill the inverse of the first columns of A; False where this is not regular."""
     square = own.square
     n, one, other = square.shape[0], 0.0, 0.0
@@ -317,7 +317,7 @@ def invert(own: Scratch, A: Floats, inverse: Floats) -> bool:
 
 
 @routine
-def put_least(moving: Moving, own: Scratch) -> None:
+def put_least(moving: MovingMachine, own: MovingScratch) -> None:
     """Fill the least motions, by their twists and actuator rates, for what is asked for, and by actuators."""
     table, sizes, twists, least = own.table, own.sizes, moving.counts[TWISTS], moving.limits[LEAST]
     width, n, k = own.shown.shape[0], own.z.shape[0], own.asked.shape[0]
@@ -335,7 +335,7 @@ def put_least(moving: Moving, own: Scratch) -> None:
 
 
 @routine
-def fill_table(own: Scratch) -> None:
+def fill_table(own: MovingScratch) -> None:
     """Fill a row for each shown motion: what it shows, what of it is asked for, and itself."""
     width, k = own.shown.shape[0], own.asked.shape[0]
     for i in range(own.table.shape[0]):
@@ -349,7 +349,7 @@ def fill_table(own: Scratch) -> None:
 
 
 @routine
-def put_motion(moving: Moving, own: Scratch, axes: Floats, rates: Floats, gains: Floats) -> int:
+def put_motion(moving: MovingMachine, own: MovingScratch, axes: Floats, rates: Floats, gains: Floats) -> int:
     """Fill rates and accelerations of all columns and frames; NOT_MADE where they are not those asked for."""
     first, marks = axes.shape[0], 0
     for j in range(own.V.shape[0]):
@@ -377,7 +377,7 @@ def put_motion(moving: Moving, own: Scratch, axes: Floats, rates: Floats, gains:
 
 
 @routine
-def rest(moving: Moving, own: Scratch, turning: Vec) -> None:
+def rest(moving: MovingMachine, own: MovingScratch, turning: Vec) -> None:
     """Take off the accelerations what moves end effector and actuators, as far as the machine may."""
     table, twists, width = own.table, moving.counts[TWISTS], own.shown.shape[0]
     for j in range(own.z.shape[0]):
@@ -392,7 +392,7 @@ def rest(moving: Moving, own: Scratch, turning: Vec) -> None:
 
 
 @routine
-def add_motion(own: Scratch, V: Floats, u: Floats) -> None:
+def add_motion(own: MovingScratch, V: Floats, u: Floats) -> None:
     """Add the shown motions at rates z."""
     for i in range(V.shape[0]):
         for j in range(own.z.shape[0]):
@@ -403,7 +403,7 @@ def add_motion(own: Scratch, V: Floats, u: Floats) -> None:
 
 
 @routine
-def follow(moving: Moving, own: Scratch, wanted: Floats, V: Floats, u: Floats) -> int:
+def follow(moving: MovingMachine, own: MovingScratch, wanted: Floats, V: Floats, u: Floats) -> int:
     """Add the motion that makes what is wanted; NOT_MADE where none does."""
     n, largest, worst = own.z.shape[0], 0.0, 0.0
     for j in range(n):
@@ -420,7 +420,7 @@ def follow(moving: Moving, own: Scratch, wanted: Floats, V: Floats, u: Floats) -
 
 
 @routine
-def put_forces(moving: Moving, own: Scratch, forces: Floats) -> None:
+def put_forces(moving: MovingMachine, own: MovingScratch, forces: Floats) -> None:
     """Fill the least forces that balance the work, in N and N m."""
     for a in range(forces.shape[0]):
         force = 0.0
@@ -430,7 +430,7 @@ def put_forces(moving: Moving, own: Scratch, forces: Floats) -> None:
 
 
 @routine
-def left_undone(moving: Moving, own: Scratch, forces: Floats) -> float:
+def left_undone(moving: MovingMachine, own: MovingScratch, forces: Floats) -> float:
     """The largest work by a shown motion that the forces leave."""
     worst = 0.0
     for j in range(own.z.shape[0]):
@@ -442,7 +442,7 @@ def left_undone(moving: Moving, own: Scratch, forces: Floats) -> float:
 
 
 @routine
-def put_matrix(moving: Moving, own: Scratch, matrix: Floats) -> None:
+def put_matrix(moving: MovingMachine, own: MovingScratch, matrix: Floats) -> None:
     """Fill the mass matrix of what is asked for, rotors included."""
     n, k = own.z.shape[0], matrix.shape[0]
     for j in range(n):

@@ -12,18 +12,18 @@ from .._jit import inlined, routine
 from ..closure.loops import BALL
 from ..vectors import Vec, add, along, cross, put, scale, sub, turn, vec
 from .closing import add_share
-from .moving import BASE, COLUMN, END, FIRST, FROM, KIND, PARENT, ROWS, TO, Moving, Scratch
+from .moving import BASE, COLUMN, END, FIRST, FROM, KIND, PARENT, ROWS, TO, MovingMachine, MovingScratch
 from .placing import point_of
 
 
 @routine
-def put_twists(moving: Moving, own: Scratch, V: Floats, u: Floats) -> None:
+def put_twists(moving: MovingMachine, own: MovingScratch, V: Floats, u: Floats) -> None:
     """Fill the twists of all frames."""
     spread(moving, own, V, u, own.twists)
 
 
 @routine
-def spread(moving: Moving, own: Scratch, V: Floats, u: Floats, twists: Floats) -> None:
+def spread(moving: MovingMachine, own: MovingScratch, V: Floats, u: Floats, twists: Floats) -> None:
     """Fill twists of all frames by that of the end effector and by rates."""
     for i in range(6):
         twists[BASE, i], twists[END, i] = 0.0, V[i]
@@ -35,7 +35,7 @@ def spread(moving: Moving, own: Scratch, V: Floats, u: Floats, twists: Floats) -
 
 
 @inlined
-def twist_of(moving: Moving, own: Scratch, k: int, u: Floats) -> tuple[Vec, Vec]:
+def twist_of(moving: MovingMachine, own: MovingScratch, k: int, u: Floats) -> tuple[Vec, Vec]:
     """The twist that a unit motion adds."""
     column = moving.units[k, COLUMN]
     v, w = scale(u[column], vec(own.screws[column])), scale(u[column], vec(own.screws[column, 3:]))
@@ -46,7 +46,7 @@ def twist_of(moving: Moving, own: Scratch, k: int, u: Floats) -> tuple[Vec, Vec]
 
 
 @routine
-def put_gains(moving: Moving, own: Scratch, dV: Floats, u: Floats, du: Floats) -> None:
+def put_gains(moving: MovingMachine, own: MovingScratch, dV: Floats, u: Floats, du: Floats) -> None:
     """Fill the accelerations of all frames, whose twists are known."""
     for i in range(6):
         own.gains[BASE, i], own.gains[END, i] = 0.0, dV[i]
@@ -65,7 +65,7 @@ def put_gains(moving: Moving, own: Scratch, dV: Floats, u: Floats, du: Floats) -
 
 
 @routine
-def add_gains(moving: Moving, own: Scratch, dV: Floats, du: Floats) -> None:
+def add_gains(moving: MovingMachine, own: MovingScratch, dV: Floats, du: Floats) -> None:
     """Add accelerations of parameters and columns to those of all frames."""
     spread(moving, own, dV, du, own.carried)
     for k in range(own.gains.shape[0]):
@@ -74,7 +74,7 @@ def add_gains(moving: Moving, own: Scratch, dV: Floats, du: Floats) -> None:
 
 
 @routine
-def put_opened(moving: Moving, own: Scratch) -> None:
+def put_opened(moving: MovingMachine, own: MovingScratch) -> None:
     """Fill by how much the accelerations of frames open the cuts."""
     row = 0
     for cut in range(moving.cuts.shape[0] - 1):
@@ -90,7 +90,7 @@ def put_opened(moving: Moving, own: Scratch) -> None:
 
 
 @inlined
-def point_gain(own: Scratch, frame: int, x: Vec) -> Vec:
+def point_gain(own: MovingScratch, frame: int, x: Vec) -> Vec:
     """The acceleration of a point of a frame."""
     v, w = vec(own.twists[frame]), vec(own.twists[frame, 3:])
     a = add(vec(own.gains[frame]), cross(vec(own.gains[frame, 3:]), x))
@@ -98,7 +98,7 @@ def point_gain(own: Scratch, frame: int, x: Vec) -> Vec:
 
 
 @routine
-def carry_none(own: Scratch) -> None:
+def carry_none(own: MovingScratch) -> None:
     """Forget what frames carry."""
     for k in range(own.carried.shape[0]):
         for i in range(6):
@@ -106,14 +106,14 @@ def carry_none(own: Scratch) -> None:
 
 
 @routine
-def carry(own: Scratch, frame: int, force: Vec, moment: Vec) -> None:
+def carry(own: MovingScratch, frame: int, force: Vec, moment: Vec) -> None:
     """Add a wrench on a frame."""
     put(own.carried[frame], add(vec(own.carried[frame]), force))
     put(own.carried[frame, 3:], add(vec(own.carried[frame, 3:]), moment))
 
 
 @routine
-def carry_masses(moving: Moving, own: Scratch, wrenches: Floats, moves: bool) -> None:
+def carry_masses(moving: MovingMachine, own: MovingScratch, wrenches: Floats, moves: bool) -> None:
     """Put on frames what masses resist with, by twists and accelerations or at rest, and other loads."""
     is_asked, b = wrenches.shape[0] > 0, moving.frames.shape[0]
     for k in range(b):
@@ -140,7 +140,7 @@ def carry_masses(moving: Moving, own: Scratch, wrenches: Floats, moves: bool) ->
 
 
 @routine
-def carry_point(moving: Moving, own: Scratch, frame: int, point: Vec) -> None:
+def carry_point(moving: MovingMachine, own: MovingScratch, frame: int, point: Vec) -> None:
     """Put on a frame what 1 kg at a point of it, given at home, resists with."""
     arm = point_of(own, frame, point)
     force = sub(vec(moving.gravity), point_gain(own, frame, arm))
@@ -148,7 +148,7 @@ def carry_point(moving: Moving, own: Scratch, frame: int, point: Vec) -> None:
 
 
 @routine
-def carry_momenta(moving: Moving, own: Scratch) -> None:
+def carry_momenta(moving: MovingMachine, own: MovingScratch) -> None:
     """Put on frames the momenta of masses by the twists."""
     for k in range(moving.frames.shape[0]):
         frame, arm = moving.frames[k], vec(own.arms[k])
@@ -158,7 +158,7 @@ def carry_momenta(moving: Moving, own: Scratch) -> None:
 
 
 @routine
-def put_work(moving: Moving, own: Scratch) -> None:
+def put_work(moving: MovingMachine, own: MovingScratch) -> None:
     """Fill the work of what frames carry by columns, h, and by motions; what they carry becomes that of all beyond."""
     for k in range(moving.units.shape[0] - 1, -1, -1):
         column, parent, carried = moving.units[k, COLUMN], moving.units[k, PARENT], own.carried[FIRST + k]

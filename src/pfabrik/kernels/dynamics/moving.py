@@ -21,11 +21,11 @@ BASE, END = 0, 1
 FIRST = 2
 
 KIND, PARENT, COORDINATE, COLUMN, SENSE = 0, 1, 2, 3, 4
-"""Columns of Moving.units: the kind of `Loops`, the frame before it, its place among the coordinates, its first column,
-and +1 or -1 as it is passed in its own direction or against it."""
+"""Columns of `units`: the kind of `Loops`, the frame before it, its place among the coordinates, its first column, and
++1 or -1 as it is passed in its own direction or against it."""
 
 FROM, TO, ROWS, OF_END, VISITS = 0, 1, 2, 3, 4
-"""Columns of Moving.cuts: the two frames; 3 conditions at a ball, 6 where they are one body; the sign of V in them; and
+"""Columns of `cuts`: the two frames; 3 conditions at a ball, 6 where they are one body; the sign of V in them; and
 the first of its visits."""
 
 SINGULAR, NOT_MADE, FREE_PART, NOT_HELD = 1, 2, 4, 8
@@ -33,7 +33,7 @@ SINGULAR, NOT_MADE, FREE_PART, NOT_HELD = 1, 2, 4, 8
 do not hold the machine."""
 
 
-class Moving(NamedTuple):
+class MovingMachine(NamedTuple):
     """A machine at home, in base coordinates."""
 
     units: Ints  # (units, 5), each after the one before it
@@ -65,15 +65,15 @@ class Moving(NamedTuple):
 
 
 TWISTS, MOTIONS, SHOWN, DUTY, ALONE = 0, 1, 2, 3, 4
-"""Columns of Moving.counts. DUTY is 1 where the motion that is asked for has to be made; ALONE is 1 where the actuators
+"""Places in `counts`. DUTY is 1 where the motion that is asked for has to be made; ALONE is 1 where the actuators
 are asked for and nothing else."""
 
 LEAST, LEAST_MASS, ALIGNED = 0, 1, 2
-"""Places in Moving.limits: a singular value that counts as none, the least inertia of a free part [kg L²], and a share
+"""Places in `limits`: a singular value that counts as none, the least inertia of a free part [kg L²], and a share
 that is rounding."""
 
 
-class Efforts(NamedTuple):
+class Exerted(NamedTuple):
     """Results of n rows. No rows without a request."""
 
     actuators: Floats  # (n, n_a): forces that make the motion [N, N m]
@@ -88,7 +88,7 @@ class Efforts(NamedTuple):
     motions: Floats  # (n, n_a, shown): rates of the actuators by motions
 
 
-class Scratch(NamedTuple):
+class MovingScratch(NamedTuple):
     """Memory of a row."""
 
     T: Floats  # (frames, 3, 4): displacements from home
@@ -134,7 +134,7 @@ class Scratch(NamedTuple):
     product: Floats  # (shown, k)
 
 
-def new_scratch(moving: Moving, k: int) -> Scratch:
+def new_moving_scratch(moving: MovingMachine, k: int) -> MovingScratch:
     """Memory of a row, for k components that are asked for."""
     frames, b, n_a = FIRST + len(moving.units), len(moving.frames), len(moving.actuated)
     columns, rows, groups = int(moving.groups[-1, 0]), int(moving.groups[-1, 2]), len(moving.groups) - 1
@@ -170,15 +170,19 @@ def new_scratch(moving: Moving, k: int) -> Scratch:
     )
     shapes = {name: shape for names, shape in parts for name in names.split()}
     whole = {"pivot_of", "pivots", "n_pivots", "slots", "left_of", "left_pivot", "pivots_left", "order"}
-    return Scratch(**{name: np.zeros(shape, np.int64 if name in whole else float) for name, shape in shapes.items()})
+    return MovingScratch(
+        **{name: np.zeros(shape, np.int64 if name in whole else float) for name, shape in shapes.items()}
+    )
 
 
 def _sample(codes: str) -> list[Any]:
     return [np.zeros((5,) * int(code[1]), f"{code[0]}8") for code in codes.split()]
 
 
-MOVING = Moving(*_sample("i2 f2 f2 i2 f2 f2 f1 i2 f2 i2 i2 i1 i1 i1 i1 f1 f2 f3 f1 i1 f2 i1 f2 f2 f2 f1"))
-SCRATCH = new_scratch(MOVING, 0)
+MOVING_MACHINE = MovingMachine(
+    *_sample("i2 f2 f2 i2 f2 f2 f1 i2 f2 i2 i2 i1 i1 i1 i1 f1 f2 f3 f1 i1 f2 i1 f2 f2 f2 f1")
+)
+SCRATCH = new_moving_scratch(MOVING_MACHINE, 0)
 """Records of the types that kernels are compiled for."""
 
-open_moving, open_scratch = opener(MOVING), opener(SCRATCH)
+open_moving, open_moving_scratch = opener(MOVING_MACHINE), opener(SCRATCH)

@@ -10,11 +10,11 @@ from ..closure.loops import BALL, SLIDE
 from ..closure.path_kinematics import turn_about
 from ..quaternions import exponential
 from ..vectors import Vec, cross, dot, move, put, scale, sub, turn, vec
-from .moving import BASE, COLUMN, COORDINATE, END, FIRST, KIND, PARENT, SENSE, Moving, Scratch
+from .moving import BASE, COLUMN, COORDINATE, END, FIRST, KIND, PARENT, SENSE, MovingMachine, MovingScratch
 
 
 @routine
-def place(moving: Moving, own: Scratch, q: Floats) -> bool:
+def place(moving: MovingMachine, own: MovingScratch, q: Floats) -> bool:
     """Pose all frames at coordinates (columns of q,), in L; False if one is NaN."""
     for k in range(q.shape[0]):
         if q[k] != q[k]:
@@ -51,7 +51,7 @@ def step(unit: Ints, axis: Floats, point: Floats, q: Floats, T: Floats) -> None:
 
 
 @routine
-def put_screws(moving: Moving, own: Scratch) -> None:
+def put_screws(moving: MovingMachine, own: MovingScratch) -> None:
     """Fill the reference point, the screws of all columns, and where masses are; positions are from this point."""
     put(own.reference, move(own.T[END], vec(moving.end)))
     for k in range(moving.units.shape[0]):
@@ -77,7 +77,7 @@ def put_screws(moving: Moving, own: Scratch) -> None:
 
 
 @inlined
-def point_of(own: Scratch, frame: int, point: Vec) -> Vec:
+def point_of(own: MovingScratch, frame: int, point: Vec) -> Vec:
     """A point of a frame, given at home, from the reference point."""
     return sub(move(own.T[frame], point), vec(own.reference))
 
