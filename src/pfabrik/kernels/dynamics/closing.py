@@ -165,16 +165,19 @@ def put_motions(moving: MovingMachine, own: MovingScratch, n: int) -> None:
                 own.by_motions[j, i] = motions[own.slots[j], i] if own.slots[j] >= 0 else 0.0
         for k in range(own.n_pivots[group]):
             row = own.pivots[moving.groups[group, 2] + k]
-            put_column(own, first, last, row, own.by_motions[first + own.pivot_of[row]])
+            put_column(own, first, last, row, n == m, own.by_motions[first + own.pivot_of[row]])
 
 
 @inlined
-def put_column(own: MovingScratch, first: int, last: int, row: int, column: Floats) -> None:
-    """Fill the rate of an eliminated column by motions."""
+def put_column(own: MovingScratch, first: int, last: int, row: int, is_free: bool, column: Floats) -> None:
+    """Fill the rate of an eliminated column by motions, which are the parameters where these are free."""
     rows, width = own.rows, own.rows.shape[1]
     inverse = -1.0 / rows[row, own.pivot_of[row]]
     for j in range(6):
-        add_share(rows[row, width - 6 + j] * inverse, own.parameters[j], column)
+        if is_free:
+            column[j] = rows[row, width - 6 + j] * inverse
+        else:
+            add_share(rows[row, width - 6 + j] * inverse, own.parameters[j], column)
     for j in range(first, last):
         if own.slots[j] >= 0:
             add_share(rows[row, j - first] * inverse, own.parameters[own.slots[j]], column)

@@ -99,7 +99,7 @@ def put_efforts(
             if abs(undone) > moving.limits[ALIGNED] * size:
                 marks |= FREE_PART
         if results.wrenches.shape[0] + results.probes.shape[0] > 0:
-            add_motions(own.parameters, n, own.idle, own.dV)
+            add_motions(own.parameters[:6], n, own.idle, own.dV)
             add_motions(own.by_motions, n, own.idle, own.du)
             put_gains(moving, own, own.dV, own.u, own.du)
             put_all_work(moving, own, wrenches)
@@ -171,13 +171,13 @@ def put_shown(moving: MovingMachine, own: MovingScratch) -> None:
             return
         if at != k:
             swap_columns(shown, at, k)
-            swap_columns(own.parameters, at, k)
+            swap_columns(own.parameters[:6], at, k)
             swap_columns(own.by_motions, at, k)
         for j in range(k + 1, m):
             factor = -shown[row, j] / shown[row, k]
             if factor != 0.0:
                 add_column(shown, factor, k, j)
-                add_column(own.parameters, factor, k, j)
+                add_column(own.parameters[:6], factor, k, j)
                 add_column(own.by_motions, factor, k, j)
                 shown[row, j] = 0.0
 
@@ -201,7 +201,7 @@ def let_idle_go(moving: MovingMachine, own: MovingScratch) -> None:
     """Factor the mass matrix of the idle motions, and take off the others what has momentum along these."""
     n, m = own.z.shape[0], own.work.shape[0]
     for i in range(m - n):
-        put_column_of(own.parameters, n + i, own.V)
+        put_column_of(own.parameters[:6], n + i, own.V)
         put_column_of(own.by_motions, n + i, own.u)
         put_twists(moving, own, own.V, own.u)
         carry_none(own)
@@ -226,7 +226,7 @@ def let_idle_go(moving: MovingMachine, own: MovingScratch) -> None:
         solve_idle(own)
         for i in range(m - n):
             if own.idle[i, m - n] != 0.0:
-                add_column(own.parameters, own.idle[i, m - n], n + i, j)
+                add_column(own.parameters[:6], own.idle[i, m - n], n + i, j)
                 add_column(own.by_motions, own.idle[i, m - n], n + i, j)
 
 
@@ -254,7 +254,7 @@ def put_column_of(table: Floats, j: int, column: Floats) -> None:
 @routine
 def add_motions(table: Floats, first: int, rates: Floats, to: Floats) -> None:
     """Add motions from column `first` on, at rates that are the last column of a table."""
-    for i in range(to.shape[0]):
+    for i in range(table.shape[0]):
         for j in range(rates.shape[0]):
             to[i] += table[i, first + j] * rates[j, rates.shape[1] - 1]
 
@@ -394,7 +394,7 @@ def rest(moving: MovingMachine, own: MovingScratch, turning: Vec) -> None:
 @routine
 def add_motion(own: MovingScratch, V: Floats, u: Floats) -> None:
     """Add the shown motions at rates z."""
-    for i in range(V.shape[0]):
+    for i in range(6):
         for j in range(own.z.shape[0]):
             V[i] += own.parameters[i, j] * own.z[j]
     for i in range(u.shape[0]):
@@ -446,7 +446,7 @@ def put_matrix(moving: MovingMachine, own: MovingScratch, matrix: Floats) -> Non
     """Fill the mass matrix of what is asked for, rotors included."""
     n, k = own.z.shape[0], matrix.shape[0]
     for j in range(n):
-        put_column_of(own.parameters, j, own.V)
+        put_column_of(own.parameters[:6], j, own.V)
         put_column_of(own.by_motions, j, own.u)
         put_twists(moving, own, own.V, own.u)
         carry_none(own)
