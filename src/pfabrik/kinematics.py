@@ -13,7 +13,7 @@ Motion        home_coordinates, displacements, joint_centres, placed, end_effect
               tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
               actuator_units, rate_units; parallel_signs
-Varied        varied, VariedMachine, MachineAt; VariedGeometry
+Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes, LegSlopes
 """
 
 from .closure.configurations import Configurations
@@ -44,13 +44,14 @@ from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
 from .motion.mobility import generic_of, internal_rates
 from .motion.singularities import parallel_signs
-from .varied import MachineAt, VariedGeometry, VariedMachine, varied
+from .varied import LegSlopes, MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
 
 __all__ = [
     "BodyInertia",
     "Configurations",
     "JointPath",
     "JointRates",
+    "LegSlopes",
     "MachineAt",
     "Model",
     "Readout",
@@ -71,6 +72,7 @@ __all__ = [
     "internal_rates",
     "joint_centres",
     "joint_path",
+    "leg_slopes",
     "links_of",
     "model_of",
     "parallel_signs",

@@ -299,7 +299,7 @@ class Formulas:
         given, own = np.concatenate([uniform, self._constants]), self._without_slopes
         if tangents is not None:
             own = np.concatenate([tangents[:m], np.zeros((len(self._constants), tangents.shape[1])), tangents[m:]])
-        values, slopes = np.empty((n, r)), np.empty((n, r, own.shape[1]))
+        values, slopes = np.empty((n, r)), np.zeros((n, r, own.shape[1]))
         K.evaluate(self._steps, self._hulls, self._outputs, self._n_values, given, varying, own, values, slopes)
         return values if tangents is None else (values, slopes)
 

@@ -20,7 +20,7 @@ from ..options import Options
 from ..rotations import to_rotvec
 from .measurements import Measurements, aligned, seen
 from .parameters import Parameters
-from .sensitivity import GeometrySlopes, require_closed
+from .sensitivity import GeometrySlopes, legs_that_stay, require_closed
 
 
 class Residuals(NamedTuple):
@@ -135,11 +135,17 @@ class Fit:
             if not missing.any():
                 self._start = copy(solution._configurations)  # a copy has its coordinates, which are of this geometry
             changes = self.parameters.slopes(values)
-            first = GeometrySlopes(mechanism, q - home_coordinates(mechanism), changes, self.parameters.like)
             moved = self.measurements.actuators[:, :, None] * self.parameters.factors.T
-            twists, rates = first.at_held_actuators(moved)
-            require_closed(first.opened, self.parameters)
-            rates += changes.home.T
+            legs = None if missing.any() or self._columns else legs_that_stay(self.parameters)
+            by_legs = None if legs is None else legs.at(mechanism, solution._configurations, changes, moved)
+            if by_legs is not None:
+                twists, opened = by_legs.twists, by_legs.opened
+            else:
+                first = GeometrySlopes(mechanism, q - home_coordinates(mechanism), changes, self.parameters.like)
+                twists, rates = first.at_held_actuators(moved)
+                opened = first.opened
+                rates += changes.home.T
+            require_closed(opened, self.parameters)
         if self.parameters.moves.any():
             poses, twists = seen(poses, twists, self._places(values), self.parameters.moves)
         blocks = list(self._blocks(poses, q, twists, rates))

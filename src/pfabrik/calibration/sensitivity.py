@@ -8,15 +8,18 @@ import numpy as np
 
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, shaped
+from ..derived import derived
 from ..description.geometry import Geometry
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..kinematics import (
     JointRates,
+    LegSlopes,
     cycle_basis,
     displacements,
     end_effector_pose,
     home_coordinates,
+    leg_slopes,
     model_of,
     rate_units,
     tree_of,
@@ -76,14 +79,27 @@ def sensitivity(solution: Solution, parameters: Parameters) -> Sensitivity:
     q = np.reshape(solution.q, (-1, len(mechanism.coordinate_names)))
     if not np.isfinite(q).all():
         raise InvalidArgument("solution", "a row that is INVALID", "configurations")
-    slopes = parameters.slopes(parameters.values)
+    slopes, twists = parameters.slopes(parameters.values), 3 if mechanism.end_effector_is_joint else 6
+    legs = legs_that_stay(parameters)
+    by_legs = None if legs is None else legs.at(parameters.like, solution._configurations, slopes)
+    if by_legs is not None:
+        require_closed(by_legs.opened, parameters)
+        pose, moved = by_legs.twists[:, :twists], by_legs.actuators
+        return Sensitivity(shaped(pose, solution.shape), shaped(moved, solution.shape), parameters.names)
     first = GeometrySlopes(parameters.like, q - home_coordinates(mechanism), slopes, parameters.like)
     pose, _ = first.at_held_actuators()
     require_closed(first.opened, parameters)
-    twists = 3 if mechanism.end_effector_is_joint else 6
     return Sensitivity(
         shaped(pose[:, :twists], solution.shape), shaped(first.at_held_pose(), solution.shape), parameters.names
     )
+
+
+@derived
+def legs_that_stay(parameters: Parameters) -> LegSlopes | None:
+    """The legs of a machine as expressions of its geometry; None unless they are that with all parameters."""
+    legs = leg_slopes(model_of(parameters.like))
+    slopes = parameters.slopes(parameters.values)
+    return legs if legs is not None and legs.keeps(parameters.like, slopes, parameters.scales) else None
 
 
 OPENS = 1e-6

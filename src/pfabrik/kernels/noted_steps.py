@@ -206,7 +206,7 @@ def evaluate(
     n_values : how many places there are.
     uniform, varying : the inputs: those that are the same at all rows, (u,), then the others, (n, v).
     tangents : slopes of the inputs (u + v, c).
-    out, slopes : (n, r), (n, r, c).
+    out, slopes : (n, r), (n, r, c); the second all zero.
     """
     n_uniform, n_columns, n_inputs = uniform.shape[0], tangents.shape[1], tangents.shape[0]
     width = max(1, min(BLOCK, out.shape[0]))
@@ -240,7 +240,6 @@ def evaluate(
             at, first, last = outputs[r, 0], outputs[r, 1], outputs[r, 2]
             for i in range(n):
                 out[start + i, r] = V[at * n + i]
-            for column in range(n_columns):
-                is_sloped = first <= column and column < last
-                for i in range(n):
-                    slopes[start + i, r, column] = D[at * m + column * n + i] if is_sloped else 0.0
+            for i in range(n if n_columns > 0 else 0):
+                for column in range(first, last):
+                    slopes[start + i, r, column] = D[at * m + column * n + i]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Floats
 from ..decomposition.leg_table import LegTable
 from ..decomposition.recording import WORD
 from ..kernels import tape, vectors
@@ -22,7 +23,8 @@ class PlacedLegs:
 
     Attributes
     ----------
-    pose, q : numbers that are given: the rows of the pose [length], the coordinates of implicit joints [L or rad].
+    pose, q : numbers that are given: the rows of the pose [length]; the coordinates of implicit joints [L or rad],
+        or `has_sides`, the sides of all legs, which these are among.
     implicit : the legs of these.
     twist : numbers that are zero, by which expressions have slopes by the pose: velocity [length], angular velocity.
     margins, limits : the margins that can bind, and their limits.
@@ -31,7 +33,9 @@ class PlacedLegs:
     rows : the constraints [L or rad].
     """
 
-    def __init__(self, trace: Trace, table: LegTable, words: list[Any], length: Number) -> None:
+    def __init__(
+        self, trace: Trace, table: LegTable, words: list[Any], length: Number, *, has_sides: bool = False
+    ) -> None:
         recording: Any = table.recording
         records = {name: _records(getattr(table, name), words, start) for name, _, _, start in recording.layouts}
         legs, task = records["legs"], records["task"][0]
@@ -40,9 +44,10 @@ class PlacedLegs:
         self.pose = [trace.input(x, is_open=True) for row in home for x in row]
         self.twist = [trace.input(0.0, is_open=True) for _ in range(6)]
         self.implicit = [k for k in range(n) if legs[k]["implicit"] == 1 and legs[k]["mirror_of"] < 0]
-        self.q = [trace.input(float(legs[k]["side"]), is_open=True) for k in self.implicit]
+        given = range(n) if has_sides else self.implicit
+        self.q = [trace.input(float(legs[k]["side"]), is_open=True) for k in given]
         sides = [leg["side"] for leg in legs]
-        for k, q in zip(self.implicit, self.q, strict=True):
+        for k, q in zip(given, self.q, strict=True):
             sides[k] = q
         placed = frames.new_frames(table.legs).astype(object)
         values, lines, rows = (np.zeros(shape).astype(object) for shape in ((n, K.N_VALUES), (n, 3), task["rows"]))
@@ -80,6 +85,34 @@ def _margins(records: dict[str, Any], values: Any, rows: Any) -> Iterator[Any]:
     closed = [of_numbers(feasibility.closing_margin)(legs, k, rows, values) for k in range(len(legs))]
     for margin in (*reach, *closed):
         yield where(margin < -NEARLY_CLOSED, margin, math.inf)
+
+
+def open_motions(table: LegTable, rotations: Floats, n_implicit: int) -> Floats:
+    """Twists and rates of what a task leaves open at rotations (n, 3, 3), as of `kernels.legs.answer.put_motions`.
+
+    Returns
+    -------
+    Columns (n, 6 + implicit, u): positions, turns, implicit joints.
+    """
+    task, n = table.task[0], len(rotations)
+    fixed = np.eye(6 + n_implicit)
+    columns = [fixed[:, axis] for axis in range(3) if task["unset"] and not task["axes"][axis]]
+    if task["unset"] and task["rotations"] == 0:
+        columns += [*fixed[:, 3:6].T]
+    elif task["unset"] and task["rotations"] < 3:
+        axis = rotations[:, :, 2]
+        turns = [axis]
+        if task["rotations"] == 1:
+            axis = axis + (0.0, 0.0, 1.0)
+            axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+            across = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+            turns = [across, np.cross(axis, across)]
+        columns += [np.pad(turn, ((0, 0), (3, n_implicit))) for turn in turns]
+    columns += [*fixed[:, 6:].T]
+    motions = np.zeros((n, 6 + n_implicit, len(columns)))
+    for k, column in enumerate(columns):
+        motions[:, :, k] = column
+    return motions
 
 
 def replayed(table: LegTable, given: Sequence[Any]) -> list[Any]:

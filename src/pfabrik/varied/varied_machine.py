@@ -37,7 +37,7 @@ from ..platform.table import kernel_table, table_handle
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
 from .noted_reading import NotedReading
-from .placed_legs import PlacedLegs, replayed
+from .placed_legs import PlacedLegs, open_motions, replayed
 
 STEP = 1e-6
 """Share of L in its central differences, by which only the margins of legs that do not close have slopes."""
@@ -306,44 +306,20 @@ class MachineAt:
         reference, moved = noted.slopes_at(self._values, self._length)
         placed = self._evaluated("margins", poses, moved=moved)
         is_closed = (np.abs(placed.rows) <= NEARLY_CLOSED).all(axis=1)
-        is_begun = noted.table.is_completed and reference[noted.table.task["axes"][0] == 0].any()
-        if not is_begun and (np.abs(placed.row_slopes[is_closed]) * np.abs(self._values) <= NEARLY_CLOSED).all():
+        unset = reference[(noted.table.task["axes"][0] == 0) & (noted.table.task["unset"] > 0)]
+        if not unset.any() and (np.abs(placed.row_slopes[is_closed]) * np.abs(self._values) <= NEARLY_CLOSED).all():
             return placed.slopes
         placed = self._evaluated("margins", poses, by_pose=True, moved=moved)
         slopes, row_slopes = placed.slopes, placed.row_slopes
-        open_motions, begun = self._open_motions(placed.completed, reference)
-        by_open = row_slopes[:, :, p:] @ open_motions
+        rotations, n_q = placed.completed[:, :12].reshape(-1, 3, 4)[:, :, :3], len(noted.legs.implicit)
+        motions = open_motions(noted.table, rotations, n_q)
+        begun = np.zeros((motions.shape[2], p))
+        begun[: len(unset)] = unset
+        by_open = row_slopes[:, :, p:] @ motions
         left = row_slopes[is_closed, :, :p] + by_open[is_closed] @ begun
         dx = np.zeros((len(slopes), *begun.shape))
         dx[is_closed] = begun - np.linalg.pinv(by_open[is_closed], TOLERANCES.rank) @ left
-        return np.asarray(slopes[:, :, :p] + slopes[:, :, p:] @ open_motions @ dx)
-
-    def _open_motions(self, completed: Floats, reference: Floats) -> tuple[Floats, Floats]:
-        """Twists and rates (n, 6 + implicit, u) of what a task leaves open; how it begins by the dimensions (u, p).
-
-        Which coordinates are open is as of `kernels.legs.answer.put_motions`.
-        """
-        task, n_q = self._noted.table.task[0], completed.shape[1] - 12
-        axes, rotations = task["axes"].tolist(), int(task["rotations"])
-        rotation = completed[:, :12].reshape(-1, 3, 4)[:, :, :3]
-        fixed = np.eye(6 + n_q)
-        placed = [axis for axis in range(3) if not axes[axis] and task["unset"]]
-        columns = [np.broadcast_to(fixed[:, axis], (len(completed), 6 + n_q)) for axis in placed]
-        turns: list[Any] = []
-        if task["unset"] and rotations == 0:
-            turns = [np.broadcast_to(axis, (len(completed), 3)) for axis in np.eye(3)]
-        elif task["unset"] and rotations == 2:
-            turns = [rotation[:, :, 2]]
-        elif task["unset"] and rotations == 1:
-            axis = rotation[:, :, 2] + (0.0, 0.0, 1.0)
-            axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-            across = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
-            turns = [across, np.cross(axis, across)]
-        columns += [np.pad(turn, ((0, 0), (3, n_q))) for turn in turns]
-        columns += [np.broadcast_to(fixed[:, 6 + k], (len(completed), 6 + n_q)) for k in range(n_q)]
-        begun = np.zeros((len(columns), len(self._values)))
-        begun[: len(placed)] = reference[placed]
-        return np.stack(columns, axis=2) if columns else np.zeros((len(completed), 6 + n_q, 0)), begun
+        return np.asarray(slopes[:, :, :p] + slopes[:, :, p:] @ motions @ dx)
 
     def _evaluated(self, name: str, poses: Floats, by_pose: bool = False, moved: Floats | None = None) -> Placed:
         """Expressions of the legs at targets, with slopes: by dimensions, where these move what is the same at all
