@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+import pfabrik.calibration.sensitivity as sensitivities
 from pfabrik.arrays import Floats
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName, UnsupportedMechanism
 from pfabrik.kinematics import VariedMachine, varied
@@ -132,6 +133,35 @@ def test_a_decision_that_comes_out_otherwise_has_expressions_noted_anew() -> Non
     np.testing.assert_allclose(other.at(values[::-1]).margins(poses), expected, atol=1e-12)
 
 
+SENSITIVITIES = (
+    ("stewart", "points", True),
+    ("stewart", "offsets", True),
+    ("servo_hexapod", "points", True),
+    ("servo_hexapod", "axes", True),
+    ("delta", "axes", True),
+    ("tricept", "points", True),
+    ("five_bar", "points", True),
+    ("prs", "points", False),
+    ("orthoglide", "offsets", True),
+)
+
+
+@pytest.mark.parametrize(("name", "kind", "by_legs"), SENSITIVITIES)
+def test_sensitivities_by_legs_are_those_of_all_loops(
+    name: str, kind: str, by_legs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The oracle differentiates the loops of all joints; where parameters take legs apart, it answers itself."""
+    machine = pf.load(name)
+    answers = pf.solve_ik(machine, poses_near_home(machine, 2, 30, 0.05))
+    answers, free = answers[np.flatnonzero(answers.status == pf.Status.REACHED)], pf.parameters(machine, kind)
+    assert (sensitivities.legs_that_stay(free) is not None) == by_legs and len(answers.status) > 3
+    found = pf.sensitivity(answers, free)
+    monkeypatch.setattr(sensitivities, "legs_that_stay", lambda _: None)
+    expected, size = pf.sensitivity(answers, free), machine.characteristic_length
+    for ours, theirs in ((found.pose, expected.pose), (found.actuators, expected.actuators)):
+        np.testing.assert_allclose(ours * free.scales, theirs * free.scales, rtol=1e-9, atol=1e-9 * size)
+
+
 def test_what_cannot_be_varied_is_told() -> None:
     with pytest.raises(UnknownName):
         varied(template("delta"), "elbow")
@@ -139,6 +169,6 @@ def test_what_cannot_be_varied_is_told() -> None:
         varied(template("delta"), ["arm", "rod"]).at([90.0])
     with pytest.raises(InvalidMechanism):
         varied(template("delta"), "rod").at([100.0])  # shorter than what it bridges at home
-    with pytest.raises(UnsupportedMechanism, match="no legs in closed form"):
-        varied(pf.load("snake60"), ())
+    with pytest.raises(UnsupportedMechanism, match="not read from a file with dimensions"):
+        varied(pf.load("stewart"))
     assert np.isnan(all_varied("6-UPS").at(drawn("6-UPS", 0)[0]).margins(np.zeros((1, 4, 4)))).all()

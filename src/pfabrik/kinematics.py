@@ -13,7 +13,7 @@ Motion        home_coordinates, displacements, joint_centres, placed, end_effect
               tilt_axis
 First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
               actuator_units, rate_units; parallel_signs
-Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes, LegSlopes
+Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes
 """
 
 from .closure.configurations import Configurations
@@ -44,14 +44,13 @@ from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
 from .motion.mobility import generic_of, internal_rates
 from .motion.singularities import parallel_signs
-from .varied import LegSlopes, MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
+from .varied import MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
 
 __all__ = [
     "BodyInertia",
     "Configurations",
     "JointPath",
     "JointRates",
-    "LegSlopes",
     "MachineAt",
     "Model",
     "Readout",

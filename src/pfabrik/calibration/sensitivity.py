@@ -14,7 +14,6 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, UnsupportedMechanism
 from ..kinematics import (
     JointRates,
-    LegSlopes,
     cycle_basis,
     displacements,
     end_effector_pose,
@@ -27,6 +26,7 @@ from ..kinematics import (
 from ..motion.displacements import geometry_screws
 from ..motion.singularities import task_twists
 from ..tolerances import TOLERANCES
+from ..varied import LegSlopes
 from .parameters import Parameters
 
 

@@ -75,7 +75,9 @@ def _varied(mechanism: Mechanism, names: tuple[str, ...]) -> VariedMachine:
         if name not in mechanism.dimensions:
             raise UnknownName("dimension", name, mechanism.dimensions)
     model, reason = model_of(mechanism), ""
-    if model.why_poses_do_not_suffice:
+    if "_source" not in mechanism.__dict__:
+        reason = "it was not read from a file with dimensions"
+    elif model.why_poses_do_not_suffice:
         reason = f"no legs in closed form, {model.why_poses_do_not_suffice}"
     elif measured(model) is not model:
         reason = "one leg places its end effector as a point"
@@ -221,7 +223,7 @@ AT_REST = np.zeros(6)
 """The twist that numbers of a pose have slopes by."""
 
 
-class Placed(NamedTuple):
+class PlacedValues(NamedTuple):
     """What expressions gave at n poses, views of one array.
 
     Attributes
@@ -239,7 +241,7 @@ class Placed(NamedTuple):
     completed: Floats
 
     @classmethod
-    def of(cls, found: Any, legs: PlacedLegs, completed: Floats) -> Placed:
+    def of(cls, found: Any, legs: PlacedLegs, completed: Floats) -> PlacedValues:
         """Split what expressions gave."""
         values, slopes = found if isinstance(found, tuple) else (found, found)
         end = values.shape[1] - len(legs.reach)
@@ -321,7 +323,7 @@ class MachineAt:
         dx[is_closed] = begun - np.linalg.pinv(by_open[is_closed], TOLERANCES.rank) @ left
         return np.asarray(slopes[:, :, :p] + slopes[:, :, p:] @ motions @ dx)
 
-    def _evaluated(self, name: str, poses: Floats, by_pose: bool = False, moved: Floats | None = None) -> Placed:
+    def _evaluated(self, name: str, poses: Floats, by_pose: bool = False, moved: Floats | None = None) -> PlacedValues:
         """Expressions of the legs at targets, with slopes: by dimensions, where these move what is the same at all
         poses, then by the pose."""
         noted, legs, m = self._noted, self._noted.legs, len(self._uniform)
@@ -342,7 +344,7 @@ class MachineAt:
             completed = np.empty((len(targets), 12))
             read_targets(table_handle(noted.table).address, targets, begin, completed)
         found = program(uniform, completed, tangents)
-        placed = Placed.of(found, legs, completed)
+        placed = PlacedValues.of(found, legs, completed)
         if noted.table.is_completed and not noted.is_coupled and not np.abs(placed.rows).max(initial=0.0) <= CLOSED:
             is_open = (np.abs(placed.rows) > CLOSED).any(axis=1) & (placed.reach == math.inf).all(axis=1)
             if is_open.any():
