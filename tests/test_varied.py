@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import tomllib
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import pfabrik as pf
 import pfabrik.calibration.sensitivity as sensitivities
 from pfabrik.arrays import Floats
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName, UnsupportedMechanism
+from pfabrik.files.reading import read_mechanism
 from pfabrik.kinematics import VariedMachine, varied
 from pfabrik.rotations import from_rotvec
 
@@ -63,6 +66,51 @@ def test_least_margins_are_those_of_the_machine_made_anew(name: str) -> None:
         assert all(named[row] == found.limits[found.binding[row]] for row in np.flatnonzero(alone))
         counts += np.count_nonzero(found.margin > 0.0), np.count_nonzero(found.margin < 0.0)
     assert counts.min() > 5
+
+
+FIELDS = {
+    "range": "r",
+    "stroke": "r",
+    "half_angle": "c",
+    "axis": "a",
+    "at": "p",
+    "base": "p",
+    "platform": "p",
+    "via": "p",
+}
+
+
+def _opened(said: Any, kind: str, dimensions: dict[str, float]) -> Any:
+    """A part of a file with a dimension for every number of a point, a direction or a limit."""
+    if isinstance(said, dict):
+        kinds = {key: "" if key == "copies" else FIELDS.get(key, kind) for key in said}
+        return {key: _opened(part, kinds[key], dimensions) for key, part in said.items()}
+    if isinstance(said, list):
+        return [_opened(part, kind, dimensions) for part in said]
+    if not kind or isinstance(said, bool | str) or said == 0:
+        return said
+    name = f"{kind}{len(dimensions)}"
+    dimensions[name] = float(said)
+    return name
+
+
+@pytest.mark.parametrize(
+    "name", ["agile_eye", "ankle_ups", "delta", "five_bar", "orthoglide", "psu", "reachy_mini", "rps", "tricept", "ucu"]
+)
+def test_every_number_of_a_file_may_be_a_dimension(name: str) -> None:
+    """As above, of all numbers at once: points to another scale, cones at random."""
+    dimensions: dict[str, float] = {}
+    table = tomllib.loads((TEMPLATES[0].parents[1] / f"{name}.toml").read_text(encoding="utf-8"))
+    kinds = {"leg": "", "joint": "", "reference_point": "p"}
+    parts = {key: _opened(table[key], kind, dimensions) for key, kind in kinds.items() if key in table}
+    drawn_machine = read_mechanism(table | parts | {"dimensions": dimensions})
+    ours, rng = varied(drawn_machine), np.random.default_rng(7)
+    factors = {"p": lambda: 1.2, "c": lambda: rng.uniform(0.9, 1.1)}
+    values = {each: factors.get(each[0], lambda: 1.0)() * dimensions[each] for each in ours.names}
+    machine = drawn_machine.with_dimensions(values)
+    poses = poses_near_home(machine, 7, reach=0.3)
+    margins, found = ours.at([*values.values()]).margins(poses), pf.feasibility(machine, poses)
+    np.testing.assert_allclose(margins.min(axis=1), found.margin, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", [path.stem for path in TEMPLATES])
