@@ -21,7 +21,7 @@ from ..extras import require
 from ..skeleton import Skeleton, skeleton_of
 from ..telling import OnProgress, telling
 from ..whole_files import whole_path
-from .canvas import canvas_on, checked_size, letters_in, usual_size
+from .canvas import Size, canvas_on, checked_size, letters_in, usual_size
 from .eye import View
 from .looks import HELD, Look, Theme, look_of
 from .machine import key_of, machine_eye
@@ -164,13 +164,7 @@ class _Film:
     """One figure, whose machine is drawn anew for each frame."""
 
     def __init__(
-        self,
-        track: Track,
-        skeletons: dict[int, Skeleton],
-        view: View | None,
-        size: tuple[float, float] | None,
-        dpi: int,
-        look: Look,
+        self, track: Track, skeletons: dict[int, Skeleton], view: View | None, size: Size | None, dpi: int, look: Look
     ) -> None:
         from matplotlib.figure import Figure
 

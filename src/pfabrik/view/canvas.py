@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -33,6 +33,9 @@ EDGE_FREE, STRIP_FREE = 9.0, 3.0
 
 TITLE, TITLE_LINE = SMALL + 2.0, 15.0
 """Size of the letters of a title, and the height of one of its lines [points]."""
+
+Size: TypeAlias = tuple[float, float]
+"""Width and height of a figure [inches]."""
 
 LEAST_SIZE = (3.0, 2.5)
 """Of a picture with axes and words, which are not legible in less [inches]: a column of a page is wider."""
@@ -187,14 +190,7 @@ def canvas_on(ax: Any, eye: Eye, look: Look, *, is_plane: bool = False) -> Canva
 
 
 def new_canvas(
-    points: Floats,
-    eye: Eye,
-    look: Look,
-    *,
-    is_plane: bool,
-    title: str,
-    size: tuple[float, float] | None,
-    beside: float = 0.0,
+    points: Floats, eye: Eye, look: Look, *, is_plane: bool, title: str, size: Size | None, beside: float
 ) -> Canvas:
     """A canvas in a new figure, which takes the shape of points (n, 3) where it is given no size.
 
@@ -224,7 +220,7 @@ def new_canvas(
     return canvas_on(axes, eye, look, is_plane=is_plane)
 
 
-def usual_size(points: Floats, eye: Eye, *, is_plane: bool) -> tuple[float, float]:
+def usual_size(points: Floats, eye: Eye, *, is_plane: bool) -> Size:
     """Width and height of a figure in the shape of points (n, 3), with room for a key and a scale [inches]."""
     spans = np.ptp(eye.seen(points)[:, :2], axis=0)
     shape = np.maximum(spans / (float(spans.max()) or 1.0), LEAST) * SIDE
@@ -277,7 +273,7 @@ STRIP = 30.0
 """Room above and below a machine in a new figure, for its key and its scale [points]."""
 
 
-def checked_size(size: Any, least: tuple[float, float] = LEAST_SIZE) -> tuple[float, float]:
+def checked_size(size: Any, least: Size = LEAST_SIZE) -> Size:
     """Width and height of a figure [inches]; InvalidArgument for what is not two positive numbers, or too small."""
     try:
         width, height = size

@@ -14,7 +14,7 @@ from ..drawing import SMALL, new_figure, require_flat
 from ..skeleton import Skeleton, skeleton_of
 from ..workspace.space import POSITIONS
 from ..workspace.workspace_table import for_people, in_words, labels
-from .canvas import LETTER, checked_size, fit
+from .canvas import LETTER, Size, checked_size, fit
 from .eye import Eye
 from .looks import Look, dress
 from .raster import Raster
@@ -53,7 +53,7 @@ FREE_EDGE = 0.1
 """Around axes [inches]: those of one scale are shrunk after their place was found."""
 
 
-def axes_for(ax: Axes | None, size: tuple[float, float], look: Look) -> Axes:
+def axes_for(ax: Axes | None, size: Size, look: Look) -> Axes:
     """Axes that were given, or those of a new figure of a size [inches]; their letters small.
 
     Raises

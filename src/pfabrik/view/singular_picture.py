@@ -9,12 +9,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..drawing import SMALL, new_figure
-from ..motion.singularities import Singularity
 from ..workspace.parts import connected
 from ..workspace.singular import signed_at
 from ..workspace.surface import face_normals, sizes_of
 from ..workspace.workspace_table import for_people, labels
-from .canvas import checked_size, draw_title, wrapped
+from .canvas import Size, checked_size, draw_title, wrapped
 from .eye import View, eye_of, upright
 from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit_bare
 from .looks import SINGULAR, Look, Theme, look_of
@@ -25,7 +24,7 @@ from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_o
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..workspace.singular import SingularityMap
+    from ..workspace.singular import SingularityMap, SingularityTrack
 
 LINES = {
     "serial": ("#0072b2", "-"),
@@ -76,22 +75,15 @@ HULL, HULL_LINE = 0.10, 0.6
 """How opaque the workspace around a locus is, and the width of its lines [points]."""
 
 
-def plot_singular_track(
-    measures: Singularity,
-    crossings: Ints,
-    ax: Axes | None = None,
-    *,
-    size: tuple[float, float] | None = None,
-    theme: Theme = "light",
-) -> Axes:
-    """Draw the measures along a path, one line each, and where it leads through parallel singularities."""
+def plot_singular_track(found: SingularityTrack, ax: Axes | None, size: Size | None, theme: Theme) -> Axes:
+    """As `SingularityTrack.plot`."""
     look = look_of(theme)
     axes = axes_for(ax, size or PLANE_SIZE, look)
     for name, (colour, dashes) in LINES.items():
-        values = np.asarray(getattr(measures, name))
+        values = np.asarray(getattr(found.measures, name))
         if np.isfinite(values).any():
             axes.plot(np.arange(1, len(values) + 1), values, color=colour, linestyle=dashes, label=name)
-    for count, row in enumerate(crossings.tolist()):
+    for count, row in enumerate(found.crossings.tolist()):
         label = "" if count else "parallel singularity"
         axes.axvline(row + 0.5, color=SINGULAR, linewidth=1.2, label=label)
     axes.set(xlabel="target", ylabel="measure of singularity", ylim=(0.0, None))
@@ -100,20 +92,9 @@ def plot_singular_track(
 
 
 def plot_singular_map(
-    found: SingularityMap,
-    ax: Axes | None = None,
-    *,
-    view: View | None = None,
-    size: tuple[float, float] | None = None,
-    theme: Theme = "light",
+    found: SingularityMap, ax: Axes | None, view: View | None, size: Size | None, theme: Theme
 ) -> Axes:
-    """Draw the parallel measure in a plane, or the locus in space with slices of the measure across it.
-
-    Parameters
-    ----------
-    view : direction that space is seen from; default: the one that shows most of the locus.
-    size : of a new figure, width and height [inches].
-    """
+    """As `SingularityMap.plot`."""
     look, region = look_of(theme), found.workspace
     vertices, faces = without_specks(found.locus_vertices, found.locus_faces, found.step)
     found = replace(found, locus_vertices=vertices, locus_faces=faces)
@@ -146,7 +127,7 @@ def plot_singular_map(
     return axes  # type: ignore[no-any-return]
 
 
-def _plot_slices(found: SingularityMap, size: tuple[float, float] | None, look: Look, title: str) -> Axes:
+def _plot_slices(found: SingularityMap, size: Size | None, look: Look, title: str) -> Axes:
     """Slices of the measure alone: where nothing is singular there is no locus to see; a small figure has one slice."""
     width, height = checked_size(size or SIZE)
     figure, across = new_figure(width, height, look.paper), 2 if _is_roomy(width, height) else 1
@@ -279,12 +260,7 @@ def _draw_curves(axes: Any, segments: Floats, area: Any) -> None:
 
 
 def _plot_in_space(
-    found: SingularityMap,
-    ax: Axes | None,
-    view: View | None,
-    size: tuple[float, float] | None,
-    look: Look,
-    title: str,
+    found: SingularityMap, ax: Axes | None, view: View | None, size: Size | None, look: Look, title: str
 ) -> Axes:
     """Draw the locus in the workspace, and slices beside it; on axes that are given, without slices."""
     if ax is None and not len(found.locus_faces):

@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints, Mask
 from ..drawing import SMALL, new_figure
 from ..workspace.border import Group, group_of_limits, groups_of
 from ..workspace.workspace_table import for_people
-from .canvas import checked_size, draw_key, draw_title, draw_triad
+from .canvas import Size, checked_size, draw_key, draw_title, draw_triad
 from .eye import Eye, View, eye_of, upright
 from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit_bare, machine_lines, title_of
 from .looks import Look
@@ -77,12 +77,7 @@ class Colours(NamedTuple):
 
 
 def plot_solid(
-    region: Region,
-    ax: Axes | None,
-    shape: Inscribed | None,
-    view: View | None,
-    size: tuple[float, float] | None,
-    look: Look,
+    region: Region, ax: Axes | None, shape: Inscribed | None, view: View | None, size: Size | None, look: Look
 ) -> Axes:
     """Draw a workspace in space on axes that are given, or on those of a new figure, with slices beside it."""
     from matplotlib.colors import to_rgb
@@ -151,7 +146,7 @@ def _eye_below(sample: PickedFaces, eye: Eye, place: Ints) -> Eye | None:
 
 
 def _panels(
-    first: SeenSolid, second: SeenSolid | None, size: tuple[float, float] | None, groups: list[Group], look: Look
+    first: SeenSolid, second: SeenSolid | None, size: Size | None, groups: list[Group], look: Look
 ) -> tuple[Any, Any, Any, list[Any]]:
     """A new figure, axes of its solids, and those of slices, as wide as what they show, one below the other."""
     rows = -(-sum(group.share >= LEAST for group in groups) // KEYS)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ..drawing import SMALL
 from ..workspace.space import TURNS
 from ..workspace.workspace_table import for_people
-from .canvas import draw_title
+from .canvas import Size, draw_title
 from .eye import View
 from .frame import PLANE_SIZE, axes_for
 from .looks import Look, Theme, look_of
@@ -22,22 +22,9 @@ if TYPE_CHECKING:
 
 
 def plot_workspace(
-    region: Region,
-    ax: Axes | None = None,
-    *,
-    shape: Inscribed | None = None,
-    view: View | None = None,
-    size: tuple[float, float] | None = None,
-    theme: Theme = "light",
+    region: Region, ax: Axes | None, shape: Inscribed | None, view: View | None, size: Size | None, theme: Theme
 ) -> Axes:
-    """Draw a workspace on matplotlib axes, or on those of a new figure, which is `ax.figure`.
-
-    Parameters
-    ----------
-    shape : one that fits in, of which the edges are drawn.
-    view : direction that a workspace in space is seen from; default: the one that shows most.
-    size : of a new figure, width and height [inches].
-    """
+    """As `Workspace.plot`."""
     look = look_of(theme)
     if not len(region.faces):
         return _say_nothing(region, ax, size, look)
@@ -48,7 +35,7 @@ def plot_workspace(
     return axes
 
 
-def _say_nothing(region: Region, ax: Axes | None, size: tuple[float, float] | None, look: Look) -> Axes:
+def _say_nothing(region: Region, ax: Axes | None, size: Size | None, look: Look) -> Axes:
     """A picture in words: nothing is within reach, with what is fixed."""
     axes: Any = axes_for(ax, size or PLANE_SIZE, look)
     draw_title(axes, f"{region.mechanism.name}: nothing within reach", look)

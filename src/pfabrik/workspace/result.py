@@ -149,7 +149,7 @@ class Workspace(Printed, Region):
         """
         from ..view.workspace_picture import plot_workspace
 
-        return plot_workspace(self, ax, shape=shape, view=view, size=size, theme=theme)
+        return plot_workspace(self, ax, shape, view, size, theme)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write .npz (all arrays), .stl or .ply (the mesh; .ply with limits), or .csv (points of the border)."""

@@ -112,7 +112,7 @@ class SingularityMap(Printed):
         """
         from ..view.singular_picture import plot_singular_map
 
-        return plot_singular_map(self, ax, view=view, size=size, theme=theme)
+        return plot_singular_map(self, ax, view, size, theme)
 
     @property
     def _signed(self) -> Floats:
@@ -193,7 +193,7 @@ class SingularityTrack(Printed):
         """
         from ..view.singular_picture import plot_singular_track
 
-        return plot_singular_track(self.measures, self.crossings, ax, size=size, theme=theme)
+        return plot_singular_track(self, ax, size, theme)
 
 
 def least_and_share(measure: float | Floats) -> tuple[float, float]:
