@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Floats
+from ..checks import require_type
 from ..description.joints import KINDS, Joint
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
-from ..errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning
+from ..errors import Fault, InvalidMechanism, MobilityWarning
 from ..files.units import metres_of
 from ..kinematics import column_joints, columns, displacements
 from ..motion.displacements import centres, screws
@@ -78,8 +79,7 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
     InvalidMechanism
         The loops cannot be closed, with how far they stay open, or what they make is no mechanism.
     """
-    if not isinstance(opened, OpenMechanism):
-        raise InvalidArgument("opened", type(opened).__name__, "an OpenMechanism")
+    require_type("opened", opened, OpenMechanism, "an OpenMechanism")
     noted = list(notes)
     with noting(noted):
         home = closed(opened, noted)

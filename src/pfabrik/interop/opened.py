@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import array
 from ..arrays import Floats
 from ..description.joints import Cone, Joint, Vector
 from ..description.structure import Structure
@@ -56,9 +57,10 @@ class Loop:
         place = f"loop '{self.name}'"
         if self.type not in get_args(LoopType):
             raise InvalidArgument(f"{place}: type", repr(self.type), f"one of {', '.join(get_args(LoopType))}")
-        _set(self, "points", self.points, (2, 3), place)
-        if self.type != "spherical":
-            _set(self, "frames", self.frames, (2, 3, 3), place)
+        for name, shape in (("points", "2 3"), ("frames", "2 3 3"))[: 1 if self.type == "spherical" else 2]:
+            value = array(f"{place}: {name}", getattr(self, name), shape).copy()
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
 
     @property
     def at(self) -> Floats:
@@ -69,17 +71,6 @@ class Loop:
     def turned(self) -> Floats:
         """The frame on each body, (2, 3, 3); of a ball, those of the base."""
         return np.asarray([np.eye(3), np.eye(3)] if self.frames is None else self.frames)
-
-
-def _set(loop: Loop, name: str, value: object, shape: tuple[int, ...], place: str) -> None:
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.array(np.nan)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise InvalidArgument(f"{place}: {name}", f"shape {array.shape}", f"finite numbers of shape {shape}")
-    array.setflags(write=False)
-    object.__setattr__(loop, name, array)
 
 
 def frame_along(axis: Floats) -> Floats:

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..checks import require_names, require_positive
+from ..checks import require_known, require_names, require_positive
 from ..description.joints import KINDS, Cone, Joint
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, PfabrikError, UnknownName, counted
+from ..errors import InvalidArgument, PfabrikError, counted
 from ..files.units import metres_of
 from ..kinematics import generic_of
 from .assembling import Imported, closed
@@ -146,12 +146,10 @@ def _proposals(mechanism: Mechanism, made: Callable[[float], Mechanism]) -> Iter
                 return
 
 
-def _require_known(argument: str, names: Iterable[str], known: Iterable[str]) -> set[str]:
-    """The names, if all are known; UnknownName for the first that is not."""
-    names, known = require_names(argument, names), list(known)
-    for name in names:
-        if name not in known:
-            raise UnknownName(f"joint to be {argument}", name, known)
+def _joints_to_be(argument: str, names: Iterable[str], known: list[str]) -> set[str]:
+    """The names of joints, if all are known."""
+    names = require_names(argument, names)
+    require_known(f"joint to be {argument}", names, known)
     return set(names)
 
 
@@ -159,9 +157,7 @@ def _without(robot: Robot, names: Iterable[str], notes: list[Note]) -> Robot:
     """Without the loops of these names, and the couplings of joints of these names."""
     known = [*(loop.name for loop in robot.loops), *(each.follower for each in robot.couplings)]
     omitted = require_names("leave_out", names)
-    for name in omitted:
-        if name not in known:
-            raise UnknownName("loop, or joint that follows another, to leave out", name, known)
+    require_known("loop, or joint that follows another, to leave out", omitted, known)
     note_names(notes, "left out as asked for", omitted)
     loops = [loop for loop in robot.loops if loop.name not in omitted]
     couplings = [each for each in robot.couplings if each.follower not in omitted]
@@ -170,7 +166,7 @@ def _without(robot: Robot, names: Iterable[str], notes: list[Note]) -> Robot:
 
 def _with_held(robot: Robot, fixed: Iterable[str]) -> Robot:
     """With some joints held where they are."""
-    held = _require_known("fixed", fixed, (joint.name for joint in robot.joints))
+    held = _joints_to_be("fixed", fixed, [joint.name for joint in robot.joints])
     joints = [Joint(each.name, "fixed", each.connects) if each.name in held else each for each in robot.joints]
     return dataclasses.replace(robot, joints=joints)
 
@@ -180,7 +176,7 @@ def _with_drives(robot: Robot, actuated: Sequence[str] | None) -> Robot:
     if actuated is None:
         return robot
     actuatable = [joint.name for joint in robot.joints if KINDS[joint.type].actuatable]
-    driven = _require_known("actuated", actuated, actuatable)
+    driven = _joints_to_be("actuated", actuated, actuatable)
     joints = [dataclasses.replace(joint, actuated=joint.name in driven) for joint in robot.joints]
     return dataclasses.replace(robot, joints=joints, order=actuated)
 
@@ -199,8 +195,7 @@ def _base(robot: Robot, base: str | None) -> str:
     """The given base, else that of the file, else the root."""
     if base is None:
         return robot.base or robot.root
-    if not isinstance(base, str) or base not in _bodies(robot):
-        raise UnknownName("body", base, _bodies(robot))
+    require_known("body", [base], _bodies(robot))
     return base
 
 
@@ -208,8 +203,7 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
     """The given end effector, else that of the file; else the error has what may be chosen."""
     if end_effector is not None:
         known = [*robot.places, *_joint_names(robot)]
-        if not isinstance(end_effector, str) or end_effector not in known:
-            raise UnknownName("body, site or joint", end_effector, known)
+        require_known("body, site or joint", [end_effector], known)
         return end_effector
     if robot.end_effector is not None:
         return robot.end_effector

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 import os
-import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
+from ..checks import require_count
 from ..description.joint_coordinates import JointCoordinate
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..errors import InvalidArgument, counted
+from ..errors import counted
 from ..files.units import metres_of
 from ..printed import Printed, ResultTable, error_text
 from ..tolerances import TOLERANCES
 from .original import Original, OriginalFile
 from .referee import Travelled, on_export, reached_at_random, travelled
+
+LARGEST_SEED = 2**63 - 1
 
 FAR = 0.25
 """Share of its range, or of what was tried, that some actuator must have gone through: poses nearer to home than that
@@ -202,11 +203,7 @@ def verify(
         An actuator, a joint or the end effector, where the original does not have it.
     """
     checked_mechanism(mechanism)
-    counts: tuple[tuple[str, Any, int], ...] = (("poses", poses, 1), ("seed", seed, 0))
-    for name, value, least in counts:
-        if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
-            raise InvalidArgument(name, reprlib.repr(value), f"an integer from {least} on")
-    rng = np.random.default_rng(seed)
+    poses, rng = require_count("poses", poses), np.random.default_rng(require_count("seed", seed, 0, LARGEST_SEED))
     metres, size = metres_of(mechanism.length_unit), mechanism.characteristic_length
     file = None if original is None else OriginalFile(original, loops, configuration)
     robot = None if file is None else Original(mechanism, file)
