@@ -10,9 +10,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from ..arrays import Floats
 from .collision import EVERYTHING, MOST_SOLIDS, Collision, Solid, solid_shape
-from .mjcf_model import MjcfModel
+from .mjcf_model import MjcfModel, frame_of
 from .mjcf_plain import IN_BODIES, kept
 from .notes import Note, counted_names, note_names
 from .xml_reading import number
@@ -146,11 +145,4 @@ def frame_on(model: MjcfModel, body: int, at: Floats, quat: Floats) -> Floats:
     """A frame (4, 4) in the world, from where it is on a body: its origin (3,) and its rotation (4,)."""
     turn = np.empty(9)
     model.mujoco.mju_quat2Mat(turn, quat)
-    return _frame(model.data.xpos[body], model.data.xmat[body]) @ _frame(at, turn)
-
-
-def _frame(at: Floats, turn: Floats) -> Floats:
-    """A frame from its origin (3,) and its rotation (9,)."""
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = turn.reshape(3, 3), at
-    return frame
+    return frame_of(model.data.xpos[body], model.data.xmat[body]) @ frame_of(at, turn)

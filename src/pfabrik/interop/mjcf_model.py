@@ -74,6 +74,13 @@ class CompiledModel:
         return data.efc_pos[:count], data.efc_J.reshape(-1, self.model.nv)[:count], data.efc_id[:count]
 
 
+def frame_of(at: Floats, turn: Floats) -> Floats:
+    """The frame (4, 4) of an origin (3,) and a rotation (9,)."""
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = turn.reshape(3, 3), at
+    return frame
+
+
 class MjcfModel(CompiledModel):
     """A model in one configuration, as joints and loops.
 

@@ -18,7 +18,7 @@ from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .loops_file import LinkLoop
 from .opened import LoopType, frame_along
-from .xml_reading import fault, number_text, numbers_in
+from .xml_reading import fault, number, number_text, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
 """Joint types that are read: those of URDF, and those that Drake and MuJoCo add."""
@@ -245,10 +245,10 @@ def origin_of(element: ET.Element | None) -> Floats:
 def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
     name, origin, limit = element.get("name", ""), element.find("origin"), element.find("limit")
     is_limited = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
-    limits = (_number(limit, "lower", 0.0), _number(limit, "upper", 0.0))
-    effort, losses = _number(limit, "effort", 0.0), element.find("dynamics")
-    friction = _number(losses, "friction", 0.0), _number(losses, "damping", 0.0)
-    speed, kind = _number(limit, "velocity", 0.0), retyped.get(name, element.get("type", "")).upper()
+    limits = (number(limit, "lower"), number(limit, "upper"))
+    effort, losses = number(limit, "effort"), element.find("dynamics")
+    friction = number(losses, "friction"), number(losses, "damping")
+    speed, kind = number(limit, "velocity"), retyped.get(name, element.get("type", "")).upper()
     axis = vector_in(element.find("axis"), "xyz", X)
     return UrdfJoint(
         name,
@@ -269,7 +269,7 @@ def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
 def _coupling(name: str, mimic: ET.Element | None) -> Coupling | None:
     if mimic is None:
         return None
-    return Coupling(name, mimic.get("joint", ""), (_number(mimic, "offset", 0.0), _number(mimic, "multiplier", 1.0)))
+    return Coupling(name, mimic.get("joint", ""), (number(mimic, "offset"), number(mimic, "multiplier", 1.0)))
 
 
 def _link(joint: ET.Element, end: str) -> str:
@@ -279,10 +279,6 @@ def _link(joint: ET.Element, end: str) -> str:
 
 def _text(element: ET.Element | None, key: str, default: str) -> str:
     return default if element is None else element.get(key, default)
-
-
-def _number(element: ET.Element | None, key: str, default: float) -> float:
-    return float(_text(element, key, str(default)))
 
 
 def _roundings(

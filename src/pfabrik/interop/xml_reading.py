@@ -91,10 +91,11 @@ def number_text(values: Iterable[float]) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def number(element: ET.Element, key: str) -> float:
-    """The first number of an attribute, or an element; 0 where it is none."""
-    value = numbers_in(" ".join((element.get(key) or element.findtext(key) or "").split()[:1]), 1)
-    return 0.0 if value is None else float(value[0])
+def number(element: ET.Element | None, key: str, default: float = 0.0) -> float:
+    """The first number of an attribute, or of an element within; the default where there is none."""
+    text = "" if element is None else element.get(key) or element.findtext(key) or ""
+    value = numbers_in(" ".join(text.split()[:1]), 1)
+    return default if value is None else float(value[0])
 
 
 def fault(place: str, found: str, expected: str) -> InvalidMechanism:
