@@ -6,11 +6,13 @@ slide and a hinge of no other use bridge the gap; locked where this is gone, the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Mask
 from ..closure.close import close, platform_poses
@@ -67,7 +69,8 @@ class OpenLoops:
         self.tree: Structure = opened.tree()
         limits = np.reshape([each.limits for each in self.tree.coordinates], (-1, 2)).T
         self.low, self.high = limits - home_coordinates(self.tree)
-        self.length = _radius(opened)
+        points = [joint.at for joint in opened.joints if joint.at is not None]
+        self.length = radius_around([*points, *(point for loop in opened.loops for point in loop.at)])
 
     @cached_property
     def bridged(self) -> tuple[Closure, dict[int, float]]:
@@ -115,12 +118,10 @@ class OpenLoops:
         return bool(len(turns) and not off.any() and turns.any(axis=1).all())
 
 
-def _radius(opened: OpenMechanism) -> float:
-    """The radius around all joints and loops [length]."""
-    points = [joint.at for joint in opened.joints if joint.at is not None]
-    every = np.concatenate([np.reshape(points, (-1, 3)), *(loop.at for loop in opened.loops)])
-    spread = np.linalg.norm(every - every.mean(axis=0), axis=1).max(initial=0.0) if len(every) else 0.0
-    return float(spread) or 1.0
+def radius_around(points: Sequence[ArrayLike]) -> float:
+    """The radius around the mean of points (3,) [length]; 1 where they have no extent."""
+    every = np.array(points, float).reshape(-1, 3)
+    return float(np.linalg.norm(every - every.mean(axis=0), axis=1).max()) or 1.0 if len(every) else 1.0
 
 
 def _sides(loop: Loop, bodies: dict[str, Floats]) -> tuple[Floats, Floats]:

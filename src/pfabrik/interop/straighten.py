@@ -19,6 +19,7 @@ from ..description.joints import Joint, Vector
 from ..description.structure import Structure
 from ..motion.loops import loop_errors_here
 from ..tolerances import TOLERANCES
+from .closing import radius_around
 from .digits import NOTHING, Rounding, worst
 from .nearest_geometry import Kept, Moving, nearest_geometry, walked
 from .notes import Note
@@ -54,7 +55,7 @@ def straighten(
     has_roundings, unclear = bool(opened.roundings), unclear_conditions(given)
     if not has_roundings and not unclear:
         return joints
-    size, more = _size(joints), slack + ROUNDED
+    size, more = radius_around([joint.at for joint in joints if joint.at is not None]), slack + ROUNDED
     known = dict(opened.roundings) | dict(_roundings_of_hinges(opened, joints))
     locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(given)
     roundings = _roundings(joints, known, size, locked)
@@ -103,11 +104,6 @@ def _moving(structure: Structure, allowed: Sequence[Rounding], kept: Kept) -> St
 def _severity(unclear: Sequence[float]) -> tuple[int, float]:
     """Severity with which loops lock: fewer conditions are better, then smaller ones."""
     return len(unclear), max(unclear, default=0.0)
-
-
-def _size(joints: Sequence[Joint]) -> float:
-    points = np.array([joint.at for joint in joints if joint.at is not None]).reshape(-1, 3)
-    return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) if len(points) > 1 else 1.0
 
 
 def _roundings_of_hinges(opened: OpenMechanism, joints: Sequence[Joint]) -> Iterator[tuple[str, Rounding]]:

@@ -20,8 +20,6 @@ from ..tolerances import TOLERANCES
 from .original import Original, OriginalFile
 from .referee import Travelled, on_export, reached_at_random, travelled
 
-LARGEST_SEED = 2**63 - 1
-
 FAR = 0.25
 """Share of its range, or of what was tried, that some actuator must have gone through: poses nearer to home than that
 hold for machines that do not move at all."""
@@ -203,7 +201,7 @@ def verify(
         An actuator, a joint or the end effector, where the original does not have it.
     """
     checked_mechanism(mechanism)
-    poses, rng = require_count("poses", poses), np.random.default_rng(require_count("seed", seed, 0, LARGEST_SEED))
+    poses, rng = require_count("poses", poses), np.random.default_rng(require_count("seed", seed, 0, 2**63 - 1))
     metres, size = metres_of(mechanism.length_unit), mechanism.characteristic_length
     file = None if original is None else OriginalFile(original, loops, configuration)
     robot = None if file is None else Original(mechanism, file)

@@ -29,9 +29,6 @@ DOTS = 32
 APART = 1.0
 """Least distance between two names [points]."""
 
-ROUNDS = 2
-"""How often each name is placed: first among those before it, then among all others."""
-
 WORDS, OUTSIDE = 60.0, 4.0
 """Weight of the area of other words, and of that beyond the axes, against an area of lines."""
 
@@ -57,7 +54,7 @@ def place_names(canvas: Canvas, texts: Sequence[Any], joints: Floats, lines: Flo
     others = [*([axes.get_legend()] if axes.get_legend() else []), *(text for text in axes.texts if text.get_text())]
     words = {other: other.get_window_extent().extents for other in others if other not in texts}
     box = axes.get_window_extent().extents
-    for text in [*texts] * ROUNDS:
+    for text in [*texts] * 2:  # among those before it, then among all others
         at = pixels(text.xy)
         extent = text.get_window_extent()
         size = np.array([extent.width, extent.height])
