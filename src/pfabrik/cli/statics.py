@@ -22,15 +22,13 @@ def bodies(mechanism: pf.Mechanism) -> tuple[str, ...]:
     return tuple(name for name in mechanism.bodies if name != mechanism.base)
 
 
-def load_of(words: str) -> tuple[str, tuple[float, list[float]]]:
-    """A body, and its mass and centre, from words such as ``platform=5,0,0,190``."""
-    body, _, numbers = words.rpartition("=")
-    mass, *centre = numbers_of("--load BODY=MASS,X,Y,Z", numbers, (4,))
-    return body, (mass, centre)
-
-
 def _by_body(loads: tuple[str, ...]) -> Loads:
-    return dict(map(load_of, loads))
+    """Body -> its mass and centre, from words such as ``platform=5,0,0,190``."""
+    found: Loads = {}
+    for body, _, numbers in (words.rpartition("=") for words in loads):
+        mass, *centre = numbers_of("--load BODY=MASS,X,Y,Z", numbers, (4,))
+        found[body] = mass, centre
+    return found
 
 
 MOMENT = "Beside it, or alone [force times length]."

@@ -103,6 +103,8 @@ def plot_singular_map(
     if len(region.names) == 3 and len(region.faces):
         return _plot_in_space(found, ax, view, size, look, title)
     axes: Any = axes_for(ax, size or PLANE_SIZE, look)
+    from matplotlib.patches import PathPatch
+
     draw_title(axes, title, look)
     if not len(found.points):
         axes.axis("off")
@@ -117,7 +119,7 @@ def plot_singular_map(
     first, step = (low * found.step + start) * factors, found.step * factors
     drawn = draw_measure(axes, grid, first, step, highest, area)
     _draw_curves(axes, (vertices * factors)[faces], area)
-    axes.add_patch(_outline(area, look))
+    axes.add_patch(PathPatch(area, facecolor="none", edgecolor=look.soft, linewidth=0.8, zorder=3))
     axes.autoscale_view()
     axes.margins(0.03)
     if len(set(region.units)) == 1:
@@ -160,12 +162,6 @@ def _least_in_words(found: SingularityMap) -> str:
     others = [(kind, np.asarray(getattr(found.measures, kind))) for kind in ("serial", "constraint")]
     least = [f"least {kind} {np.nanmin(values):.2g}" for kind, values in others if np.isfinite(values).any()]
     return "; ".join([f"least parallel measure {np.nanmin(found.measures.parallel):.2g} at {at}", *least])
-
-
-def _outline(area: Any, look: Look) -> Any:
-    from matplotlib.patches import PathPatch
-
-    return PathPatch(area, facecolor="none", edgecolor=look.soft, linewidth=0.8, zorder=3)
 
 
 def _dress_bar(bar: Any, look: Look) -> None:

@@ -322,12 +322,8 @@ def _step(over: Workspace, resolution: float | None) -> Floats:
     if resolution is None:
         cells = over.size / float(np.prod(over.resolution))
         return np.asarray(over.resolution * max(1.0, (cells / POINTS) ** (1.0 / d)))
-    return np.asarray(over.resolution * require_positive("resolution", resolution) / over.resolution[_leading(over)])
-
-
-def _leading(over: Workspace) -> int:
-    """The coordinate that a resolution belongs to: the first length, if there is one."""
-    return next((axis for axis, unit in enumerate(over.units) if unit != "rad"), 0)
+    leading = next((axis for axis, unit in enumerate(over.units) if unit != "rad"), 0)  # the first length, if any
+    return np.asarray(over.resolution * require_positive("resolution", resolution) / over.resolution[leading])
 
 
 def _places(over: Workspace, step: Floats) -> Ints:

@@ -61,7 +61,9 @@ class Searches:
 
         def search() -> None:
             modes = working_modes(mechanism, target) if kind == "working" else assembly_modes(mechanism, actuators)
-            words = [f"{number}: {_kept(mode)}" for number, mode in enumerate(modes, 1)]
+            beyond = [by_bound(exceeded(mode)) for mode in modes]
+            kept = [f"beyond {limits}" if limits else "within limits" for limits in beyond]
+            words = [f"{number}: {each}" for number, each in enumerate(kept, 1)]
             with self._lock:
                 if self._shown() is machine:
                     machine.modes = tuple(modes)
@@ -132,12 +134,6 @@ class Searches:
     def end(self) -> None:
         """Let the thread end."""
         self._newest.end()
-
-
-def _kept(mode: Solution) -> str:
-    """The limits that a mode exceeds, in words; "within limits" if there are none."""
-    beyond = by_bound(exceeded(mode))
-    return f"beyond {beyond}" if beyond else "within limits"
 
 
 def _ends(mechanism: Mechanism) -> dict[str, tuple[float, float]] | None:
