@@ -266,6 +266,10 @@ def machine(name: str) -> Any:
     return pf.plot(mechanism, names=mechanism.actuator_names[:: -(-len(mechanism.actuator_names) // 12)])
 
 
+def in_a_column(name: str) -> Any:
+    return pf.plot(pf.load(name), names=True, size=(3.5, 3.0))
+
+
 def workspace(name: str) -> Any:
     mechanism = pf.load(name)
     length = mechanism.characteristic_length if set(mechanism.task) & set("xyz") else 1.0
@@ -289,6 +293,7 @@ CASES = [
         pytest.param(machine, name, marks=[pytest.mark.campaign] * (name not in MACHINES_DRAWN))
         for name in pf.catalog()
     ),
+    *(pytest.param(in_a_column, name) for name in ("nrpm", "hexaglide", "ucu")),
     *(pytest.param(workspace, name) for name in WORKSPACES),
     *(pytest.param(workspace, name, marks=pytest.mark.campaign) for name in OTHER_WORKSPACES),
     pytest.param(singularities, "five_bar"),  # of one in space: in the tests of these maps

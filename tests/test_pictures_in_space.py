@@ -110,6 +110,7 @@ def test_names_and_numbers_hide_nothing(
     assert faults(axes.figure, monkeypatch) == []
     assert any(word in text.get_text() for text in (*axes.figure.texts, axes.title))
     if len(region.faces):
+        assert [line.get_color() for line in axes.lines if line.get_marker() == "+"] == ["white"]  # home is inside
         key = [text.get_text() for text in axes.figure.legends[0].get_texts()]
         assert 97 <= sum(int(entry.split()[-2]) for entry in key) <= 103
 
