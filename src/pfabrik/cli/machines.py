@@ -74,13 +74,7 @@ class WithDimensions(click.Command):
 @json_option("With --list: one JSON object on stdout.")
 @click.pass_context
 def new(
-    ctx: click.Context,
-    kind: str | None,
-    machine: str | None,
-    output: Path,
-    force: bool,
-    list_all: bool,
-    as_json: bool,
+    ctx: click.Context, kind: str | None, machine: str | None, output: Path, force: bool, list_all: bool, as_json: bool
 ) -> int:
     """Write a starting file for a machine of your own.
 

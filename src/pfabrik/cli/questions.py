@@ -42,14 +42,7 @@ if TYPE_CHECKING:
 @click.option("--margins", "with_margins", is_flag=True, help="List how far off every limit is, nearest first.")
 @click.option("--all", "list_all", is_flag=True, help="List every working mode, limits kept or not.")
 @json_option()
-def ik(
-    mech: str,
-    target: TargetOptions,
-    options: pf.Options,
-    with_margins: bool,
-    list_all: bool,
-    as_json: bool,
-) -> int:
+def ik(mech: str, target: TargetOptions, options: pf.Options, with_margins: bool, list_all: bool, as_json: bool) -> int:
     """Solve for one target.
 
     A target out of reach gets the feasible answer nearest to it, with the limits that hold it back,

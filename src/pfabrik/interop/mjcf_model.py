@@ -188,11 +188,7 @@ class MjcfModel(CompiledModel):
                 holds_frames = is_weld and model.eq_data[index, 10] != 0.0
                 bodies, points, frames, self.roundings[name] = self._sides(index, is_weld)
                 yield Loop(
-                    name,
-                    "fixed" if holds_frames else "spherical",
-                    bodies,
-                    points,
-                    frames if holds_frames else None,
+                    name, "fixed" if holds_frames else "spherical", bodies, points, frames if holds_frames else None
                 )
 
     def _sides(self, index: int, is_weld: bool) -> tuple[tuple[str, str], Floats, Floats, Rounding]:

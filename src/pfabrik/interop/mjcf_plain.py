@@ -37,11 +37,7 @@ KEPT: dict[str, tuple[str, ...]] = {
 
 IN_DEFAULTS = ("default", "joint", "site")
 IN_BODIES = ("body", "frame", "replicate")
-REFUSED = {
-    "attach": "a model that attaches others",
-    "composite": "a composite body",
-    "flexcomp": "a flexible body",
-}
+REFUSED = {"attach": "a model that attaches others", "composite": "a composite body", "flexcomp": "a flexible body"}
 """Elements that make bodies in ways that are not read -> their description."""
 
 TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")

@@ -25,9 +25,7 @@ Table = dict[str, Any]
 
 
 def to_urdf(
-    mechanism: Mechanism,
-    path: str | os.PathLike[str] | None = None,
-    loops: str | os.PathLike[str] | None = None,
+    mechanism: Mechanism, path: str | os.PathLike[str] | None = None, loops: str | os.PathLike[str] | None = None
 ) -> tuple[str, Table]:
     """A mechanism as a robot description, and what URDF cannot tell of it: loops, balls and motors.
 

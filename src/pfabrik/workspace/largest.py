@@ -172,9 +172,7 @@ def _first(mechanism: Mechanism, kind: ShapeKind, centre: Any, extents: Any, cer
     proportions = None if shape is None or kind == "ball" else shape[[0, 2]] if kind == "cylinder" else shape[axes]
     try:
         found = space.inscribed(
-            "sphere" if kind == "ball" else kind,
-            None if middle is None else middle[axes],
-            proportions=proportions,
+            "sphere" if kind == "ball" else kind, None if middle is None else middle[axes], proportions=proportions
         )
     except PfabrikError:
         if middle is None:

@@ -28,12 +28,7 @@ class Region:
     """The fields of a `Workspace`, which documents them; functions that draw, write or fill a workspace read these."""
 
     def __init__(
-        self,
-        question: MapQuestion,
-        resolution: Floats,
-        mesh: BorderMesh,
-        parts: Parts,
-        part: int | None = None,
+        self, question: MapQuestion, resolution: Floats, mesh: BorderMesh, parts: Parts, part: int | None = None
     ) -> None:
         self._question, self._mesh, self._parts, self._part = question, mesh, parts, part
         self.mechanism, self.names, self.units = question.mechanism, question.space.names, question.space.units

@@ -92,11 +92,7 @@ class Workspace(Printed, Region):
         return Workspace(*sliced(self._question, fixed, self.resolution if resolution is None else resolution))
 
     def inscribed(
-        self,
-        kind: Kind,
-        centre: ArrayLike | None = None,
-        *,
-        proportions: ArrayLike | None = None,
+        self, kind: Kind, centre: ArrayLike | None = None, *, proportions: ArrayLike | None = None
     ) -> Inscribed:
         """The largest sphere (in a plane: circle), box or cylinder within reach.
 

@@ -211,19 +211,11 @@ def measured_rows(measures: Singularity) -> list[tuple[str, str, str]]:
 
 @overload
 def singularity_map(
-    mechanism: Mechanism,
-    over: Workspace,
-    *,
-    resolution: float | None = None,
-    on_progress: OnProgress | None = None,
+    mechanism: Mechanism, over: Workspace, *, resolution: float | None = None, on_progress: OnProgress | None = None
 ) -> SingularityMap: ...
 @overload
 def singularity_map(
-    mechanism: Mechanism,
-    over: Track,
-    *,
-    resolution: float | None = None,
-    on_progress: OnProgress | None = None,
+    mechanism: Mechanism, over: Track, *, resolution: float | None = None, on_progress: OnProgress | None = None
 ) -> SingularityTrack: ...
 def singularity_map(
     mechanism: Mechanism,

@@ -93,11 +93,7 @@ class Space:
 
 
 def space_of(
-    mechanism: Mechanism,
-    over: Sequence[str] | None,
-    fixed: Mapping[str, float] | None,
-    orientation: Any,
-    start: Floats,
+    mechanism: Mechanism, over: Sequence[str] | None, fixed: Mapping[str, float] | None, orientation: Any, start: Floats
 ) -> Space:
     """The space that a question is about.
 
