@@ -146,10 +146,16 @@ def placed_bodies(mechanism: Mechanism, moved: dict[str, Array]) -> tuple[dict[s
     return placed, open_by
 
 
+@lru_cache(maxsize=1)  # a gap and an excess are measured one after the other
+def placed_by(mechanism: Mechanism, solution: Solution) -> tuple[dict[str, Array], list[Array]]:
+    """The bodies as an answer's `joints` place them, and by how much every loop is open."""
+    return placed_bodies(mechanism, deviations(mechanism, solution))
+
+
 def gap_of_joints(mechanism: Mechanism, solution: Solution) -> Array:
     """How far an answer's `joints` are from closed loops, its pose, points and actuators, (n,) [L or rad]."""
     mechanism = with_axes(mechanism)
-    placed, open_by = placed_bodies(mechanism, deviations(mechanism, solution))
+    placed, open_by = placed_by(mechanism, solution)
     length, pose = mechanism.characteristic_length, solution.pose.reshape(-1, 4, 4)
     worst = np.zeros(len(pose))
     for each in open_by:
@@ -176,8 +182,7 @@ def gap_of_joints(mechanism: Mechanism, solution: Solution) -> Array:
 def excess_of_joints(mechanism: Mechanism, solution: Solution) -> Array:
     """Largest excess of an answer's `joints` over any range or cone, (n,) [L or rad]."""
     mechanism = with_axes(mechanism)
-    moved = deviations(mechanism, solution)
-    placed, _ = placed_bodies(mechanism, moved)
+    moved, (placed, _) = deviations(mechanism, solution), placed_by(mechanism, solution)
     worst = np.zeros(len(placed[mechanism.base]))
     for joint in mechanism.joints:
         if joint.range is not None:

@@ -115,9 +115,9 @@ TO_TARGETS = [question for question in QUESTIONS if "forward" not in question]
 @pytest.mark.parametrize("name", NAMES)
 def test_an_answer_is_a_closed_configuration_as_near_as_it_says_and_has_reasons(name: str, question: str) -> None:
     m, (request, answer) = machine(name), asked(name, question)
-    assert_feasible(m, answer)
     assert_configuration_is_what_the_answer_says(m, answer)
     if question.startswith("forward"):
+        assert_feasible(m, answer)
         off = (np.abs(answer.actuators - request) / actuator_units(m)).max(axis=1)
         np.testing.assert_allclose(answer.actuator_error, off, rtol=1e-9, atol=1e-9)
         assert np.array_equal(answer.status == Status.REACHED, off <= 1e-9)

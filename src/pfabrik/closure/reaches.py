@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -65,4 +66,5 @@ def _reach(loops: Loops, units: Ints) -> tuple[Floats, Floats, float]:
 def _from_axis(axis: Floats, way: Floats) -> tuple[float, float]:
     """Coordinate of a point along an axis, and its distance from the axis."""
     along = float(axis @ way)
-    return along, float(np.linalg.norm(way - along * axis))
+    across = way - along * axis
+    return along, math.sqrt(across @ across)
