@@ -160,7 +160,7 @@ def wrong_of(case: Case) -> list[str]:
     return wrong
 
 
-BATCHES, SAMPLES = (1, 2) if INTERPRETED else (8, 6)
+BATCHES, SAMPLES = (1, 2) if INTERPRETED else (4, 6)
 
 
 def wrong_among(seeds: range, samples: int) -> dict[int, list[str]]:
@@ -170,7 +170,7 @@ def wrong_among(seeds: range, samples: int) -> dict[int, list[str]]:
 
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_what_a_machine_can_do_is_reached_from_home_and_nothing_aside_moves(batch: int) -> None:
-    """200 machines in all."""
+    """100 machines in all; the campaign has thousands."""
     assert not wrong_among(range(25 * batch, 25 * batch + 25), SAMPLES)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 
 import numpy as np
@@ -23,9 +24,10 @@ from pfabrik.view.raster import lines_between, rasterised
 from pfabrik.view.solid import SeenSolid, best_eye, picked_faces, scale_of, seen_solid
 
 OVER = {"rps": ["z", "tilt_x", "tilt_y"]}
-CELLS = 30.0
+CELLS = 20.0
 
 
+@cache
 def space_of(name: str) -> pf.Workspace:
     """A workspace of a catalogue machine in space, with few cells."""
     machine = pf.load(name)
