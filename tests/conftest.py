@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,15 @@ def figures_are_closed() -> Iterator[None]:
     yield
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of solids have few pixels, and are drawn quickly."""
+    sizes = {"solid_picture": ("ACROSS", "ACROSS_BELOW"), "singular_picture": ("PIXELS", "HULL_PIXELS")}
+    for module, names in sizes.items():
+        for name in names:
+            monkeypatch.setattr(import_module(f"pfabrik.view.{module}"), name, 120)
 
 
 @pytest.fixture

@@ -82,8 +82,8 @@ def test_every_page_is_on_the_map(page: Path) -> None:
     assert page == MAP or page.resolve() in linked
 
 
-ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2")
-"""Programs of seconds: an export to C and a workspace, as pages of tasks have them as well."""
+ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2", "docs/ros2-node.md-1", "docs/cluster.md-1")
+"""Programs of seconds: exports, a workspace and processes, which tasks, examples and other tests have as well."""
 
 
 @pytest.mark.slow

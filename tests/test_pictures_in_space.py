@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -96,12 +95,6 @@ CASES: list[tuple[str, Callable[[], pf.Workspace]]] = [
 ]
 
 
-@pytest.fixture
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of few pixels, which are drawn quickly."""
-    monkeypatch.setattr(import_module("pfabrik.view.solid_picture"), "ACROSS", 120)
-
-
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize(("word", "make"), CASES, ids=[word for word, _ in CASES])
 def test_names_and_numbers_hide_nothing(
@@ -133,6 +126,7 @@ COLUMN = (3.5, 3.0)
 """A column of a page [inches]."""
 
 
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("kind", ["space", "plane", "singular", "singular in a plane", "travel"])
 @pytest.mark.filterwarnings("error")
 def test_words_of_a_picture_in_a_column_hide_nothing_and_are_whole(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:

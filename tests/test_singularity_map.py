@@ -164,6 +164,7 @@ def test_what_is_no_workspace_of_the_machine_is_refused(free_five_bar: pf.Worksp
         pf.singularity_map(machine, free_five_bar, resolution=-1.0)
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_map_in_space_has_its_locus_and_its_slices_in_one_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     pyplot = pytest.importorskip("matplotlib.pyplot")
     machine = pf.load("stewart").without_limits()
