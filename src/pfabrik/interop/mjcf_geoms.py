@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from ..arrays import Floats
 from .collision import EVERYTHING, MOST_SOLIDS, Collision, Solid, solid_shape
 from .mjcf_model import MjcfModel, frame_of
 from .mjcf_plain import IN_BODIES, kept
