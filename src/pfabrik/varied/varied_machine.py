@@ -302,8 +302,8 @@ class MachineAt:
     def slopes(self, poses: Floats) -> Floats:
         """Derivatives (n, r, p) of the margins by the dimensions; what a task leaves open moves so that legs close.
 
-        With H the slopes of the constraints by what is open, x, and g those by the dimensions, H dx + g = 0. The pose is
-        held where legs do not close; where they leave x open, it moves as little as it can, to first order.
+        With H the slopes of the constraints by what is open, x, and g those by the dimensions, H dx + g = 0. The pose
+        is held where legs do not close; where they leave x open, it moves as little as it can, to first order.
         """
         noted, p = self._noted, len(self._values)
         reference, moved = noted.slopes_at(self._values, self._length)
