@@ -14,7 +14,7 @@ from ..answers.start_configuration import Start
 from ..arguments import as_floats
 from ..arrays import Floats, shaped
 from ..description.mechanism import Mechanism, checked_mechanism
-from ..dynamics.drives import Drives
+from ..dynamics.drives import drives_of
 from ..dynamics.mass_matrix import mass_matrix
 from ..errors import InvalidArgument
 from ..files.units import metres_of
@@ -238,7 +238,7 @@ class Actuation:
         """
         metres = metres_of(self.mechanism.length_unit)
         rows, shape = rows_of(self.names, q)
-        own, drives = self._placer.jacobian(rows), Drives(self.mechanism, metres)
+        own, drives = self._placer.jacobian(rows), drives_of(self.mechanism)
         J = own * (drives.si[:, None] / np.where(self._coordinates.is_angle, 1.0, metres))
         inertia = drives.inertia
         if rotor_inertia is not None:

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from ..derived import derived
 from ..description.mechanism import Mechanism
+from ..files.units import metres_of
 
 
 class Drives:
@@ -23,7 +25,8 @@ class Drives:
     friction : dry [N m, N] and viscous [N m s/rad, N s/m], (n_a, 2).
     """
 
-    def __init__(self, mechanism: Mechanism, metres: float) -> None:
+    def __init__(self, mechanism: Mechanism) -> None:
+        metres = metres_of(mechanism.length_unit)
         is_length = np.array([drive.kind == "length" for drive in mechanism.drives])
         self.forces = ["N" if length else "N m" for length in is_length]
         self.si = np.where(is_length, metres, 1.0)
@@ -43,6 +46,12 @@ class Drives:
     def rubbed(self, rates: Floats) -> Floats:
         """What friction takes at rates (n, n_a) of the machine, in N and N m."""
         return self.friction[:, 0] * np.sign(rates) + self.friction[:, 1] * rates * self.si
+
+
+@derived
+def drives_of(mechanism: Mechanism) -> Drives:
+    """The actuators of a mechanism."""
+    return Drives(mechanism)
 
 
 def of_drive(drive: Any, name: str) -> Any:

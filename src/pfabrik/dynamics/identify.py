@@ -21,7 +21,7 @@ from ..kinematics import inertias_of
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity, checked_loads, positive_values
 from .asked_motion import NEIGHBOURS
-from .drives import Drives
+from .drives import drives_of
 from .effort_fit import EffortFit
 from .identification import Identification
 from .inverse_dynamics import TimedMotion, asked_motion, lacking_masses, loads_of, resting_bodies, rows_of
@@ -91,7 +91,7 @@ def identify(
     asked = asked_motion(motion, twists, accelerations, at)
     mechanism, n = asked.solution.mechanism, len(asked.rates)
     metres, names = metres_of(mechanism.length_unit), mechanism.actuator_names
-    drives, carried = Drives(mechanism, metres), checked_loads(mechanism, loads)
+    drives, carried = drives_of(mechanism), checked_loads(mechanism, loads)
     measured = _efforts(efforts, asked.solution.shape, names) * drives.units
     known = None if sigma is None else positive_values("sigma", sigma, names) * drives.units
     wanted = _bodies(mechanism, bodies)

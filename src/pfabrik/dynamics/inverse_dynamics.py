@@ -12,6 +12,7 @@ from ..answers.tracked import Track
 from ..arguments import array
 from ..arrays import Floats, Ints, shaped
 from ..checks import require_choice
+from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
@@ -31,7 +32,7 @@ from ..statics.loads import (
 from ..statics.sharing import within_limits
 from ..statics.transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated
 from .asked_motion import motion_of
-from .drives import Drives
+from .drives import drives_of
 from .efforts import Efforts
 from .moving_rows import MovingRows, Weights, weights_of
 from .reactions import Reactions
@@ -128,7 +129,7 @@ def inverse_dynamics(
     mechanism, solution = asked.solution.mechanism, asked.solution
     metres, pull = metres_of(mechanism.length_unit), checked_gravity(gravity)
     weights = loads_of(mechanism, metres, checked_loads(mechanism, loads))
-    drives, n = Drives(mechanism, metres), len(asked.rates)
+    drives, n = drives_of(mechanism), len(asked.rates)
     reasons, n_a = no_reasons(n), len(mechanism.actuator_names)
     add_reason(reasons, np.isnan(solution._coordinates).any(axis=1), NO_CONFIGURATION)
     known = np.flatnonzero(~has_reason(reasons))
@@ -219,14 +220,15 @@ def lacking_masses(mechanism: Mechanism, metres: float) -> list[str]:
     return [body for body in mechanism.bodies if body not in found and body not in resting]
 
 
-def resting_bodies(mechanism: Mechanism) -> set[str]:
+@derived
+def resting_bodies(mechanism: Mechanism) -> frozenset[str]:
     """The base, and the bodies that are held on it."""
     resting = {mechanism.base}
     for index, forward in tree_of(mechanism).steps:
         joint = mechanism.joints[index]
         if joint.is_rigid and joint.connects[0 if forward else 1] in resting:
             resting.add(joint.connects[1 if forward else 0])
-    return resting
+    return frozenset(resting)
 
 
 def rows_of(asked: AskedMotion, rows: Any, weights: Weights, gravity: Floats) -> MovingRows:

@@ -19,7 +19,7 @@ from ..kernels.threads import in_blocks
 from ..kinematics import BodyInertia, actuator_units, cut_loops, generic_of, joint_path, rate_units
 from ..tolerances import TOLERANCES
 from .asked_motion import are_lengths, axes_of, in_lengths
-from .drives import Drives
+from .drives import drives_of
 
 ROWS_A_BLOCK = 64
 
@@ -159,7 +159,7 @@ def moving_of(rows: MovingRows, probes: Probes = NO_PROBES) -> MovingMachine:
     if isinstance(rows.at, tuple):
         asked = joint_path(mechanism, rows.at).columns.tolist()
     cut = cut_loops(mechanism, (*actuated, *asked))
-    drives, counts = Drives(mechanism, metres_of(mechanism.length_unit)), generic_of(mechanism).mobility
+    drives, counts = drives_of(mechanism), generic_of(mechanism).mobility
     length, metres = mechanism.characteristic_length, metres_of(mechanism.length_unit)
     shown, by_coordinate = counts.platform + counts.internal, drives.si * actuator_units(mechanism)
     of_drives = (

@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints, Mask
 from ..files.units import metres_of
 from ..kinematics import JointRates, end_effector_pose, joint_centres, model_of, tree_of
 from ..statics.joint_balance import about_centres, balance_at, open_components
-from .drives import Drives
+from .drives import drives_of
 from .moving_rows import MovingRows
 
 ROWS_A_BLOCK = 256
@@ -40,7 +40,7 @@ class Reactions:
         mechanism, weights = self.rows.mechanism, self.rows.weights
         found = self.rows.efforts(["wrenches"])
         metres = metres_of(mechanism.length_unit)
-        drives, paths = Drives(mechanism, metres), tree_of(mechanism).paths
+        drives, paths = drives_of(mechanism), tree_of(mechanism).paths
         by_body = np.array([paths[body] for body in (*weights.bodies, *weights.loaded)]).reshape(
             -1, len(mechanism.joints)
         )

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..files.units import metres_of
 from ..kernels.dynamics.moving import FREE_PART
 from ..kinematics import BodyInertia
-from .drives import Drives
+from .drives import drives_of
 from .moving_rows import MovingRows, Probes
 
 PARTS = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -86,7 +85,7 @@ class EffortRows(NamedTuple):
 
 def effort_rows(rows: MovingRows, scales: BodyScales) -> EffortRows:
     """Efforts of rows, and how they depend on the parameters of bodies."""
-    drives = Drives(rows.mechanism, metres_of(rows.mechanism.length_unit))
+    drives = drives_of(rows.mechanism)
     places = scales.points[:, None] + scales.sizes[:, None, None] * _PLACES
     bodies = tuple(body for body in scales.bodies for _ in _PLACES)
     found = rows.efforts(["motions", "probes"], Probes(bodies, places.reshape(-1, 3)))

@@ -11,7 +11,7 @@ from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..statics.loads import BodyLoads, add_reason, checked_gravity, checked_loads, has_reason
 from ..statics.transmission import NO_CONFIGURATION
-from .drives import Drives
+from .drives import drives_of
 from .inverse_dynamics import AskedMotion, loads_of, reasons_of, rows_of
 
 
@@ -32,7 +32,7 @@ def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: B
     """
     mechanism = solution.mechanism
     metres, n = metres_of(mechanism.length_unit), len(slopes)
-    weights, drives = loads_of(mechanism, metres, checked_loads(mechanism, loads)), Drives(mechanism, metres)
+    weights, drives = loads_of(mechanism, metres, checked_loads(mechanism, loads)), drives_of(mechanism)
     asked = AskedMotion(solution, None, "actuators", slopes, np.zeros(slopes.shape))
     moving = rows_of(asked, np.arange(n), weights, checked_gravity(gravity))
     found = moving.efforts(["resting", "matrices"])

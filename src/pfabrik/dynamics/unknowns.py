@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..description.joints import Joint
 from ..description.mechanism import Mass, Mechanism
 from ..kinematics import BodyInertia, inertias_of
-from .drives import Drives, of_drive
+from .drives import Drives, drives_of, of_drive
 from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
 from .regressor import PARTS, POWERS, BodyScales, EffortRows, body_of, ten_of
 
@@ -40,7 +40,7 @@ class Unknowns:
     @cached_property
     def drives(self) -> Drives:
         """The actuators as they are described."""
-        return Drives(self.mechanism, self.metres)
+        return drives_of(self.mechanism)
 
     @cached_property
     def gears(self) -> Floats:

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats
-from ..dynamics.drives import Drives
-from ..files.units import metres_of
+from ..dynamics.drives import drives_of
 from ..kinematics import actuator_units
 from ..statics.shared_limits import facets_of, minors_along
 from ..statics.transmission import is_redundantly_actuated
@@ -55,7 +54,7 @@ class TorquePath:
             meeting = [others for others, _ in facets_of(minors[:1], len(limits), self._motions)]
             self.names = tuple(" and ".join(mechanism.actuator_names[i] for i in others) for others in meeting)
             self.limits = limits[[others[0] for others in meeting]]
-        self._spline, self._drives = Spline.through(s, rows), Drives(mechanism, metres_of(mechanism.length_unit))
+        self._spline, self._drives = Spline.through(s, rows), drives_of(mechanism)
         self._work = self._drives.si * actuator_units(mechanism)  # of a unit of force, by what the minors are in
 
     def at(self, s: Floats, slopes: Floats, bends: Floats) -> TorqueParts:
