@@ -175,6 +175,32 @@ def test_power_goes_into_kinetic_and_potential_energy() -> None:
     np.testing.assert_allclose(power, change, rtol=1e-8, atol=1e-8 * np.abs(power).max())
 
 
+def test_rods_that_spin_as_they_will_take_no_power() -> None:
+    machine, h, gravity = pf.load("linear_delta"), 1e-3, np.array([2.0, -1.0, -9.0])
+    length, metres, masses = machine.characteristic_length, metres_of(machine.length_unit), []
+    for body in machine.bodies[1:]:
+        ends = np.array([joint.at for joint in machine.joints if body in joint.connects and joint.at is not None])
+        line = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        inertia = 0.1 * length**2 * (np.eye(3) - 0.3 * np.outer(line, line))  # round about its line
+        masses.append(pf.Mass(body, 0.7, ends.mean(axis=0), inertia))
+    machine = machine.with_masses(masses)
+    t = (np.linspace(0.1, 2.0, 9)[:, None] + h * np.array([-2, -1, 0, 1, 2])).ravel()[:, None]
+    size, speed = 0.1 * length * np.array([1.0, 0.7, 0.4]), np.array([3.0, 2.0, 4.0])
+    solutions = pf.solve_ik(machine, machine.home_pose[:3, 3] + size * np.sin(speed * t))
+    assert (solutions.status == 0).all()
+    motion = size * speed * np.cos(speed * t), -size * speed**2 * np.sin(speed * t)
+    found = pf.inverse_dynamics(solutions, twists=motion[0], accelerations=motion[1], gravity=gravity)
+    si = motion[0] * metres
+    energy = 0.5 * np.einsum("ni,nij,nj->n", si, pf.mass_matrix(solutions), si)
+    for mass in machine.masses:
+        moved = displacements(machine, solutions.q - home_coordinates(machine))[mass.body]
+        energy -= mass.mass * metres * (moved[:, :3, :3] @ np.array(mass.centre) + moved[:, :3, 3]) @ gravity
+    e = energy.reshape(-1, 5)
+    power = found.power.sum(axis=-1).reshape(-1, 5)[:, 2]
+    change = (8.0 * (e[:, 3] - e[:, 1]) - (e[:, 4] - e[:, 0])) / (12.0 * h)
+    np.testing.assert_allclose(power, change, atol=1e-8 * np.abs(power).max())
+
+
 def lagrange(shown: Callable[[Any], Any], weights: Any, potential: Callable[[Any], Any], q: Any, v: Any, a: Any) -> Any:
     """Generalised forces of coordinates that show positions and angles with weights: d/dt dT/dv - dT/dq + dU/dq."""
     h, one = 1e-4, np.eye(len(q))
