@@ -92,7 +92,7 @@ def complete_format(ctx: click.Context, param: click.Parameter, incomplete: str)
     "--parts",
     metavar="A,B,...",
     callback=comma_separated,
-    help="Of c, c-float: some of ik, limits, fk, rates.  [default: all]",
+    help="Of c, c-float: some of ik, limits, fk, rates, nearest; bodies, effort.  [default: all but the last two]",
 )
 @force_option
 def export(

@@ -21,7 +21,7 @@ from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from ..whole_files import whole_path
 from .drives import Drives
-from .reactions import Reactions
+from .transmitted import TransmittedForces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,7 +59,7 @@ class Efforts(Printed):
     reason: str | Reasons
     _mechanism: Mechanism = field(repr=False)
     _drives: Drives = field(repr=False)
-    _reactions: Reactions = field(repr=False)
+    _reactions: TransmittedForces = field(repr=False)
 
     @cached_property
     def power(self) -> Floats:
@@ -81,13 +81,13 @@ class Efforts(Printed):
         Moments are about the points that `Forces.reactions` has. NaN where `reason` says why, and where `undetermined`
         does.
         """
-        found = self._reactions.transmitted[0]
+        found = self._reactions.found[0]
         return FrozenMapping({joint.name: found[..., place, :] for place, joint in enumerate(self._mechanism.joints)})
 
     @property
     def undetermined(self) -> str:
         """Which of the reactions the motion does not determine, in words; empty if it determines all."""
-        return open_in_words(self._mechanism, self._reactions.transmitted[1])
+        return open_in_words(self._mechanism, self._reactions.found[1])
 
     def table(self) -> ResultTable:
         """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""

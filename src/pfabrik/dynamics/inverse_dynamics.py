@@ -35,7 +35,7 @@ from .asked_motion import motion_of
 from .drives import drives_of
 from .efforts import Efforts
 from .moving_rows import MovingRows, Weights, weights_of
-from .reactions import Reactions
+from .transmitted import TransmittedForces
 
 LEFT_FREE = "the loads move a part without inertia that neither the end effector nor an actuator holds"
 NEVER_MADE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"
@@ -93,7 +93,7 @@ def inverse_dynamics(
     in the machine's unit, as everywhere.
 
     Parts that neither the end effector nor an actuator holds, such as a rod that spins between two ball joints, have
-    the least rates there are, and move on as the forces on them will.
+    no momentum along the motions that are left to them, and move on as the forces on them will.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def inverse_dynamics(
     shape = solution.shape
     exerted, rates, gains = (shaped(each, shape) for each in values)
     reasons_here = in_shape(reasons, shape)
-    reactions = Reactions(rows, known, values[0], shape)
+    reactions = TransmittedForces(rows, known, values[0], shape)
     return Efforts(
         exerted,
         rates,

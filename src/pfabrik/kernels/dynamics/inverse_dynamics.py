@@ -13,7 +13,7 @@ from ...arrays import Floats
 from .._jit import routine, search
 from ..closure.first_order import fill_map, orthogonalise_rows, orthonormalise_rows
 from ..vectors import Vec, copy_row, cross, dot, vec
-from .closing import add_share, close_gains, close_rates
+from .allowed_motions import add_share, close_gains, close_rates
 from .masses import (
     add_gains,
     carry_masses,
@@ -86,8 +86,13 @@ def put_efforts(
     is_regular = put_following(moving, own, axes)
     marks = put_motion(moving, own, axes, rates, gains)
     wrenches = results.wrenches[row] if results.wrenches.shape[0] > 0 else own.arms[:0]
-    size = put_all_work(moving, own, wrenches)
+    put_all_work(moving, own, wrenches)
     n, m = own.z.shape[0], own.work.shape[0]
+    size = 0.0
+    if m > n or not is_regular:
+        for k in range(own.carried.shape[0]):
+            for i in range(6):
+                size = max(size, abs(own.carried[k, i]))
     if m > n:
         for j in range(n, m):
             own.idle[j - n, m - n] = own.work[j]
@@ -136,16 +141,11 @@ def put_efforts(
 
 
 @routine
-def put_all_work(moving: MovingMachine, own: MovingScratch, wrenches: Floats) -> float:
-    """Fill the work of masses in motion and of other loads; the largest of what frames carry."""
+def put_all_work(moving: MovingMachine, own: MovingScratch, wrenches: Floats) -> None:
+    """Fill the work of masses in motion and of other loads."""
     carry_none(own)
     carry_masses(moving, own, wrenches, True)
     put_work(moving, own)
-    size = 0.0
-    for k in range(own.carried.shape[0]):
-        for i in range(6):
-            size = max(size, abs(own.carried[k, i]))
-    return size
 
 
 @routine
@@ -394,12 +394,18 @@ def rest(moving: MovingMachine, own: MovingScratch, turning: Vec) -> None:
 @routine
 def add_motion(own: MovingScratch, V: Floats, u: Floats) -> None:
     """Add the shown motions at rates z."""
-    for i in range(6):
-        for j in range(own.z.shape[0]):
-            V[i] += own.parameters[i, j] * own.z[j]
-    for i in range(u.shape[0]):
-        for j in range(own.z.shape[0]):
-            u[i] += own.by_motions[i, j] * own.z[j]
+    add_rates(own.parameters[:6], own.z, V)
+    add_rates(own.by_motions, own.z, u)
+
+
+@routine
+def add_rates(motions: Floats, z: Floats, to: Floats) -> None:
+    """Add what the first motions of a table move."""
+    for i in range(motions.shape[0]):
+        rate = to[i]
+        for j in range(z.shape[0]):
+            rate += motions[i, j] * z[j]
+        to[i] = rate
 
 
 @routine
@@ -408,8 +414,7 @@ def follow(moving: MovingMachine, own: MovingScratch, wanted: Floats, V: Floats,
     n, largest, worst = own.z.shape[0], 0.0, 0.0
     for j in range(n):
         own.z[j] = 0.0
-        for k in range(wanted.shape[0]):
-            own.z[j] += own.following[j, k] * wanted[k]
+    add_rates(own.following, wanted, own.z)
     add_motion(own, V, u)
     for k in range(wanted.shape[0] if moving.counts[DUTY] == 1 else 0):
         made = -wanted[k]

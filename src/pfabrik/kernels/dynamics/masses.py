@@ -11,7 +11,6 @@ from ...arrays import Floats
 from .._jit import inlined, routine
 from ..closure.loops import BALL
 from ..vectors import Vec, add, along, cross, put, scale, sub, turn, vec
-from .closing import add_share
 from .moving import BASE, COLUMN, END, FIRST, FROM, KIND, PARENT, ROWS, TO, MovingMachine, MovingScratch
 from .placing import point_of
 
@@ -167,11 +166,12 @@ def put_work(moving: MovingMachine, own: MovingScratch) -> None:
         for i in range(6):
             own.carried[parent, i] += carried[i]
     for j in range(own.work.shape[0]):
-        own.work[j] = 0.0
-    for i in range(6):
-        add_share(own.carried[END, i], own.parameters[i], own.work)
-    for k in range(own.h.shape[0]):
-        add_share(own.h[k], own.by_motions[k], own.work)
+        work = 0.0
+        for i in range(6):
+            work += own.carried[END, i] * own.parameters[i, j]
+        for k in range(own.h.shape[0]):
+            work += own.h[k] * own.by_motions[k, j]
+        own.work[j] = work
 
 
 @inlined

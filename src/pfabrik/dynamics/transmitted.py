@@ -19,7 +19,7 @@ ROWS_A_BLOCK = 256
 
 
 @dataclass(frozen=True, eq=False)
-class Reactions:
+class TransmittedForces:
     """What joints transmit in motion, computed when it is asked for.
 
     Attributes
@@ -35,7 +35,7 @@ class Reactions:
     shape: tuple[int, ...]
 
     @cached_property
-    def transmitted(self) -> tuple[Floats, Mask]:
+    def found(self) -> tuple[Floats, Mask]:
         """Force [N] and moment about their centres [N m], (..., joints, 6), and where that is not determined."""
         mechanism, weights = self.rows.mechanism, self.rows.weights
         found = self.rows.efforts(["wrenches"])
