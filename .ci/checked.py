@@ -16,7 +16,9 @@ QUESTIONS = """
 import warnings
 import numpy as np
 import pfabrik as pf
+from pathlib import Path
 from pfabrik.kernels._shipped import LIBRARY
+from pfabrik.varied import varied
 assert LIBRARY is not None
 warnings.simplefilter("ignore")
 for name in pf.catalog():
@@ -32,6 +34,13 @@ for name in pf.catalog():
         pf.solve_fk(machine, found.actuators + 0.2 * size * rng.normal(size=found.actuators.shape))
         found.q, pf.margins(found)
     print(name, flush=True)
+for path in sorted((Path(pf.__file__).parent / "catalog" / "templates").glob("*.toml")):
+    machine, rng = pf.load(path), np.random.default_rng(3)
+    shift = 0.3 * machine.characteristic_length * rng.normal(size=(100, 3))
+    ours, targets = varied(machine), pf.pose(machine.home_pose[:3, 3] + shift, rotvec=0.3 * rng.normal(size=(100, 3)))
+    at = ours.at([1.01 * machine.dimensions[name] for name in ours.names])
+    at.margins(targets), at.slopes(targets), at.inverse_jacobians(targets)
+    print(path.stem, flush=True)
 """
 
 

@@ -148,9 +148,8 @@ class NotedMachine:
         length = trace.input(sketch.characteristic_length)
         words = replayed(self.table, [length, *numbers, *reading.limits])
         self.legs = legs = PlacedLegs(trace, self.table, words, length)
-        model = model_of(mechanism)
-        self.is_coupled = self.table.is_completed and not (
-            self.table.is_for_blocks and not has_parasitic_motion(model.path_closure)
+        self.is_coupled = self.table.is_completed and (
+            not self.table.is_for_blocks or has_parasitic_motion(model_of(mechanism).path_closure)
         )
         self._programs: dict[tuple[str, int, bool], Formulas] = {}
         self.uniform = uniform_parts([*legs.margins, *legs.rows, *legs.actuators])
@@ -192,20 +191,24 @@ class NotedMachine:
         return slopes[0, a:b], slopes[0, c:d]
 
     def program(self, name: str, by_dimensions: int, by_pose: bool) -> Formulas:
-        """Formulas of the legs at poses, with slopes by dimensions, and then by twists and implicit joints."""
+        """Formulas of the legs at poses, with slopes as of `tangents`."""
         key = name, by_dimensions, by_pose
         if key not in self._programs:
             legs, m = self.legs, len(self.uniform)
-            n_pose = 6 + len(legs.q) if by_pose else 0
-            depends = np.zeros((m + 18 + len(legs.q), by_dimensions + n_pose), bool)
-            depends[:m, :by_dimensions] = True
-            if by_pose:
-                depends[m : m + 6, by_dimensions : by_dimensions + 6] = np.eye(6)
-                depends[m + 18 :, by_dimensions + 6 :] = np.eye(len(legs.q))
             outputs = [*(legs.margins if name == "margins" else legs.actuators), *legs.rows, *legs.reach]
             inputs = [*self.uniform, *legs.twist, *legs.pose, *legs.q]
+            depends = self.tangents(np.ones((m, by_dimensions)), by_pose) != 0.0
             self._programs[key] = Formulas(outputs, inputs, m + 6, depends)
         return self._programs[key]
+
+    def tangents(self, moved: Floats, by_pose: bool) -> Floats:
+        """Slopes of all inputs: of what is the same at all poses by p dimensions, (m, p), then by twists and q."""
+        (m, p), n_q = moved.shape, len(self.legs.q)
+        tangents = np.zeros((m + 18 + n_q, p + (6 + n_q if by_pose else 0)))
+        tangents[:m, :p] = moved
+        if by_pose:
+            tangents[m : m + 6, p : p + 6], tangents[m + 18 :, p + 6 :] = np.eye(6), np.eye(n_q)
+        return tangents
 
 
 def _radii(centres: Floats) -> Floats:
@@ -297,7 +300,11 @@ class MachineAt:
 
     def inverse_jacobians(self, poses: Floats) -> Floats:
         """Derivatives (n, n_a, 6) of the actuators by velocity [length] and angular velocity of the end effector."""
-        return self._evaluated("actuators", poses, by_pose=True).slopes
+        placed = self._evaluated("actuators", poses, by_pose=True)
+        by_pose, by_q, rows = placed.slopes[:, :, :6], placed.slopes[:, :, 6:], placed.row_slopes
+        if by_q.shape[2]:
+            by_pose = by_pose - by_q @ np.linalg.pinv(rows[:, :, 6:], TOLERANCES.rank) @ rows[:, :, :6]
+        return by_pose
 
     def slopes(self, poses: Floats) -> Floats:
         """Derivatives (n, r, p) of the margins by the dimensions; what a task leaves open moves so that legs close.
@@ -308,6 +315,8 @@ class MachineAt:
         noted, p = self._noted, len(self._values)
         reference, moved = noted.slopes_at(self._values, self._length)
         placed = self._evaluated("margins", poses, moved=moved)
+        if not noted.table.is_completed:
+            return placed.slopes
         is_closed = (np.abs(placed.rows) <= NEARLY_CLOSED).all(axis=1)
         unset = reference[(noted.table.task["axes"][0] == 0) & (noted.table.task["unset"] > 0)]
         if not unset.any() and (np.abs(placed.row_slopes[is_closed]) * np.abs(self._values) <= NEARLY_CLOSED).all():
@@ -327,16 +336,10 @@ class MachineAt:
     def _evaluated(self, name: str, poses: Floats, by_pose: bool = False, moved: Floats | None = None) -> PlacedValues:
         """Expressions of the legs at targets, with slopes: by dimensions, where these move what is the same at all
         poses, then by the pose."""
-        noted, legs, m = self._noted, self._noted.legs, len(self._uniform)
-        program = noted.program(name, 0 if moved is None else moved.shape[1], by_pose)
-        tangents = None
+        noted, legs = self._noted, self._noted.legs
+        program, tangents = noted.program(name, 0 if moved is None else moved.shape[1], by_pose), None
         if moved is not None or by_pose:
-            p, n_q = 0 if moved is None else moved.shape[1], len(legs.q)
-            tangents = np.zeros((m + 18 + n_q, p + (6 + n_q if by_pose else 0)))
-            if moved is not None:
-                tangents[:m, :p] = moved
-            if by_pose:
-                tangents[m : m + 6, p : p + 6], tangents[m + 18 :, p + 6 :] = np.eye(6), np.eye(n_q)
+            tangents = noted.tangents(np.empty((len(self._uniform), 0)) if moved is None else moved, by_pose)
         uniform = np.concatenate([self._uniform, AT_REST])
         targets, begin = np.ascontiguousarray(poses, float), self.home_pose[None]
         if noted.is_coupled:
