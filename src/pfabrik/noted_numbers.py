@@ -284,7 +284,7 @@ class Formulas:
             free += [at[name] for name in dict.fromkeys(names) if last[name] == k and at[name] >= n_inputs]
         self._steps, self._hulls = np.array(steps, np.int64).reshape(-1, 5), np.array(hulls, np.int64).reshape(-1, 6)
         self._outputs = np.array([(at[name], *hull_of[name]) for name in map(_name, outputs)], np.int64).reshape(-1, 3)
-        self._n_values = n_values
+        self._n_values, self._n_inputs, self._n_columns = n_values, n_inputs, depends.shape[1]
         self._without_slopes = np.zeros((n_inputs, 0))
 
     def __call__(self, uniform: Floats, varying: Floats = NOTHING, tangents: Floats | None = None) -> Any:
@@ -299,6 +299,7 @@ class Formulas:
         given, own = np.concatenate([uniform, self._constants]), self._without_slopes
         if tangents is not None:
             own = np.concatenate([tangents[:m], np.zeros((len(self._constants), tangents.shape[1])), tangents[m:]])
+        assert own.shape[1] in (0, self._n_columns) and len(own) == self._n_inputs
         values, slopes = np.empty((n, r)), np.zeros((n, r, own.shape[1]))
         K.evaluate(self._steps, self._hulls, self._outputs, self._n_values, given, varying, own, values, slopes)
         return values if tangents is None else (values, slopes)
