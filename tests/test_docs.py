@@ -97,7 +97,7 @@ ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2", "docs/ros2-node
         for name in [f"{page_id(page)}-{number}"]
     ],
 )
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("folder", "coarse")
 def test_python_blocks_run_as_they_are_written(code: str) -> None:
     exec(compile(code, "<block>", "exec"), {"__name__": "__main__"})
 
@@ -123,6 +123,7 @@ def compiler_that_does_not_optimize(folder: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("program", sorted(ROOT.glob("examples/tasks/*.py")), ids=lambda program: program.stem)
 def test_the_page_of_a_task_is_what_its_program_prints(
     program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
