@@ -23,6 +23,7 @@ __all__ = ["main"]
         "travel": ("questions", "Tell how far the end effector can go along and about axes."),
         "workspace": ("workspace", "Tell how big the workspace is, and which limits form its border."),
         "certify": ("certify", "Prove that every pose of a region is reached, or find one that is not."),
+        "design": ("design", "Find dimensions with which a machine does what it must, as small as can be."),
         "calibrate": ("calibrate", "Find the parameters of a machine from measurements."),
         "time": ("track", "Find the fastest way along a path."),
         "effort": ("motor_forces", "Tell what motors exert along a path."),

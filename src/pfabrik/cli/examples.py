@@ -13,6 +13,11 @@ EXAMPLES = {
     "travel": ("travel stewart --position 0 20 200", "travel stewart --about 0 0 1 --plot travel.png"),
     "workspace": ("workspace stewart --fix z=190", "workspace five_bar -o workspace.png"),
     "certify": ("certify stewart --box -10:10,-10:10,185:195", "certify delta --ball 0,0,-200,20 --tolerance 0.05"),
+    "design": (
+        "design my.toml --vary base_radius=60:200 --vary shortest=80:500 --vary longest=120:600 --vary height=100:400 "
+        "--box -30:30,-30:30,-30:30 --rotation 8 --about home --stroke 1.82",
+        "design my.toml --vary shortest=80:500 --vary longest=120:600 --ball 0,0,195,20 --minimise longest -o designed.toml",
+    ),
     "calibrate": ("calibrate printer.cfg", "calibrate printer.cfg --klipper calibrated.cfg"),
     "time": (
         "time linear_delta part.gcode --speed 300 -o timed.csv",

@@ -25,11 +25,13 @@ def completing(
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         mech = ctx.params.get("mech") or next(iter(ctx.args), None)  # left over where the option still has no value
+        machines = mech if isinstance(mech, tuple) else () if mech is None else (mech,)
         done, comma, begun = incomplete.rpartition(",")
         try:
-            names = () if mech in (None, STANDARD_INPUT) else names_of(pf.load(mech))
+            known = [names_of(pf.load(each)) for each in machines if each != STANDARD_INPUT]
         except (pf.errors.PfabrikError, OSError):  # a file that is not finished has no names yet
             return []
+        names = dict.fromkeys(name for each in known for name in each)
         fitting = [name for name in names if name.startswith(begun) and name not in done.split(",")]
         return [CompletionItem(f"{done}{comma}{name}{ending}") for name in fitting]
 
