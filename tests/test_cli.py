@@ -543,6 +543,7 @@ def test_wrong_words_are_told_on_stderr_with_exit_code_2_and_write_nothing(line:
         ("workspace five_bar --fix ", ["y=", "z="]),
         ("singularities stewart --over x,y,t", ["x,y,tilt_x", "x,y,tilt_y"]),
         ("certify stewart --limits AL1,BL", ["AL1,BL1", "AL1,BL2", "AL1,BL3"]),
+        ("design stewart my.toml --vary plat", ["platform_radius=", "platform_angle="]),
         ("ik g1_ankle --joint ", ["pitch_joint=", "roll_joint="]),
         ("plot g1_ankle --joints r", ["roll_joint"]),
         ("speed five_bar --speed ", ["p1=", "p5="]),
@@ -553,6 +554,7 @@ def test_wrong_words_are_told_on_stderr_with_exit_code_2_and_write_nothing(line:
     ],
 )
 def test_names_of_machines_and_of_what_they_have_are_completed(line: str, found: list[str]) -> None:
+    Path("my.toml").write_text(template("6-UPS"), encoding="utf-8")
     *words, incomplete = line.split(" ")
     completions = BashComplete(main, {}, "pfabrik", "_PFABRIK_COMPLETE").get_completions(words, incomplete)
     assert [each.value for each in completions] == found

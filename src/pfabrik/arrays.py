@@ -27,6 +27,8 @@ def as_plain(value: Any) -> Any:
         return {each.name: as_plain(getattr(value, each.name)) for each in fields(value) if each.repr}
     if isinstance(value, tuple | list):
         return [as_plain(each) for each in value]
+    if isinstance(value, dict):
+        return {name: as_plain(each) for name, each in value.items()}
     if hasattr(value, "to_dict"):
         return value.to_dict()
     array = np.asarray(value)

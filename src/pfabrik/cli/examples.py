@@ -14,9 +14,8 @@ EXAMPLES = {
     "workspace": ("workspace stewart --fix z=190", "workspace five_bar -o workspace.png"),
     "certify": ("certify stewart --box -10:10,-10:10,185:195", "certify delta --ball 0,0,-200,20 --tolerance 0.05"),
     "design": (
-        "design my.toml --vary base_radius=60:200 --vary shortest=80:500 --vary longest=120:600 --vary height=100:400 "
-        "--box -30:30,-30:30,-30:30 --rotation 8 --about home --stroke 1.82",
-        "design my.toml --vary shortest=80:500 --vary longest=120:600 --ball 0,0,195,20 --minimise longest -o designed.toml",
+        "design my.toml --vary longest=200:600 --ball 0,0,195,20 --minimise longest -o designed.toml",
+        "design my.toml --vary base_radius=60:200 --vary height=100:400 --box -9:9,-9:9,-9:9 --about home --margin 0.1",
     ),
     "calibrate": ("calibrate printer.cfg", "calibrate printer.cfg --klipper calibrated.cfg"),
     "time": (
