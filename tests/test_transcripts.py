@@ -35,7 +35,10 @@ def transcript(text: str) -> str:
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     "name",
-    ["check", "design", "fk", "ik", "info", "speed", "statics", "track", "travel", pytest.param("modes", marks=pytest.mark.slow)],
+    [
+        *("check", "design", "fk", "ik", "info", "speed", "statics", "track", "travel"),
+        pytest.param("modes", marks=pytest.mark.slow),
+    ],
 )
 def test_the_command_prints_this(name: str) -> None:
     write_files()

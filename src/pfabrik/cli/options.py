@@ -24,8 +24,9 @@ def completing(
     """A completion to names that the machine MECH has, each after the last comma and before an ending."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        mech = ctx.params.get("mech") or next(iter(ctx.args), None)  # left over where the option still has no value
-        machines = mech if isinstance(mech, tuple) else () if mech is None else (mech,)
+        many = next((each.nargs for each in ctx.command.params if each.name == "mech"), 1) < 0
+        given = ctx.params.get("mech") or ctx.args[: None if many else 1]  # left over where the option has no value yet
+        machines = [given] if isinstance(given, str) else given
         done, comma, begun = incomplete.rpartition(",")
         try:
             known = [names_of(pf.load(each)) for each in machines if each != STANDARD_INPUT]
