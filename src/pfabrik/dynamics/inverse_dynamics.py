@@ -12,12 +12,10 @@ from ..answers.tracked import Track
 from ..arguments import array
 from ..arrays import Floats, Ints, shaped
 from ..checks import require_choice
-from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..kernels.dynamics.moving import FREE_PART, NOT_HELD, NOT_MADE, SINGULAR
-from ..kinematics import BodyInertia, inertias_of, tree_of
 from ..statics.forces import GRAVITY
 from ..statics.loads import (
     BodyLoads,
@@ -32,9 +30,10 @@ from ..statics.loads import (
 from ..statics.sharing import within_limits
 from ..statics.transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated
 from .asked_motion import motion_of
+from .carried import loads_of
 from .drives import drives_of
 from .efforts import Efforts
-from .moving_rows import MovingRows, Weights, weights_of
+from .moving_rows import MovingRows, Weights
 from .transmitted import TransmittedForces
 
 LEFT_FREE = "the loads move a part without inertia that neither the end effector nor an actuator holds"
@@ -199,38 +198,6 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
     return AskedMotion(solution, times, at, *values)
 
 
-def masses_of(mechanism: Mechanism, metres: float) -> dict[str, BodyInertia]:
-    """What the bodies that move weigh.
-
-    Raises
-    ------
-    InvalidArgument : some bodies have no mass.
-    """
-    lacking = lacking_masses(mechanism, metres)
-    if lacking:
-        expected = "a mass of each body that moves: `with_masses`, or in its file, and 0 where it weighs nothing"
-        raise InvalidArgument("mechanism", f"no mass of {', '.join(lacking)}", expected)
-    resting = resting_bodies(mechanism)
-    return {body: each for body, each in inertias_of(mechanism, metres).items() if body not in resting}
-
-
-def lacking_masses(mechanism: Mechanism, metres: float) -> list[str]:
-    """The bodies that move and have no mass."""
-    found, resting = inertias_of(mechanism, metres), resting_bodies(mechanism)
-    return [body for body in mechanism.bodies if body not in found and body not in resting]
-
-
-@derived
-def resting_bodies(mechanism: Mechanism) -> frozenset[str]:
-    """The base, and the bodies that are held on it."""
-    resting = {mechanism.base}
-    for index, forward in tree_of(mechanism).steps:
-        joint = mechanism.joints[index]
-        if joint.is_rigid and joint.connects[0 if forward else 1] in resting:
-            resting.add(joint.connects[1 if forward else 0])
-    return frozenset(resting)
-
-
 def rows_of(asked: AskedMotion, rows: Any, weights: Weights, gravity: Floats) -> MovingRows:
     """Some rows of a question."""
     solution = asked.solution
@@ -244,18 +211,3 @@ def rows_of(asked: AskedMotion, rows: Any, weights: Weights, gravity: Floats) ->
         asked.rates[rows],
         asked.accelerations[rows],
     )
-
-
-def loads_of(mechanism: Mechanism, metres: float, loads: BodyLoads) -> Weights:
-    """All masses, those that bodies carry among them, and other loads on them."""
-    parts, acting = list(masses_of(mechanism, metres).items()), []
-    for body, (load, point) in loads.items():
-        value = array(f"loads['{body}']", load, "() | 3 | 6", note=", a mass [kg], force [N] or wrench [N, N m]")
-        place = array(f"loads['{body}'][1]", point, "3", note=", its centre or point")
-        if value.shape == ():
-            if value < 0.0:
-                raise InvalidArgument(f"loads['{body}']", f"a mass of {value}", "a mass that is not negative")
-            parts.append((body, BodyInertia(float(value), place, np.zeros((3, 3)))))
-        else:
-            acting.append((body, np.append(value, np.zeros(6 - len(value))), place))
-    return weights_of(parts, acting)

@@ -11,7 +11,7 @@ from ..arrays import Floats
 from ..files.units import metres_of
 from ..statics.loads import BodyLoads, checked_loads
 from .asked_motion import checked_at
-from .inverse_dynamics import loads_of
+from .carried import loads_of
 from .moving_rows import MovingRows
 
 
