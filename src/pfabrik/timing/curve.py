@@ -44,20 +44,27 @@ class Spline:
 
     def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
         """Values, first and second derivatives at s (n,), (n, m) each."""
-        place, step = self._places(s)
-        after = ((s - self.s[place]) / step)[:, None]
-        before, step = 1.0 - after, step[:, None]
-        low, high = self.values[place], self.values[place + 1]
+        place, step, before, after = self._places(s)
         bend, bend_after = self.curves[place], self.curves[place + 1]
-        values = before * low + after * high
-        values += step**2 / 6.0 * ((before**3 - before) * bend + (after**3 - after) * bend_after)
-        slopes = (high - low) / step
+        slopes = (self.values[place + 1] - self.values[place]) / step
         slopes += step / 6.0 * ((1.0 - 3.0 * before**2) * bend + (3.0 * after**2 - 1.0) * bend_after)
-        return values, slopes, before * bend + after * bend_after
+        return self.values_at(s), slopes, before * bend + after * bend_after
 
-    def _places(self, s: Floats) -> tuple[np.ndarray, Floats]:
+    def values_at(self, s: Floats) -> Floats:
+        """Values at s (n,), (n, m)."""
+        place, step, before, after = self._places(s)
+        values = before * self.values[place]
+        values += after * self.values[place + 1]
+        values += step**2 / 6.0 * (before**3 - before) * self.curves[place]
+        values += step**2 / 6.0 * (after**3 - after) * self.curves[place + 1]
+        return np.asarray(values)
+
+    def _places(self, s: Floats) -> tuple[np.ndarray, Floats, Floats, Floats]:
+        """The step that each s is in, its length, and the shares of its ends, (n, 1)."""
         place = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-        return place, np.diff(self.s)[place]
+        step = np.diff(self.s)[place]
+        after = ((s - self.s[place]) / step)[:, None]
+        return place, step[:, None], 1.0 - after, after
 
 
 @dataclass(frozen=True)
@@ -85,10 +92,9 @@ class Curve(Spline):
 
     def poses_at(self, s: Floats) -> Floats:
         """Poses at s (n,): positions on the spline, rotations by the shortest turn from step to step."""
-        place, step = self._places(s)
-        shares = ((s - self.s[place]) / step)[:, None, None]
-        poses = between(self.poses[place], self.poses[place + 1], shares)
-        poses[:, :3, 3] = self.at(s)[0][:, self.n_actuators :]
+        place, _, _, after = self._places(s)
+        poses = between(self.poses[place], self.poses[place + 1], after[:, None])
+        poses[:, :3, 3] = self.values_at(s)[:, self.n_actuators :]
         return poses
 
     def step_of(self, s: Floats) -> np.ndarray:
