@@ -18,7 +18,8 @@ import numpy as np
 from ..answers.solution import Solution
 from ..arrays import Floats
 from ..dynamics.asked_motion import in_lengths
-from ..dynamics.moving_rows import MovingRows, weights_of
+from ..dynamics.moving_rows import MovingRows
+from ..dynamics.weights import weights_of
 from ..errors import UnsupportedMechanism
 from ..kinematics import JointPath, generic_of
 from ..rotations import CROSSED, turning

@@ -46,7 +46,7 @@ carrying = together(
 
 def lacking(mechanism: pf.Mechanism) -> list[str]:
     """The bodies that move and have no mass."""
-    from ..dynamics.carried import lacking_masses
+    from ..dynamics.weights import lacking_masses
     from ..files.units import metres_of
 
     return lacking_masses(mechanism, metres_of(mechanism.length_unit))

@@ -21,13 +21,13 @@ from ..kinematics import inertias_of
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity, checked_loads, positive_values
 from .asked_motion import NEIGHBOURS
-from .carried import lacking_masses, loads_of, resting_bodies
 from .drives import drives_of
 from .effort_fit import EffortFit
 from .identification import Identification
 from .inverse_dynamics import TimedMotion, asked_motion, rows_of
 from .regressor import BodyScales, EffortRows, effort_rows
 from .unknowns import FRICTION, ROTOR, Unknowns
+from .weights import lacking_masses, loads_of, resting_bodies
 
 LEAST_SIZE = 0.1
 """Size of a body at least, to compare its moments with [L]: of one without joints apart."""

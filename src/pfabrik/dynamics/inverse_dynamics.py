@@ -30,11 +30,11 @@ from ..statics.loads import (
 from ..statics.sharing import within_limits
 from ..statics.transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated
 from .asked_motion import motion_of
-from .carried import loads_of
 from .drives import drives_of
 from .efforts import Efforts
-from .moving_rows import MovingRows, Weights
+from .moving_rows import MovingRows
 from .transmitted import TransmittedForces
+from .weights import Weights, loads_of
 
 LEFT_FREE = "the loads move a part without inertia that neither the end effector nor an actuator holds"
 NEVER_MADE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"

@@ -11,8 +11,8 @@ from ..arrays import Floats
 from ..files.units import metres_of
 from ..statics.loads import BodyLoads, checked_loads
 from .asked_motion import checked_at
-from .carried import loads_of
 from .moving_rows import MovingRows
+from .weights import loads_of
 
 
 def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: BodyLoads | None = None) -> Floats:

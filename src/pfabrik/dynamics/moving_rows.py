@@ -16,43 +16,13 @@ from ..kernels.dynamics.inverse_dynamics import inverse_dynamics
 from ..kernels.dynamics.moving import SHOWN, Exerted, MovingMachine, new_moving_scratch
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
-from ..kinematics import BodyInertia, actuator_units, cut_loops, generic_of, joint_path, rate_units
+from ..kinematics import actuator_units, cut_loops, generic_of, joint_path, rate_units
 from ..tolerances import TOLERANCES
 from .asked_motion import are_lengths, axes_of, in_lengths
 from .drives import drives_of
+from .weights import Weights
 
 ROWS_A_BLOCK = 64
-
-
-class Weights(NamedTuple):
-    """Masses of bodies, some of which may have several, and other loads on them.
-
-    Attributes
-    ----------
-    bodies : names of what bears each, b.
-    masses : [kg], (b,); centres : at home (b, 3) [length]; inertias : about these, (b, 3, 3) [kg length²].
-    loaded : names of what bears each of the other loads.
-    points : at home, (loads, 3) [length]; loads : force, and moment about the point, (loads, 6) [N, N m].
-    """
-
-    bodies: tuple[str, ...]
-    masses: Floats
-    centres: Floats
-    inertias: Floats
-    loaded: tuple[str, ...]
-    points: Floats
-    loads: Floats
-
-
-def weights_of(parts: Sequence[tuple[str, BodyInertia]], acting: Sequence[tuple[str, Floats, Floats]]) -> Weights:
-    """Masses, and loads at points, as arrays."""
-    masses = np.array([each.mass for _, each in parts], float)
-    centres, inertias = ([getattr(each, name) for _, each in parts] for name in ("centre", "inertia"))
-    vectors = np.reshape(centres, (-1, 3)).astype(float), np.reshape(inertias, (-1, 3, 3)).astype(float)
-    points, loads = (np.reshape([each[k] for each in acting], (-1, w)).astype(float) for k, w in ((2, 3), (1, 6)))
-    return Weights(
-        tuple(body for body, _ in parts), masses, *vectors, tuple(body for body, *_ in acting), points, loads
-    )
 
 
 class Probes(NamedTuple):

@@ -11,9 +11,9 @@ from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..statics.loads import BodyLoads, add_reason, checked_gravity, checked_loads, has_reason
 from ..statics.transmission import NO_CONFIGURATION
-from .carried import loads_of
 from .drives import drives_of
 from .inverse_dynamics import AskedMotion, reasons_of, rows_of
+from .weights import loads_of
 
 
 def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: BodyLoads | None, steps: Ints) -> Floats:

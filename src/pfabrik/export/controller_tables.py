@@ -13,8 +13,8 @@ from ..arrays import Records
 from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
 from ..dynamics.asked_motion import task_axes
-from ..dynamics.carried import loads_of
 from ..dynamics.moving_rows import MovingRows, moving_of
+from ..dynamics.weights import loads_of
 from ..files.units import metres_of
 from ..kernels.clearance.convex import new_polytope
 from ..kernels.clearance.distance_constants import MOST_CORNERS

@@ -12,8 +12,8 @@ from ..answers.tracked import Track, refuse_leaps
 from ..arrays import Floats
 from ..checks import put_limits, require_positive, require_type
 from ..description.mechanism import Mechanism
-from ..dynamics.carried import lacking_masses
 from ..dynamics.torque_rows import torque_rows
+from ..dynamics.weights import lacking_masses
 from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..fk import solve_fk

@@ -1,16 +1,50 @@
-"""Masses and loads of the bodies that move."""
+"""What bodies weigh, and what they carry."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arguments import array
+from ..arrays import Floats
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
 from ..kinematics import BodyInertia, inertias_of, tree_of
 from ..statics.loads import BodyLoads
-from .moving_rows import Weights, weights_of
+
+
+class Weights(NamedTuple):
+    """Masses of bodies, some of which may have several, and other loads on them.
+
+    Attributes
+    ----------
+    bodies : names of what bears each, b.
+    masses : [kg], (b,); centres : at home (b, 3) [length]; inertias : about these, (b, 3, 3) [kg length²].
+    loaded : names of what bears each of the other loads.
+    points : at home, (loads, 3) [length]; loads : force, and moment about the point, (loads, 6) [N, N m].
+    """
+
+    bodies: tuple[str, ...]
+    masses: Floats
+    centres: Floats
+    inertias: Floats
+    loaded: tuple[str, ...]
+    points: Floats
+    loads: Floats
+
+
+def weights_of(parts: Sequence[tuple[str, BodyInertia]], acting: Sequence[tuple[str, Floats, Floats]]) -> Weights:
+    """Masses, and loads at points, as arrays."""
+    masses = np.array([each.mass for _, each in parts], float)
+    centres, inertias = ([getattr(each, name) for _, each in parts] for name in ("centre", "inertia"))
+    vectors = np.reshape(centres, (-1, 3)).astype(float), np.reshape(inertias, (-1, 3, 3)).astype(float)
+    points, loads = (np.reshape([each[k] for each in acting], (-1, w)).astype(float) for k, w in ((2, 3), (1, 6)))
+    return Weights(
+        tuple(body for body, _ in parts), masses, *vectors, tuple(body for body, *_ in acting), points, loads
+    )
 
 
 def masses_of(mechanism: Mechanism, metres: float) -> dict[str, BodyInertia]:
