@@ -132,7 +132,7 @@ def certify(
     gap, budget, uncertain = _checked(tolerance, budget, uncertain)
     poses = None if isinstance(region, PoseRegion) else _steps(mechanism, region)
     if isinstance(region, PoseRegion):
-        _require_task(mechanism, region)
+        require_task(mechanism, region)
         parameters = region_parameters(model, region, uncertain)
     else:
         assert poses is not None
@@ -404,7 +404,7 @@ def _steps(mechanism: Mechanism, track: Any) -> Floats:
     return np.asarray(poses)
 
 
-def _require_task(mechanism: Mechanism, region: PoseRegion) -> None:
+def require_task(mechanism: Mechanism, region: PoseRegion) -> None:
     """Raise if a region spans, or shifts, what the task does not set."""
     task, home = task_of(mechanism), mechanism.home_pose
     at_home = np.array([*home[:3, 3], 0.0, 0.0, 0.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..answers.differential import singularity
 from ..answers.solution import Solution
 from ..arrays import Floats
 from ..description.mechanism import Mechanism
-from ..errors import InvalidMechanism, UnsupportedMechanism
+from ..errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
 from ..ik import solve_ik
 from ..kinematics import MachineAt, VariedMachine, generic_of, task_of
 
@@ -21,17 +22,17 @@ IMPOSSIBLE, REACHED = -1.0, 1.0
 NARROW = 0.01
 """Half of a range below which margins are shares of this [L or rad]."""
 
-ENDS = ("min", "max")
-
 
 class Dimensions:
     """The dimensions that are sought, and what does not change with them.
 
     Attributes
     ----------
-    mechanism : the machine as described.
+    mechanism : the machine as described; own : its values, (p,).
     names, low, high : of the p dimensions, and their bounds, (p,).
-    limits : pairs (joint, bound) of the r limits.
+    limits : pairs (joint, bound) of the r limits; reaching : pairs (row, actuator) of those that are reaches.
+    ends : triples (row, actuator, is the lower) of those that are ends of an actuator.
+    is_length : True for actuators that slide, (n_a,); sliding_names : of those between two ends.
     axes : components of the twist that the task sets, velocity before angular velocity.
     is_direct : True where actuators follow these one by one, and nothing else moves with them.
     """
@@ -41,31 +42,27 @@ class Dimensions:
         self.low, self.high, self._varied = low, high, varied
         mechanism = self.mechanism
         self.source = mechanism.__dict__["_source"]
-        places = {drive.joint.name: place for place, drive in enumerate(mechanism.drives)}
-        self.reaching = [
-            (row, places.get(joint, -1)) for row, (joint, bound) in enumerate(self.limits) if bound == "reach"
-        ]
+        self.own = np.array([mechanism.dimensions[name] for name in self.names])
+        drive_of = {drive.joint.name: place for place, drive in enumerate(mechanism.drives)}
+        limits = [(row, drive_of.get(joint), bound) for row, (joint, bound) in enumerate(self.limits)]
+        of_drives = [(row, drive, bound) for row, drive, bound in limits if drive is not None]
+        self.reaching = [(row, drive) for row, drive, bound in of_drives if bound == "reach"]
+        self.ends = [(row, drive, bound == "min") for row, drive, bound in of_drives if bound in ("min", "max")]
         self.is_length = np.array([drive.kind == "length" for drive in mechanism.drives])
-        self.ends_of = [
-            [(row, bound == "min") for row, (joint, bound) in enumerate(self.limits) if joint == name and bound in ENDS]
-            for name in mechanism.actuator_names
-        ]
+        is_ended = np.isfinite(varied.at(self.own).ranges).all(axis=1)
+        self.sliding = np.flatnonzero(self.is_length & is_ended)
+        self.sliding_names = [mechanism.actuator_names[drive] for drive in self.sliding]
         task = task_of(mechanism)
         self.axes = np.flatnonzero([*task.axes, *(() if mechanism.end_effector_is_joint else task.turns)])
         freedoms = generic_of(mechanism).mobility.platform
         self.is_direct = len(mechanism.drives) == len(self.axes) == freedoms and task.rotations in (0, 3)
 
-    def at(self, values: Floats, poses: Floats, *, from_home: bool) -> Candidate:
-        """The machine at values (p,); of the poses (n, 4, 4), positions count from home's if `from_home`."""
+    def at(self, values: Floats) -> MachineAt | None:
+        """The machine at values (p,); None where the file's expressions give none."""
         try:
-            found: MachineAt | None = self._varied.at(values)
+            return self._varied.at(values)
         except (InvalidMechanism, UnsupportedMechanism):
-            found = None
-        home = self.mechanism.home_pose if found is None else found.home_pose
-        if from_home:
-            poses = poses.copy()
-            poses[:, :3, 3] += home[:3, 3]
-        return Candidate(self, values, found, poses, home)
+            return None
 
     def named(self, values: Floats) -> dict[str, float]:
         """Values by name."""
@@ -75,15 +72,20 @@ class Dimensions:
 class Candidate:
     """A machine at values of its dimensions, and poses that it is to reach, (n, 4, 4) [length]."""
 
-    def __init__(
-        self, dimensions: Dimensions, values: Floats, found: MachineAt | None, poses: Floats, home: Floats
-    ) -> None:
-        self.dimensions, self.values, self._found, self.poses, self.home = dimensions, values, found, poses, home
+    def __init__(self, dimensions: Dimensions, values: Floats, poses: Floats, moves: Floats) -> None:
+        """Positions of the poses count from home's along axes where `moves` (3,) is 1."""
+        self.dimensions, self.values, self._found = dimensions, values, dimensions.at(values)
+        home = dimensions.mechanism.home_pose if self._found is None else self._found.home_pose
+        self._all = np.concatenate([poses, home[None]])
+        self._all[:-1, :3, 3] += moves * home[:3, 3]
+        self.poses, self._n_drives = self._all[:-1], len(dimensions.is_length)
 
-    @property
-    def is_machine(self) -> bool:
-        """False where the file's expressions give no machine."""
-        return self._found is not None
+    def value_of(self, expression: str) -> float:
+        """The value of an expression of dimensions; NaN where it has none."""
+        try:
+            return float(self.dimensions.source.value_of(expression, self.dimensions.named(self.values)))
+        except InvalidArgument:
+            return math.nan
 
     @property
     def length(self) -> float:
@@ -91,79 +93,74 @@ class Candidate:
         return np.inf if self._found is None else self._found.characteristic_length
 
     @property
-    def ranges(self) -> Floats:
-        """Lowest and highest values of the actuators, (n_a, 2) [length or rad]."""
-        n = len(self.dimensions.mechanism.drives)
-        return np.full((n, 2), np.nan) if self._found is None else self._found.ranges
+    def sliding_ranges(self) -> Floats:
+        """Ends of the actuators that slide between two, (n, 2) [length]."""
+        places = self.dimensions.sliding
+        return np.full((len(places), 2), np.nan) if self._found is None else self._found.ranges[places]
 
-    @cached_property
+    @property
     def margins(self) -> Floats:
         """Margins of all limits at all poses, (n, r): finite, and continuous where a leg just reaches.
 
         A leg that reaches has, in place of no margin at all, 1 / (J u)^2 of its actuator's rate J by the twist: like
         the gap beyond, it goes to 0 with the distance from the dead point.
         """
-        return self._margins_at(self.poses)
-
-    @cached_property
-    def home_margins(self) -> Floats:
-        """Margins at home, where a machine that is built is first, (1, r)."""
-        return self._margins_at(self.home[None])
-
-    def _margins_at(self, poses: Floats) -> Floats:
-        dimensions = self.dimensions
-        if self._found is None:
-            return np.full((len(poses), len(dimensions.limits)), IMPOSSIBLE)
-        margins = self._found.margins(poses)
-        margins = np.where(np.isposinf(margins), REACHED, margins)
-        if dimensions.reaching:
-            with np.errstate(all="ignore"):
-                rates = self._found.inverse_jacobians(poses)[:, :, dimensions.axes[dimensions.axes < 3]]
-                near = 1.0 / (np.square(rates).sum(axis=2) * self._unit**2)
-            near = np.clip(np.nan_to_num(near, nan=0.0, posinf=REACHED), 0.0, REACHED)
-            for row, drive in dimensions.reaching:
-                if drive >= 0:
-                    margins[:, row] = np.where(margins[:, row] == REACHED, near[:, drive], margins[:, row])
-        self._put_narrow(margins, poses)
-        return np.nan_to_num(margins, nan=IMPOSSIBLE, neginf=IMPOSSIBLE)
-
-    def _put_narrow(self, margins: Floats, poses: Floats) -> None:
-        """Margins of actuators whose range is narrow, or ends before it begins, as shares of `NARROW`: so they fall
-        with its ends."""
-        assert self._found is not None
-        units = np.where(self.dimensions.is_length, self.length, 1.0) * NARROW
-        narrow = np.flatnonzero(np.ptp(self.ranges, axis=1) * np.sign(np.diff(self.ranges, axis=1)[:, 0]) < 2.0 * units)
-        values = self._found.actuators(poses) if len(narrow) else np.zeros((0, 0))
-        for drive in narrow.tolist():
-            low, high = self.ranges[drive]
-            for row, is_low in self.dimensions.ends_of[drive]:
-                margins[:, row] = (values[:, drive] - low if is_low else high - values[:, drive]) / units[drive]
+        return self._margins[:-1]
 
     @property
-    def _unit(self) -> Floats:
-        """What a translation by a unit of length is of an actuator that turns, (n_a,): L."""
-        return np.where(self.dimensions.is_length, 1.0, self.length)
+    def home_margins(self) -> Floats:
+        """Margins at home, where a machine that is built is first, (r,)."""
+        return np.asarray(self._margins[-1])
+
+    @cached_property
+    def _margins(self) -> Floats:
+        dimensions, found = self.dimensions, self._found
+        if found is None:
+            return np.full((len(self._all), len(dimensions.limits)), IMPOSSIBLE)
+        margins = found.margins(self._all)
+        if dimensions.reaching:
+            rows, drives = np.array(dimensions.reaching).T
+            rates = self._rates[:, drives][:, :, dimensions.axes[dimensions.axes < 3]]
+            units = np.where(dimensions.is_length, 1.0, found.characteristic_length)[drives]
+            with np.errstate(all="ignore"):
+                near = np.fmin(1.0 / (np.square(rates).sum(axis=2) * units**2), REACHED)
+            margins[:, rows] = np.where(np.isposinf(margins[:, rows]), np.nan_to_num(near), margins[:, rows])
+        units = np.where(dimensions.is_length, found.characteristic_length, 1.0) * NARROW
+        narrow = found.ranges[:, 1] - found.ranges[:, 0] < 2.0 * units
+        if narrow.any():  # so the margin of a range that ends before it begins falls with its ends
+            values = found.actuators(self._all)
+            for row, drive, is_low in dimensions.ends:
+                if narrow[drive]:
+                    low, high = found.ranges[drive]
+                    gap = values[:, drive] - low if is_low else high - values[:, drive]
+                    margins[:, row] = gap / units[drive]
+        return np.nan_to_num(margins, nan=IMPOSSIBLE, posinf=REACHED, neginf=IMPOSSIBLE)
 
     @cached_property
     def actuators(self) -> Floats:
         """Values of the actuators at all poses, (n, n_a) [length or rad]."""
         if self._found is None:
-            return np.full((len(self.poses), len(self.dimensions.mechanism.drives)), np.nan)
+            return np.full((len(self.poses), self._n_drives), np.nan)
         return self._found.actuators(self.poses)
 
-    @cached_property
+    @property
     def rates(self) -> Floats:
         """Rates of the actuators by the end effector's twist, (n, n_a, 6) [length, rad]; NaN where there are none."""
+        return self._rates[:-1]
+
+    @cached_property
+    def _rates(self) -> Floats:
         if self._found is None:
-            return np.full((len(self.poses), len(self.dimensions.mechanism.drives), 6), np.nan)
-        return self._found.inverse_jacobians(self.poses)
+            return np.full((len(self._all), self._n_drives, 6), np.nan)
+        return self._found.inverse_jacobians(self._all)
 
     @cached_property
     def factors(self) -> Floats:
         """Actuator speeds per speed along what the task sets, (n, k): singular values, L the unit of mixed lengths."""
         axes, is_length = self.dimensions.axes, self.dimensions.is_length
         units = np.where(axes < 3, self.length, 1.0) / np.where(is_length, self.length, 1.0)[:, None]
-        found = self.rates[:, :, axes] * units
+        with np.errstate(all="ignore"):
+            found = self.rates[:, :, axes] * units
         is_known = np.isfinite(found).all(axis=(1, 2))
         values = np.full((len(found), min(found.shape[1:])), np.nan)
         values[is_known] = np.linalg.svd(found[is_known], compute_uv=False)
@@ -180,7 +177,7 @@ class Candidate:
 
     @cached_property
     def unlimited(self) -> Mechanism:
-        """The machine without limits, which can be built where its limits exclude home."""
+        """The machine without limits, which can be built where its limits exclude home; or InvalidMechanism."""
         sketch = self.dimensions.source.sketch_with(self.dimensions.named(self.values))
         own = self.dimensions.mechanism
         joints = [dataclasses.replace(joint, range=None, cone=None) for joint in sketch.joints]

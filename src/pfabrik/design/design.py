@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -22,15 +22,15 @@ from ..kinematics import varied
 from ..targets import Target
 from ..telling import OnProgress, telling
 from .candidate import Candidate, Dimensions
-from .keep import DEFAULT_SINGULARITY, Home, Margin, OfPoses, Requirement, clearance, requirement_of, singularity
-from .reach import Reach
-from .result import Binding, Design, Designs, Round
+from .keep import DEFAULT_SINGULARITY, HOME, Requirement, clearance, margin, requirement_of, singularity
+from .reach import DENSE, SAMPLES, Reach
+from .result import Binding, Design, Designs, Round, Verdict
 from .search import KEPT, NEAR, Found, multipliers, smallest, spread
 
 MOST_ROUNDS, MOST_INNER = 20, 12
 """Rounds that end with a proof or a pose that refutes; searches in a round, as samples show further poses."""
 
-STARTS, SCREENED = 3, 256
+STARTS, SCREENED = 3, 64
 """Starts beside the machine as described: of so many spread points those that break the least."""
 
 WORST = 3
@@ -38,6 +38,9 @@ WORST = 3
 
 SLACK = 1e-4
 """Least margin over a region, of which a proof needs some; it doubles where a proof does not end."""
+
+MOST_SLACK = 0.02
+"""Slack after which a proof that does not end is given up."""
 
 BINDS = 1e-3
 """Share of a multiplier from which a row binds."""
@@ -110,46 +113,35 @@ def design(
     require_choice("about", about, ("base", "home"))
     bounds = _bounds(vary)
     requirements = [requirement_of(each) for each in ([keep] if isinstance(keep, str | Requirement) else keep)]
-    if isinstance(mechanism, Mapping) or not isinstance(mechanism, Mechanism | str):
-        machines = (
-            dict(mechanism)
-            if isinstance(mechanism, Mapping)
-            else {m.name: m for m in map(checked_mechanism, mechanism)}
-        )
-        if not machines:
+    if isinstance(mechanism, Mapping | list | tuple):
+        machines = list(mechanism.items()) if isinstance(mechanism, Mapping) else [(m, m) for m in mechanism]
+        named = [(name if isinstance(name, str) else name.name, checked_mechanism(m)) for name, m in machines]
+        if not named:
             raise InvalidArgument("mechanism", "no machine", "one or more")
-        known = {name for m in machines.values() for name in m.dimensions}
-        for name in bounds:
-            if name not in known:
-                raise UnknownName("dimension", name, sorted(known))
-        return Designs(
-            [
-                replace(
-                    design(
-                        m,
-                        {name: ends for name, ends in bounds.items() if name in m.dimensions},
-                        reach,
-                        keep=requirements,
-                        minimise=minimise,
-                        about=about,
-                        seed=seed,
-                        executor=executor,
-                        on_progress=on_progress,
-                    ),
-                    _name=name,
-                )
-                for name, m in machines.items()
-            ]
-        )
-    machine = checked_mechanism(mechanism)
-    for name in bounds:
-        if name not in machine.dimensions:
-            raise UnknownName("dimension", name, machine.dimensions)
-    with telling("design", on_progress) as tell:
-        asked = _Asked(machine, bounds, reach, requirements, about, seed, executor, tell)
-        if isinstance(minimise, tuple):
-            return _front(asked, *minimise)
-        return asked.answer(minimise)
+        known = {name for _, m in named for name in m.dimensions}
+        _require_known(bounds, known)
+    else:
+        named = [("", checked_mechanism(mechanism))]
+        _require_known(bounds, named[0][1].dimensions)
+    found = []
+    for name, machine in named:
+        own = {each: ends for each, ends in bounds.items() if each in machine.dimensions}
+        if not own:
+            raise InvalidArgument("vary", f"no dimension of '{name}'", f"one of {', '.join(machine.dimensions)}")
+        with telling("design", on_progress) as tell:
+            asked = _Asked(machine, own, reach, requirements, about, seed, executor, tell)
+            aims = minimise if isinstance(minimise, tuple) else (minimise,)
+            if len(aims) not in (1, 2):
+                raise InvalidArgument("minimise", f"{len(aims)} aims", "one, or two for a front")
+            answer = _front(asked, *aims) if len(aims) == 2 else _Search(asked, *aims).answer()
+        found.append(replace(answer, _name=name or machine.name))
+    return found[0] if named[0][0] == "" else Designs(found)
+
+
+def _require_known(names: Iterable[str], known: Iterable[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise UnknownName("dimension", name, sorted(known))
 
 
 def _bounds(vary: Any) -> dict[str, tuple[float, float]]:
@@ -188,40 +180,51 @@ class _Asked:
         self.dimensions = Dimensions(varied(alone, tuple(bounds)), low, high)
         self.rng = np.random.default_rng(seed)
         self.reach = Reach(mechanism, reach, about, self.rng)
+        for text in (text for each in requirements for text in each.expressions):
+            self.dimensions.source.value_of(text, {})
         own = [each for each in requirements if each.name]
-        if not any(isinstance(each, Margin) for each in own):
-            own.insert(0, Margin(0.0))
-        if not any("singularity" in each.name or not each.name for each in requirements):
+        if not any(each.kind == "margin" for each in own):
+            own.insert(0, margin(0.0))
+        if not any(each.kind == "singularity" for each in requirements):
             own.append(singularity(DEFAULT_SINGULARITY))
         if mechanism.clearance is not None:
             own.append(clearance(mechanism.clearance))
-        self.requirements = [*own, Home()]
+        self.requirements = [*own, HOME]
 
-    def answer(self, minimise: Aim, extra: Sequence[Requirement] = ()) -> Design:
-        """The design with the smallest aim."""
-        return _Search(self, minimise, extra).answer()
+    def values(self, z: Floats) -> Floats:
+        """Dimensions (p,) at shares of their bounds."""
+        return np.asarray(self.dimensions.low + z * (self.dimensions.high - self.dimensions.low))
 
     def at(self, z: Floats, poses: Floats) -> Candidate:
         """The machine at shares z (p,) of the bounds, at poses (n, 4, 4)."""
-        values = self.dimensions.low + z * (self.dimensions.high - self.dimensions.low)
-        return self.dimensions.at(values, poses, from_home=self.reach.from_home)
+        return Candidate(self.dimensions, self.values(z), poses, self.reach.moves)
 
 
-class _Place(NamedTuple):
-    """What a row is of: a requirement, a column, and the index of a pose, -1 without poses."""
+class _Checked(NamedTuple):
+    """What became of a machine.
 
-    requirement: Requirement
-    column: int
-    pose: int
+    Attributes
+    ----------
+    verdict, refuted_by : as of a `Round`.
+    is_final : True if nothing that follows can prove it.
+    """
+
+    verdict: str
+    found: Found
+    mechanism: Mechanism | None = None
+    certificate: Certificate | None = None
+    refuted_by: Floats | None = None
+    reason: str = ""
+    is_final: bool = False
 
 
 class _Search:
     """The search for one aim."""
 
-    def __init__(self, asked: _Asked, minimise: Aim, extra: Sequence[Requirement]) -> None:
+    def __init__(self, asked: _Asked, minimise: Aim, extra: Sequence[Requirement] = ()) -> None:
         self.asked, self.requirements = asked, [*asked.requirements, *extra]
         self.words, self._aim = _aim_of(asked, minimise)
-        self.poses, self.slack = asked.reach.first(), SLACK if asked.reach.region is not None else 0.0
+        self.poses, self.slack = asked.reach.first, 0.0 if asked.reach.region is None else SLACK
         self._kept: dict[bytes, Candidate] = {}
         self.rounds: list[Round] = []
         self.unit = 1.0
@@ -242,163 +245,144 @@ class _Search:
 
     def rows(self, z: Floats) -> Floats:
         """All rows, (m,)."""
-        return np.concatenate([rows.ravel() for _, rows in self._parts(self.candidate(z))])
+        return np.concatenate([rows.ravel() for _, rows in self._parts(self.candidate(z), self.slack)])
 
-    def _parts(self, machine: Candidate) -> list[tuple[Requirement, Floats]]:
-        parts = []
-        for each in self.requirements:
-            found = each.rows(machine)
-            parts.append((each, found - self.slack if isinstance(each, Margin | Home) else found))
-        return parts
-
-    def places(self, z: Floats) -> list[_Place]:
-        """What every row is of."""
-        found = []
-        for each, rows in self._parts(self.candidate(z)):
-            if each.has_poses:
-                found += [_Place(each, j, i) for i in range(rows.shape[0]) for j in range(rows.shape[1])]
-            else:
-                found += [_Place(each, j, -1) for j in range(len(rows))]
-        return found
+    def _parts(self, machine: Candidate, slack: float) -> list[tuple[Requirement, Floats]]:
+        return [(each, each.rows(machine) - slack * (each.kind == "margin")) for each in self.requirements]
 
     def look_at(self, poses: Floats) -> None:
         """Add poses."""
         self.poses = np.concatenate([self.poses, poses])
         self._kept.clear()
 
+    def ask(self, slack: float) -> None:
+        """Ask for another least margin beyond that which is kept."""
+        self.slack = slack
+        self._kept.clear()
+
     def answer(self) -> Design:
         """Rounds until a proof, or wishes that contradict."""
         found = self._first()
-        reason = f"no proof in {MOST_ROUNDS} rounds"
+        last = _Checked("NOT FOUND", found)
         for number in range(MOST_ROUNDS):
             if self.asked.tell is not None:
                 self.asked.tell(number, MOST_ROUNDS)
-            found = self._settled(found)
+            found = self._anew(self._settled(found))
+            if KEPT < found.violation <= KEPT + self.slack and not self.rounds:
+                self.ask(0.0)
+                found = self._settled(smallest(self.aim, self.rows, found.z))
             if found.violation > KEPT:
-                found = self._anew(found)
-            if found.violation > KEPT:
-                return self._result("NOT FOUND", found, None, None)
-            verdict, mechanism, certificate, pose, reason = self._checked(found)
-            self.rounds.append(Round(self._named(found), self._value(found), len(self.poses), verdict, pose))
-            if verdict in ("PROVED", "CHECKED"):
-                return self._result(verdict, found, mechanism, certificate)
-            if pose is None:
-                self.slack = max(2.0 * self.slack, SLACK * 1e-3)
-                self._kept.clear()
+                return self._result(last if last.verdict == "OPEN" else _Checked("NOT FOUND", found))
+            last = self._checked(found)
+            self.rounds.append(Round(self._named(found), self._value(found), len(self.poses), *last[0:5:4]))
+            if last.verdict in ("PROVED", "CHECKED") or last.is_final or self.slack > MOST_SLACK:
+                return self._result(last)
+            if last.verdict == "OPEN":
+                self.ask(max(2.0 * self.slack, SLACK * 1e-3))
             found = smallest(self.aim, self.rows, found.z)
-        return self._result("OPEN", found, mechanism, certificate, reason)
+        return self._result(last._replace(verdict="OPEN", reason=last.reason or f"no proof in {MOST_ROUNDS} rounds"))
 
     def _first(self) -> Found:
         """The best of several starts."""
         dimensions = self.asked.dimensions
-        own = np.array([self.asked.mechanism.dimensions[name] for name in dimensions.names])
-        z = np.clip((own - dimensions.low) / (dimensions.high - dimensions.low), 0.0, 1.0)
+        z = np.clip((dimensions.own - dimensions.low) / (dimensions.high - dimensions.low), 0.0, 1.0)
         others = spread(SCREENED, len(z), self.asked.rng)
         worst = np.array([self.rows(each).min(initial=0.0) for each in others])
         starts = [z, *others[np.argsort(-worst, kind="stable")[:STARTS]]]
-        self.unit = abs(self._aim(self.candidate(z))) or 1.0
-        if not np.isfinite(self.unit):
-            self.unit = 1.0
+        unit = abs(self._aim(self.candidate(z)))
+        self.unit = unit if unit and np.isfinite(unit) else 1.0
         return min((smallest(self.aim, self.rows, each) for each in starts), key=_rank)
 
     def _anew(self, found: Found) -> Found:
-        """The best from other starts where the poses so far have left none near the last."""
+        """The best from other starts, if the poses so far have left none near the last."""
+        if found.violation <= KEPT:
+            return found
         others = spread(2 * STARTS, len(found.z), self.asked.rng)
         tried = [self._settled(smallest(self.aim, self.rows, each)) for each in others]
-        return min([found, *tried], key=_rank)
+        again = [Found(each.z, each.aim, max(0.0, -self.rows(each.z).min())) for each in (found, *tried)]
+        return min(again, key=_rank)
 
     def _settled(self, found: Found) -> Found:
         """The smallest aim at the poses so far and at the worst samples, again while there are such."""
-        samples = self.asked.reach.poses
         for _ in range(MOST_INNER):
             if found.violation > KEPT:
                 return found
-            worst = self._worst(self.asked.at(found.z, samples))
-            broken = np.flatnonzero(worst < -10.0 * KEPT)
-            if not len(broken):
+            poses, worst = self._worst(found, SAMPLES, self.slack)
+            broken = worst < -10.0 * KEPT
+            if not broken.any():
                 return found
-            self.look_at(samples[broken[np.argsort(worst[broken])[:WORST]]])
+            self.look_at(poses[broken][:WORST])
             found = smallest(self.aim, self.rows, found.z)
         return found
 
-    def _worst(self, machine: Candidate, unproved_only: bool = False) -> Floats:
-        """The least row at each pose, (n,)."""
-        rows = [
-            found.min(axis=1, initial=np.inf)
-            for each, found in self._parts(machine)
-            if each.has_poses and not (unproved_only and each.is_proved)
-        ]
-        return np.min(rows, axis=0) if rows else np.full(len(machine.poses), np.inf)
+    def _worst(self, found: Found, count: int, slack: float) -> tuple[Floats, Floats]:
+        """Poses where the least row is about the least, and that row: the worst first."""
 
-    def _checked(self, found: Found) -> tuple[str, Mechanism | None, Certificate | None, Floats | None, str]:
-        """The verdict on dimensions, the machine, its certificate, a pose that refutes them, and why it is open."""
+        def least(poses: Floats) -> Floats:
+            machine = self.asked.at(found.z, poses)
+            rows = [rows.min(axis=1, initial=np.inf) for each, rows in self._parts(machine, slack) if each.has_poses]
+            return np.asarray(np.min(rows, axis=0))
+
+        return self.asked.reach.worst(least, count)
+
+    def _checked(self, found: Found) -> _Checked:
+        """What becomes of dimensions; poses that refute them are looked at from now on."""
         asked, reach = self.asked, self.asked.reach
-        values = self._named(found)
         try:
-            mechanism = asked.mechanism.with_dimensions(values)
+            mechanism = asked.mechanism.with_dimensions(self._named(found))
         except InvalidMechanism as fault:
-            return "OPEN", None, None, None, f"no machine has these dimensions: {fault}"
-        dense = reach.dense()
-        worst = self._worst(asked.at(found.z, dense), unproved_only=True)
-        if worst.min(initial=np.inf) < -10.0 * KEPT:
-            place = int(np.argmin(worst))
-            self.look_at(dense[place][None])
-            return "REFUTED", mechanism, None, self._placed(dense[place], mechanism), "a sample breaks a requirement"
-        statuses = np.array(solve_ik(mechanism, reach.at(mechanism)).status) if reach.region is None else np.zeros(0)
-        missed = np.flatnonzero(statuses != Status.REACHED)
-        if len(missed):
-            self.look_at(reach.poses[missed[:1]])
-            return "OPEN", mechanism, None, None, "a pose is not quite reached"
-        certificate = reach.certificate(mechanism, executor=asked.executor, on_progress=_silent)
-        if certificate is None or certificate.verdict == "PROVED":
-            return "CHECKED" if certificate is None else "PROVED", mechanism, certificate, None, ""
-        if certificate.refutation is None:
-            return "OPEN", mechanism, certificate, None, certificate.reason
-        pose = certificate.refutation.pose
-        self.look_at(reach.relative(pose, mechanism)[None])
-        return "REFUTED", mechanism, certificate, pose, ""
-
-    def _placed(self, pose: Floats, mechanism: Mechanism) -> Floats:
-        moved = pose.copy()
-        if self.asked.reach.from_home:
-            moved[:3, 3] += mechanism.reference_point
-        return moved
+            return _Checked("OPEN", found, reason=f"no machine has these dimensions: {fault}")
+        poses, worst = self._worst(found, DENSE, 0.0)
+        if worst[0] < -10.0 * KEPT:
+            self.look_at(poses[:WORST])
+            refuted_by = reach.at(mechanism, poses)[0]
+            return _Checked("REFUTED", found, mechanism, None, refuted_by, "a sample breaks a requirement")
+        if reach.region is None:
+            statuses = np.array(solve_ik(mechanism, reach.at(mechanism, reach.poses)).status)
+            if (statuses != Status.REACHED).any():
+                return _Checked("OPEN", found, mechanism, reason="a pose is not quite reached")
+        least = max(each.least for each in self.requirements)
+        gap = max(0.5 * self.slack, 1e-6) if least else None
+        certificate = reach.certificate(mechanism, tolerance=gap, executor=asked.executor, on_progress=_silent)
+        if certificate is None:
+            return _Checked("CHECKED", found, mechanism)
+        if certificate.refutation is not None:
+            pose = certificate.refutation.pose
+            self.look_at(reach.at(mechanism, pose[None], -1.0))
+            return _Checked("REFUTED", found, mechanism, certificate, pose, "a pose is not reached")
+        if not certificate:
+            is_final = not len(certificate.open_boxes)
+            return _Checked("OPEN", found, mechanism, certificate, None, certificate.reason, is_final)
+        if certificate.margin < least:
+            return _Checked(
+                "OPEN", found, mechanism, certificate, None, f"the margin is proved to {certificate.margin:.6g}"
+            )
+        return _Checked("PROVED", found, mechanism, certificate)
 
     def _named(self, found: Found) -> dict[str, float]:
-        dimensions = self.asked.dimensions
-        return dimensions.named(dimensions.low + found.z * (dimensions.high - dimensions.low))
+        return self.asked.dimensions.named(self.asked.values(found.z))
 
     def _value(self, found: Found) -> float:
         return float(self._aim(self.candidate(found.z)))
 
-    def _result(
-        self,
-        verdict: Any,
-        found: Found,
-        mechanism: Mechanism | None,
-        certificate: Certificate | None,
-        reason: str = "",
-    ) -> Design:
-        asked, is_found = self.asked, verdict != "NOT FOUND"
+    def _result(self, last: _Checked) -> Design:
+        asked, found, is_found, reason = self.asked, last.found, last.verdict != "NOT FOUND", last.reason
         binding = self._binding(found, is_found)
         if not is_found:
-            names = list(dict.fromkeys(each.requirement for each in binding))
-            against = " against ".join(names[:2]) if len(names) > 1 else "".join(names)
+            against = " against ".join(list(dict.fromkeys(each.requirement for each in binding))[:2])
             reason = f"nothing within the bounds keeps all: {against}, missed by {found.violation:.2g} at least"
-        unproved = tuple(each.name for each in self.requirements if each.has_poses and not each.is_proved)
-        own = asked.mechanism.dimensions
         return Design(
-            verdict,
-            mechanism,
+            cast(Verdict, last.verdict),
+            last.mechanism,
             self._named(found),
             self._value(found),
             self.words,
-            certificate,
-            unproved,
+            last.certificate,
+            tuple(each.name for each in self.requirements if each.has_poses and each.kind != "margin"),
             tuple(binding),
             tuple(self.rounds),
             reason,
-            _before={name: own[name] for name in asked.bounds},
+            _before=asked.dimensions.named(asked.dimensions.own),
             _bounds=asked.bounds,
             _name=asked.mechanism.name,
         )
@@ -408,19 +392,18 @@ class _Search:
         near = NEAR if is_found else NEAR - found.violation
         shares = multipliers(self.aim if is_found else None, self.rows, found.z, near)
         total = sum(float(part.sum()) for part in shares) or 1.0
-        machine, places = self.candidate(found.z), self.places(found.z)
-        binding = []
-        for row in np.flatnonzero(shares.rows > BINDS * total).tolist():
-            requirement, column, pose = places[row]
-            label = requirement.labels(machine)[column]
-            where = machine.poses[pose] if pose >= 0 else None
-            binding.append(Binding(requirement.name, label, where, float(shares.rows[row] / total)))
-        for name, (low, high), at_low, at_high in zip(
-            self.asked.bounds, self.asked.bounds.values(), shares.low, shares.high, strict=True
-        ):
-            for share, words in ((at_low, f"{name} >= {low:g}"), (at_high, f"{name} <= {high:g}")):
+        machine, binding, first = self.candidate(found.z), [], 0
+        for each, rows in self._parts(machine, self.slack):
+            for row in np.flatnonzero(shares.rows[first : first + rows.size] > BINDS * total).tolist():
+                pose, column = divmod(row, rows.shape[-1])
+                where = machine.poses[pose] if each.has_poses else None
+                share = float(shares.rows[first + row] / total)
+                binding.append(Binding(each.name, each.labels(machine)[column], where, share))
+            first += rows.size
+        for place, (name, ends) in enumerate(self.asked.bounds.items()):
+            for share, sign, end in zip((shares.low[place], shares.high[place]), (">=", "<="), ends, strict=True):
                 if share > BINDS * total:
-                    binding.append(Binding(words, "bound", None, float(share / total)))
+                    binding.append(Binding(f"{name} {sign} {end:g}", "bound", None, float(share / total)))
         return sorted(binding, key=lambda each: -each.share)
 
 
@@ -432,50 +415,52 @@ def _silent(done: int, total: int) -> None:
     """Progress of a proof within a design, which has its own."""
 
 
-def _aim_of(asked: _Asked, minimise: Aim) -> tuple[str, Callable[[Candidate], float]]:
-    """An aim in words, and its value of a machine."""
+def _aim_of(asked: _Asked, minimise: Any) -> tuple[str, Callable[[Candidate], float]]:
+    """An aim in words, and its value of a machine, which is not finite where it has none."""
     if callable(minimise):
-        return getattr(minimise, "__name__", "aim"), lambda machine: float(minimise(machine.unlimited))
+
+        def of_machine(machine: Candidate) -> float:
+            try:
+                return float(minimise(machine.unlimited))
+            except InvalidMechanism:
+                return np.inf
+
+        return getattr(minimise, "__name__", "aim"), of_machine
     if minimise == "size":
         return "size", lambda machine: 2.0 * machine.length
     if minimise == "stroke":
-        is_length = np.array([drive.kind == "length" for drive in asked.mechanism.drives])
 
         def stroke(machine: Candidate) -> float:
-            used = np.ptp(machine.actuators, axis=0)
-            return float(np.where(is_length, used, used * machine.length).max())
+            units = np.where(machine.dimensions.is_length, 1.0, machine.length)
+            return float((np.ptp(machine.actuators, axis=0) * units).max())
 
         return "stroke", stroke
     if not isinstance(minimise, str):
         raise InvalidArgument("minimise", repr(minimise), "size, stroke, an expression of dimensions, or a function")
-    source = asked.dimensions.source
-    source.value_of(minimise, {})
-    return minimise, lambda machine: float(source.value_of(minimise, machine.dimensions.named(machine.values)))
+    asked.dimensions.source.value_of(minimise, {})
+    return minimise, lambda machine: machine.value_of(minimise)
 
 
 def _front(asked: _Asked, first: Aim, second: Aim) -> Design:
     """Designs from the smallest first aim to the smallest second one, in equal steps of the second."""
-    _, other = _aim_of(asked, second)
-    words = _aim_of(asked, second)[0]
+    words, other = _aim_of(asked, second)
 
     def second_of(found: Design) -> float:
-        dimensions = asked.dimensions
         values = np.array(list(found.dimensions.values()))
-        return other(dimensions.at(values, asked.reach.poses, from_home=asked.reach.from_home))
+        return other(Candidate(asked.dimensions, values, asked.reach.poses, asked.reach.moves))
 
-    ends = asked.answer(first), asked.answer(second)
+    ends = _Search(asked, first).answer(), _Search(asked, second).answer()
     if not all(ends):
         return ends[0] if not ends[0] else ends[1]
     most, least = second_of(ends[0]), second_of(ends[1])
-    designs = [replace(ends[0], _other=most)]
+    designs = [replace(ends[0], other=most)]
     for bound in np.linspace(most, least, FRONT)[1:]:
         eased = bound + 1e-4 * abs(most - least)
 
         def kept(machine: Candidate, eased: float = eased) -> Floats:
-            return np.full((len(machine.poses), 1), (eased - other(machine)) / (abs(most) or 1.0))
+            return np.array([(eased - other(machine)) / (abs(most) or 1.0)])
 
-        found = asked.answer(first, [OfPoses(f"{words} <= {eased:.6g}", kept)])
+        found = _Search(asked, first, [Requirement(f"{words} <= {eased:.6g}", kept, has_poses=False)]).answer()
         if found:
-            designs.append(replace(found, _other=second_of(found)))
-    best = designs[0]
-    return replace(best, front=tuple(designs), minimised=f"{best.minimised}, {words}")
+            designs.append(replace(found, other=second_of(found)))
+    return replace(designs[0], front=tuple(designs), minimised=f"{designs[0].minimised}, {words}")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +14,11 @@ from ..arguments import array
 from ..arrays import Floats
 from ..checks import require_finite, require_positive
 from ..clearance.clearance import clearance as clearance_of
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, InvalidMechanism
 from ..statics.accuracy import accuracy as accuracy_of
 from ..statics.forces import forces as forces_of
 from ..statics.stiffness import stiffness as stiffness_of
-from .candidate import IMPOSSIBLE, Candidate
+from .candidate import IMPOSSIBLE, REACHED, Candidate
 
 __all__ = [
     "Requirement",
@@ -39,138 +38,55 @@ DEFAULT_SINGULARITY = 0.05
 """Least measure of a singularity that is asked for by default: L of travel moves an actuator by at most 20 L."""
 
 
-class Requirement(ABC):
+@dataclass(frozen=True, eq=False)
+class Requirement:
     """A requirement; its rows are positive where it is kept, and of order 1.
 
     Attributes
     ----------
-    is_proved : True if `certify` proves it over a region.
+    name : the requirement in words; empty if it asks for nothing.
+    function : rows of a machine at its poses (n, k), or without poses (k,).
+    kind : "margin", proved by `certify` over a region; "singularity", in place of what is kept by default; or "".
+    has_poses : False if it is of the dimensions alone.
+    width : k, of a function that raises where there is no machine.
+    columns : names of what the k columns are of; none if they have no names.
+    expressions : of dimensions, which need a value.
+    least : the margin that is asked for.
     """
 
-    is_proved = False
-
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """The requirement in words."""
-
-    @abstractmethod
-    def rows(self, machine: Candidate) -> Floats:
-        """Rows at poses (n, k), or without poses (k,)."""
-
-    def labels(self, machine: Candidate) -> list[str]:
-        """What the k columns are of."""
-        return [""] * self.rows(machine).shape[-1]
-
-    @property
-    def has_poses(self) -> bool:
-        """False if it is of the dimensions alone."""
-        return True
-
-
-@dataclass(frozen=True)
-class Margin(Requirement):
-    """Margins of all limits."""
-
-    least: float
-    is_proved = True
-
-    @property
-    def name(self) -> str:
-        return f"margin >= {self.least:g}"
-
-    def rows(self, machine: Candidate) -> Floats:
-        return np.asarray(machine.margins - self.least)
-
-    def labels(self, machine: Candidate) -> list[str]:
-        return [" ".join(limit) for limit in machine.dimensions.limits]
-
-
-@dataclass(frozen=True)
-class Home(Requirement):
-    """Home within all limits: a machine is built there."""
-
-    @property
-    def name(self) -> str:
-        return "home within limits"
-
-    def rows(self, machine: Candidate) -> Floats:
-        return machine.home_margins[0]
-
-    def labels(self, machine: Candidate) -> list[str]:
-        return [" ".join(limit) for limit in machine.dimensions.limits]
-
-    @property
-    def has_poses(self) -> bool:
-        return False
-
-
-@dataclass(frozen=True)
-class Stroke(Requirement):
-    """Lowest and highest values of actuators that slide."""
-
-    ratio: float
-
-    @property
-    def name(self) -> str:
-        return f"stroke ratio <= {self.ratio:g}"
-
-    def _ends(self, machine: Candidate) -> Iterator[tuple[str, Floats]]:
-        mechanism = machine.dimensions.mechanism
-        for name, drive, ends in zip(mechanism.actuator_names, mechanism.drives, machine.ranges, strict=True):
-            if drive.kind == "length" and (np.isfinite(ends).all() or not machine.is_machine):
-                yield name, ends
-
-    def rows(self, machine: Candidate) -> Floats:
-        return np.array([self.ratio * low / abs(high or 1.0) - 1.0 for _, (low, high) in self._ends(machine)])
-
-    def labels(self, machine: Candidate) -> list[str]:
-        return [name for name, _ in self._ends(machine)]
-
-    @property
-    def has_poses(self) -> bool:
-        return False
-
-
-@dataclass(frozen=True)
-class Relation(Requirement):
-    """An inequality of dimensions."""
-
-    text: str
-    left: str
-    right: str
-
-    @property
-    def name(self) -> str:
-        return self.text
-
-    def rows(self, machine: Candidate) -> Floats:
-        values = machine.dimensions.named(machine.values)
-        left, right = (machine.dimensions.source.value_of(side, values) for side in (self.left, self.right))
-        return np.array([(left - right) / max(abs(left), abs(right), np.finfo(float).tiny)])
-
-    @property
-    def has_poses(self) -> bool:
-        return False
-
-
-@dataclass(frozen=True)
-class OfPoses(Requirement):
-    """A requirement whose rows a function gives."""
-
-    words: str
+    name: str
     function: Callable[[Candidate], Floats]
+    kind: str = ""
+    has_poses: bool = True
+    width: int = 1
+    columns: Callable[[Candidate], Sequence[str]] | None = None
+    expressions: tuple[str, ...] = ()
+    least: float = 0.0
 
-    @property
-    def name(self) -> str:
-        return self.words
+    def __repr__(self) -> str:
+        return f"<Requirement {self.name or 'none'}>"
 
     def rows(self, machine: Candidate) -> Floats:
-        n = len(machine.poses)
-        if not machine.is_machine:
-            return np.full((n, 1), IMPOSSIBLE)
-        found = np.asarray(self.function(machine), float).reshape(n, -1)
-        return np.asarray(np.nan_to_num(found, nan=IMPOSSIBLE, posinf=1.0, neginf=IMPOSSIBLE))
+        """Rows at poses (n, k), or without poses (k,): finite, and negative where there is no machine."""
+        try:
+            found = np.asarray(self.function(machine), float)
+        except InvalidMechanism:
+            found = np.full((len(machine.poses), self.width) if self.has_poses else self.width, IMPOSSIBLE)
+        if found.ndim == 1 and self.has_poses:
+            found = found[:, None]
+        return np.asarray(np.nan_to_num(found, nan=IMPOSSIBLE, posinf=REACHED, neginf=IMPOSSIBLE))
+
+    def labels(self, machine: Candidate) -> Sequence[str]:
+        """What the columns are of."""
+        return self.columns(machine) if self.columns is not None else [""] * self.rows(machine).shape[-1]
+
+
+def _limits(machine: Candidate) -> list[str]:
+    return [" ".join(limit) for limit in machine.dimensions.limits]
+
+
+HOME = Requirement("home within limits", lambda m: m.home_margins, "margin", has_poses=False, columns=_limits)
+"""Home within all limits: a machine is built there."""
 
 
 def margin(least: float) -> Requirement:
@@ -181,7 +97,8 @@ def margin(least: float) -> Requirement:
     least : float
         0 or more.
     """
-    return Margin(_not_negative("least", least))
+    value = _not_negative("least", least)
+    return Requirement(f"margin >= {value:g}", lambda m: m.margins - value, "margin", columns=_limits, least=value)
 
 
 def stroke(ratio: float) -> Requirement:
@@ -194,7 +111,14 @@ def stroke(ratio: float) -> Requirement:
     """
     if not require_finite("ratio", ratio) > 1.0:
         raise InvalidArgument("ratio", f"{ratio:g}", "more than 1: longest by shortest")
-    return Stroke(ratio)
+
+    def rows(machine: Candidate) -> Floats:
+        low, high = machine.sliding_ranges.T
+        return np.asarray(ratio * low / np.where(high == 0.0, 1.0, np.abs(high)) - 1.0)
+
+    return Requirement(
+        f"stroke ratio <= {ratio:g}", rows, has_poses=False, columns=lambda m: m.dimensions.sliding_names
+    )
 
 
 def singularity(least: float | None = DEFAULT_SINGULARITY) -> Requirement:
@@ -205,8 +129,9 @@ def singularity(least: float | None = DEFAULT_SINGULARITY) -> Requirement:
     least : float or None
         0 at a singularity; 0 or None asks for nothing. Without this requirement 0.05 is asked for.
     """
-    value = _not_negative("least", least or 0.0)
-    return OfPoses(f"singularity >= {value:g}" if value else "", lambda m: m.distances / (value or 1.0) - bool(value))
+    value = _not_negative("least", 0.0 if least is None else least)
+    words = f"singularity >= {value:g}" if value else ""
+    return Requirement(words, lambda m: m.distances / (value or 1.0) - 1.0, "singularity", width=2)
 
 
 def factors(least: float, most: float) -> Requirement:
@@ -221,14 +146,14 @@ def factors(least: float, most: float) -> Requirement:
     if low > high:
         raise InvalidArgument("most", f"{most:g}", f"not less than least, {least:g}")
     words = f"factors {low:g} to {high:g}"
-    return OfPoses(words, lambda m: np.concatenate([1.0 - low * m.factors, high * m.factors - 1.0], axis=1))
+    return Requirement(words, lambda m: np.concatenate([1.0 - low * m.factors, high * m.factors - 1.0], axis=1))
 
 
 def clearance(distance: float) -> Requirement:
     """A least distance of links that may not touch [length], of a machine whose legs or bodies have shapes."""
     least = _not_negative("distance", distance)
     words = f"clearance >= {least:g}"
-    return OfPoses(words, lambda m: (np.asarray(clearance_of(m.solution).distance) - least) / m.length)
+    return Requirement(words, lambda m: (np.asarray(clearance_of(m.solution).distance) - least) / m.length)
 
 
 def force(wrenches: ArrayLike, most: float) -> Requirement:
@@ -241,14 +166,14 @@ def force(wrenches: ArrayLike, most: float) -> Requirement:
     most : float
         As in `pfabrik.forces`.
     """
-    given = np.atleast_2d(np.asarray(wrenches, float))
+    given = _rows_of("wrenches", wrenches)
     limit = require_positive("most", most)
 
     def rows(machine: Candidate) -> Floats:
         held = [np.abs(forces_of(machine.solution, wrench).actuators).max(axis=1) for wrench in given]
         return 1.0 - np.stack(held, axis=1) / limit
 
-    return OfPoses(f"actuator force <= {limit:g}", rows)
+    return Requirement(f"actuator force <= {limit:g}", rows, width=len(given))
 
 
 def stiffness(least: float, k: float | Mapping[str, float], axes: str = "xyz") -> Requirement:
@@ -263,15 +188,16 @@ def stiffness(least: float, k: float | Mapping[str, float], axes: str = "xyz") -
     axes : str, optional
         Some of "x", "y", "z".
     """
-    wanted, places = require_positive("least", least), ["xyz".index(axis) for axis in axes]
-    if not places or not set(axes) <= set("xyz"):
+    wanted = require_positive("least", least)
+    if not isinstance(axes, str) or not axes or not set(axes) <= set("xyz"):
         raise InvalidArgument("axes", repr(axes), "some of x, y, z")
+    places = ["xyz".index(axis) for axis in axes]
 
     def rows(machine: Candidate) -> Floats:
         gives = np.diagonal(stiffness_of(machine.solution, k).compliance, axis1=-2, axis2=-1)[:, places]
         return np.asarray(1.0 - wanted * gives)
 
-    return OfPoses(f"stiffness along {axes} >= {wanted:g}", rows)
+    return Requirement(f"stiffness along {axes} >= {wanted:g}", rows, width=len(places))
 
 
 def accuracy(errors: float | Mapping[str, float], most: float) -> Requirement:
@@ -285,7 +211,9 @@ def accuracy(errors: float | Mapping[str, float], most: float) -> Requirement:
         How far off the reference point may be [length].
     """
     limit = require_positive("most", most)
-    return OfPoses(f"error <= {limit:g}", lambda m: 1.0 - np.asarray(accuracy_of(m.solution, errors).position) / limit)
+    return Requirement(
+        f"error <= {limit:g}", lambda m: 1.0 - np.asarray(accuracy_of(m.solution, errors).position) / limit
+    )
 
 
 def speed(twists: ArrayLike, most: float) -> Requirement:
@@ -298,14 +226,13 @@ def speed(twists: ArrayLike, most: float) -> Requirement:
     most : float
         Of every actuator [length/s or rad/s].
     """
-    given = np.atleast_2d(array("twists", twists, "... 6 | ... 3"))
+    given = _rows_of("twists", twists)
     limit = require_positive("most", most)
-    given = np.pad(given.reshape(-1, given.shape[-1]), ((0, 0), (0, 6 - given.shape[-1])))
 
     def rows(machine: Candidate) -> Floats:
-        return np.asarray(1.0 - np.abs(machine.rates @ given.T).max(axis=1) / limit)
+        return np.asarray(1.0 - np.abs(machine.rates[:, :, : given.shape[1]] @ given.T).max(axis=1) / limit)
 
-    return OfPoses(f"actuator speed <= {limit:g}", rows)
+    return Requirement(f"actuator speed <= {limit:g}", rows)
 
 
 def relation(text: str) -> Requirement:
@@ -314,7 +241,13 @@ def relation(text: str) -> Requirement:
     if len(parts) != 3:
         raise InvalidArgument("keep", repr(text), "two expressions of dimensions with <= or >= between them")
     left, sign, right = (part.strip() for part in parts)
-    return Relation(text, *((left, right) if sign == ">=" else (right, left)))
+    more, less = (left, right) if sign == ">=" else (right, left)
+
+    def rows(machine: Candidate) -> Floats:
+        value, other = machine.value_of(more), machine.value_of(less)
+        return np.array([(value - other) / max(abs(value), abs(other), np.finfo(float).tiny)])
+
+    return Requirement(text, rows, has_poses=False, expressions=(more, less))
 
 
 def requirement_of(given: Any) -> Requirement:
@@ -324,6 +257,14 @@ def requirement_of(given: Any) -> Requirement:
     if not isinstance(given, Requirement):
         raise InvalidArgument("keep", repr(given), "requirements of pfabrik.keep, or texts such as 'rod >= 1.2*arm'")
     return given
+
+
+def _rows_of(name: str, given: ArrayLike) -> Floats:
+    """Wrenches or twists, (n, 6) or (n, 3)."""
+    found = array(name, given, "... 6 | ... 3")
+    if not found.size:
+        raise InvalidArgument(name, "none", "one or more")
+    return np.asarray(found.reshape(-1, found.shape[-1]))
 
 
 def _not_negative(name: str, value: float) -> float:

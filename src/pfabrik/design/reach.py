@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,19 @@ from ..answers.tracked import Track
 from ..arrays import Floats
 from ..certify.certificates import Certificate
 from ..certify.pose_region import PoseRegion
-from ..certify.question import certify
+from ..certify.question import certify, require_task
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
+from ..kinematics import task_of
+from ..poses import are_poses
 from ..targets import as_targets
 from ..track import track
 
-SAMPLES = 500
-"""Random poses of a region beside its corners, of which the worst are looked at next."""
+SAMPLES, DENSE = 300, 5000
+"""Random poses of a region of which the worst are looked at next, and by which what has no proof is decided."""
 
-DENSE = 5000
-"""Poses by which what has no proof is decided."""
+PLACES, AROUND, SIZES = 8, 24, (0.3, 0.1, 0.03, 0.01)
+"""How many of the worst are looked around, at how many poses, and how far away [half sizes of the region]."""
 
 
 class Reach:
@@ -30,57 +33,79 @@ class Reach:
     Attributes
     ----------
     region : PoseRegion or None; else `poses` are all.
-    poses : array (n, 4, 4) [length]: corners, middle and random ones of a region.
-    from_home : positions count from home's.
+    poses : array (n, 4, 4) [length]: of a region its middle and corners.
+    first : those that are looked at first.
+    moves : array (3,): 1 for axes along which positions count from home's, as along all that the task does not set.
     """
 
     def __init__(self, mechanism: Mechanism, reach: Any, about: str, rng: np.random.Generator) -> None:
-        self.from_home, self.region, self._rng = about == "home", None, rng
-        self.is_track = isinstance(reach, Track)
+        self.region, self._rng, self.is_track = None, rng, isinstance(reach, Track)
+        self.moves = np.where(task_of(mechanism).axes, float(about == "home"), 1.0)
+        fixed = (self.moves - float(about == "home")) * mechanism.home_pose[:3, 3]
         if isinstance(reach, PoseRegion):
-            self.region = reach
-            self.poses = reach.pose(np.concatenate([reach.middle[None], corners(reach), drawn(reach, SAMPLES, rng)]))
+            region = _shifted(reach, -fixed)
+            require_task(mechanism, _shifted(region, self.moves * mechanism.home_pose[:3, 3]))
+            self.region = region
+            self.poses = region.pose(np.concatenate([region.middle[None], corners(region)]))
+            self.first = self.poses[:9]
         else:
             given = reach.targets if isinstance(reach, Track) else reach
             self.poses = np.array(as_targets(mechanism, given)[0].reshape(-1, 4, 4))
-        if not len(self.poses) or not np.isfinite(self.poses).all():
-            raise InvalidArgument("reach", "no poses, or such as are not finite", "a PoseRegion, poses, or a Track")
+            if not len(self.poses) or not are_poses(self.poses).all():
+                raise InvalidArgument("reach", "no poses, or rows that are none", "a PoseRegion, finite poses, a Track")
+            self.poses[:, :3, 3] -= fixed
+            self.first = self.poses[:: max(1, len(self.poses) // 8)]
 
-    def first(self) -> Floats:
-        """Poses that are looked at first."""
-        return self.poses[:: max(1, len(self.poses) // 8)] if self.region is None else self.poses[:9]
+    def worst(self, least: Callable[[Floats], Floats], count: int) -> tuple[Floats, Floats]:
+        """Poses where a function of poses (n, 4, 4) is about the least, and its values there, the least first.
 
-    def dense(self) -> Floats:
-        """Poses by which what has no proof is decided."""
-        if self.region is None:
-            return self.poses
-        return np.concatenate([self.poses, self.region.pose(drawn(self.region, DENSE, self._rng))])
+        Of a region: random poses, then others ever nearer to the worst of these, which are apart from each other.
+        """
+        region = self.region
+        if region is None:
+            values = least(self.poses)
+            order = np.argsort(values)
+            return self.poses[order], values[order]
+        found = np.concatenate([region.middle[None], corners(region), drawn(region, count, self._rng)])
+        values = least(region.pose(found))
+        best = _apart(found[np.argsort(values)], region.half)
+        for size in SIZES:
+            steps = self._rng.uniform(-size, size, (AROUND, len(best), 6)) * region.half
+            steps[0] = 0.0
+            near = rounded(region, np.clip(best + steps, region.low, region.high))
+            values = least(region.pose(near.reshape(-1, 6))).reshape(AROUND, -1)
+            best, values = near[values.argmin(axis=0), np.arange(len(best))], values.min(axis=0)
+        order = np.argsort(values)
+        return region.pose(best[order]), values[order]
 
     def certificate(self, mechanism: Mechanism, **asked: Any) -> Certificate | None:
         """What `certify` says; None of poses without anything between them."""
-        shift = mechanism.reference_point if self.from_home else np.zeros(3)
         if self.region is not None:
-            moved = np.concatenate([shift, np.zeros(3)])
-            region = dataclasses.replace(self.region, low=self.region.low + moved, high=self.region.high + moved)
-            return certify(mechanism, region, **asked)
-        if not self.is_track:
+            return certify(mechanism, _shifted(self.region, self.moves * mechanism.home_pose[:3, 3]), **asked)
+        if not self.is_track or len(self.poses) < 2:
             return None
-        path: Any = track(mechanism, self.at(mechanism))
+        path: Any = track(mechanism, self.at(mechanism, self.poses))
         return certify(mechanism, path, **asked)
 
-    def at(self, mechanism: Mechanism) -> Floats:
-        """The poses [length] of a machine that is built."""
-        poses = self.poses.copy()
-        if self.from_home:
-            poses[:, :3, 3] += mechanism.reference_point
-        return poses
-
-    def relative(self, pose: Floats, mechanism: Mechanism) -> Floats:
-        """A pose of a machine that is built, as these poses are."""
-        found = pose.copy()
-        if self.from_home:
-            found[:3, 3] -= mechanism.reference_point
+    def at(self, mechanism: Mechanism, poses: Floats, sign: float = 1.0) -> Floats:
+        """Poses (n, 4, 4) [length] of a machine that is built; with sign -1, such poses as those here are."""
+        found = poses.copy()
+        found[:, :3, 3] += sign * self.moves * mechanism.home_pose[:3, 3]
         return found
+
+
+def _apart(parameters: Floats, half: Floats) -> Floats:
+    """The first of some parameters (n, 6) that are apart from those before them, of the first hundred."""
+    shares, kept = parameters[:100] / np.where(half > 0.0, half, np.inf), [0]
+    for place in range(1, len(shares)):
+        if len(kept) < PLACES and (np.abs(shares[place] - shares[kept]).max(axis=1) > 2.0 * SIZES[0]).all():
+            kept.append(place)
+    return parameters[kept]
+
+
+def _shifted(region: PoseRegion, shift: Floats) -> PoseRegion:
+    moved = np.concatenate([shift, np.zeros(3)])
+    return dataclasses.replace(region, low=region.low + moved, high=region.high + moved)
 
 
 def corners(region: PoseRegion) -> Floats:

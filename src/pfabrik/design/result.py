@@ -97,6 +97,8 @@ class Design(Printed):
         The rounds of the search.
     front : tuple of Design
         With two aims, designs from the smallest of the first to the smallest of the second.
+    other : float or None
+        The second aim of a design of a front.
     reason : str
         Why nothing was found, or it is open; empty otherwise.
     """
@@ -112,6 +114,7 @@ class Design(Printed):
     rounds: tuple[Round, ...]
     reason: str = ""
     front: tuple[Design, ...] = ()
+    other: float | None = None
     _before: Mapping[str, float] = field(default_factory=dict)
     _bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     _name: str = ""
@@ -139,7 +142,7 @@ class Design(Printed):
         more = [ResultTable("Binding", (), (title, "limit", "at", "share"), held)] if held else []
         remarks = [f"not proved, by samples: {', '.join(self.unproved)}"] if self.unproved and self.mechanism else []
         if self.front:
-            ends = [(f"{each.aim:.6g}", f"{each._other:.6g}", each.verdict) for each in self.front]
+            ends = [(f"{each.aim:.6g}", f"{each.other:.6g}", each.verdict) for each in self.front]
             first, second = self.minimised.split(", ", 1)
             more.append(ResultTable("Front", (), (first, second, "verdict"), ends))
         return ResultTable(f"Design of {self._name}", lines, header, rows, remarks, more=more)
@@ -151,6 +154,7 @@ class Design(Printed):
             "dimensions": dict(self.dimensions),
             "minimised": self.minimised,
             "aim": self.aim,
+            "other": self.other,
             "unproved": list(self.unproved),
             "binding": [as_plain(each._asdict()) for each in self.binding],
             "rounds": [as_plain(each._asdict()) for each in self.rounds],
@@ -191,8 +195,6 @@ class Design(Printed):
             ax.tick_params(labelsize=SMALL)
         figure.suptitle(f"{self._name}: {self.verdict}, {self.minimised} {self.aim:.5g}", fontsize=SMALL + 1.0)
         return figure
-
-    _other: float = np.nan
 
 
 class Designs(Printed, Sequence[Design]):

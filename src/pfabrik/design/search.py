@@ -7,10 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats
 
 STEP = 1e-6
-"""Step of central differences by dimensions, as a share of their bounds."""
+"""Step of differences by dimensions, as a share of their bounds."""
+
+FAR = 0.5
+"""Rows above this at the start of a search are left out of it, until its end breaks them."""
 
 KEPT = 1e-7
 """By how much a row may be negative and count as kept."""
@@ -40,12 +43,12 @@ Function = Callable[[Floats], Any]
 
 
 def slopes(function: Function, z: Floats) -> Floats:
-    """Central differences within the bounds, (..., p)."""
-    columns = []
+    """Differences within the bounds, (..., p)."""
+    columns, value = [], function(z)
     for k in range(len(z)):
-        more, less = z.copy(), z.copy()
-        more[k], less[k] = min(z[k] + STEP, 1.0), max(z[k] - STEP, 0.0)
-        columns.append((function(more) - function(less)) / (more[k] - less[k]))
+        moved = z.copy()
+        moved[k] += STEP if z[k] < 0.5 else -STEP
+        columns.append((function(moved) - value) / (moved[k] - z[k]))
     return np.asarray(np.nan_to_num(np.stack(columns, axis=-1), nan=0.0, posinf=0.0, neginf=0.0))
 
 
@@ -59,45 +62,52 @@ def smallest(aim: Function, rows: Function, z: Floats) -> Found:
 
 
 def _searched(aim: Function, rows: Function, z: Floats) -> Found:
-    from scipy.optimize import minimize
-
-    constraint = {"type": "ineq", "fun": rows, "jac": lambda x: slopes(rows, x)}
-    with np.errstate(all="ignore"):
-        ended: Any = minimize(
-            lambda x: float(aim(x)),
-            z,
-            jac=lambda x: slopes(aim, x),
-            bounds=[(0.0, 1.0)] * len(z),
-            constraints=[constraint],
-            method="SLSQP",
-            options={"maxiter": MOST_STEPS, "ftol": 1e-9},
-        )
-    return _ended(aim, rows, np.clip(np.nan_to_num(ended.x, nan=0.5), 0.0, 1.0))
+    return _ended(aim, rows, _slsqp(aim, lambda x: slopes(aim, x), rows, lambda x: slopes(rows, x), z))
 
 
 def _least_violation(aim: Function, rows: Function, z: Floats) -> Found:
     """The least t with all rows at least -t."""
-    from scipy.optimize import minimize
+    unit = np.append(np.zeros(len(z)), 1.0)
 
     def eased(x: Floats) -> Floats:
-        return np.asarray(rows(np.clip(x[:-1], 0.0, 1.0)) + x[-1])
+        return np.asarray(rows(x[:-1]) + x[-1])
 
     def eased_slopes(x: Floats) -> Floats:
-        own = slopes(rows, np.clip(x[:-1], 0.0, 1.0))
+        own = slopes(rows, x[:-1])
         return np.concatenate([own, np.ones((len(own), 1))], axis=1)
 
     start = np.append(z, max(0.0, -rows(z).min(initial=0.0)))
-    unit = np.append(np.zeros(len(z)), 1.0)
-    ended: Any = minimize(
-        lambda x: float(x[-1]),
-        start,
-        jac=lambda x: unit,
-        bounds=[(0.0, 1.0)] * len(z) + [(-1.0, None)],
-        constraints=[{"type": "ineq", "fun": eased, "jac": eased_slopes}],
-        method="SLSQP",
-        options={"maxiter": MOST_STEPS, "ftol": 1e-9},
-    )
-    return _ended(aim, rows, np.clip(np.nan_to_num(ended.x[:-1], nan=0.5), 0.0, 1.0))
+    return _ended(aim, rows, _slsqp(lambda x: x[-1], lambda x: unit, eased, eased_slopes, start)[:-1])
+
+
+def _slsqp(aim: Function, aim_slopes: Function, rows: Function, row_slopes: Function, x: Floats) -> Floats:
+    """Where a search ends, whose numbers stay where the aim and the rows are: within 0 to 1, above that if x is."""
+    from scipy.optimize import minimize
+
+    high = np.where(x > 1.0, np.inf, 1.0)
+    chosen = rows(x) < FAR
+    while True:
+        used = np.flatnonzero(chosen)
+        constraint = {
+            "type": "ineq",
+            "fun": lambda x, used=used: rows(x)[used],
+            "jac": lambda x, used=used: row_slopes(x)[used],
+        }
+        with np.errstate(all="ignore"):
+            ended: Any = minimize(
+                lambda x: float(aim(x)),
+                x,
+                jac=aim_slopes,
+                bounds=np.stack([np.zeros(len(x)), high], axis=1),
+                constraints=[constraint] if len(used) else [],
+                method="SLSQP",
+                options={"maxiter": MOST_STEPS, "ftol": 1e-9},
+            )
+        x = np.clip(np.nan_to_num(ended.x, nan=0.5), 0.0, high)
+        missed = ~chosen & (rows(x) < -KEPT)
+        if not missed.any():
+            return x
+        chosen |= rows(x) < FAR
 
 
 def _ended(aim: Function, rows: Function, z: Floats) -> Found:
@@ -147,9 +157,3 @@ def spread(count: int, p: int, rng: np.random.Generator) -> Floats:
     """Points spread over the unit cube, (count, p): of each coordinate one in every share of it (Latin hypercube)."""
     order = np.stack([rng.permutation(count) for _ in range(p)], axis=1)
     return np.asarray((order + rng.random((count, p))) / count)
-
-
-def largest(mask: Mask, values: Floats, count: int) -> list[int]:
-    """Indices of the lowest values among some, (n,)."""
-    places = np.flatnonzero(mask)
-    return [int(place) for place in places[np.argsort(values[places])][:count]]
