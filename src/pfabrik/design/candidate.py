@@ -96,7 +96,12 @@ class Candidate:
     def sliding_ranges(self) -> Floats:
         """Ends of the actuators that slide between two, (n, 2) [length]."""
         places = self.dimensions.sliding
-        return np.full((len(places), 2), np.nan) if self._found is None else self._found.ranges[places]
+        return np.full((len(places), 2), np.nan) if self._found is None else self._ranges[places]
+
+    @cached_property
+    def _ranges(self) -> Floats:
+        assert self._found is not None
+        return self._found.ranges
 
     @property
     def margins(self) -> Floats:
@@ -126,15 +131,17 @@ class Candidate:
                 near = np.fmin(1.0 / (np.square(rates).sum(axis=2) * units**2), REACHED)
             margins[:, rows] = np.where(np.isposinf(margins[:, rows]), np.nan_to_num(near), margins[:, rows])
         units = np.where(dimensions.is_length, found.characteristic_length, 1.0) * NARROW
-        narrow = found.ranges[:, 1] - found.ranges[:, 0] < 2.0 * units
+        narrow = self._ranges[:, 1] - self._ranges[:, 0] < 2.0 * units
         if narrow.any():  # so the margin of a range that ends before it begins falls with its ends
             values = found.actuators(self._all)
             for row, drive, is_low in dimensions.ends:
                 if narrow[drive]:
-                    low, high = found.ranges[drive]
+                    low, high = self._ranges[drive]
                     gap = values[:, drive] - low if is_low else high - values[:, drive]
                     margins[:, row] = gap / units[drive]
-        return np.nan_to_num(margins, nan=IMPOSSIBLE, posinf=REACHED, neginf=IMPOSSIBLE)
+        margins[np.isposinf(margins)] = REACHED
+        margins[~np.isfinite(margins)] = IMPOSSIBLE
+        return margins
 
     @cached_property
     def actuators(self) -> Floats:

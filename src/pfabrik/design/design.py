@@ -37,7 +37,7 @@ WORST = 3
 """Poses that are added at a time."""
 
 SLACK = 1e-4
-"""Least margin over a region, of which a proof needs some; it doubles where a proof does not end."""
+"""Least margin over a region, of which a proof needs some; four times as much where one does not end."""
 
 MOST_SLACK = 0.02
 """Slack after which a proof that does not end is given up."""
@@ -278,7 +278,7 @@ class _Search:
             if last.verdict in ("PROVED", "CHECKED") or last.is_final or self.slack > MOST_SLACK:
                 return self._result(last)
             if last.verdict == "OPEN":
-                self.ask(max(2.0 * self.slack, SLACK * 1e-3))
+                self.ask(max(4.0 * self.slack, SLACK * 1e-3))
             found = smallest(self.aim, self.rows, found.z)
         return self._result(last._replace(verdict="OPEN", reason=last.reason or f"no proof in {MOST_ROUNDS} rounds"))
 

@@ -74,6 +74,8 @@ class Requirement:
             found = np.full((len(machine.poses), self.width) if self.has_poses else self.width, IMPOSSIBLE)
         if found.ndim == 1 and self.has_poses:
             found = found[:, None]
+        if np.isfinite(found).all():
+            return found
         return np.asarray(np.nan_to_num(found, nan=IMPOSSIBLE, posinf=REACHED, neginf=IMPOSSIBLE))
 
     def labels(self, machine: Candidate) -> Sequence[str]:

@@ -20,10 +20,10 @@ from ..poses import are_poses
 from ..targets import as_targets
 from ..track import track
 
-SAMPLES, DENSE = 300, 5000
+SAMPLES, DENSE = 300, 2000
 """Random poses of a region of which the worst are looked at next, and by which what has no proof is decided."""
 
-PLACES, AROUND, SIZES = 8, 24, (0.3, 0.1, 0.03, 0.01)
+PLACES, AROUND, SIZES = 16, 24, (0.3, 0.1, 0.03, 0.01)
 """How many of the worst are looked around, at how many poses, and how far away [half sizes of the region]."""
 
 
