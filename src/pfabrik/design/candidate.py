@@ -11,13 +11,15 @@ import numpy as np
 from ..answers.differential import singularity
 from ..answers.solution import Solution
 from ..arrays import Floats
+from ..description.joints import set_fields
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
 from ..ik import solve_ik
 from ..kinematics import MachineAt, VariedMachine, generic_of, task_of
 
-IMPOSSIBLE, REACHED = -1.0, 1.0
-"""Margins where there is no machine, and of a leg that reaches by far."""
+NOWHERE, IMPOSSIBLE, UNKNOWN, REACHED = -1e3, -1.0, -0.01, 1.0
+"""Rows where there is no machine, where a margin is infinitely broken, where what is no margin has no value, as a leg
+does not reach, and of a leg that reaches by far."""
 
 NARROW = 0.01
 """Half of a range below which margins are shares of this [L or rad]."""
@@ -88,6 +90,11 @@ class Candidate:
             return math.nan
 
     @property
+    def is_machine(self) -> bool:
+        """False where the file's expressions give no machine."""
+        return self._found is not None
+
+    @property
     def length(self) -> float:
         """L: the radius of the smallest sphere about the centres of all joints at home [length]."""
         return np.inf if self._found is None else self._found.characteristic_length
@@ -121,7 +128,7 @@ class Candidate:
     def _margins(self) -> Floats:
         dimensions, found = self.dimensions, self._found
         if found is None:
-            return np.full((len(self._all), len(dimensions.limits)), IMPOSSIBLE)
+            return np.full((len(self._all), len(dimensions.limits)), NOWHERE)
         margins = found.margins(self._all)
         if dimensions.reaching:
             rows, drives = np.array(dimensions.reaching).T
@@ -165,8 +172,8 @@ class Candidate:
     def factors(self) -> Floats:
         """Actuator speeds per speed along what the task sets, (n, k): singular values, L the unit of mixed lengths."""
         axes, is_length = self.dimensions.axes, self.dimensions.is_length
-        units = np.where(axes < 3, self.length, 1.0) / np.where(is_length, self.length, 1.0)[:, None]
         with np.errstate(all="ignore"):
+            units = np.where(axes < 3, self.length, 1.0) / np.where(is_length, self.length, 1.0)[:, None]
             found = self.rates[:, :, axes] * units
         is_known = np.isfinite(found).all(axis=(1, 2))
         values = np.full((len(found), min(found.shape[1:])), np.nan)
@@ -185,10 +192,13 @@ class Candidate:
     @cached_property
     def unlimited(self) -> Mechanism:
         """The machine without limits, which can be built where its limits exclude home; or InvalidMechanism."""
-        sketch = self.dimensions.source.sketch_with(self.dimensions.named(self.values))
-        own = self.dimensions.mechanism
+        own, source = self.dimensions.mechanism, self.dimensions.source
+        sketch = source.sketch_with(self.dimensions.named(self.values))
         joints = [dataclasses.replace(joint, range=None, cone=None) for joint in sketch.joints]
-        return dataclasses.replace(own, joints=tuple(joints), reference_point=sketch.reference_point)
+        found = dataclasses.replace(own, joints=tuple(joints), reference_point=sketch.reference_point)
+        values = {name: self.value_of(name) for name in own.dimensions}
+        set_fields(found, _source=dataclasses.replace(source, dimensions=values))
+        return found
 
     @cached_property
     def solution(self) -> Solution:

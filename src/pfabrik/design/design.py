@@ -22,7 +22,7 @@ from ..kinematics import varied
 from ..targets import Target
 from ..telling import OnProgress, telling
 from .candidate import Candidate, Dimensions
-from .keep import DEFAULT_SINGULARITY, HOME, Requirement, clearance, margin, requirement_of, singularity
+from .keep import DEFAULT_SINGULARITY, HOME, Requirement, clearance, margin, requirements_of, singularity
 from .reach import DENSE, SAMPLES, Reach
 from .result import Binding, Design, Designs, Round, Verdict
 from .search import KEPT, NEAR, Found, multipliers, smallest, spread
@@ -112,10 +112,10 @@ def design(
     require("design", "scipy", "calibrate")
     require_choice("about", about, ("base", "home"))
     bounds = _bounds(vary)
-    requirements = [requirement_of(each) for each in ([keep] if isinstance(keep, str | Requirement) else keep)]
+    requirements = requirements_of(keep)
     if isinstance(mechanism, Mapping | list | tuple):
-        machines = list(mechanism.items()) if isinstance(mechanism, Mapping) else [(m, m) for m in mechanism]
-        named = [(name if isinstance(name, str) else name.name, checked_mechanism(m)) for name, m in machines]
+        machines = list(mechanism.items()) if isinstance(mechanism, Mapping) else [("", m) for m in mechanism]
+        named = [(name or checked_mechanism(m).name, checked_mechanism(m)) for name, m in machines]
         if not named:
             raise InvalidArgument("mechanism", "no machine", "one or more")
         known = {name for _, m in named for name in m.dimensions}
@@ -297,7 +297,7 @@ class _Search:
         """The best from other starts, if the poses so far have left none near the last."""
         if found.violation <= KEPT:
             return found
-        others = spread(2 * STARTS, len(found.z), self.asked.rng)
+        others = spread(STARTS, len(found.z), self.asked.rng)
         tried = [self._settled(smallest(self.aim, self.rows, each)) for each in others]
         again = [Found(each.z, each.aim, max(0.0, -self.rows(each.z).min())) for each in (found, *tried)]
         return min(again, key=_rank)
@@ -418,6 +418,9 @@ def _silent(done: int, total: int) -> None:
 def _aim_of(asked: _Asked, minimise: Any) -> tuple[str, Callable[[Candidate], float]]:
     """An aim in words, and its value of a machine, which is not finite where it has none."""
     if callable(minimise):
+        value = minimise(asked.mechanism)
+        if not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise InvalidArgument("minimise", f"{value!r} of the machine as it is", "a function that gives a number")
 
         def of_machine(machine: Candidate) -> float:
             try:

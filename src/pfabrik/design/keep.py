@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from ..errors import InvalidArgument, InvalidMechanism
 from ..statics.accuracy import accuracy as accuracy_of
 from ..statics.forces import forces as forces_of
 from ..statics.stiffness import stiffness as stiffness_of
-from .candidate import IMPOSSIBLE, REACHED, Candidate
+from .candidate import IMPOSSIBLE, NOWHERE, REACHED, UNKNOWN, Candidate
 
 __all__ = [
     "Requirement",
@@ -71,12 +71,13 @@ class Requirement:
         try:
             found = np.asarray(self.function(machine), float)
         except InvalidMechanism:
-            found = np.full((len(machine.poses), self.width) if self.has_poses else self.width, IMPOSSIBLE)
+            found = np.full((len(machine.poses), self.width) if self.has_poses else self.width, np.nan)
         if found.ndim == 1 and self.has_poses:
             found = found[:, None]
         if np.isfinite(found).all():
             return found
-        return np.asarray(np.nan_to_num(found, nan=IMPOSSIBLE, posinf=REACHED, neginf=IMPOSSIBLE))
+        unknown = UNKNOWN if machine.is_machine else NOWHERE
+        return np.asarray(np.nan_to_num(found, nan=unknown, posinf=REACHED, neginf=IMPOSSIBLE))
 
     def labels(self, machine: Candidate) -> Sequence[str]:
         """What the columns are of."""
@@ -252,13 +253,16 @@ def relation(text: str) -> Requirement:
     return Requirement(text, rows, has_poses=False, expressions=(more, less))
 
 
-def requirement_of(given: Any) -> Requirement:
-    """A requirement that may be given as a text."""
-    if isinstance(given, str):
-        return relation(given)
-    if not isinstance(given, Requirement):
-        raise InvalidArgument("keep", repr(given), "requirements of pfabrik.keep, or texts such as 'rod >= 1.2*arm'")
-    return given
+def requirements_of(given: Any) -> list[Requirement]:
+    """Requirements, some of which may be given as texts."""
+    one_or_more = [given] if isinstance(given, str | Requirement) or not isinstance(given, Iterable) else given
+    found = []
+    for each in one_or_more:
+        if not isinstance(each, str | Requirement):
+            words = "requirements of pfabrik.keep, or texts such as 'rod >= 1.2*arm'"
+            raise InvalidArgument("keep", repr(each), words)
+        found.append(relation(each) if isinstance(each, str) else each)
+    return found
 
 
 def _rows_of(name: str, given: ArrayLike) -> Floats:

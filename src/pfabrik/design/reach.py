@@ -131,7 +131,7 @@ def rounded(region: PoseRegion, parameters: Floats) -> Floats:
     if region.turning == "tilt":
         round_parts.append(([3, 4], np.zeros(2), region.high[3]))
     for places, middle, radius in round_parts:
-        off = found[:, places] - middle
-        sizes = np.maximum(np.linalg.norm(off, axis=1), np.finfo(float).tiny)
-        found[:, places] = middle + off * np.minimum(1.0, radius / sizes)[:, None]
+        off = found[..., places] - middle
+        sizes = np.maximum(np.linalg.norm(off, axis=-1, keepdims=True), np.finfo(float).tiny)
+        found[..., places] = middle + off * np.minimum(1.0, radius / sizes)
     return found

@@ -84,7 +84,7 @@ class Design(Printed):
     dimensions : dict of str to float
         The dimensions, in the units of the file; if not found, those that break the wishes least.
     aim : float
-        What was to be small.
+        What was to be small; infinite where no machine was found at all.
     minimised : str
         What that was, in words.
     certificate : Certificate or None
@@ -153,7 +153,7 @@ class Design(Printed):
             "verdict": self.verdict,
             "dimensions": dict(self.dimensions),
             "minimised": self.minimised,
-            "aim": self.aim,
+            "aim": self.aim if np.isfinite(self.aim) else None,
             "other": self.other,
             "unproved": list(self.unproved),
             "binding": [as_plain(each._asdict()) for each in self.binding],
