@@ -73,6 +73,13 @@ PAGES = {
         "certify Certificate PoseRegion Enclosure largest Largest",
         "certify.certificates.Refutation",
     ),
+    "design": Page(
+        "Design",
+        "`design` finds dimensions for what a machine must do, with a proof of its margins. Requirements are in "
+        "`pf.keep`.",
+        "design Design Designs " + " ".join(f"keep.{name}" for name in pf.keep.__all__),
+        "design.result.Binding design.result.Round",
+    ),
     "first-order": Page(
         "First order",
         "What holds to first order at a configuration: freedoms, Jacobians, and distances from singularities. "
@@ -186,8 +193,9 @@ def section(heading: str, place: str) -> str:
 
 def place_of(name: str) -> str:
     """A name as the site finds it: public, but where a file or folder has this name too."""
-    place = Path(pf.__file__).parent / name.replace(".", "/")
-    if place.exists() or place.with_suffix(".py").exists():
+    place, head = Path(pf.__file__).parent / name.replace(".", "/"), name.partition(".")[0]
+    is_elsewhere = head != name and public(head).__name__ != f"pfabrik.{head}"  # a module that lies deeper
+    if place.exists() or place.with_suffix(".py").exists() or is_elsewhere:
         return f"{public(name).__module__}.{name.rpartition('.')[2]}"
     return f"pfabrik.{name}"
 
