@@ -18,6 +18,7 @@ from calls import calls
 from chains import chain_rows
 from closed_forms import Array, FiveBar, Struts
 from closure_engine import closed_chains, forward, joint_coordinates, modes
+from designs import designs
 from dynamics import dynamics
 from in_c import IS_THERE, InC
 from in_placo import peer
@@ -74,9 +75,11 @@ farther out; the engine in joint coordinates answers a few of them. PlaCo is a C
 (benchmarks/in_placo.py); its rows are left out where it is not installed, as are those of the viewer without headless
 Chromium. Forces of a motion close the loops and share them among the actuators; Pinocchio (benchmarks/dynamics.py), as
 the baseline where it is installed, has those of the open tree, with the rates of all joints as given. The platform with
-40 modes is that of Dietmaier (1998). Times of modes, of workspaces and of new processes are for all of it, not for a
-pose; first answers count the processor's time. The viewer's motions are timed in a page
-of Chromium, which draws without a graphics card, from the motion of the mouse until the answer has been drawn."""
+40 modes is that of Dietmaier (1998). Designs are next to SciPy's differential evolution on the same rows at the corners
+of the region, with a penalty, until it is within 1% of the design's aim, and until it ends by itself. Times of modes,
+of designs, of workspaces and of new processes are for all of it, not for a pose; first answers count the processor's
+time. The viewer's motions are timed in a page of Chromium, which draws without a graphics card, from the motion of the
+mouse until the answer has been drawn."""
 
 
 def agree(solution: pf.Solution, values: Array) -> None:
@@ -209,6 +212,7 @@ def main() -> None:
         *modes(min(runs, 5)),
         *workspaces(rng, runs, 20_000 if given.quick else 200_000),
         *proofs(runs),
+        *designs(runs),
         *kept_apart(runs),
         *maps(rng, min(runs, 5), 2000 if given.quick else 10_000),
         *dynamics(np.random.default_rng(4), min(runs, 5), 500 if given.quick else 2000),
