@@ -84,7 +84,7 @@ def counted(answer: Callable[[], object]) -> tuple[object, int]:
 
 
 def evolved(start: pf.Mechanism, enough: float) -> pf.Mechanism:
-    """A machine with short struts by differential evolution at the corners of the region, with a penalty on rows below 0."""
+    """A machine with short struts by differential evolution at corners of the region, with a penalty below 0."""
     machines, bounds = varied(start, tuple(VARY)), np.array(list(VARY.values()))
     corners = np.array(list(product(*[(-1.0, 1.0)] * 6))) * [*[TRAVEL] * 3, *[TURN] * 3]
     poses = pf.pose(corners[:, :3], rotvec=corners[:, 3:])
