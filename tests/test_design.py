@@ -250,3 +250,162 @@ def test_coaxial_five_bar_reaches_an_annulus(
 
 
 # What no design can have.
+def test_contradicting_wishes_are_named() -> None:
+    """A pose 20 mm up and down from home needs struts between two lengths, which a ratio of 1.02 is not."""
+    poses = np.array([[0.0, 0.0, -20.0], [0.0, 0.0, 20.0]])
+    found = pf.design(
+        template("6-UPS"),
+        {"shortest": (100, 300), "longest": (110, 320)},
+        poses,
+        keep=[keep.stroke(1.02)],
+        about="home",
+    )
+    assert found.verdict == "NOT FOUND" and not found and found.mechanism is None
+    named = {each.requirement for each in found.binding}
+    assert {"stroke ratio <= 1.02", "margin >= 0"} <= named
+    assert "stroke ratio" in found.reason
+    assert "stands against" in str(found.table())
+    assert found.plot().axes
+    with pytest.raises(pf.errors.InvalidArgument, match="NOT FOUND"):
+        found.save("none.toml")
+
+
+def test_what_is_out_of_reach_of_all_machines_is_not_found() -> None:
+    found = pf.design(template("delta"), {"rod": (100, 400), "arm": (40, 200)}, [[4000.0, 0.0, 0.0]])
+    assert found.verdict == "NOT FOUND"
+    assert {"margin >= 0", "rod <= 400"} <= {each.requirement for each in found.binding}
+    assert math.isfinite(found.aim)
+
+
+def test_a_bound_that_binds_is_named_and_the_machine_is_saved(folder: Path) -> None:
+    found = pf.design(template("delta"), {"rod": (240, 300)}, SLIGHT, about="home")
+    assert found.verdict == "PROVED"
+    assert found.dimensions["rod"] == pytest.approx(240)
+    assert [(each.requirement, each.limit) for each in found.binding] == [("rod >= 240", "bound")]
+    found.save("found.toml")
+    text = Path("found.toml").read_text()
+    assert 'across = "base_radius + arm - platform_radius"' in text
+    again = pf.load("found.toml")
+    assert dict(again.dimensions) == dict(found.mechanism.dimensions)
+    assert np.array_equal(again.home_pose, found.mechanism.home_pose)
+    assert found.to_dict()["dimensions"] == found.dimensions
+
+
+def test_machines_are_ranked_and_none_is_lost() -> None:
+    large = template("delta").with_dimensions(arm=120)
+    vary = {"rod": (240, 300), "longest": (250, 300)}
+    found = pf.design([template("6-UPS"), large, template("delta")], vary, SLIGHT, about="home")
+    assert [type(each) for each in found] == [pf.Design] * 3
+    assert [each.aim for each in found] == sorted(each.aim for each in found)
+    named = pf.design({"short": template("delta"), "long": large}, {"rod": (240, 300)}, SLIGHT, about="home")
+    assert str(named.table()).index("short") < str(named.table()).index("long")
+
+
+def test_a_front_falls_from_one_design_to_the_other() -> None:
+    vary = {"base_radius": (60, 120), "arm": (60, 150), "rod": (150, 300)}
+    reach = PoseRegion.cylinder([0, 0, 0], 40, 20)
+    asked: dict[str, Any] = {"keep": [keep.singularity(None)], "about": "home"}
+    found = pf.design(template("delta"), vary, reach, minimise=("rod", "arm"), **asked)
+    first, second = [each.aim for each in found.front], [each.other for each in found.front]
+    assert len(first) >= 3
+    assert all(np.diff(first) >= -1e-3 * first[0])
+    assert all(np.diff(second) <= 1e-3 * second[0])
+    ends = [pf.design(template("delta"), vary, reach, minimise=name, **asked).aim for name in ("rod", "arm")]
+    assert [first[0], second[-1]] == pytest.approx(ends, rel=5e-3)
+
+
+# Requirements of `keep` on a delta: what `pf` measures at random poses of the design is within the bound.
+
+DELTA = {"base_radius": (50, 200), "arm": (40, 200), "rod": (100, 400), "platform_radius": (20, 80)}
+CYLINDER = PoseRegion.cylinder([0, 0, 0], 60, 40)
+
+
+MEASURES: dict[str, tuple[Any, Any]] = {
+    "margin": (keep.margin(0.2), lambda s: pf.feasibility(s.mechanism, s.pose).margin.min() - 0.2),
+    "singularity": (
+        keep.singularity(0.3),
+        lambda s: min(pf.singularity(s).serial.min(), pf.singularity(s).parallel.min()) - 0.3,
+    ),
+    "speed": (
+        keep.speed([[100, 0, 0], [0, 100, 0]], 1.2),
+        lambda s: 1.2 - np.abs(pf.inverse_jacobian(s)[:, :, :2] * 100).max(),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MEASURES)
+def test_what_is_kept_is_kept_at_random_poses(name: str) -> None:
+    requirement, measure = MEASURES[name]
+    found = pf.design(template("delta"), DELTA, CYLINDER, keep=[requirement], about="home")
+    plain = pf.design(template("delta"), DELTA, CYLINDER, about="home")
+    assert found.verdict == plain.verdict == "PROVED"
+    assert found.aim > plain.aim * 1.001
+    for each, holds in ((found, True), (plain, False)):
+        poses = random_poses(each, CYLINDER, 2000)
+        from_home = poses[:, :3, 3] - each.mechanism.home_pose[:3, 3]
+        poses = poses[np.hypot(*from_home[:, :2].T) <= 60]
+        answer = pf.solve_ik(each.mechanism, poses)
+        assert (np.asarray(answer.status) == Status.REACHED).all()
+        assert (measure(answer) >= -1e-3) == holds
+
+
+def test_a_track_is_proved_between_its_steps() -> None:
+    steps = np.array([[-40.0, 0.0, 195.0], [40.0, 0.0, 195.0]])
+    path = pf.track(template("6-UPS"), steps)
+    found = pf.design(template("6-UPS"), {"longest": (200, 300), "shortest": (100, 200)}, path, minimise="longest")
+    assert found.verdict == "PROVED"
+    between = np.linspace(steps[0], steps[1], 101)
+    assert (np.asarray(pf.solve_ik(found.mechanism, between).status) == Status.REACHED).all()
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "3-RRR", "3-RPR"])
+def test_proofs_of_three_freedoms_are_not_refuted(name: str) -> None:
+    machine = template(name)
+    source = machine.__dict__["_source"].independent
+    vary = {each: (0.8 * machine.dimensions[each], 1.25 * machine.dimensions[each]) for each in source[:3]}
+    flat = name != "linear-delta"
+    region = PoseRegion.box([-10, -10, 0], [10, 10, 0], rotation=[0, 0, 0.1]) if flat else SLIGHT
+    found = pf.design(machine, vary, region, about="home")
+    assert found.verdict == "PROVED"
+    poses = random_poses(found, region, 20_000)
+    assert (np.asarray(pf.solve_ik(found.mechanism, poses).status) == Status.REACHED).all()
+
+
+def test_a_tilting_machine_stays_open_and_says_why() -> None:
+    machine = template("3-RPS")
+    region = PoseRegion.box([0, 0, -10], [0, 0, 10], tilt=0.1)
+    asked: dict[str, Any] = {"keep": [keep.singularity(None)], "about": "home"}
+    found = pf.design(machine, {"height": (150, 250), "longest": (200, 400)}, region, **asked)
+    assert found.verdict == "OPEN" and "yaw" in found.reason
+    assert len(found.rounds) <= 3
+
+
+@pytest.mark.parametrize(
+    "changed, says",
+    [
+        ({"vary": {"arms": (1, 2)}}, "arms"),
+        ({"vary": {}}, "no dimension"),
+        ({"vary": {"arm": (91, 90)}}, "91 to 90"),
+        ({"vary": {"arm": 90}}, "a lowest and a highest"),
+        ({"reach": np.full((4, 4), np.nan)}, "reach"),
+        ({"reach": np.zeros((0, 3))}, "reach"),
+        ({"reach": PoseRegion.box([-1] * 3, [1] * 3, rotation=0.1)}, "rotation about x"),
+        ({"about": "origin"}, "origin"),
+        ({"keep": "arm"}, "<= or >="),
+        ({"keep": "arm >= foo"}, "foo"),
+        ({"keep": 3}, "requirements of pfabrik.keep"),
+        ({"keep": [keep.margin]}, "requirements of pfabrik.keep"),
+        ({"minimise": "foo"}, "foo"),
+        ({"minimise": 3}, "minimise"),
+        ({"minimise": ("size",) * 3}, "3 aims"),
+        ({"minimise": lambda machine: math.nan}, "nan"),
+        ({"mechanism": []}, "no machine"),
+        ({"mechanism": [3]}, "Mechanism"),
+    ],
+)
+def test_errors_are_one_sentence(changed: dict[str, Any], says: str) -> None:
+    asked = {"mechanism": template("delta"), "vary": {"arm": (80, 100)}, "reach": SLIGHT, "about": "home"}
+    with pytest.raises((pf.errors.InvalidArgument, pf.errors.UnknownName)) as raised:
+        pf.design(**(asked | changed))
+    assert says in str(raised.value)
+    assert "\n" not in str(raised.value)
