@@ -57,7 +57,7 @@ class Dimensions:
         task = task_of(mechanism)
         self.axes = np.flatnonzero([*task.axes, *(() if mechanism.end_effector_is_joint else task.turns)])
         freedoms = generic_of(mechanism).mobility.platform
-        self.is_direct = len(mechanism.drives) == len(self.axes) == freedoms and task.rotations in (0, 3)
+        self.is_direct = len(mechanism.drives) == len(self.axes) == freedoms and task.rotations != 2
 
     def at(self, values: Floats) -> MachineAt | None:
         """The machine at values (p,); None where the file's expressions give none."""

@@ -223,6 +223,7 @@ class _Search:
 
     def __init__(self, asked: _Asked, minimise: Aim, extra: Sequence[Requirement] = ()) -> None:
         self.asked, self.requirements = asked, [*asked.requirements, *extra]
+        self.asked_for = [each for each in self.requirements if not each.has_poses or each.kind == "margin"]
         self.words, self._aim = _aim_of(asked, minimise)
         self.poses, self.slack = asked.reach.first, 0.0 if asked.reach.region is None else SLACK
         self._kept: dict[bytes, Candidate] = {}
@@ -244,15 +245,17 @@ class _Search:
         return value / self.unit if np.isfinite(value) else 1e6
 
     def rows(self, z: Floats) -> Floats:
-        """All rows, (m,)."""
-        return np.concatenate([rows.ravel() for _, rows in self._parts(self.candidate(z), self.slack)])
+        """All rows, (m,): of requirements that samples have broken, of all margins, and of dimensions alone."""
+        return np.concatenate([rows.ravel() for _, rows in self._parts(self.candidate(z))])
 
-    def _parts(self, machine: Candidate, slack: float) -> list[tuple[Requirement, Floats]]:
-        return [(each, each.rows(machine) - slack * (each.kind == "margin")) for each in self.requirements]
+    def _parts(self, machine: Candidate) -> list[tuple[Requirement, Floats]]:
+        return [(each, each.rows(machine) - self.slack * (each.kind == "margin")) for each in self.asked_for]
 
-    def look_at(self, poses: Floats) -> None:
-        """Add poses."""
+    def look_at(self, poses: Floats, z: Floats) -> None:
+        """Add poses, and the requirements that the machine at z breaks there."""
+        machine, known = self.asked.at(z, poses), self.asked_for
         self.poses = np.concatenate([self.poses, poses])
+        self.asked_for = [each for each in self.requirements if each in known or each.rows(machine).min() < -KEPT]
         self._kept.clear()
 
     def ask(self, slack: float) -> None:
@@ -311,7 +314,7 @@ class _Search:
             broken = worst < -10.0 * KEPT
             if not broken.any():
                 return found
-            self.look_at(poses[broken][:WORST])
+            self.look_at(poses[broken][:WORST], found.z)
             found = smallest(self.aim, self.rows, found.z)
         return found
 
@@ -320,7 +323,8 @@ class _Search:
 
         def least(poses: Floats) -> Floats:
             machine = self.asked.at(found.z, poses)
-            rows = [rows.min(axis=1, initial=np.inf) for each, rows in self._parts(machine, slack) if each.has_poses]
+            of_poses = [each for each in self.requirements if each.has_poses]
+            rows = [each.rows(machine).min(axis=1) - slack * (each.kind == "margin") for each in of_poses]
             return np.asarray(np.min(rows, axis=0))
 
         return self.asked.reach.worst(least, count)
@@ -334,7 +338,7 @@ class _Search:
             return _Checked("OPEN", found, reason=f"no machine has these dimensions: {fault}")
         poses, worst = self._worst(found, DENSE, 0.0)
         if worst[0] < -10.0 * KEPT:
-            self.look_at(poses[:WORST])
+            self.look_at(poses[:WORST], found.z)
             refuted_by = reach.at(mechanism, poses)[0]
             return _Checked("REFUTED", found, mechanism, None, refuted_by, "a sample breaks a requirement")
         if reach.region is None:
@@ -348,7 +352,7 @@ class _Search:
             return _Checked("CHECKED", found, mechanism)
         if certificate.refutation is not None:
             pose = certificate.refutation.pose
-            self.look_at(reach.at(mechanism, pose[None], -1.0))
+            self.look_at(reach.at(mechanism, pose[None], -1.0), found.z)
             return _Checked("REFUTED", found, mechanism, certificate, pose, "a pose is not reached")
         if not certificate:
             is_final = not len(certificate.open_boxes)
@@ -393,7 +397,7 @@ class _Search:
         shares = multipliers(self.aim if is_found else None, self.rows, found.z, near)
         total = sum(float(part.sum()) for part in shares) or 1.0
         machine, binding, first = self.candidate(found.z), [], 0
-        for each, rows in self._parts(machine, self.slack):
+        for each, rows in self._parts(machine):
             for row in np.flatnonzero(shares.rows[first : first + rows.size] > BINDS * total).tolist():
                 pose, column = divmod(row, rows.shape[-1])
                 where = machine.poses[pose] if each.has_poses else None
@@ -456,7 +460,7 @@ def _front(asked: _Asked, first: Aim, second: Aim) -> Design:
     if not all(ends):
         return ends[0] if not ends[0] else ends[1]
     most, least = second_of(ends[0]), second_of(ends[1])
-    designs = [replace(ends[0], other=most)]
+    designs, lowest = [replace(ends[0], other=most)], most
     for bound in np.linspace(most, least, FRONT)[1:]:
         eased = bound + 1e-4 * abs(most - least)
 
@@ -464,6 +468,7 @@ def _front(asked: _Asked, first: Aim, second: Aim) -> Design:
             return np.array([(eased - other(machine)) / (abs(most) or 1.0)])
 
         found = _Search(asked, first, [Requirement(f"{words} <= {eased:.6g}", kept, has_poses=False)]).answer()
-        if found:
-            designs.append(replace(found, other=second_of(found)))
+        if found and (other_of := second_of(found)) < lowest:
+            designs.append(replace(found, other=other_of))
+            lowest = other_of
     return replace(designs[0], front=tuple(designs), minimised=f"{designs[0].minimised}, {words}")

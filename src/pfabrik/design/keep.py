@@ -127,6 +127,8 @@ def stroke(ratio: float) -> Requirement:
 def singularity(least: float | None = DEFAULT_SINGULARITY) -> Requirement:
     """A least distance from singularities, serial and parallel ones, as `pfabrik.singularity` measures it.
 
+    Where actuators follow the task's coordinates one by one, only these count, not constraints that are lost.
+
     Parameters
     ----------
     least : float or None
