@@ -43,7 +43,7 @@ print(*sorted({each.requirement for each in small.binding if each.share > 0.05})
 # ## And how fast
 #
 # Where rods lie flat, carriages race: one moves many times as fast as the nozzle. Ask for no more than 300 mm/s there
-# where the nozzle moves at 200 mm/s, whichever way. Speeds have no proof: 5,000 samples decide, and the result says so.
+# where the nozzle moves at 200 mm/s, whichever way. Speeds have no proof: samples decide, and the result says so.
 angle = np.radians([0, 60, 120])  # and the opposite ways, as fast
 ways = 200 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
 quick = pf.design(printer, vary, build, keep=[*keep, pf.keep.speed(ways, 300)], minimise=towers)
