@@ -115,6 +115,7 @@ def _bounds(vary: Sequence[str]) -> dict[str, tuple[float, float]]:
     bounds: dict[str, tuple[float, float]] = {}
     for words in vary:
         name, equals, ends = words.partition("=")
+        name = name.strip()
         if not equals or name in bounds:
             raise click.UsageError(f"--vary: found '{words}'; expected NAME=MIN:MAX, each dimension once")
         low, high = numbers_of(f"--vary {name}", ends, (2,), ":")
