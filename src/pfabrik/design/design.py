@@ -396,9 +396,10 @@ class _Search:
         near = NEAR if is_found else NEAR - found.violation
         shares = multipliers(self.aim if is_found else None, self.rows, found.z, near)
         total = sum(float(part.sum()) for part in shares) or 1.0
+        least = BINDS * (total if is_found else float(shares.rows.sum()))  # bounds where machines end outweigh all rows
         machine, binding, first = self.candidate(found.z), [], 0
         for each, rows in self._parts(machine):
-            for row in np.flatnonzero(shares.rows[first : first + rows.size] > BINDS * total).tolist():
+            for row in np.flatnonzero(shares.rows[first : first + rows.size] > least).tolist():
                 pose, column = divmod(row, rows.shape[-1])
                 where = machine.poses[pose] if each.has_poses else None
                 share = float(shares.rows[first + row] / total)
