@@ -33,6 +33,9 @@ HEXAPOD: dict[str, Any] = {
     "minimise": "(longest + 2*base_radius)/100",
     "about": "home",
 }
+PRINTER = {"arm_length": (120, 500), "delta_radius": (40, 250), "position_endstop": (200, 400), "travel": (150, 600)}
+BUILD = PoseRegion.cylinder([0, 0, 100], 100, 200)
+TOWERS = "height + arm_length/10"
 FIVE_BAR = """
 schema = 1
 name = "Coaxial five-bar"
@@ -321,6 +324,13 @@ def test_a_front_falls_from_one_design_to_the_other() -> None:
     assert all(np.diff(second) <= 1e-3 * second[0])
     ends = [pf.design(template("delta"), vary, reach, minimise=name, **asked).aim for name in ("rod", "arm")]
     assert [first[0], second[-1]] == pytest.approx(ends, rel=5e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 6])
+def test_other_starts_find_what_one_start_finds(seed: int) -> None:
+    found = [pf.design(template("linear-delta"), PRINTER, BUILD, minimise=TOWERS, seed=each) for each in (1, seed)]
+    assert [each.verdict for each in found] == ["PROVED"] * 2
+    assert found[0].aim == pytest.approx(found[1].aim, rel=1e-4)
 
 
 # Requirements of `keep` on a delta: what `pf` measures at random poses of the design is within the bound.

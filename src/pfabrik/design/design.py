@@ -33,6 +33,9 @@ MOST_ROUNDS, MOST_INNER = 20, 12
 STARTS, SCREENED = 3, 64
 """Starts beside the machine as described: of so many spread points those that break the least."""
 
+MOST_ANEW = 2
+"""How often other starts are tried: those of the first time find the poses that the second begins with."""
+
 WORST = 3
 """Poses that are added at a time."""
 
@@ -287,23 +290,28 @@ class _Search:
 
     def _first(self) -> Found:
         """The best of several starts."""
+        starts = self._starts()
+        unit = abs(self._aim(self.candidate(starts[0])))
+        self.unit = unit if unit and np.isfinite(unit) else 1.0
+        return min((smallest(self.aim, self.rows, each) for each in starts), key=_rank)
+
+    def _starts(self) -> list[Floats]:
+        """The machine as described, and the spread points that break the least at the poses so far."""
         dimensions = self.asked.dimensions
         z = np.clip((dimensions.own - dimensions.low) / (dimensions.high - dimensions.low), 0.0, 1.0)
         others = spread(SCREENED, len(z), self.asked.rng)
         worst = np.array([self.rows(each).min(initial=0.0) for each in others])
-        starts = [z, *others[np.argsort(-worst, kind="stable")[:STARTS]]]
-        unit = abs(self._aim(self.candidate(z)))
-        self.unit = unit if unit and np.isfinite(unit) else 1.0
-        return min((smallest(self.aim, self.rows, each) for each in starts), key=_rank)
+        return [z, *others[np.argsort(-worst, kind="stable")[:STARTS]]]
 
     def _anew(self, found: Found) -> Found:
         """The best from other starts, if the poses so far have left none near the last."""
-        if found.violation <= KEPT:
-            return found
-        others = spread(STARTS, len(found.z), self.asked.rng)
-        tried = [self._settled(smallest(self.aim, self.rows, each)) for each in others]
-        again = [Found(each.z, each.aim, max(0.0, -self.rows(each.z).min())) for each in (found, *tried)]
-        return min(again, key=_rank)
+        for _ in range(MOST_ANEW):
+            if found.violation <= KEPT:
+                return found
+            tried = [self._settled(smallest(self.aim, self.rows, each)) for each in self._starts()]
+            again = [Found(each.z, each.aim, max(0.0, -self.rows(each.z).min())) for each in (found, *tried)]
+            found = min(again, key=_rank)
+        return found
 
     def _settled(self, found: Found) -> Found:
         """The smallest aim at the poses so far and at the worst samples, again while there are such."""
