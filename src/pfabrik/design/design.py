@@ -48,8 +48,8 @@ MOST_SLACK = 0.02
 BINDS = 1e-3
 """Share of a multiplier from which a row binds."""
 
-FRONT = 7
-"""Designs of a front."""
+FRONT, APART = 7, 1e-5
+"""Designs of a front at most, and by what share the second aim falls from one to the next at least."""
 
 Aim = str | Callable[[Mechanism], float]
 
@@ -477,7 +477,7 @@ def _front(asked: _Asked, first: Aim, second: Aim) -> Design:
             return np.array([(eased - other(machine)) / (abs(most) or 1.0)])
 
         found = _Search(asked, first, [Requirement(f"{words} <= {eased:.6g}", kept, has_poses=False)]).answer()
-        if found and (other_of := second_of(found)) < lowest:
-            designs.append(replace(found, other=other_of))
+        if found and (other_of := second_of(found)) < lowest - APART * abs(lowest):
+            designs = [each for each in designs if each.aim < found.aim] + [replace(found, other=other_of)]
             lowest = other_of
     return replace(designs[0], front=tuple(designs), minimised=f"{designs[0].minimised}, {words}")
