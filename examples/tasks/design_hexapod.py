@@ -49,7 +49,7 @@ for name, value in found.dimensions.items():
 # What holds the size there: to have shorter struts, ask for less of these.
 print(sorted({each.requirement for each in found.binding if each.share > 0.05}))
 
-# Distances from singularities have no proof; thousands of samples decide, and the result says so.
+# Distances from singularities have no proof; samples decide, and the result says so.
 print("by samples:", *found.unproved)
 
 # The machine as it came, and as it is now; mind the scale.
