@@ -30,14 +30,11 @@ ABOUT = "Where positions count from: the base's origin, or the reference point a
 WHAT = "size, stroke, or an expression of dimensions; twice for a front. Default: size."
 
 
-def dimensions(mechanism: pf.Mechanism) -> tuple[str, ...]:
-    """Names of the dimensions of a machine's file."""
-    return tuple(mechanism.dimensions)
-
-
 @click.command()
 @click.argument("mech", type=MECH, nargs=-1, required=True)
-@named_values("--vary", "vary", dimensions, "A dimension and its bounds, in its units.", "NAME=MIN:MAX", required=True)
+@named_values(
+    "--vary", "vary", lambda m: m.dimensions, "A dimension and its bounds, in its units.", "NAME=MIN:MAX", required=True
+)
 @regioned
 @click.option("--about", type=click.Choice(["base", "home"]), default="base", show_default=True, help=ABOUT)
 @click.option("--margin", type=FINITE, metavar="M", help="Share of half its range that every limit keeps. Default: 0.")
@@ -80,7 +77,10 @@ def design(
     if len(minimise) > 2:
         raise click.UsageError(f"--minimise: found it {len(minimise)} times; expected once, or twice for a front")
     bounds, machines = _bounds(vary), {name: load(name) for name in mech}
-    _require_dimensions(machines, bounds)
+    for name, mechanism in machines.items():
+        if not mechanism.dimensions or (len(machines) > 1 and not bounds.keys() & mechanism.dimensions):
+            known = ", ".join(mechanism.dimensions) or "dimensions: `pfabrik new --list` has kinds of files with some"
+            raise click.UsageError(f"--vary: found none of {name}; expected {known}")
     first = machines[mech[0]]
     reach: Any = region.of(first)
     if region.path is not None:
@@ -121,17 +121,6 @@ def _bounds(vary: Sequence[str]) -> dict[str, tuple[float, float]]:
         low, high = numbers_of(f"--vary {name}", ends, (2,), ":")
         bounds[name] = low, high
     return bounds
-
-
-def _require_dimensions(machines: Mapping[str, pf.Mechanism], bounds: Mapping[str, object]) -> None:
-    """Stop at a machine without dimensions, and of several at one that has none of those that vary."""
-    for name, mechanism in machines.items():
-        if not mechanism.dimensions:
-            instead = "`pfabrik new --list` has kinds of files with dimensions"
-            raise click.ClickException(f"{name}: found no dimensions in it; {instead}")
-        if len(machines) > 1 and not set(bounds) & set(mechanism.dimensions):
-            known = ", ".join(mechanism.dimensions)
-            raise click.UsageError(f"--vary: found no dimension of {name}; expected one or more of {known}")
 
 
 def _requirements(kept: Mapping[str, Any]) -> list[Any]:
