@@ -125,6 +125,18 @@ URDF = """
 """
 
 
+def test_armature_and_friction_of_mujocos_joints_are_those_of_the_drives() -> None:
+    text = """<mujoco><default><joint armature="0.002"/></default><worldbody>
+      <body name="a"><joint name="j" axis="0 1 0" damping="0.3" frictionloss="0.1"/><inertial pos="1 0 0" mass="2"
+        diaginertia="1 1 1"/><body name="b"><joint name="k" type="slide" axis="1 0 0" armature="0"/>
+        <inertial pos="1 0 0" mass="2" diaginertia="1 1 1"/></body></body>
+      </worldbody><actuator><motor joint="j"/><motor joint="k"/></actuator></mujoco>"""
+    read = pf.interop.from_mjcf(text, base="world", end_effector="b", length_unit="mm").mechanism
+    turned, pushed = (read.joint(name) for name in "jk")
+    assert (turned.rotor_inertia, turned.gear, turned.friction) == (0.002, None, (0.1, 0.3))
+    assert (pushed.rotor_inertia, pushed.friction) == (None, None)
+
+
 def test_masses_and_drives_of_a_robot_description_are_read() -> None:
     read = pf.interop.from_urdf(URDF, base="base", end_effector="t", actuated=["j", "k"], length_unit="mm")
     first, second = read.mechanism.masses

@@ -16,6 +16,7 @@ from ..description.joints import Joint
 from ..errors import UnknownName
 from .couplings import Coupling
 from .digits import ModelDigits, Rounding, worst
+from .driving import Rates
 from .names import unique
 from .notes import Note, note_names
 from .opened import Loop
@@ -114,6 +115,17 @@ class MjcfModel(CompiledModel):
     def driven(self) -> list[str]:
         """Names of the joints that are driven, in the order of the actuators."""
         return [self.joint(int(index)) for index in self.model.actuator_trnid[:, 0]]
+
+    def rates(self) -> dict[str, Rates]:
+        """The armature and the friction of each hinge and slide, by its name."""
+        own = (self.model.dof_armature, self.model.dof_frictionloss, self.model.dof_damping)
+        found: dict[str, Rates] = {}
+        for index, kind in enumerate(self.model.jnt_type):
+            if self.is_slide[index] or bool(kind == self.mujoco.mjtJoint.mjJNT_HINGE):
+                armature, dry, viscous = (float(each[self.model.jnt_dofadr[index]]) for each in own)
+                friction = (dry, viscous) if dry or viscous else None
+                found[self.joint(index)] = Rates(rotor_inertia=armature or None, friction=friction)
+        return found
 
     def places(self) -> dict[str, tuple[str, Floats]]:
         """Body or site -> its body, and where it is (3,) [m]."""

@@ -17,13 +17,14 @@ from .xml_reading import fault, number, number_text
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 BY_GEOMS = ("inertiafromgeom", "inertiagrouprange")
 WEIGHING = ("mass", "density", "shellinertia", "group")
+OWN = ("armature", "frictionloss", "damping")
 KEPT: dict[str, tuple[str, ...]] = {
     "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq", *BY_GEOMS),
     "default": ("class",),
     "body": ("name", "childclass", *PLACE),
     "frame": ("name", "childclass", *PLACE),
     "replicate": ("count", "offset", "euler", "sep", "childclass"),
-    "joint": ("name", "class", "type", "pos", "axis", "range", "limited", "ref"),
+    "joint": ("name", "class", "type", "pos", "axis", "range", "limited", "ref", *OWN),
     "freejoint": ("name",),
     "inertial": ("mass", "diaginertia", "fullinertia", *PLACE),
     "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *WEIGHING, *PLACE),
