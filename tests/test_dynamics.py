@@ -466,6 +466,25 @@ def test_refusals_name_what_is_lacking() -> None:
     assert "2" in str(refused.value)
 
 
+def test_no_mass_is_felt_where_the_motion_cannot_be_made() -> None:
+    length = 0.3
+    at = {"A": (0, 0, 0), "B": (0.1, 0, 0), "C": (0.1 + length, 0, 0), "D": (0.1 + length, 0, 0)}
+    ends = {"A": ("base", "crank"), "B": ("crank", "rod"), "C": ("rod", "slider"), "D": ("slider", "base")}
+    joints = [
+        pf.Joint(name, "prismatic" if name == "D" else "revolute", ends[name], at=at[name],
+                 axis=(1, 0, 0) if name == "D" else (0, 0, 1), actuated=name == "A")
+        for name in at
+    ]  # fmt: skip
+    crank = pf.Mechanism("crank", joints, "slider", at["D"], task=("x",), length_unit="m")
+    crank = crank.with_masses([pf.Mass("crank", 0.0), pf.Mass("rod", 0.0), pf.Mass("slider", 2.0, at["C"])])
+    solutions = pf.solve_fk(crank, [[0.0], [1e-3], [0.5]])  # from the dead centre on
+    assert np.isnan(np.ravel(pf.mass_matrix(solutions))).tolist() == [True, False, False]
+    angle = np.array([0.0, 1e-3, 0.5])
+    rate = -0.1 * np.sin(angle) * (1 + 0.1 * np.cos(angle) / np.sqrt(length**2 - (0.1 * np.sin(angle)) ** 2))
+    np.testing.assert_allclose(np.ravel(pf.mass_matrix(solutions, "actuators")), 2 * rate**2, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(np.ravel(pf.mass_matrix(solutions, "D")), [np.nan, 2, 2], rtol=1e-9)
+
+
 def test_at_singular_poses_a_reason_is_given() -> None:
     machine = weighed(pf.load("five_bar").without_limits())
     a, b, c = (np.array(machine.joint(name).at) for name in ("p1", "p2", "p3"))

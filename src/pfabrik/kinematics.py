@@ -11,7 +11,7 @@ Graph         tree_of, column_joints, columns; passive_series; links_of
 Masses        inertias_of, BodyInertia
 Motion        home_coordinates, displacements, joint_centres, placed, end_effector_pose; joint_path, JointPath
               tilt_axis
-First order   generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
+First order   around_home, generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
               actuator_units, rate_units; parallel_signs
 Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes
 """
@@ -42,7 +42,7 @@ from .motion.displacements import (
 from .motion.fitting_task import tilt_axis
 from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
-from .motion.mobility import generic_of, internal_rates
+from .motion.mobility import around_home, generic_of, internal_rates
 from .motion.singularities import parallel_signs
 from .varied import MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
 
@@ -58,6 +58,7 @@ __all__ = [
     "VariedGeometry",
     "VariedMachine",
     "actuator_units",
+    "around_home",
     "column_joints",
     "columns",
     "cut_loops",

@@ -7,10 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..answers.solution import Solution, checked_solution
-from ..arrays import Floats
+from ..arrays import Floats, Ints
+from ..description.mechanism import Mechanism
 from ..files.units import metres_of
+from ..kinematics import JointRates, around_home, end_effector_pose, joint_path, model_of
+from ..statics.joint_balance import pairs_at
 from ..statics.loads import BodyLoads, checked_loads
-from .asked_motion import checked_at
+from ..tolerances import TOLERANCES
+from .asked_motion import axes_of, checked_at
 from .moving_rows import MovingRows
 from .weights import loads_of
 
@@ -36,7 +40,8 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     Returns
     -------
     array (..., k, k)
-        NaN where there is no configuration, or the loops are in a constraint singularity.
+        NaN where there is no configuration, the loops are in a constraint singularity, or some motion that `at` has
+        elsewhere cannot be made: there the machine resists it without bound.
 
     Raises
     ------
@@ -52,4 +57,20 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     found = moving.efforts(["matrices"])
     matrices = np.full((len(rows.status), *found.matrices.shape[1:]), np.nan)
     matrices[known] = moving.in_si(found.matrices)
+    few = np.flatnonzero(np.linalg.matrix_rank(np.nan_to_num(found.matrices), TOLERANCES.rank) < matrices.shape[1])
+    if len(few):
+        usual = _made(mechanism, at, around_home(mechanism)).max()
+        matrices[known[few[_made(mechanism, at, q[few]) < usual]]] = np.nan
     return matrices.reshape(*solution.shape, *matrices.shape[1:])
+
+
+def _made(mechanism: Mechanism, at: str | tuple[str, ...], q: Floats) -> Ints:
+    """In how many ways a machine moves what `at` names, at coordinates q (n, c), (n,)."""
+    first = JointRates(model_of(mechanism), q)
+    twists, rates = pairs_at(mechanism, first)
+    if at == "task":
+        rates = axes_of(mechanism, at, end_effector_pose(mechanism, q))[..., : twists.shape[1]] @ twists
+    elif at != "actuators":
+        rates = first.pairs[:, joint_path(mechanism, at).columns]
+    sizes, least = np.linalg.svd(rates, compute_uv=False), TOLERANCES.singular
+    return np.asarray((sizes > least * np.maximum(sizes[:, :1], least)).sum(axis=1))
