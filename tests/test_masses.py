@@ -137,6 +137,16 @@ def test_armature_and_friction_of_mujocos_joints_are_those_of_the_drives() -> No
     assert (pushed.rotor_inertia, pushed.friction) == (None, None)
 
 
+@pytest.mark.parametrize(("effort", "most"), [("<effort>12</effort>", 12.0), ("<effort>-1</effort>", None), ("", None)])
+def test_effort_and_friction_of_an_sdf_are_read(effort: str, most: float | None) -> None:
+    text = f"""<sdf version="1.9"><model name="arm"><link name="base"/><link name="a"/>
+      <joint name="w" type="fixed"><parent>world</parent><child>base</child></joint>
+      <joint name="j" type="revolute"><parent>base</parent><child>a</child><axis><xyz>0 1 0</xyz><limit>{effort}
+        </limit><dynamics><damping>0.3</damping><friction>0.1</friction></dynamics></axis></joint></model></sdf>"""
+    joint = pf.interop.from_sdf(text, end_effector="a", actuated=["j"]).mechanism.joint("j")
+    assert (joint.max_torque, joint.friction) == (most, (0.1, 0.3))
+
+
 def test_masses_and_drives_of_a_robot_description_are_read() -> None:
     read = pf.interop.from_urdf(URDF, base="base", end_effector="t", actuated=["j", "k"], length_unit="mm")
     first, second = read.mechanism.masses

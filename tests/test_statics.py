@@ -433,6 +433,8 @@ def test_a_load_that_tips_and_cables_that_would_push_are_said() -> None:
     elsewhere = pf.forces(rows_of("cables")[1], [0, 0, -5.0])
     with pytest.raises(InvalidArgument, match="forces of other configurations"):
         pf.stiffness(hung, 40.0, forces=elsewhere)
+    with pytest.raises(InvalidArgument, match="infinite"):
+        pf.stiffness(hung, 40.0, forces=np.where(pushed.actuators > 0.0, np.inf, pushed.actuators))
 
 
 def test_rods_that_stretch_are_as_soft_as_slides_in_them() -> None:

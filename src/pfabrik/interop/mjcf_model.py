@@ -20,6 +20,7 @@ from .driving import Rates
 from .names import unique
 from .notes import Note, note_names
 from .opened import Loop
+from .urdf_links import friction_of
 from .xml_reading import fault
 
 
@@ -123,8 +124,7 @@ class MjcfModel(CompiledModel):
         for index, kind in enumerate(self.model.jnt_type):
             if self.is_slide[index] or bool(kind == self.mujoco.mjtJoint.mjJNT_HINGE):
                 armature, dry, viscous = (float(each[self.model.jnt_dofadr[index]]) for each in own)
-                friction = (dry, viscous) if dry or viscous else None
-                found[self.joint(index)] = Rates(rotor_inertia=armature or None, friction=friction)
+                found[self.joint(index)] = Rates(rotor_inertia=armature or None, friction=friction_of(dry, viscous))
         return found
 
     def places(self) -> dict[str, tuple[str, Floats]]:

@@ -18,7 +18,7 @@ from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .notes import Note, note_names
 from .told_loops import named_in
-from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, require_few
+from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, friction_of, require_few
 from .xml_reading import fault, number, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal")
@@ -218,10 +218,11 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint
             raise fault(f"{place}.{tag}", "no direction", "three numbers, not all zero")
         frame = xyz.get("expressed_in", "") if xyz is not None else ""
         axes.append(poses[MODEL if is_old else frame or name][:3, :3] @ direction)
-    low, high, speed = (
+    low, high, speed, effort = (
         _number(element, f"axis/limit/{key}", default, place)
-        for key, default in (("lower", -ENDLESS), ("upper", ENDLESS), ("velocity", ENDLESS))
+        for key, default in (("lower", -ENDLESS), ("upper", ENDLESS), ("velocity", ENDLESS), ("effort", ENDLESS))
     )
+    dry, viscous = (_number(element, f"axis/dynamics/{key}", 0.0, place) for key in ("friction", "damping"))
     limits = None
     if kind in ("revolute", "prismatic") and min(abs(low), abs(high)) < ENDLESS:
         limits = (low if low > -ENDLESS else high - FAR, high if high < ENDLESS else low + FAR)
@@ -238,7 +239,14 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint
         coupling = Coupling(name, leader, (offset - ratio * reference, ratio))
     max_speed = speed if 0.0 < speed < ENDLESS else None
     joint = UrdfJoint(name, kind.upper(), parent, child, poses[name], axes=np.array(axes))
-    return replace(joint, limits=limits, max_speed=max_speed, mimic=coupling)
+    return replace(
+        joint,
+        limits=limits,
+        max_speed=max_speed,
+        max_torque=effort if 0.0 < effort < ENDLESS else None,
+        friction=friction_of(dry, viscous),
+        mimic=coupling,
+    )
 
 
 def _number(element: ET.Element, path: str, default: float, place: str) -> float:

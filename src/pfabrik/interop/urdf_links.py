@@ -242,12 +242,16 @@ def origin_of(element: ET.Element | None) -> Floats:
     return frame_at(vector_in(element, "xyz"), vector_in(element, "rpy"))
 
 
+def friction_of(dry: float, viscous: float) -> tuple[float, float] | None:
+    """Dry and viscous friction of a file's joint; None where it has none, or numbers that stand for none."""
+    return (dry, viscous) if min(dry, viscous) >= 0.0 and 0.0 < max(dry, viscous) < ENDLESS else None
+
+
 def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
     name, origin, limit = element.get("name", ""), element.find("origin"), element.find("limit")
     is_limited = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
     limits = (number(limit, "lower"), number(limit, "upper"))
     effort, losses = number(limit, "effort"), element.find("dynamics")
-    friction = number(losses, "friction"), number(losses, "damping")
     speed, kind = number(limit, "velocity"), retyped.get(name, element.get("type", "")).upper()
     axis = vector_in(element.find("axis"), "xyz", X)
     return UrdfJoint(
@@ -260,7 +264,7 @@ def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
         limits=limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
         max_speed=speed if speed > 0.0 else None,
         max_torque=effort if 0.0 < effort < ENDLESS else None,
-        friction=friction if 0.0 <= min(friction) <= max(friction) < ENDLESS and any(friction) else None,
+        friction=friction_of(number(losses, "friction"), number(losses, "damping")),
         mimic=_coupling(name, element.find("mimic")),
         written={"pos": _text(origin, "xyz", ZERO), "euler": _text(origin, "rpy", ZERO)},
     )

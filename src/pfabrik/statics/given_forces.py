@@ -32,6 +32,8 @@ def exerted_of(solution: Solution, given: Forces | ArrayLike) -> Floats:
     shape = (*solution.shape, len(solution.mechanism.actuator_names))
     if values.shape not in (shape, shape[-1:]):
         raise InvalidArgument("forces", f"shape {values.shape}", f"shape {shape}")
+    if np.isinf(values).any():
+        raise InvalidArgument("forces", "infinite ones", "numbers, or NaN where they are not known")
     return np.broadcast_to(values, shape).reshape(-1, shape[-1])
 
 
