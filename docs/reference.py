@@ -78,7 +78,7 @@ PAGES = {
         "`design` finds dimensions for what a machine must do, with a proof of its margins. Requirements are in "
         "`pf.keep`.",
         "design Design Designs " + " ".join(f"keep.{name}" for name in pf.keep.__all__),
-        "design.result.Binding design.result.Round",
+        "design.found_design.Binding design.found_design.DesignRound",
     ),
     "first-order": Page(
         "First order",

@@ -7,7 +7,7 @@ That answers are closed, feasible and at the values asked for is in `test_matrix
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,12 +29,15 @@ def test_the_check_of_joints_accepts_home_and_notices_one_wrong_joint(name: str)
     joints = [joint.name for joint in mechanism.joints if joint.type != "fixed"]
     home = {name: np.array(mechanism.home_coordinate(name), dtype=float) for name in joints}
     points = {joint.name: np.array(joint.at) for joint in mechanism.joints if joint.at is not None}
-    answer = SimpleNamespace(
-        shape=(), pose=mechanism.home_pose, actuators=home_values(mechanism), joints=home, points=points
-    )
-    assert checks.gap_of_joints(mechanism, answer).max() <= 1e-12
+
+    def answer_with(joints: dict[str, np.ndarray]) -> Any:
+        answer = type("Answer", (), {"shape": (), "points": points})()
+        answer.pose, answer.actuators, answer.joints = mechanism.home_pose, home_values(mechanism), joints
+        return answer
+
+    assert checks.gap_of_joints(mechanism, answer_with(home)).max() <= 1e-12
     for joint in home.keys() - {mechanism.end_effector}:
-        answer.joints = home | {joint: home[joint] + 0.01}
+        answer = answer_with(home | {joint: home[joint] + 0.01})
         assert checks.gap_of_joints(mechanism, answer).max() > 1e-6
 
 

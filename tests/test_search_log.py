@@ -34,7 +34,7 @@ def test_the_limit_that_blocks_is_named() -> None:
     log = pf.search_log(machine, machine.reference_point + np.array([0.0, 0.0, 1000.0]))
     assert log.blocked_by is not None
     joint, bound, beyond = log.blocked_by
-    assert f"beyond &#x27;max&#x27; of {joint}" in log._repr_html_()
+    assert f"beyond {joint} max" in log._repr_html_()
     assert bound == "max" and machine.joint(joint).actuated and beyond > 0.0
 
 

@@ -72,8 +72,8 @@ _NAMES = {
     "decomposition.decompose": ("SubChain", "decompose"),
     "description.legs": ("Leg",),
     "description.mechanism": ("Cone", "Joint", "Mass", "Mechanism", "Shape"),
-    "design.design": ("design",),
-    "design.result": ("Design", "Designs"),
+    "design.by_counterexample": ("design",),
+    "design.found_design": ("Design", "Designs"),
     "dynamics.efforts": ("Efforts",),
     "dynamics.identification": ("BaseParameter", "Identification"),
     "dynamics.identify": ("identify",),
@@ -165,8 +165,8 @@ if TYPE_CHECKING:
         Shape as Shape,
     )
     from .design import keep as keep
-    from .design.design import design as design
-    from .design.result import Design as Design, Designs as Designs
+    from .design.by_counterexample import design as design
+    from .design.found_design import Design as Design, Designs as Designs
     from .dynamics.efforts import Efforts as Efforts
     from .dynamics.identification import BaseParameter as BaseParameter
     from .dynamics.identification import Identification as Identification

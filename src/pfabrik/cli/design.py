@@ -85,8 +85,9 @@ def design(
     reach: Any = region.of(first)
     if region.path is not None:
         reach = pf.track(first, reach)
+    asked: Any = machines if len(machines) > 1 else first
     result = pf.design(
-        machines if len(machines) > 1 else first,
+        asked,
         bounds,
         reach,
         keep=[*_requirements(kept), *relations],
@@ -94,7 +95,7 @@ def design(
         about=about,
         seed=seed,
     )
-    best: pf.Design = result[0] if len(machines) > 1 else result
+    best: pf.Design = result[0] if isinstance(result, pf.Designs) else result
     if output is not None and best.mechanism is not None:
         from ..files import dumps
 

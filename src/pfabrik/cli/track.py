@@ -267,7 +267,10 @@ def at_lines_of(path: paths.Path) -> Iterator[None]:
         if not error.rows:
             raise
         place = place_of(1, error.rows[0], path.lines)
-        raise click.ClickException(f"PATH: found {error.found}, first at {place}; expected {error.expected}") from error
+        name = "--torque" if error.argument == "torque" else "PATH"
+        raise click.ClickException(
+            f"{name}: found {error.found}, first at {place}; expected {error.expected}"
+        ) from error
 
 
 @click.command()

@@ -44,14 +44,22 @@ class Requirement:
 
     Attributes
     ----------
-    name : the requirement in words; empty if it asks for nothing.
-    function : rows of a machine at its poses (n, k), or without poses (k,).
-    kind : "margin", proved by `certify` over a region; "singularity", in place of what is kept by default; or "".
-    has_poses : False if it is of the dimensions alone.
-    width : k, of a function that raises where there is no machine.
-    columns : names of what the k columns are of; none if they have no names.
-    expressions : of dimensions, which need a value.
-    least : the margin that is asked for.
+    name : str
+        The requirement in words; empty if it asks for nothing.
+    function : callable
+        Rows of a machine at its poses (n, k), or without poses (k,).
+    kind : str
+        "margin", proved by `certify` over a region; "singularity", in place of what is kept by default; or "".
+    has_poses : bool
+        False if it is of the dimensions alone.
+    width : int
+        k, of a function that raises where there is no machine.
+    columns : callable or None
+        Names of what the k columns are of; none if they have no names.
+    expressions : tuple of str
+        Of dimensions, which need a value.
+    least : float
+        The margin that is asked for.
     """
 
     name: str
@@ -131,7 +139,7 @@ def singularity(least: float | None = DEFAULT_SINGULARITY) -> Requirement:
 
     Parameters
     ----------
-    least : float or None
+    least : float or None, optional
         0 at a singularity; 0 or None asks for nothing. Without this requirement 0.05 is asked for.
     """
     value = _not_negative("least", 0.0 if least is None else least)
@@ -155,7 +163,13 @@ def factors(least: float, most: float) -> Requirement:
 
 
 def clearance(distance: float) -> Requirement:
-    """A least distance of links that may not touch [length], of a machine whose legs or bodies have shapes."""
+    """A least distance of links that may not touch, of a machine whose legs or bodies have shapes.
+
+    Parameters
+    ----------
+    distance : float
+        Between their surfaces [length].
+    """
     least = _not_negative("distance", distance)
     words = f"clearance >= {least:g}"
     return Requirement(words, lambda m: (np.asarray(clearance_of(m.solution).distance) - least) / m.length)
@@ -241,7 +255,13 @@ def speed(twists: ArrayLike, most: float) -> Requirement:
 
 
 def relation(text: str) -> Requirement:
-    """An inequality of dimensions, such as "rod >= 1.2*arm"."""
+    """An inequality of dimensions.
+
+    Parameters
+    ----------
+    text : str
+        Two expressions with <= or >= between them: "rod >= 1.2*arm".
+    """
     parts = re.split(r"(<=|>=)", text)
     if len(parts) != 3:
         raise InvalidArgument("keep", repr(text), "two expressions of dimensions with <= or >= between them")

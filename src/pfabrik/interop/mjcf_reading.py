@@ -113,7 +113,7 @@ def from_mjcf(
 def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
     """The model as a robot, with its loops."""
     data, places = _own_notes(root), model.places()
-    written = _written_by_us(data) if data else {"rates": model.rates()}
+    written: dict[str, Any] = _written_by_us(data) if data else {"rates": model.rates()}
     site = places.get(written.pop("reference_point", ""))
     if site is not None and written.get("end_effector") in places:
         places[written["end_effector"]] = (written["end_effector"], site[1])

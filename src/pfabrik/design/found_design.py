@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class Binding(NamedTuple):
     share: float
 
 
-class Round(NamedTuple):
+class DesignRound(NamedTuple):
     """One round of a search.
 
     Attributes
@@ -93,7 +93,7 @@ class Design(Printed):
         Requirements that samples decided.
     binding : tuple of Binding
         What binds, the most first.
-    rounds : tuple of Round
+    rounds : tuple of DesignRound
         The rounds of the search.
     front : tuple of Design
         With two aims, designs from the smallest of the first to the smallest of the second.
@@ -111,7 +111,7 @@ class Design(Printed):
     certificate: Certificate | None
     unproved: tuple[str, ...]
     binding: tuple[Binding, ...]
-    rounds: tuple[Round, ...]
+    rounds: tuple[DesignRound, ...]
     reason: str = ""
     front: tuple[Design, ...] = ()
     other: float | None = None
@@ -203,7 +203,13 @@ class Designs(Printed, Sequence[Design]):
     def __init__(self, designs: Sequence[Design]) -> None:
         self._designs = sorted(designs, key=lambda each: (not each, each.mechanism is None, each.aim))
 
-    def __getitem__(self, place: Any) -> Any:
+    @overload
+    def __getitem__(self, place: int) -> Design: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[Design]: ...
+
+    def __getitem__(self, place: int | slice) -> Design | list[Design]:
         return self._designs[place]
 
     def __len__(self) -> int:

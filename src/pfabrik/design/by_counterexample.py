@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 
@@ -22,10 +22,10 @@ from ..kinematics import varied
 from ..targets import Target
 from ..telling import OnProgress, telling
 from .candidate import Candidate, Dimensions
+from .found_design import Binding, Design, DesignRound, Designs, Verdict
 from .keep import DEFAULT_SINGULARITY, HOME, Requirement, clearance, margin, requirements_of, singularity
-from .reach import DENSE, SAMPLES, Reach
-from .result import Binding, Design, Designs, Round, Verdict
-from .search import KEPT, NEAR, Found, multipliers, smallest, spread
+from .poses_to_reach import DENSE, SAMPLES, PosesToReach
+from .smallest_aim import KEPT, NEAR, Found, multipliers, smallest, spread
 
 MOST_ROUNDS, MOST_INNER = 20, 12
 """Rounds that end with a proof or a pose that refutes; searches in a round, as samples show further poses."""
@@ -54,6 +54,36 @@ FRONT, APART = 7, 1e-5
 Aim = str | Callable[[Mechanism], float]
 
 
+@overload
+def design(
+    mechanism: Mechanism,
+    vary: Mapping[str, tuple[float, float]],
+    reach: PoseRegion | Target,
+    *,
+    keep: Iterable[Requirement | str] = ...,
+    minimise: Aim | tuple[Aim, Aim] = ...,
+    about: Literal["base", "home"] = ...,
+    seed: int = ...,
+    executor: Executor | None = ...,
+    on_progress: OnProgress | None = ...,
+) -> Design: ...
+
+
+@overload
+def design(
+    mechanism: Sequence[Mechanism] | Mapping[str, Mechanism],
+    vary: Mapping[str, tuple[float, float]],
+    reach: PoseRegion | Target,
+    *,
+    keep: Iterable[Requirement | str] = ...,
+    minimise: Aim | tuple[Aim, Aim] = ...,
+    about: Literal["base", "home"] = ...,
+    seed: int = ...,
+    executor: Executor | None = ...,
+    on_progress: OnProgress | None = ...,
+) -> Designs: ...
+
+
 def design(
     mechanism: Mechanism | Sequence[Mechanism] | Mapping[str, Mechanism],
     vary: Mapping[str, tuple[float, float]],
@@ -65,7 +95,7 @@ def design(
     seed: int = 0,
     executor: Executor | None = None,
     on_progress: OnProgress | None = None,
-) -> Any:
+) -> Design | Designs:
     """Find dimensions with which a machine reaches all poses of a region and keeps what it must, as small as can be.
 
     By counterexample: the smallest aim for some poses; `certify` proves the region, or has a pose that is not reached,
@@ -100,8 +130,9 @@ def design(
 
     Returns
     -------
-    Design, or Designs of several machines
-        True if found. Wishes that contradict each other end as "NOT FOUND", with those that do by name.
+    Design or Designs
+        Designs of several machines. True if found. Wishes that contradict each other end as "NOT FOUND", with those
+        that do by name.
 
     Raises
     ------
@@ -136,7 +167,7 @@ def design(
             aims = minimise if isinstance(minimise, tuple) else (minimise,)
             if len(aims) not in (1, 2):
                 raise InvalidArgument("minimise", f"{len(aims)} aims", "one, or two for a front")
-            answer = _front(asked, *aims) if len(aims) == 2 else _Search(asked, *aims).answer()
+            answer = _front(asked, *aims) if len(aims) == 2 else _SmallestSearch(asked, *aims).answer()
         found.append(replace(answer, _name=name or machine.name))
     return found[0] if named[0][0] == "" else Designs(found)
 
@@ -182,7 +213,7 @@ class _Asked:
         alone = mechanism if mechanism.clearance is None else mechanism.with_clearance(None)
         self.dimensions = Dimensions(varied(alone, tuple(bounds)), low, high)
         self.rng = np.random.default_rng(seed)
-        self.reach = Reach(mechanism, reach, about, self.rng)
+        self.reach = PosesToReach(mechanism, reach, about, self.rng)
         for text in (text for each in requirements for text in each.expressions):
             self.dimensions.source.value_of(text, {})
         own = [each for each in requirements if each.name]
@@ -208,7 +239,7 @@ class _Checked(NamedTuple):
 
     Attributes
     ----------
-    verdict, refuted_by : as of a `Round`.
+    verdict, refuted_by : as of a `DesignRound`.
     is_final : True if nothing that follows can prove it.
     """
 
@@ -221,7 +252,7 @@ class _Checked(NamedTuple):
     is_final: bool = False
 
 
-class _Search:
+class _SmallestSearch:
     """The search for one aim."""
 
     def __init__(self, asked: _Asked, minimise: Aim, extra: Sequence[Requirement] = ()) -> None:
@@ -230,7 +261,7 @@ class _Search:
         self.words, self._aim = _aim_of(asked, minimise)
         self.poses, self.slack = asked.reach.first, 0.0 if asked.reach.region is None else SLACK
         self._kept: dict[bytes, Candidate] = {}
-        self.rounds: list[Round] = []
+        self.rounds: list[DesignRound] = []
         self.unit = 1.0
 
     def candidate(self, z: Floats) -> Candidate:
@@ -280,7 +311,7 @@ class _Search:
             if found.violation > KEPT:
                 return self._result(last if last.verdict == "OPEN" else _Checked("NOT FOUND", found))
             last = self._checked(found)
-            self.rounds.append(Round(self._named(found), self._value(found), len(self.poses), *last[0:5:4]))
+            self.rounds.append(DesignRound(self._named(found), self._value(found), len(self.poses), *last[0:5:4]))
             if last.verdict in ("PROVED", "CHECKED") or last.is_final or self.slack > MOST_SLACK:
                 return self._result(last)
             if last.verdict == "OPEN":
@@ -465,7 +496,7 @@ def _front(asked: _Asked, first: Aim, second: Aim) -> Design:
         values = np.array(list(found.dimensions.values()))
         return other(Candidate(asked.dimensions, values, asked.reach.poses, asked.reach.moves))
 
-    ends = _Search(asked, first).answer(), _Search(asked, second).answer()
+    ends = _SmallestSearch(asked, first).answer(), _SmallestSearch(asked, second).answer()
     if not all(ends):
         return ends[0] if not ends[0] else ends[1]
     most, least = second_of(ends[0]), second_of(ends[1])
@@ -476,7 +507,7 @@ def _front(asked: _Asked, first: Aim, second: Aim) -> Design:
         def kept(machine: Candidate, eased: float = eased) -> Floats:
             return np.array([(eased - other(machine)) / (abs(most) or 1.0)])
 
-        found = _Search(asked, first, [Requirement(f"{words} <= {eased:.6g}", kept, has_poses=False)]).answer()
+        found = _SmallestSearch(asked, first, [Requirement(f"{words} <= {eased:.6g}", kept, has_poses=False)]).answer()
         if found and (other_of := second_of(found)) < lowest - APART * abs(lowest):
             designs = [each for each in designs if each.aim < found.aim] + [replace(found, other=other_of)]
             lowest = other_of

@@ -27,7 +27,7 @@ PLACES, AROUND, SIZES = 16, 24, (0.3, 0.1, 0.03, 0.01)
 """How many of the worst are looked around, at how many poses, and how far away [half sizes of the region]."""
 
 
-class Reach:
+class PosesToReach:
     """The poses that a machine is to reach.
 
     Attributes
