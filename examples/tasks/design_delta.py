@@ -1,7 +1,7 @@
 """A delta for a bed: how tall are the towers, how long the rods?
 
 For a printer that is not built yet. You say how wide and high it prints, how fast, and where its towers stand, and get
-the smallest machine with a proof that the nozzle gets everywhere. SciPy is needed: `pip install pfabrik[calibrate]`.
+the smallest machine with a proof that the nozzle gets everywhere. SciPy is needed: `pip install '.[calibrate]'`.
 """
 
 # `pfabrik new linear-delta` has a printer whose dimensions we take as the start.

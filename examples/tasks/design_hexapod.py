@@ -1,7 +1,7 @@
 """A hexapod for a travel: how long must its struts be?
 
 For a machine that is not built yet. You say what it must reach and keep, and get the dimensions, a proof that every
-pose is reached, and what holds the size where it is. SciPy is needed: `pip install pfabrik[calibrate]`.
+pose is reached, and what holds the size where it is. SciPy is needed: `pip install '.[calibrate]'`.
 """
 
 # `pfabrik new` has files of machines with dimensions to start from. This one has the size of no job in particular.
