@@ -1,4 +1,4 @@
-"""What `design` found: dimensions, their proof, and what binds them."""
+"""Result of `design`: dimensions, their proof, and the requirements that bind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Verdict = Literal["PROVED", "CHECKED", "OPEN", "NOT FOUND"]
 
 
 class Binding(NamedTuple):
-    """What holds a design where it is, or what wishes that contradict have in common.
+    """A requirement or bound that keeps a design from a smaller aim, or from being found.
 
     Attributes
     ----------
@@ -53,11 +53,11 @@ class DesignRound(NamedTuple):
     dimensions : mapping of str to float
         The dimensions that were the best for the poses so far.
     aim : float
-        What was to be small.
+        The aim.
     poses : int
         Number of poses that were looked at.
     verdict : str
-        What became of it: "PROVED", "CHECKED", "REFUTED" or "OPEN".
+        The outcome: "PROVED", "CHECKED", "REFUTED" or "OPEN".
     refuted_by : array (4, 4) or None
         The pose that is not reached, or does not keep a requirement [length].
     """
@@ -84,9 +84,9 @@ class Design(Printed):
     dimensions : dict of str to float
         The dimensions, in the units of the file; if not found, those that break the wishes least.
     aim : float
-        What was to be small; infinite where no machine was found at all.
+        The aim; infinite where no machine was found at all.
     minimised : str
-        What that was, in words.
+        The aim in words.
     certificate : Certificate or None
         Of a region or a track.
     unproved : tuple of str

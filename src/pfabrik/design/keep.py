@@ -1,4 +1,4 @@
-"""What a machine must keep, at every pose that it is to reach: requirements of `pfabrik.design`."""
+"""Requirements of `pfabrik.design` at every pose that a machine is to reach."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Requirement:
         return np.asarray(np.nan_to_num(found, nan=unknown, posinf=REACHED, neginf=IMPOSSIBLE))
 
     def labels(self, machine: Candidate) -> Sequence[str]:
-        """What the columns are of."""
+        """Names of the columns."""
         return self.columns(machine) if self.columns is not None else [""] * self.rows(machine).shape[-1]
 
 
@@ -106,9 +106,11 @@ def margin(least: float) -> Requirement:
     Parameters
     ----------
     least : float
-        0 or more.
+        From 0 to less than 1, which only the middle of a range has.
     """
     value = _not_negative("least", least)
+    if value >= 1.0:
+        raise InvalidArgument("least", f"{value:g}", "less than 1, which only the middle of a range has")
     return Requirement(f"margin >= {value:g}", lambda m: m.margins - value, "margin", columns=_limits, least=value)
 
 

@@ -79,7 +79,7 @@ class PosesToReach:
         return region.pose(best[order]), values[order]
 
     def certificate(self, mechanism: Mechanism, **asked: Any) -> Certificate | None:
-        """What `certify` says; None of poses without anything between them."""
+        """The certificate of a region or track; None of separate poses."""
         if self.region is not None:
             return certify(mechanism, _shifted(self.region, self.moves * mechanism.home_pose[:3, 3]), **asked)
         if not self.is_track or len(self.poses) < 2:

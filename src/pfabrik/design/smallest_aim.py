@@ -16,7 +16,7 @@ FAR = 0.5
 """Rows above this at the start of a search are left out of it, until its end breaks them."""
 
 KEPT = 1e-7
-"""By how much a row may be negative and count as kept."""
+"""Least value of a row that counts as kept, below 0."""
 
 NEAR = 1e-5
 """Rows up to this bind where they have a multiplier."""
@@ -31,7 +31,7 @@ class Found(NamedTuple):
     Attributes
     ----------
     z : dimensions as shares of their bounds, (p,).
-    aim : what was to be small; violation : the largest of a row, 0 where all are kept.
+    aim : its value; violation : the largest of a row, 0 where all are kept.
     """
 
     z: Floats
@@ -115,7 +115,7 @@ def _ended(aim: Function, rows: Function, z: Floats) -> Found:
 
 
 class Multipliers(NamedTuple):
-    """What holds a point: the shares by which rows and bounds are in the way.
+    """Lagrange multipliers of rows and bounds at a point.
 
     Attributes
     ----------

@@ -101,15 +101,20 @@ class Source:
         """The description with other values of some dimensions, without the checks of a mechanism."""
         return _read(_with_numbers(self._table_with(values))[0], Structure)
 
-    def value_of(self, expression: str, values: Mapping[str, float]) -> float:
-        """The value of an expression of dimensions, with other values of some; InvalidArgument if it has none."""
+    def value_of(self, expression: str, values: Mapping[str, float], argument: str = "expression") -> float:
+        """The value of an expression of dimensions, with other values of some; InvalidArgument if it has none.
+
+        Parameters
+        ----------
+        argument : its name in the error.
+        """
         faults: list[Fault] = []
         unit = str(_units(self.table).get("angle", "deg"))
         known = dimension_values(self._table_with(values)["dimensions"], unit, faults)
         try:
             return number_of(expression, known, unit, ())
         except NoNumber as reason:
-            raise InvalidArgument("expression", str(reason), f"one of {', '.join(known)}") from None
+            raise InvalidArgument(argument, str(reason), f"an expression of {', '.join(known)}") from None
 
     def _table_with(self, values: Mapping[str, float]) -> Table:
         return self.table | {"dimensions": self.table["dimensions"] | dict(values)}

@@ -1,4 +1,4 @@
-"""What is read from a file, as expressions of its dimensions."""
+"""Numbers of a file as expressions of its dimensions."""
 
 from __future__ import annotations
 

@@ -227,11 +227,11 @@ AT_REST = np.zeros(6)
 
 
 class PlacedValues(NamedTuple):
-    """What expressions gave at n poses, views of one array.
+    """Values of expressions at n poses, views of one array.
 
     Attributes
     ----------
-    values, rows, reach : what was asked for, the constraints, and the margins of the reach of legs.
+    values, rows, reach : the values asked for, the constraints, and the margins of the reach of legs.
     slopes, row_slopes : of the first two.
     completed : the poses.
     """
