@@ -27,12 +27,7 @@ vary = {"arm_length": (120, 500), "delta_radius": (40, 250), "position_endstop":
 keep = [pf.keep.margin(0.02), "radius >= 120"]
 towers = "height + arm_length/10"
 
-
-def designed(keep):  # searches are local ones: the first of several that finds a machine
-    return next(filter(None, (pf.design(printer, vary, build, keep=keep, minimise=towers, seed=n) for n in range(9))))
-
-
-small = designed(keep)
+small = pf.design(printer, vary, build, keep=keep, minimise=towers)
 
 
 def sizes(found):
@@ -52,7 +47,7 @@ print(*sorted({each.requirement for each in small.binding if each.share > 0.05})
 # where the nozzle moves at 200 mm/s, whichever way. Speeds have no proof: samples decide, and the result says so.
 angle = np.radians([0, 60, 120])  # and the opposite ways, as fast
 ways = 200 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-quick = designed([*keep, pf.keep.speed(ways, 300)])
+quick = pf.design(printer, vary, build, keep=[*keep, pf.keep.speed(ways, 300)], minimise=towers)
 print(quick.verdict)
 print(sizes(quick))
 print("by samples:", ", ".join(quick.unproved))
