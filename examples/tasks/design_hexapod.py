@@ -44,7 +44,7 @@ def designed(margin):
 found = designed(0.005)
 print(found.verdict)
 for name, value in found.dimensions.items():
-    print(f"{name:16}{hexapod.dimensions[name]:6.1f} -> {value:6.1f} mm")
+    print(f"{name:16}{hexapod.dimensions[name]:4.0f} -> {value:4.0f} mm")
 
 # What holds the size there: to have shorter struts, ask for less of these.
 print(sorted({each.requirement for each in found.binding if each.share > 0.05}))
@@ -67,7 +67,8 @@ while not made:
     middle = np.array(found.mechanism.reference_point)
     region = pf.PoseRegion.box(middle - 30, middle + 30, rotation=np.radians(8))
     made = pf.certify(found.mechanism, region, uncertain=0.1)
-    print(f"margin {margin:5.3f}: struts up to {found.dimensions['longest']:.1f} mm, {made.verdict} for 0.1 mm")
+    longest = np.ceil(found.dimensions["longest"])
+    print(f"margin {margin:5.3f}: struts up to {longest:.0f} mm, {made.verdict} for 0.1 mm")
     if not made:
         margin *= 4
         found = designed(margin)
@@ -76,7 +77,7 @@ while not made:
 #
 # The file that is written keeps its expressions; its dimensions are the ones found.
 found.save("mine.toml")
-print(f"{pf.load('mine.toml').dimensions['longest']:.1f} mm")
+print(pf.load("mine.toml"))
 
 # On the command line: `pfabrik design hexapod.toml --vary longest=120:600 … -o mine.toml`. [Design](../design.md) lists
 # all requirements, and says what is guaranteed.
