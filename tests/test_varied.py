@@ -158,6 +158,24 @@ def test_actuators_and_their_jacobians(name: str) -> None:
             np.testing.assert_allclose(jacobians[reached, :, column], differences, rtol=1e-6, atol=1e-7 * size)
 
 
+@pytest.mark.parametrize("name", [path.stem for path in TEMPLATES])
+def test_along_motions_a_wrench_and_the_actuators_that_hold_it_do_no_work(name: str) -> None:
+    """The oracle is statics, at the configurations of the machine made anew."""
+    values, machine = drawn(name, 6)
+    poses, size = poses_near_home(machine, 6, 40, 0.2), machine.characteristic_length
+    answer = pf.solve_ik(machine, poses)
+    reached = answer.status == pf.Status.REACHED
+    wrench = np.array([1.0, -2.0, 3.0, 0.5 * size, -0.3 * size, 0.2 * size])[
+        : 3 if machine.end_effector_is_joint else 6
+    ]
+    rates, twists = (each[reached] for each in all_varied(name).at(values).motions(poses))
+    twists = twists * np.where(np.arange(6) < 3, size, 1.0)[:, None]
+    held = np.asarray(pf.forces(answer, wrench).actuators)[reached]
+    assert reached.sum() > 5 and rates.shape[2] == len(machine.actuator_names)
+    work = np.einsum("na,naf->nf", held, rates) + np.einsum("w,nwf->nf", wrench, twists[:, : len(wrench)])
+    np.testing.assert_allclose(work, 0.0, atol=1e-9 * size)
+
+
 def test_limits_that_home_exceeds_are_numbers() -> None:
     machine = template("6-UPS")
     with pytest.raises(InvalidMechanism):

@@ -16,6 +16,7 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
 from ..ik import solve_ik
 from ..kinematics import MachineAt, VariedMachine, generic_of, task_of
+from ..tolerances import TOLERANCES
 
 NOWHERE, IMPOSSIBLE, UNKNOWN, REACHED = -1e3, -1.0, -0.01, 1.0
 """Rows where there is no machine, where a margin is infinitely broken, where what is no margin has no value, as a leg
@@ -167,6 +168,42 @@ class Candidate:
         if self._found is None:
             return np.full((len(self._all), self._n_drives, 6), np.nan)
         return self._found.inverse_jacobians(self._all)
+
+    @cached_property
+    def motions(self) -> tuple[Floats, Floats]:
+        """Actuator rates (n, n_a, f) and twists (n, 6, f) of the motions at all poses, lengths in L; NaN without."""
+        if self._found is None:
+            return np.full((len(self.poses), self._n_drives, 1), np.nan), np.full((len(self.poses), 6, 1), np.nan)
+        rates, twists = self._found.motions(self.poses)
+        return rates / np.where(self.dimensions.is_length, self.length, 1.0)[:, None], twists
+
+    def forces(self, wrenches: Floats) -> Floats:
+        """Actuator forces (n, w, n_a) that hold wrenches (w, 6) or forces (w, 3); of redundant actuators, the least.
+
+        With motions' rates A and twists T, A' f = -T' w: they do no work together.
+        """
+        (rates, twists), found = self.motions, np.full((len(self.poses), len(wrenches), self._n_drives), np.nan)
+        known = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2))
+        units = np.append(np.ones(3), np.full(3, 1.0 / self.length))
+        units = units[: wrenches.shape[1]]
+        asked = -wrenches * units @ twists[known, : len(units)]
+        held = asked @ np.linalg.pinv(rates[known], TOLERANCES.rank)
+        is_held = np.isclose(held @ rates[known], asked, rtol=0.0, atol=1e-9 * np.abs(wrenches * units).max())
+        held[~is_held.all(axis=2)] = np.nan
+        found[known] = held * np.where(self.dimensions.is_length, 1.0, self.length)
+        return found
+
+    def compliance(self, stiffness: Floats) -> Floats:
+        """Compliance T (A' k A)^-1 T' of positions, (n, 3, 3), by actuators of stiffness k, (n_a,)."""
+        rates, twists = self.motions
+        rates = rates * np.where(self.dimensions.is_length, self.length, 1.0)[:, None]
+        found = np.full((len(rates), 3, 3), np.nan)
+        known = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2))
+        gives, directions = np.linalg.eigh(np.swapaxes(rates[known], 1, 2) * stiffness @ rates[known])
+        moved = self.length * twists[known, :3] @ directions
+        with np.errstate(all="ignore"):
+            found[known] = moved / gives[:, None] @ np.swapaxes(moved, 1, 2)
+        return found
 
     @cached_property
     def factors(self) -> Floats:

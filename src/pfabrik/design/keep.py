@@ -16,8 +16,7 @@ from ..checks import require_finite, require_positive
 from ..clearance.clearance import clearance as clearance_of
 from ..errors import InvalidArgument, InvalidMechanism
 from ..statics.accuracy import accuracy as accuracy_of
-from ..statics.forces import forces as forces_of
-from ..statics.stiffness import stiffness as stiffness_of
+from ..statics.loads import positive_values
 from .candidate import IMPOSSIBLE, NOWHERE, REACHED, UNKNOWN, Candidate
 
 __all__ = [
@@ -191,8 +190,7 @@ def force(wrenches: ArrayLike, most: float) -> Requirement:
     limit = require_positive("most", most)
 
     def rows(machine: Candidate) -> Floats:
-        held = [np.abs(forces_of(machine.solution, wrench).actuators).max(axis=1) for wrench in given]
-        return 1.0 - np.stack(held, axis=1) / limit
+        return np.asarray(1.0 - np.abs(machine.forces(given)).max(axis=2) / limit)
 
     return Requirement(f"actuator force <= {limit:g}", rows, width=len(given))
 
@@ -215,7 +213,8 @@ def stiffness(least: float, k: float | Mapping[str, float], axes: str = "xyz") -
     places = ["xyz".index(axis) for axis in axes]
 
     def rows(machine: Candidate) -> Floats:
-        gives = np.diagonal(stiffness_of(machine.solution, k).compliance, axis1=-2, axis2=-1)[:, places]
+        values = positive_values("k", k, machine.dimensions.mechanism.actuator_names)
+        gives = np.diagonal(machine.compliance(values), axis1=-2, axis2=-1)[:, places]
         return np.asarray(1.0 - wanted * gives)
 
     return Requirement(f"stiffness along {axes} >= {wanted:g}", rows, width=len(places))

@@ -32,6 +32,7 @@ from ..kernels.home import measure_home
 from ..kernels.legs.feasibility import feasibility, read_targets
 from ..kernels.search_constants import CLOSED, NEARLY_CLOSED
 from ..model import model_of
+from ..motion.mobility import generic_of
 from ..noted_numbers import NOTHING, Formulas, uniform_parts
 from ..platform.table import kernel_table, table_handle
 from ..platform.tip_engine import measured
@@ -135,6 +136,7 @@ class NotedMachine:
     """The expressions of a varied machine; they hold as long as decisions come out as when they were noted."""
 
     def __init__(self, mechanism: Mechanism, names: Sequence[str], values: Floats) -> None:
+        self.mechanism = mechanism
         reading, p = NotedReading(mechanism, names, values), len(names)
         sketch, trace, given, numbers = reading.sketch, reading.trace, reading.given, reading.numbers
         try:
@@ -305,6 +307,20 @@ class MachineAt:
         if by_q.shape[2]:
             by_pose = by_pose - by_q @ np.linalg.pinv(rows[:, :, 6:], TOLERANCES.rank) @ rows[:, :, :6]
         return by_pose
+
+    def motions(self, poses: Floats) -> tuple[Floats, Floats]:
+        """Motions of the end effector that the constraints leave: their actuator rates (n, n_a, f), and their twists
+        (n, 6, f), of which velocities are in L; NaN where the constraints' slopes have no values."""
+        placed, mechanism = self._evaluated("actuators", poses, by_pose=True), self._noted.mechanism
+        n, freedoms = placed.slopes.shape[2], generic_of(mechanism).mobility.platform
+        units = np.append(np.full(3, self._length), np.ones(n - 3))
+        held = np.zeros((len(placed.rows), n, n))
+        held[:, [3, 4, 5], [3, 4, 5]] = mechanism.end_effector_is_joint
+        rows = np.concatenate([placed.row_slopes, held], axis=1)
+        moves = np.full((len(rows), n, freedoms), np.nan)
+        known = np.isfinite(rows).all(axis=(1, 2))
+        moves[known] = np.swapaxes(np.linalg.svd(rows[known] * units)[2][:, n - freedoms :], 1, 2)
+        return placed.slopes * units @ moves, moves[:, :6]
 
     def slopes(self, poses: Floats) -> Floats:
         """Derivatives (n, r, p) of the margins by the dimensions; what a task leaves open moves so that legs close.
