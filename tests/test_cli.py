@@ -497,6 +497,7 @@ REFUSED = [
     ("workspace stewart -o a.bmp", "-o: found 'a.bmp'; expected a name that ends in"),
     ("workspace stewart --centre 1,2,3", "says nothing without --largest"),
     ("workspace stewart --any-orientation --rpy 0 0 1", "give one of them"),
+    ("time five_bar swing.csv --torque 0.01 --load link1=1,0,0,200", "--torque: found 0.01, where 'p1' has to exert"),
     # starting files and exports
     ("new 6-UPX", "no kind of machine named '6-UPX'; did you mean '6-UPS'? (known: 3-PRS, "),
     ("new dleta -o my.toml", "did you mean 'delta'?"),
@@ -517,14 +518,14 @@ REFUSED = [
 
 @pytest.mark.parametrize(("line", "told"), REFUSED, ids=[line for line, _ in REFUSED])
 def test_wrong_words_are_told_on_stderr_with_exit_code_2_and_write_nothing(line: str, told: str) -> None:
-    write_files("path.csv")
+    write_files("path.csv", "swing.csv")
     pf.save(FIVE_BAR, "mine.toml")
     Path("mine.png").symlink_to("mine.toml")
     result = pfabrik(line)
     assert (result.exit_code, result.stdout) == (2, "")
     assert told in result.stderr
     assert all(text.startswith("pfabrik: ") for text in result.stderr.splitlines())
-    assert listed() == ["mine.png", "mine.toml", "path.csv"]
+    assert listed() == ["mine.png", "mine.toml", "path.csv", "swing.csv"]
 
 
 # Words and columns
