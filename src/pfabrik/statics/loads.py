@@ -40,7 +40,7 @@ def _pair(argument: str, given: Any) -> tuple[float, float]:
         return -float(value), float(value)
     if value.shape == (2,) and value[0] <= value[1]:
         return float(value[0]), float(value[1])
-    raise InvalidArgument(argument, reprlib.repr(given if value.shape else float(value)), BOUND)
+    raise InvalidArgument(argument, reprlib.repr(value.tolist()), BOUND)
 
 
 def positive_values(argument: str, given: ArrayLike | Mapping[str, float], names: Sequence[str]) -> Floats:
