@@ -214,9 +214,8 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         share = np.abs(parts.rest) / parts.most
         place = int(np.argmax(share.max(axis=0)))
         limit = path.limits[place]
-        found = (
-            f"{limit:.6g}, where '{path.names[place]}' has to exert up to {limit * share[:, place].max():.6g} at rest"
-        )
+        most = limit * share[:, place].max()
+        found = f"{limit:.6g}, where '{path.names[place]}' must exert up to {most:.6g} at rest"
         steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
