@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -162,6 +163,20 @@ def test_efforts_that_no_machine_makes_are_doubted() -> None:
     turned = pf.identify(solution, -efforts, **how)  # of friction that drives
     assert "no possible bodies explain these efforts" in str(turned)
     assert "missed by" in pf.identify(solution, 1e3 * efforts, sigma=0.01, friction=False, **how).doubt
+
+
+def test_a_body_far_from_the_file_is_doubted() -> None:
+    truth = weighed(pf.load("delta"))
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+
+    def doubt(times: float) -> str:
+        heavier = truth.with_masses(pf.Mass(m.body, times * m.mass, m.centre, m.inertia) for m in truth.masses)
+        described = moved(heavier, solution)
+        return pf.identify(described, efforts, friction=False, sigma=0.01, **how).doubt
+
+    assert doubt(0.25) == ""
+    assert re.search(r"'\w+' would differ from the file by [\d.]+ times", doubt(0.02))
 
 
 def test_refusals_name_what_is_wrong() -> None:

@@ -21,6 +21,9 @@ SHOWN = 3
 UNSEEN = 1e-9
 """Share of the largest, in its scale, up to which efforts do not depend on a parameter at all."""
 
+ABSURD = 10.0
+"""Change of a body, in what it is expected to be off by, from which it is none that anybody describes so."""
+
 
 class BaseParameter(NamedTuple):
     """A combination of parameters that the efforts determine.
@@ -141,10 +144,14 @@ class Identification(Printed):
     @property
     def doubt(self) -> str:
         """Why these values may be wrong as a whole, in a sentence; "" if nothing says so."""
-        if not self._fit.missed > FAR:
-            return ""
-        off = f"{self._fit.missed:.3g} times their noise"
-        return f"no possible bodies explain these efforts, missed by {off}: are they in N and N m, and of this motion?"
+        bodies, missed, found = tuple(self.points), self._fit.missed, ""
+        changes = np.abs(self._fit.found[: 10 * len(bodies)]).reshape(-1, 10).max(axis=1)
+        if changes.max(initial=0.0) > ABSURD:
+            body, times = bodies[changes.argmax()], f"{changes.max():.3g}"
+            found = f"'{body}' would differ from the file by {times} times what is expected of it"
+        if missed > FAR:
+            found = f"no possible bodies explain these efforts, missed by {missed:.3g} times their noise"
+        return f"{found}: are they in N and N m, with the right signs, and of this motion?" if found else ""
 
     @property
     def undetermined(self) -> tuple[str, ...]:
