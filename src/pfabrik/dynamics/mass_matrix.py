@@ -9,6 +9,7 @@ import numpy as np
 from ..answers.solution import Solution, checked_solution
 from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
+from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..kinematics import JointRates, around_home, end_effector_pose, joint_path, model_of
 from ..statics.joint_balance import pairs_at
@@ -35,22 +36,26 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
         of the base; tilts about the platform's x and y axes. "actuators": in the order of their names. Or joints, or
         coordinates of joints, that stand in series between base and end effector.
     loads : mapping of str to tuple, optional
-        Body -> (mass, centre), for what it carries, as in `inverse_dynamics`.
+        Body -> (mass, centre), for what it carries, as in `inverse_dynamics`; no forces, which change no mass.
 
     Returns
     -------
     array (..., k, k)
-        NaN where there is no configuration, the loops are in a constraint singularity, or some motion that `at` has
-        elsewhere cannot be made: there the machine resists it without bound.
+        Where the machine has fewer motions than `at` has coordinates, that of the possible motion nearest to the one
+        asked for, angles compared with lengths over L: of no higher rank than there are motions, with rows of zeros for
+        coordinates that never move. NaN where there is no configuration, the loops are in a constraint singularity, or
+        some motion that `at` has elsewhere cannot be made: there the machine resists it without bound.
 
     Raises
     ------
     InvalidArgument or UnknownName
-        Bodies without a mass; joints that are not in series.
+        Bodies without a mass; a load that is a force; joints that are not in series.
     """
     mechanism = checked_solution(solution).mechanism
     at, metres = checked_at(mechanism, at), metres_of(mechanism.length_unit)
     weights, rows = loads_of(mechanism, metres, checked_loads(mechanism, loads)), solution._rows
+    if weights.loaded:
+        raise InvalidArgument(f"loads['{weights.loaded[0]}']", "a force", "(mass, centre): a force changes no mass")
     known = np.flatnonzero(~np.isnan(solution._coordinates).any(axis=1))
     q = solution._configurations.coordinates_at(known)
     moving = MovingRows(mechanism, weights, np.zeros(3), at, q, rows.poses[known])
