@@ -111,7 +111,7 @@ class Efforts(Printed):
         if np.isfinite(limits).any():
             header.append("of its limit")
         remarks = []
-        if self.energy is not None and self.times is not None:
+        if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
             remarks = [f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s"]
         return ResultTable(self._mechanism.name, lines, header, rows, remarks)
 

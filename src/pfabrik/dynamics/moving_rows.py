@@ -17,6 +17,7 @@ from ..kernels.dynamics.moving import SHOWN, Exerted, MovingMachine, new_moving_
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
 from ..kinematics import actuator_units, cut_loops, generic_of, joint_path, rate_units
+from ..statics.transmission import is_redundantly_actuated
 from ..tolerances import TOLERANCES
 from .asked_motion import are_lengths, axes_of, in_lengths
 from .drives import drives_of
@@ -138,6 +139,7 @@ def moving_of(rows: MovingRows, probes: Probes = NO_PROBES) -> MovingMachine:
         drives.friction[:, 0],
         drives.friction[:, 1] * by_coordinate,
     )
+    has_duty = rows.at == "task" or (rows.at == "actuators" and not is_redundantly_actuated(mechanism))
     least_mass = TOLERANCES.implied * weights.masses.sum()
     fields, twists = cut._asdict(), 3 if mechanism.end_effector_is_joint else 6
     frames, places = fields.pop("frames"), fields.pop("places")
@@ -149,7 +151,7 @@ def moving_of(rows: MovingRows, probes: Probes = NO_PROBES) -> MovingMachine:
         **fields,
         actuated=integers(places[q] for q in actuated),
         asked=integers(places[q] for q in asked),
-        counts=integers((twists, counts.mobility, shown, rows.at == "task", rows.at == "actuators")),
+        counts=integers((twists, counts.mobility, shown, has_duty, rows.at == "actuators")),
         frames=integers(frames[body] for body in weights.bodies),
         masses=weights.masses,
         centres=weights.centres / length,
