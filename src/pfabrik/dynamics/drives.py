@@ -52,9 +52,3 @@ class Drives:
 def drives_of(mechanism: Mechanism) -> Drives:
     """The actuators of a mechanism."""
     return Drives(mechanism)
-
-
-def of_drive(drive: Any, name: str) -> Any:
-    """What is said of a driven coordinate, of a joint that has one or two."""
-    value = getattr(drive.joint, name)
-    return value[drive.place] if len(drive.joint.driven) == 2 and value is not None else value

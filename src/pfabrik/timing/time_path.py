@@ -141,12 +141,7 @@ def _torques(
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
     """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
-    limits = np.full(len(mechanism.drives), np.inf)
-    for place, drive in enumerate(mechanism.drives):
-        limit = getattr(drive.joint, f"max_{what}")
-        value = limit[drive.place] if isinstance(limit, tuple) else limit
-        if value is not None:
-            limits[place] = value
+    limits = np.array([drive.said(f"max_{what}") or np.inf for drive in mechanism.drives])
     put_limits(limits, what, given, mechanism.actuator_names)
     return limits
 
