@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from ..arrays import Floats, as_plain
+from ..arrays import Floats, Mask, as_plain, shaped
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
@@ -20,8 +20,9 @@ from ..printed import Printed, ResultTable, plain
 from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from ..whole_files import whole_path
-from .drives import Drives
-from .transmitted import TransmittedForces
+from .drives import Drives, drives_of
+from .moving_rows import MovingRows
+from .transmitted import transmitted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,9 +58,19 @@ class Efforts(Printed):
     times: Floats | None
     is_least_norm: bool
     reason: str | Reasons
-    _mechanism: Mechanism = field(repr=False)
-    _drives: Drives = field(repr=False)
-    _reactions: TransmittedForces = field(repr=False)
+    _rows: MovingRows = field(repr=False)
+
+    @property
+    def _mechanism(self) -> Mechanism:
+        return self._rows.solution.mechanism
+
+    @property
+    def _drives(self) -> Drives:
+        return drives_of(self._mechanism)
+
+    @cached_property
+    def _transmitted(self) -> tuple[Floats, Mask]:
+        return transmitted(self._rows, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names))))
 
     @cached_property
     def power(self) -> Floats:
@@ -81,13 +92,13 @@ class Efforts(Printed):
         Moments are about the points that `Forces.reactions` has. NaN where `reason` says why, and where `undetermined`
         does.
         """
-        found = self._reactions.found[0]
-        return FrozenMapping({joint.name: found[..., place, :] for place, joint in enumerate(self._mechanism.joints)})
+        joints, shape = enumerate(self._mechanism.joints), self._rows.solution.shape
+        return FrozenMapping({joint.name: shaped(self._transmitted[0][:, place], shape) for place, joint in joints})
 
     @property
     def undetermined(self) -> str:
         """Which of the reactions the motion does not determine, in words; empty if it determines all."""
-        return open_in_words(self._mechanism, self._reactions.found[1])
+        return open_in_words(self._mechanism, self._transmitted[1])
 
     def table(self) -> ResultTable:
         """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""

@@ -85,7 +85,7 @@ class EffortRows(NamedTuple):
 
 def effort_rows(rows: MovingRows, scales: BodyScales) -> EffortRows:
     """Efforts of rows, and how they depend on the parameters of bodies."""
-    drives = drives_of(rows.mechanism)
+    drives = drives_of(rows.solution.mechanism)
     places = scales.points[:, None] + scales.sizes[:, None, None] * _PLACES
     bodies = tuple(body for body in scales.bodies for _ in _PLACES)
     found = rows.efforts(["motions", "probes"], Probes(bodies, places.reshape(-1, 3)))

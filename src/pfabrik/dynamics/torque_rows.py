@@ -8,12 +8,11 @@ from numpy.typing import ArrayLike
 from ..answers.solution import Solution
 from ..arrays import Floats, Ints
 from ..errors import InvalidArgument
-from ..files.units import metres_of
-from ..statics.loads import BodyLoads, add_reason, checked_gravity, checked_loads, has_reason
-from ..statics.transmission import NO_CONFIGURATION
+from ..statics.loads import BodyLoads, checked_gravity, has_reason
 from .drives import drives_of
-from .inverse_dynamics import AskedMotion, reasons_of, rows_of
-from .weights import loads_of
+from .inverse_dynamics import reasons_of
+from .moving_rows import MovingRows, in_si
+from .weights import weights_of
 
 
 def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: BodyLoads | None, steps: Ints) -> Floats:
@@ -32,16 +31,17 @@ def torque_rows(solution: Solution, slopes: Floats, gravity: ArrayLike, loads: B
     InvalidArgument : places at which there are no torques, with the reason.
     """
     mechanism = solution.mechanism
-    metres, n = metres_of(mechanism.length_unit), len(slopes)
-    weights, drives = loads_of(mechanism, metres, checked_loads(mechanism, loads)), drives_of(mechanism)
-    asked = AskedMotion(solution, None, "actuators", slopes, np.zeros(slopes.shape))
-    moving = rows_of(asked, np.arange(n), weights, checked_gravity(gravity))
-    found = moving.efforts(["resting", "matrices"])
-    reasons = reasons_of(mechanism, found.marks)
-    add_reason(reasons, np.isnan(moving.q).any(axis=1), NO_CONFIGURATION)
+    rows = MovingRows(
+        *(solution, "actuators", slopes, np.zeros(slopes.shape)),
+        weights=weights_of(mechanism, loads),
+        gravity=checked_gravity(gravity),
+    )
+    found = rows.efforts(["resting", "matrices"])
+    reasons = reasons_of(solution, found.marks)
     bad = np.flatnonzero(has_reason(reasons))
     if len(bad):
-        rows = np.unique(steps[bad])[:5].tolist()
-        raise InvalidArgument("track", f"no torques: {reasons[bad[0]]}", "a path that its actuators hold", rows=rows)
-    moved = found.actuators - found.resting - drives.rubbed(slopes)
-    return np.concatenate([moving.in_si(found.matrices).reshape(n, -1), moved, found.resting], axis=1)
+        places = np.unique(steps[bad])[:5].tolist()
+        raise InvalidArgument("track", f"no torques: {reasons[bad[0]]}", "a path that its actuators hold", rows=places)
+    moved = found.actuators - found.resting - drives_of(mechanism).rubbed(slopes)
+    masses = in_si(mechanism, "actuators", found.matrices)
+    return np.concatenate([masses.reshape(len(slopes), -1), moved, found.resting], axis=1)

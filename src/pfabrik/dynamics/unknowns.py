@@ -11,8 +11,9 @@ import numpy as np
 from ..arrays import Floats
 from ..description.joints import Joint
 from ..description.mechanism import Mass, Mechanism
+from ..files.units import metres_of
 from ..kinematics import BodyInertia, inertias_of
-from .drives import Drives, drives_of, of_drive
+from .drives import Drives, drives_of
 from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
 from .regressor import PARTS, POWERS, BodyScales, EffortRows, body_of, ten_of
 
@@ -25,14 +26,13 @@ class Unknowns:
 
     Attributes
     ----------
-    mechanism : with a mass of all bodies that move; metres : of its unit of length.
+    mechanism : with a mass of all bodies that move.
     scales : of the bodies.
     kinds : of "dry", "viscous" and "rotor".
     typical : what those of actuators are compared with, (kinds, n_a), in their units.
     """
 
     mechanism: Mechanism
-    metres: float
     scales: BodyScales
     kinds: tuple[str, ...]
     typical: Floats
@@ -45,7 +45,7 @@ class Unknowns:
     @cached_property
     def gears(self) -> Floats:
         """Gear ratios, (n_a,)."""
-        return np.array([of_drive(drive, "gear") or 1.0 for drive in self.mechanism.drives])
+        return np.array([drive.said("gear") or 1.0 for drive in self.mechanism.drives])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ class Unknowns:
     @cached_property
     def described(self) -> Floats:
         """Their values in the description, (p,)."""
-        known = inertias_of(self.mechanism, self.metres)
+        known = inertias_of(self.mechanism, metres_of(self.mechanism.length_unit))
         parts = [known[body] for body in self.scales.bodies]
         masses = np.array([each.mass for each in parts])
         arms = np.reshape([each.centre for each in parts], (-1, 3)) - self.scales.points

@@ -15,7 +15,6 @@ from ..description.mechanism import Mechanism
 from ..dynamics.torque_rows import torque_rows
 from ..dynamics.weights import lacking_masses
 from ..errors import InvalidArgument
-from ..files.units import metres_of
 from ..fk import solve_fk
 from ..kernels.timing import fastest
 from ..kinematics import actuator_units, readouts
@@ -88,7 +87,7 @@ def time_path(
     speeds = limits_of(mechanism, "speed", speed)
     accelerations = limits_of(mechanism, "acceleration", acceleration)
     torques = limits_of(mechanism, "torque", torque)
-    if torque is None and lacking_masses(mechanism, metres_of(mechanism.length_unit)):
+    if torque is None and lacking_masses(mechanism):
         torques[:] = np.inf
     most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
     every = 1.0 / require_positive("rate", rate)
