@@ -60,7 +60,7 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
         except ValueError:
             expected = f"one for all, or one for each of batch shape {solution.shape}"
             raise InvalidArgument(name, f"a batch of {value.shape[:-1]}", expected) from None
-    return MovingRows(solution, at, *values, motion.times if isinstance(motion, Track) else None)
+    return MovingRows(solution, at, values[0], values[1], motion.times if isinstance(motion, Track) else None)
 
 
 def motion_of(track: Track) -> tuple[Floats, Floats]:

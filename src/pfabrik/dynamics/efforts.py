@@ -12,8 +12,8 @@ import numpy as np
 from ..arrays import Floats, Mask, as_plain, shaped
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
+from ..drawing import curves_over_time
 from ..errors import InvalidArgument
-from ..extras import require
 from ..frozen import FrozenMapping
 from ..kinematics import readouts
 from ..printed import Printed, ResultTable, plain
@@ -170,26 +170,12 @@ class Efforts(Printed):
         InvalidArgument
             Configurations that are no path with times.
         """
-        times = self._require_times()
-        require("pictures", "matplotlib", "plot")
-        from matplotlib.figure import Figure
-
-        figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
-        shown = readouts(self._mechanism)
-        moves = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
-        kinds = sorted({f"{each.unit}/s" for each in shown}), sorted(set(self._drives.forces))
-        labels = f"exerts [{', '.join(kinds[1])}]", f"rate [{', '.join(kinds[0])}]", "power [W]"
-        for axes, label, values in zip(
-            figure.subplots(3, 1, sharex=True), labels, (self.actuators, moves, self.power), strict=True
-        ):
-            for each, column in zip(shown, values.T, strict=True):
-                axes.plot(times, column, label=each.name)
-            axes.set_ylabel(label)
-        axes.set_xlabel("time [s]")
-        handles, names = axes.get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
-        drawn: Figure = figure
-        return drawn
+        times, shown = self._require_times(), readouts(self._mechanism)
+        rates = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
+        forces, units = sorted(set(self._drives.forces)), sorted({f"{each.unit}/s" for each in shown})
+        labels = f"exerts [{', '.join(forces)}]", f"rate [{', '.join(units)}]", "power [W]"
+        panels = dict(zip(labels, (self.actuators, rates, self.power), strict=True))
+        return curves_over_time(times, [each.name for each in shown], panels)
 
 
 def _largest(values: Floats) -> float:

@@ -87,8 +87,8 @@ def inverse_dynamics(
         least, both = exerted[over] * drives.units, np.stack([-limits, limits], axis=1)
         exerted[over] = within_limits(least, found.motions[over], both)[0] / drives.units
     exerted[has_reason(reasons)] = found.rates[has_reason(reasons)] = found.gains[has_reason(reasons)] = np.nan
-    values = (shaped(each, shape) for each in (exerted, found.rates, found.gains))
-    return Efforts(*values, rows.times, is_redundant, in_shape(reasons, shape), rows)
+    exerted, rates, gains = (shaped(each, shape) for each in (exerted, found.rates, found.gains))
+    return Efforts(exerted, rates, gains, rows.times, is_redundant, in_shape(reasons, shape), rows)
 
 
 def reasons_of(solution: Solution, marks: Ints) -> Reasons:
