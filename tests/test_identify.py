@@ -96,7 +96,7 @@ def test_efforts_are_linear_in_the_parameters(name: str) -> None:
     result = pf.identify(solution, efforts[0], rotors=True, sigma=1.0, **how)
     more = np.array(list(map(parameters(result, other).get, result.names)), float) - result.described
     scaled = np.linalg.solve(result._unknowns.by_scaled, more)
-    change = result._fit._columns @ scaled / result._unknowns.drives.units
+    change = result._fit._columns @ scaled
     np.testing.assert_allclose(change, efforts[1] - efforts[0], atol=1e-9 * np.abs(efforts[0]).max())
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Mask
 from ..errors import InvalidArgument, counted
-from .inertial_fit import IMPOSSIBLE, InertialFit, inverse
+from .inertial_fit import IMPOSSIBLE, InertialFit
 from .regressor import EffortRows
 from .unknowns import Unknowns
 
@@ -36,13 +36,12 @@ class EffortFit:
     """
 
     def __init__(
-        self, unknowns: Unknowns, moved: EffortRows, measured: Floats, rows: Ints, n: int, sigma: Floats | None
+        self, unknowns: Unknowns, moved: EffortRows, measured: Floats, is_used: Mask, sigma: Floats | None
     ) -> None:
         self._columns, self._off = unknowns.columns(moved), measured - moved.described
         n_a = measured.shape[1]
         self._motions = moved.motions if moved.motions.shape[2] < n_a else None
         self._least = LEAST_NOISE * float(np.abs(measured).max(initial=0.0))
-        self._spare = np.ones(n_a)
         if sigma is None:
             first = self._fitted(np.ones(n_a))
             left, spare = self._left(first.likeliest(self._least), np.ones(n_a)), self._spare_of(first)
@@ -57,16 +56,15 @@ class EffortFit:
             left = self._left(self.fit.likeliest(1.0), sigma) / sigma
             spare = self._spare_of(self.fit)
             self.deviation = max(1.0, float(np.sqrt((left**2).sum() / spare))) if spare > 0 else 1.0
-        described = inverse(unknowns.by_scaled) @ unknowns.described
+        described = unknowns.to_scaled @ unknowns.described
         values, broken = self.fit.physical(described, len(unknowns.scales.bodies), self.deviation)
         self.found, self.is_broken = values - described, broken > IMPOSSIBLE
-        units, left = unknowns.drives.units, self._left(self.found, sigma)
+        left = self._left(self.found, sigma)
         self.missed = float(np.sqrt(np.mean((left / sigma) ** 2)))
-        left = left / units
-        self.rms_before = np.sqrt(np.mean((self._left(np.zeros_like(values), sigma) / units) ** 2, axis=0))
-        self.rms, self.largest = np.sqrt(np.mean(left**2, axis=0)), np.abs(measured / units).max(axis=0)
-        self.residuals = np.full((n, n_a), np.nan)
-        self.residuals[rows] = left
+        self.rms_before = np.sqrt(np.mean(self._left(np.zeros_like(values), sigma) ** 2, axis=0))
+        self.rms, self.largest = np.sqrt(np.mean(left**2, axis=0)), np.abs(measured).max(axis=0)
+        self.residuals = np.full((len(is_used), n_a), np.nan)
+        self.residuals[is_used] = left
 
     def sensitivity(self, to_scaled: Floats) -> Floats:
         """How much efforts depend on each parameter, (p,): root mean square by scaled ones (p, p)."""

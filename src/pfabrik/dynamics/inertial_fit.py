@@ -33,16 +33,6 @@ RELAXED = 1.7
 """How much farther than found a step goes: those to bodies at the edge of what is possible are many."""
 
 
-def inverse(matrix: Floats) -> Floats:
-    """The inverse of a matrix (p, p)."""
-    return np.asarray(np.linalg.inv(matrix), float)
-
-
-def lengths(rows: Floats) -> Floats:
-    """Lengths of the rows of a matrix, (p,)."""
-    return np.asarray(np.linalg.norm(rows, axis=1), float)
-
-
 _R = np.sqrt(0.5)
 _SECOND = np.array([[-0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0.5, 0.5, -0.5]])
 TO_DENSITY = np.zeros((10, 10))
@@ -51,7 +41,7 @@ TO_DENSITY[0, 0] = 1.0
 TO_DENSITY[1:4, 1:4] = np.eye(3) / _R
 TO_DENSITY[4:7, 4:7] = _SECOND
 TO_DENSITY[7:, 7:] = -np.eye(3) / _R
-FROM_DENSITY = inverse(TO_DENSITY)
+FROM_DENSITY = np.linalg.inv(TO_DENSITY)
 
 _ROW, _COLUMN = np.array([3, 0, 1, 2, 0, 1, 2, 0, 0, 1]), np.array([3, 3, 3, 3, 0, 1, 2, 1, 2, 2])
 _HALF = np.where(_ROW == _COLUMN, 1.0, _R)
@@ -108,7 +98,7 @@ class InertialFit(NamedTuple):
 
     def deviations(self, by_scaled: Floats, deviation: float) -> Floats:
         """Standard deviations of parameters by scaled ones, (p, p): infinite where the data do not determine one."""
-        rank, sizes = self.rank, lengths(by_scaled)
+        rank, sizes = self.rank, np.linalg.norm(by_scaled, axis=1)
         along = by_scaled @ self.right[:rank].T
         spread = np.linalg.norm(along * (deviation / self.values[:rank]), axis=1)
         outside = np.linalg.norm(by_scaled - along @ self.right[:rank], axis=1)
@@ -158,22 +148,9 @@ def _projected(values: Floats, n_bodies: int) -> tuple[Floats, Floats]:
     return np.append(bodies, np.maximum(drives, 0.0)), np.append(broken, np.maximum(-drives, 0.0))
 
 
-class Combinations(NamedTuple):
-    """What data determine of parameters, as combinations, each led by a parameter of its own.
-
-    Attributes
-    ----------
-    leading : index of the parameter, (r,).
-    factors : by which the parameters count, (r, p): 1 of the leading one, 0 of all other leading ones.
-    deviations : standard, (r,).
-    """
-
-    leading: Ints
-    factors: Floats
-    deviations: Floats
-
-
-def combined(directions: Floats, spread: Floats, to_scaled: Floats, sizes: Floats, alone: Mask) -> Combinations:
+def combined(
+    directions: Floats, spread: Floats, to_scaled: Floats, sizes: Floats, alone: Mask
+) -> tuple[Ints, Floats, Floats]:
     """The combinations that determined directions (r, p) of scaled parameters, with deviations (r,), stand for.
 
     Parameters
@@ -181,16 +158,21 @@ def combined(directions: Floats, spread: Floats, to_scaled: Floats, sizes: Float
     alone : True for parameters that lead first, as they are determined without others, (p,).
     to_scaled : scaled parameters by parameters, (p, p).
     sizes : of the parameters, to compare them by, (p,).
+
+    Returns
+    -------
+    The parameter that leads each, by its index, (r,); factors by which parameters count, (r, p), 1 of the leading one
+    and 0 of all other leading ones; standard deviations, (r,).
     """
     from scipy.linalg import qr
 
     shown = (directions @ to_scaled) * sizes
     if not len(shown):
-        return Combinations(np.zeros(0, int), shown, np.zeros(0))
+        return np.zeros(0, int), shown, np.zeros(0)
     first = np.where(alone, FIRST, 1.0)
     leading = np.sort(qr(shown * first, mode="r", pivoting=True)[1][: len(shown)])
     back = np.linalg.inv(shown[:, leading])
     factors, deviations = back @ shown, np.linalg.norm(back * spread, axis=1)
     factors[np.abs(factors) <= np.maximum(SLIGHT * deviations[:, None], OPEN)] = 0.0
     own = sizes[leading]
-    return Combinations(leading, factors * (own[:, None] / sizes), own * deviations)
+    return leading, factors * (own[:, None] / sizes), own * deviations

@@ -12,10 +12,10 @@ from ..arrays import Floats
 from ..description.joints import Joint
 from ..description.mechanism import Mass, Mechanism
 from ..files.units import metres_of
-from ..kinematics import BodyInertia, inertias_of
+from ..kinematics import inertias_of
 from .drives import Drives, drives_of
 from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
-from .regressor import PARTS, POWERS, BodyScales, EffortRows, body_of, ten_of
+from .regressor import PARTS, POWERS, BodyScales, EffortRows, ten_of
 
 FRICTION, ROTOR = ("dry", "viscous"), "rotor"
 
@@ -88,30 +88,33 @@ class Unknowns:
             found[own, own] = mass * units[:, None] * FROM_DENSITY
         return found
 
-    def columns(self, rows: EffortRows) -> Floats:
-        """Efforts of `EffortRows` by scaled parameters, (n, n_a, p)."""
-        moves = {"dry": np.sign(rows.rates), "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
-        own = [moves[kind][..., None] * np.diag(self.drives.units) for kind in self.kinds]
-        in_sizes = np.append(self.scales.units, np.ones(self.typical.size))
-        return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ (self.by_scaled / in_sizes[:, None]))
+    @cached_property
+    def to_scaled(self) -> Floats:
+        """Scaled parameters by parameters, (p, p)."""
+        return np.asarray(np.linalg.inv(self.by_scaled), float)
 
-    def body(self, values: Floats, place: int) -> BodyInertia:
-        """What a body weighs by parameters (p,); nothing where that is rounding."""
-        ten = values[10 * place : 10 * place + 10]
-        if ten[0] <= IMPOSSIBLE * self.scales.masses[place]:
-            return BodyInertia(0.0, self.scales.points[place], np.zeros((3, 3)))
-        found = body_of(ten, self.scales.points[place])
-        spread, axes = np.linalg.eigh(0.5 * np.trace(found.inertia) * np.eye(3) - found.inertia)  # of mass, by place
-        rounding = IMPOSSIBLE * found.mass * self.scales.sizes[place] ** 2
-        spread = np.where(spread <= rounding, 0.0, spread)
+    def columns(self, rows: EffortRows) -> Floats:
+        """Efforts by scaled parameters, (n, n_a, p)."""
+        moves = {"dry": np.sign(rows.rates), "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
+        own = [moves[kind][..., None] * np.eye(len(self.gears)) for kind in self.kinds]
+        return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ self.by_scaled)
+
+    def mass(self, values: Floats, place: int) -> Mass:
+        """The mass of a body by parameters (p,); none where that is rounding."""
+        body, ten, point = self.scales.bodies[place], values[10 * place :][:10], self.scales.points[place]
+        mass, size = ten[0], self.scales.sizes[place]
+        if mass <= IMPOSSIBLE * self.scales.masses[place]:
+            return Mass(body, 0.0, point, np.zeros((3, 3)))
+        arm, about = ten[1:4] / mass, ten[[4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(3, 3)
+        second = 0.5 * np.trace(about) * np.eye(3) - about - mass * np.outer(arm, arm)  # of mass by place
+        spread, axes = np.linalg.eigh(second)
+        spread = np.where(spread <= IMPOSSIBLE * mass * size**2, 0.0, spread)
         second = (axes * spread) @ axes.T
-        inertia = spread.sum() * np.eye(3) - 0.5 * (second + second.T)
-        return found._replace(inertia=inertia)
+        return Mass(body, float(mass), point + arm, spread.sum() * np.eye(3) - 0.5 * (second + second.T))
 
     def apply(self, values: Floats) -> Mechanism:
         """The machine with parameters (p,)."""
-        found = [(name, self.body(values, place)) for place, name in enumerate(self.scales.bodies)]
-        masses = [Mass(name, each.mass, each.centre, each.inertia) for name, each in found]
+        masses = [self.mass(values, place) for place in range(len(self.scales.bodies))]
         others = [each for each in self.mechanism.masses if each.body not in self.scales.bodies]
         shapes = [
             replace(shape, density=None) if shape.body in self.scales.bodies else shape
