@@ -44,7 +44,7 @@ class EffortFit:
         self._least = LEAST_NOISE * float(np.abs(measured).max(initial=0.0))
         if sigma is None:
             first = self._fitted(np.ones(n_a))
-            left, spare = self._left(first.likeliest(self._least), np.ones(n_a)), self._spare_of(first)
+            left, spare = self._left(first.likeliest(self._least), np.ones(n_a)), first.spare
             if spare <= 0:
                 found = f"{counted(len(measured), 'row')}, no more than are needed for {first.rank} parameters"
                 raise InvalidArgument("efforts", found, "more rows, or sigma: nothing says how good they are")
@@ -54,7 +54,7 @@ class EffortFit:
         else:
             self.fit = self._fitted(sigma)
             left = self._left(self.fit.likeliest(1.0), sigma) / sigma
-            spare = self._spare_of(self.fit)
+            spare = self.fit.spare
             self.deviation = max(1.0, float(np.sqrt((left**2).sum() / spare))) if spare > 0 else 1.0
         described = unknowns.to_scaled @ unknowns.described
         values, broken = self.fit.physical(described, len(unknowns.scales.bodies), self.deviation)
@@ -89,6 +89,3 @@ class EffortFit:
             bases = self._bases(sigma)
             left = (bases @ (np.swapaxes(bases, 1, 2) @ left[..., None]))[..., 0]
         return np.asarray(left * sigma)
-
-    def _spare_of(self, fit: InertialFit) -> int:
-        return len(fit.off) - fit.rank

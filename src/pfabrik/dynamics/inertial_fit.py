@@ -47,19 +47,19 @@ _ROW, _COLUMN = np.array([3, 0, 1, 2, 0, 1, 2, 0, 0, 1]), np.array([3, 3, 3, 3, 
 _HALF = np.where(_ROW == _COLUMN, 1.0, _R)
 
 
-def nearest_bodies(vectors: Floats) -> tuple[Floats, Floats]:
-    """The nearest physical bodies (b, 10) of density matrices as vectors (b, 10), and how far they are off, (b,).
+def nearest_possible(values: Floats, n_bodies: int) -> tuple[Floats, Floats]:
+    """The nearest parameters (p,) that bodies and actuators can have, and how far these are off, (b + drives,).
 
     A body is physical where its density matrix, the integral of [r; 1] [r; 1]' over its mass, is not negative: where
-    its mass and moments of inertia are positive, and none of these is more than the other two together.
+    its mass and moments of inertia are positive, and none of these is more than the other two together. Parameters of
+    actuators are not negative.
     """
-    matrices = np.zeros((len(vectors), 4, 4))
+    vectors, drives = values[: 10 * n_bodies].reshape(-1, 10), values[10 * n_bodies :]
+    matrices = np.zeros((n_bodies, 4, 4))
     matrices[:, _ROW, _COLUMN] = matrices[:, _COLUMN, _ROW] = vectors * _HALF
-    values, axes = np.linalg.eigh(matrices)
-    if values.min(initial=0.0) >= 0.0:
-        return vectors, np.zeros(len(vectors))
-    kept = (axes * np.maximum(values, 0.0)[:, None]) @ np.swapaxes(axes, 1, 2)
-    return kept[:, _ROW, _COLUMN] / _HALF, np.maximum(-values[:, 0], 0.0)
+    sizes, axes = np.linalg.eigh(matrices)
+    kept = ((axes * np.maximum(sizes, 0.0)[:, None]) @ np.swapaxes(axes, 1, 2))[:, _ROW, _COLUMN] / _HALF
+    return np.append(kept, np.maximum(drives, 0.0)), np.maximum(-np.append(sizes[:, 0], drives), 0.0)
 
 
 class InertialFit(NamedTuple):
@@ -84,6 +84,11 @@ class InertialFit(NamedTuple):
     def rank(self) -> int:
         """Number of directions that the efforts depend on."""
         return int((self.values > RANK * self.values.max(initial=0.0)).sum())
+
+    @property
+    def spare(self) -> int:
+        """Number of efforts beyond what determines these."""
+        return len(self.off) - self.rank
 
     def directions(self, deviation: float) -> tuple[Floats, Floats]:
         """Orthonormal directions that the data determine, (r, p), and their deviations, (r,).
@@ -119,13 +124,11 @@ class InertialFit(NamedTuple):
         values, broken : (p,), (b + drives,).
         """
         found = described + self.likeliest(deviation)
-        kept, broken = _projected(found, n_bodies)
+        kept, broken = nearest_possible(found, n_bodies)
         if broken.max(initial=0.0) <= IMPOSSIBLE:
             return found, broken
         weights, pulled = (self.values / deviation) ** 2, (self.left.T @ self.off) * self.values / deviation**2
-        stiff = float(
-            np.sqrt(weights.max() + 1.0)
-        )  # of the pull to the point before: between the stiffest and the rest
+        stiff = float(np.sqrt(weights.max() + 1.0))  # the pull to the point before: between the stiffest and the rest
         apart = np.zeros(len(found))
         for _ in range(STEPS):
             wanted = stiff * (kept - apart - described)
@@ -133,19 +136,12 @@ class InertialFit(NamedTuple):
             inside = (pulled + along) / (weights + 1.0 + stiff)
             found = described + self.right.T @ (inside - along / (1.0 + stiff)) + wanted / (1.0 + stiff)
             farther = RELAXED * found + (1.0 - RELAXED) * kept
-            before, kept = kept, _projected(farther + apart, n_bodies)[0]
+            before, kept = kept, nearest_possible(farther + apart, n_bodies)[0]
             apart = apart + farther - kept
             missed = np.linalg.norm(self.right @ (kept - found) * self.values / deviation)
             if missed <= CLOSE and stiff * np.abs(kept - before).max() <= CLOSE:
                 break
         return kept, broken
-
-
-def _projected(values: Floats, n_bodies: int) -> tuple[Floats, Floats]:
-    """The nearest parameters that bodies and actuators can have, and how far these are off, (b + drives,)."""
-    bodies, broken = nearest_bodies(values[: 10 * n_bodies].reshape(-1, 10))
-    drives = values[10 * n_bodies :]
-    return np.append(bodies, np.maximum(drives, 0.0)), np.append(broken, np.maximum(-drives, 0.0))
 
 
 def combined(

@@ -14,7 +14,7 @@ from ..batch import take
 from ..description.mechanism import Mechanism
 from ..files.units import metres_of
 from ..kernels.dynamics.inverse_dynamics import inverse_dynamics
-from ..kernels.dynamics.moving import SHOWN, Exerted, MovingMachine, new_moving_scratch
+from ..kernels.dynamics.moving import Exerted, MovingMachine, new_exerted, new_moving_scratch
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
 from ..kinematics import actuator_units, cut_loops, generic_of, joint_path, rate_units, task_of
@@ -67,31 +67,17 @@ class MovingRows:
         requests : of "wrenches", "resting", "matrices", "twists", "motions", with `probes` "probes" too.
         """
         mechanism, q = self.solution.mechanism, self.solution._coordinates
-        moving = moving_of(mechanism, self.at, self.weights, self.gravity, probes := probes or Probes())
+        moving = moving_of(mechanism, self.at, self.weights, self.gravity, probes or Probes())
         axes, n = axes_of(mechanism, self.at, self.solution._rows.poses), len(q)
-        units, k, n_a = in_lengths(mechanism, self.at), axes.shape[1] + len(moving.asked), len(moving.actuated)
+        units, k = in_lengths(mechanism, self.at), axes.shape[1] + len(moving.asked)
         rates, gains = (
-            np.zeros((n, k)) if x is None else self._components(axes, x[:, : len(units)] / units)
-            for x in (self.rates, self.gains)
+            np.zeros((n, len(units))) if x is None else x[:, : len(units)] / units for x in (self.rates, self.gains)
         )
-        shapes = {
-            "actuators": (n_a,),
-            "rates": (n_a,),
-            "gains": (n_a,),
-            "marks": (),
-            "wrenches": (len(moving.frames) + len(moving.loaded), 6),
-            "resting": (n_a,),
-            "matrices": (k, k),
-            "probes": (n_a, len(probes.bodies)),
-            "twists": (6,),
-            "motions": (n_a, int(moving.counts[SHOWN])),
-        }
-        found = Exerted(**{
-            name: np.full((n if place < 4 or name in requests else 0, *shape), 0 if name == "marks" else np.nan)
-            for place, (name, shape) in enumerate(shapes.items())
-        })  # fmt: skip
+        if self.at == "task":
+            rates, gains = ((axes[..., : len(units)] @ x[..., None])[..., 0].copy() for x in (rates, gains))
+        found = new_exerted(moving, n, k, requests)
         machine, scratch = Handle(moving), Scratch(new_moving_scratch, moving, k)
-        coordinates = np.ascontiguousarray(q / rate_units(mechanism))
+        coordinates = q / rate_units(mechanism)
 
         def run(block: slice) -> None:
             own = take(found, block) if n > ROWS_A_BLOCK else found
@@ -102,12 +88,6 @@ class MovingRows:
         length, units = mechanism.characteristic_length, actuator_units(mechanism)
         scale = length**2 * metres_of(mechanism.length_unit)
         return found._replace(rates=found.rates * units, gains=found.gains * units, wrenches=found.wrenches * scale)
-
-    def _components(self, axes: Floats, values: Floats) -> Floats:
-        """Those of twists that the task sets; else the values as they are."""
-        return np.ascontiguousarray(
-            np.einsum("nki,ni->nk", axes[..., : values.shape[1]], values) if self.at == "task" else values
-        )
 
 
 def axes_of(mechanism: Mechanism, at: At, poses: Floats) -> Floats:

@@ -12,14 +12,14 @@ from ..answers.tracked import Track, refuse_leaps
 from ..arrays import Floats
 from ..checks import put_limits, require_positive, require_type
 from ..description.mechanism import Mechanism
-from ..dynamics.torque_rows import torque_rows
-from ..dynamics.weights import lacking_masses
+from ..dynamics.moving_rows import MovingRows
+from ..dynamics.weights import lacking_masses, weights_of
 from ..errors import InvalidArgument
 from ..fk import solve_fk
 from ..kernels.timing import fastest
 from ..kinematics import actuator_units, readouts
 from ..statics.forces import GRAVITY
-from ..statics.loads import BodyLoads
+from ..statics.loads import BodyLoads, checked_gravity
 from ..tolerances import TOLERANCES
 from .curve import Curve, curve_of, largest_between, refuse_crossings
 from .timed import Timed, What
@@ -135,7 +135,9 @@ def _torques(
     values, slopes, _ = (x[:, :n] for x in curve.at(s))
     steps = curve.step_of(s)
     solution = solve_fk(mechanism, values, start=track[steps])
-    return TorquePath(solution, s, torque_rows(solution, slopes, gravity, loads, steps), limits)
+    weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
+    rows = MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
+    return TorquePath(rows, s, steps, limits)
 
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
