@@ -40,7 +40,7 @@ class EffortFit:
     ) -> None:
         self._columns, self._off = unknowns.columns(moved), measured - moved.described
         n_a = measured.shape[1]
-        self._motions = moved.motions if moved.motions.shape[2] < n_a else None
+        self._motions = moved.motions
         self._least = LEAST_NOISE * float(np.abs(measured).max(initial=0.0))
         if sigma is None:
             first = self._fitted(np.ones(n_a))
@@ -72,20 +72,14 @@ class EffortFit:
 
     def _bases(self, sigma: Floats) -> Floats:
         """Orthonormal motions of the actuators, (n, n_a, d), in deviations."""
-        assert self._motions is not None
         return np.linalg.qr(self._motions * sigma[:, None])[0]
 
     def _fitted(self, sigma: Floats) -> InertialFit:
-        columns, off = self._columns / sigma[:, None], self._off / sigma
-        if self._motions is not None:
-            turned = np.swapaxes(self._bases(sigma), 1, 2)
-            columns, off = turned @ columns, (turned @ off[..., None])[..., 0]
+        turned = np.swapaxes(self._bases(sigma), 1, 2)
+        columns, off = turned @ (self._columns / sigma[:, None]), turned @ (self._off / sigma)[..., None]
         return InertialFit(*np.linalg.svd(columns.reshape(-1, columns.shape[2]), full_matrices=False), off.ravel())
 
     def _left(self, found: Floats, sigma: Floats) -> Floats:
         """Residuals with scaled parameters, (n, n_a)."""
-        left = (self._off - self._columns @ found) / sigma
-        if self._motions is not None:
-            bases = self._bases(sigma)
-            left = (bases @ (np.swapaxes(bases, 1, 2) @ left[..., None]))[..., 0]
-        return np.asarray(left * sigma)
+        bases, left = self._bases(sigma), (self._off - self._columns @ found) / sigma
+        return np.asarray((bases @ (np.swapaxes(bases, 1, 2) @ left[..., None]))[..., 0] * sigma)
