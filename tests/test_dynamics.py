@@ -223,43 +223,28 @@ def lagrange(shown: Callable[[Any], Any], weights: Any, potential: Callable[[Any
     return derivative(momentum) - np.array(by_place) + pull
 
 
-def test_a_slider_crank_is_as_its_closed_form() -> None:
-    r, length, m = 0.1, 0.25, {"crank": (0.4, 0.03), "rod": (0.3, 0.1), "slider": (0.7, 0.0)}
-
-    def joint(name: str, kind: Any, bodies: Any, at: Any, **more: Any) -> pf.Joint:
-        return pf.Joint(name, kind, bodies, at=at, axis=(0, 0, 1), **more)
-
+def slider_crank(drive: str, r: float = 0.1, length: float = 0.25) -> pf.Mechanism:
+    """Its crank upright at home, driven at the crank, A, or the slider, D."""
+    reach, turn = math.sqrt(length**2 - r * r), math.asin(r / length)
     joints = [
-        joint(
-            "A",
-            "revolute",
-            ("base", "crank"),
-            (0, 0, 0),
-            actuated=True,
-            rotor_inertia=1e-5,
-            gear=20,
-            friction=(0.1, 0.02),
-        ),
-        joint("B", "revolute", ("crank", "rod"), (0, r, 0)),
-        joint("C", "revolute", ("rod", "slider"), (math.sqrt(length**2 - r * r), 0, 0)),
-        pf.Joint("D", "prismatic", ("base", "slider"), axis=(1, 0, 0)),
+        pf.Joint("A", "revolute", ("base", "crank"), (0, 0, 0), (0, 0, 1), actuated=drive == "A"),
+        pf.Joint("B", "revolute", ("crank", "rod"), (0, r, 0), (0, 0, 1)),
+        pf.Joint("C", "revolute", ("rod", "slider"), (reach, 0, 0), (0, 0, 1)),
+        pf.Joint("D", "prismatic", ("base", "slider"), axis=(1, 0, 0), actuated=drive == "D"),
     ]
-    turn = math.asin(r / length)
-    along = {"crank": (0, 1), "rod": (math.cos(turn), -math.sin(turn)), "slider": (1, 0)}
-    start = {"crank": (0, 0), "rod": (0, r), "slider": (math.sqrt(length**2 - r * r), 0)}
-    masses = [
-        pf.Mass(body, mass, (*np.add(start[body], np.multiply(at, along[body])), 0), (1e-3, 1e-3, 2e-3 * mass))
-        for body, (mass, at) in m.items()
-    ]
-    machine = pf.Mechanism(
-        "slider-crank",
-        joints,
-        "slider",
-        (math.sqrt(length**2 - r * r), 0, 0),
-        length_unit="m",
-        task=("x",),
-        masses=masses,
-    )
+    if drive == "A":
+        joints[0] = dataclasses.replace(joints[0], rotor_inertia=1e-5, gear=20, friction=(0.1, 0.02))
+    centres = {
+        "crank": (0.4, (0, 0.03, 0)),
+        "rod": (0.3, (0.1 * math.cos(turn), r - 0.1 * math.sin(turn), 0)),
+        "slider": (0.7, (reach, 0, 0)),
+    }
+    masses = [pf.Mass(body, mass, at, (1e-3, 1e-3, 2e-3 * mass)) for body, (mass, at) in centres.items()]
+    return pf.Mechanism("sc", joints, "slider", (reach, 0, 0), length_unit="m", task=("x",), masses=masses)
+
+
+def test_a_slider_crank_is_as_its_closed_form() -> None:
+    machine, r, length = slider_crank("A"), 0.1, 0.25
 
     def shown(q: Any) -> Any:
         theta = q[0] + math.pi / 2  # from the x axis
@@ -276,6 +261,43 @@ def test_a_slider_crank_is_as_its_closed_form() -> None:
     drive = 1e-5 * 20**2 * a + 0.1 + 0.02 * v
     np.testing.assert_allclose(found.actuators, expected + drive, rtol=1e-8)
     np.testing.assert_allclose(found.power, found.actuators * v)
+
+
+def test_a_slider_does_not_drive_its_crank_through_dead_centre() -> None:
+    machine, down = slider_crank("D"), (0, -9.81, 0)
+    there = pf.solve_fk(slider_crank("A"), np.linspace(-0.2, 0.2, 5)[:, None] - math.pi / 2)
+    solution, is_dead = pf.configuration(machine, there.q), np.arange(5) == 2
+    moving = pf.inverse_dynamics(solution, twists=[1.0], at="actuators")
+    for found, reason in (
+        (moving, "serial singularity"),
+        (pf.inverse_dynamics(solution, gravity=down), "parallel singularity"),
+    ):
+        assert [reason in each for each in np.atleast_1d(found.reason)] == is_dead.tolist(), found.reason
+        np.testing.assert_array_equal(np.isnan(found.actuators[:, 0]), is_dead)
+    np.testing.assert_array_equal(np.isnan(pf.mass_matrix(solution)[:, 0, 0]), is_dead)
+    path = pf.track(machine, solution.pose, start=solution[0], sample_time=0.1)
+    for refused in (lambda: pf.inverse_dynamics(path), lambda: pf.time_path(path, torque=500.0, gravity=down)):
+        with pytest.raises(pf.errors.InvalidArgument, match=r"track: .* not reached.*row: 2\)"):
+            refused()
+
+
+@pytest.mark.parametrize(("name", "motions", "still"), [("rps", 3, []), ("five_bar", 2, [0])])
+def test_more_coordinates_than_motions_share_the_rank_of_these(name: str, motions: int, still: list[int]) -> None:
+    machine = weighed(pf.load(name))
+    machine = machine._with(task=machine.whole_task)
+    solution, rates, _ = somewhere(machine)
+    mass, twist = pf.mass_matrix(solution), pf.forward_jacobian(solution) @ rates
+    assert np.linalg.matrix_rank(mass, 1e-9) == motions < len(mass) == len(twist)
+    assert not mass[still].any()
+    si, metres = units(machine)[1], np.repeat([metres_of(machine.length_unit), 1.0], 3)[: len(twist)]
+    energy = (rates * si) @ pf.mass_matrix(solution, "actuators") @ (rates * si)
+    np.testing.assert_allclose((twist * metres) @ mass @ (twist * metres), energy)
+
+
+def test_a_mass_matrix_takes_no_forces() -> None:
+    solution, *_ = somewhere(weighed(pf.load("delta")))
+    with pytest.raises(pf.errors.InvalidArgument, match=r"loads\['platform'\]: found a force.*\(mass, centre\)"):
+        pf.mass_matrix(solution, loads={"platform": ((0, 0, -5), (0, 0, -190))})
 
 
 def test_a_five_bar_is_as_its_closed_form() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -95,7 +96,7 @@ def test_efforts_are_linear_in_the_parameters(name: str) -> None:
     result = pf.identify(solution, efforts[0], rotors=True, sigma=1.0, **how)
     more = np.array(list(map(parameters(result, other).get, result.names)), float) - result.described
     scaled = np.linalg.solve(result._unknowns.by_scaled, more)
-    change = result._fit._columns @ scaled / result._unknowns.drives.units
+    change = result._fit._columns @ scaled
     np.testing.assert_allclose(change, efforts[1] - efforts[0], atol=1e-9 * np.abs(efforts[0]).max())
 
 
@@ -162,6 +163,20 @@ def test_efforts_that_no_machine_makes_are_doubted() -> None:
     turned = pf.identify(solution, -efforts, **how)  # of friction that drives
     assert "no possible bodies explain these efforts" in str(turned)
     assert "missed by" in pf.identify(solution, 1e3 * efforts, sigma=0.01, friction=False, **how).doubt
+
+
+def test_a_body_far_from_the_file_is_doubted() -> None:
+    truth = weighed(pf.load("delta"))
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+
+    def doubt(times: float) -> str:
+        heavier = truth.with_masses(pf.Mass(m.body, times * m.mass, m.centre, m.inertia) for m in truth.masses)
+        described = moved(heavier, solution)
+        return pf.identify(described, efforts, friction=False, sigma=0.01, **how).doubt
+
+    assert doubt(0.25) == ""
+    assert re.search(r"'\w+' would differ from the file by [\d.]+ times", doubt(0.02))
 
 
 def test_refusals_name_what_is_wrong() -> None:

@@ -137,6 +137,54 @@ def test_armature_and_friction_of_mujocos_joints_are_those_of_the_drives() -> No
     assert (pushed.rotor_inertia, pushed.friction) == (None, None)
 
 
+def test_friction_and_armature_of_passive_joints_are_noted() -> None:
+    passive = "".join(
+        f'<body name="{name}"><joint name="j_{name}" type="{kind}" {said}/><geom size="1"/>'
+        for name, kind, said in (
+            ("b", "hinge", 'damping="0.3"'),
+            ("c", "ball", 'armature="0.1"'),
+            ("d", "slide", 'frictionloss="2"'),
+            ("e", "hinge", ""),
+        )
+    )
+    text = f"""<mujoco><worldbody><body name="a"><joint name="j" damping="1"/><geom size="1"/>{passive}{"</body>" * 5}
+      </worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
+    found = pf.interop.from_mjcf(text, end_effector="e")
+    (note,) = (each for each in found.notes if "friction and armature" in each.what)
+    assert note.names == ("j_b", "j_c", "j_d")
+
+
+ACTUATORS = """<mujoco><default><default class="strong"><motor ctrlrange="-3 3" gear="50"/></default>
+    <default class="servo"><position kp="1e9" forcerange="-20 30"/></default></default><worldbody>
+    <body name="a"><joint name="j0" axis="0 1 0"/><geom size="1"/>
+    <body name="b"><joint name="j1" axis="0 1 0" actuatorfrcrange="-120 120"/><geom size="1"/>
+    <body name="c"><joint name="j2" axis="0 1 0"/><geom size="1"/>
+    <body name="d"><joint name="j3" axis="0 1 0"/><geom size="1"/>
+    <body name="e"><joint name="j4" type="slide" axis="0 1 0"/><geom size="1"/>
+    <body name="f"><joint name="j5" axis="0 1 0"/><geom size="1"/></body></body></body></body></body></body>
+    </worldbody><actuator><motor class="strong" joint="j0"/><motor class="strong" joint="j1"/>
+    <position class="servo" joint="j2" ctrlrange="-1 1" gear="-2"/><velocity joint="j3" ctrlrange="-1 1"/>
+    <cylinder joint="j4" forcerange="-9 0"/>
+    <general joint="j5" gainprm="7" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+def test_limits_of_mujocos_actuators_are_those_of_the_drives() -> None:
+    """The largest force of either way that MuJoCo lets each joint have, at any control."""
+    mujoco = pytest.importorskip("mujoco")
+    found = pf.interop.from_mjcf(ACTUATORS, end_effector="f", length_unit="mm")
+    read = [found.mechanism.joint(f"j{k}").max_torque for k in range(6)]
+    model = mujoco.MjModel.from_xml_string(ACTUATORS)
+    data, forces = mujoco.MjData(model), []
+    for control in (-1e9, 1e9):
+        data.ctrl[:] = control
+        mujoco.mj_forward(model, data)
+        forces.append(data.qfrc_actuator.copy())
+    least = np.abs(forces).min(axis=0)
+    assert [most or 0.0 for most in read] == pytest.approx([*least[:3], 0.0, 0.0, least[5]])
+    (note,) = (each for each in found.notes if "exert more one way" in each.what)
+    assert note.names == ("j2", "j4")
+
+
 @pytest.mark.parametrize(("effort", "most"), [("<effort>12</effort>", 12.0), ("<effort>-1</effort>", None), ("", None)])
 def test_effort_and_friction_of_an_sdf_are_read(effort: str, most: float | None) -> None:
     text = f"""<sdf version="1.9"><model name="arm"><link name="base"/><link name="a"/>

@@ -613,7 +613,7 @@ WRONG = {
     "loads['platform'][1]: found shape (2,)": lambda m, s: pf.forces(s, loads={"platform": (5, [0, 0])}),
     "gravity: found shape ()": lambda m, s: pf.forces(s, [0, 0, 1], gravity=9.81),
     "limits: found -5": lambda m, s: pf.wrench_capacity(s, -5.0),
-    "limits: found array([5., 1.]); expected a positive number": lambda m, s: pf.wrench_capacity(s, (5.0, 1.0)),
+    "limits: found [5.0, 1.0]; expected a positive number": lambda m, s: pf.wrench_capacity(s, (5.0, 1.0)),
     "limits: found no value of BL2, BL3, BR1, BR2, BR3": lambda m, s: pf.wrench_capacity(s, {"BL1": 5.0}),
     "no actuator named 'X1'": lambda m, s: pf.wrench_capacity(s, {"X1": 5.0}),
     "of: found 'torque'": lambda m, s: pf.wrench_capacity(s, 5.0, of="torque"),

@@ -427,14 +427,14 @@ def test_redundant_motors_share_what_a_linear_programme_finds_no_timing_beats(na
     assert max(shares) < 1.0 + 1e-5
     assert np.mean(np.array(shares) > 0.99) > 0.95
     assert all(" and " in who and what == "torque" for who, what in timed.held_back)
-    with pytest.raises(InvalidArgument, match=r"0.1, where '\w[^']* and [^']*' has to exert"):
+    with pytest.raises(InvalidArgument, match=r"0.1, where '\w[^']* and [^']*' must exert"):
         pf.time_path(timed._track, torque=0.1)
 
 
 def test_limits_of_torque_that_no_timing_keeps_are_refused() -> None:
     machine = heavy("five_bar")
     track = pf.track(machine, followed("five_bar", 1).pose)
-    with pytest.raises(InvalidArgument, match=r"0.1, where 'p\d' has to exert"):
+    with pytest.raises(InvalidArgument, match=r"0.1, where 'p\d' must exert"):
         pf.time_path(track, torque=0.1)
     with pytest.raises(InvalidArgument, match="no mass of link1"):
         pf.time_path(followed("five_bar", 1), torque=1.0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
+from .arrays import Floats
 from .errors import InvalidArgument
 from .extras import require
 
@@ -24,6 +26,23 @@ def new_figure(
     from matplotlib import pyplot
 
     return pyplot.figure(figsize=(width, height), dpi=dpi, layout=layout, facecolor=paper)
+
+
+def curves_over_time(times: Floats, names: Sequence[str], panels: Mapping[str, Floats]) -> Figure:
+    """Columns of arrays (n, k) over times (n,) [s], a panel for each array by its label, a name for each column."""
+    require("pictures", "matplotlib", "plot")
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
+    for axes, (label, values) in zip(figure.subplots(len(panels), 1, sharex=True), panels.items(), strict=True):
+        for name, column in zip(names, values.T, strict=True):
+            axes.plot(times, column, label=name)
+        axes.set_ylabel(label)
+    axes.set_xlabel("time [s]")
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
+    drawn: Figure = figure
+    return drawn
 
 
 def require_flat(ax: Axes) -> None:

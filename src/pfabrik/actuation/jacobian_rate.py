@@ -17,9 +17,7 @@ import numpy as np
 
 from ..answers.solution import Solution
 from ..arrays import Floats
-from ..dynamics.asked_motion import in_lengths
-from ..dynamics.moving_rows import MovingRows
-from ..dynamics.weights import weights_of
+from ..dynamics.moving_rows import MovingRows, in_lengths
 from ..errors import UnsupportedMechanism
 from ..kinematics import JointPath, generic_of
 from ..rotations import CROSSED, turning
@@ -49,8 +47,7 @@ def jacobian_rates(coordinates: Coordinates, solution: Solution, rates: Floats) 
     known = np.flatnonzero(~np.isnan(solution._coordinates).any(axis=1))
     for start in range(0, len(known), ROWS_A_BLOCK):
         rows = known[start : start + ROWS_A_BLOCK]
-        q, poses = solution._configurations.coordinates_at(rows), solution._rows.poses[rows]
-        of = _second_order(coordinates, MovingRows(mechanism, weights_of([], []), np.zeros(3), at, q, poses))
+        of = _second_order(coordinates, MovingRows(solution[rows], at))
         own = rates[rows] / units
         size = np.abs(own).max(axis=1, initial=0.0)[:, None]
         size[size == 0.0] = 1.0
@@ -75,15 +72,15 @@ def _refuse(coordinates: Coordinates) -> None:
 
 def _second_order(coordinates: Coordinates, rows: MovingRows) -> Callable[[Floats], Floats]:
     """Accelerations of the actuators (n, n_a) by rates (n, k) of coordinates that do not accelerate."""
-    units = in_lengths(coordinates.mechanism, rows.at)
+    units, poses = in_lengths(coordinates.mechanism, rows.at), rows.solution._rows.poses
 
     def accelerations(rates: Floats) -> Floats:
         if not isinstance(coordinates, TaskPath):
             return replace(rows, rates=rates * units).efforts().gains
-        twist, change = (each[:, : len(units)] * units for each in _turned(coordinates, rows.poses, rates))
+        twist, change = (each[:, : len(units)] * units for each in _turned(coordinates, poses, rates))
         moving = replace(rows, rates=twist)
         if len(units) > 3:
-            spin, z = moving.efforts(["twists"]).twists[:, 3:], rows.poses[:, :3, 2]
+            spin, z = moving.efforts(["twists"]).twists[:, 3:], poses[:, :3, 2]
             about = spin - twist[:, 3:]
             change[:, 3:] += (about * z).sum(axis=1)[:, None] * np.cross(spin, z)  # it turns about its own axis too
         return replace(moving, gains=change).efforts().gains

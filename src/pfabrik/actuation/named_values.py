@@ -102,8 +102,7 @@ def speeds_of(mechanism: Mechanism, given: Any) -> Floats:
         return per_actuator(mechanism.actuator_names, "speed_max", given)
     speeds = []
     for drive in mechanism.drives:
-        rates = drive.joint.max_speed
-        rate = rates[drive.place] if isinstance(rates, tuple) else rates
+        rate = drive.said("max_speed")
         if rate is None:
             raise InvalidArgument("speed_max", f"None, and no max_speed of '{drive.name}'", "speeds of actuators")
         speeds.append(rate)

@@ -44,19 +44,13 @@ carrying = together(
 """Adds ``--load``, which a command gets as `loads` by body, and ``--gravity``."""
 
 
-def lacking(mechanism: pf.Mechanism) -> list[str]:
-    """The bodies that move and have no mass."""
-    from ..dynamics.weights import lacking_masses
-    from ..files.units import metres_of
-
-    return lacking_masses(mechanism, metres_of(mechanism.length_unit))
-
-
 def weighed(mechanism: pf.Mechanism, loads: Loads) -> pf.Mechanism:
     """The machine with a mass of every body; a note names those that count as none, and none at all is an error."""
     if not (loads or mechanism.masses or any(shape.density for shape in mechanism.shapes)):
         raise click.UsageError("nothing has a mass: give --load, or `mass` in tables [[body]] of the file")
-    weightless = lacking(mechanism)
+    from ..dynamics.weights import lacking_masses
+
+    weightless = lacking_masses(mechanism)
     if left := [body for body in weightless if body not in loads]:
         note(f"without a mass, and counted as none: {', '.join(left)}; `mass` in its table [[body]] gives a body one")
     return mechanism.with_masses([*mechanism.masses, *(pf.Mass(body, 0.0) for body in weightless)])

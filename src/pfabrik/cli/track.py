@@ -31,7 +31,7 @@ from .outputs import (
 )
 from .printing import json_option, note, print_json, print_result, print_text
 from .questions import own_limits, speed_limits, speed_option
-from .statics import Loads, carrying, lacking, weighed
+from .statics import Loads, carrying, weighed
 
 if TYPE_CHECKING:
     from ..answers.tracked import TrackSummary
@@ -301,11 +301,13 @@ def time(
     """
     refuse_both_on_stdout(output, as_json)
     check_outputs([("-o", output)], [path, Path(mech)], as_json=as_json)
+    from ..dynamics.weights import lacking_masses
+
     mechanism = load(mech)
     limits = limits_of(mechanism)
     if "torque" in limits:
         mechanism = weighed(mechanism, loads)
-    elif any(joint.max_torque for joint in mechanism.joints) and (left := lacking(mechanism)):
+    elif any(joint.max_torque for joint in mechanism.joints) and (left := lacking_masses(mechanism)):
         note(f"max_torque of the file has no effect: no `mass` of {', '.join(left)} in tables [[body]]")
     read = pf.read_path(path, mechanism)
     with nullcontext() if output is None else whole_file(output) as handle, at_lines_of(read):

@@ -39,6 +39,11 @@ class JointCoordinate:
         """Its kind: an angle or a length."""
         return KINDS[self.joint.type].coordinates[self.place]
 
+    def said(self, field: str) -> Any:
+        """What its joint has in a field of drives for this coordinate; None where that is not known."""
+        value = getattr(self.joint, field)
+        return value if value is None or len(self.joint.driven) < 2 else value[self.place]
+
     @property
     def limits(self) -> Range:
         """Its range [rad or length], infinite where there is no limit."""

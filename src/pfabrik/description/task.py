@@ -40,10 +40,18 @@ class Task:
         """Which rotations count, about x, y and z; of a tilt, about those of the target."""
         return self.rotations > 1, self.rotations > 1, self.rotations % 2 == 1
 
-    def turning_axes(self, pose: Floats) -> Floats:
-        """Axes of the rotations at a pose (4, 4): unit vectors (k, 3) in the base frame."""
-        axes = pose[:3, :3].T if self.rotations == 2 else np.eye(3)
-        return np.asarray(axes[list(self.turns)])
+    def turning_axes(self, poses: Floats) -> Floats:
+        """Axes of the rotations at poses (..., 4, 4): unit vectors (..., k, 3) in the base frame."""
+        turned = np.swapaxes(poses[..., :3, :3], -1, -2)
+        axes = turned if self.rotations == 2 else np.broadcast_to(np.eye(3), turned.shape)
+        return np.asarray(axes[..., list(self.turns), :])
+
+    def twists(self, poses: Floats) -> Floats:
+        """The motions that it sets at poses (..., 4, 4): unit twists (..., k, 6), each along or about one axis."""
+        lines, turns = np.eye(3)[list(self.axes)], self.turning_axes(poses)
+        found = np.zeros((*turns.shape[:-2], len(lines) + turns.shape[-2], 6))
+        found[..., : len(lines), :3], found[..., len(lines) :, 3:] = lines, turns
+        return found
 
     @property
     def frame(self) -> int:

@@ -1,61 +1,66 @@
-"""Motions that are asked for: of the end effector, of actuators, or of other joints; and those of paths with times."""
+"""Motions as they are given: a path with times, or configurations with rates and accelerations."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..answers.solution import Solution, checked_solution
 from ..answers.tracked import Track, refuse_leaps
-from ..arrays import Floats, Mask
-from ..checks import names_of
-from ..description.mechanism import Mechanism
+from ..arguments import array
+from ..arrays import Floats
+from ..checks import require_choice
 from ..errors import InvalidArgument
-from ..kinematics import actuator_units, joint_path, task_of
 from ..rotations import to_rotvec
+from .moving_rows import MovingRows
 
 NEIGHBOURS = 5
 """Steps of a path through which a polynomial gives the rates and accelerations of one: of the fourth degree."""
 
 
-def axes_of(mechanism: Mechanism, at: str | tuple[str, ...], poses: Floats) -> Floats:
-    """The components of the end effector's twist that `at` names, at poses (n, 4, 4), (n, k, 6); those of coordinates
-    are none of these."""
-    if at == "task":
-        return task_axes(mechanism, poses)
-    whole = (3 if mechanism.end_effector_is_joint else 6) if at == "path" else 0
-    return np.tile(np.eye(whole, 6), (len(poses), 1, 1))
+@runtime_checkable
+class TimedMotion(Protocol):
+    """Configurations at times, and how the actuators move, as `Timed` has them."""
+
+    @property
+    def solution(self) -> Solution: ...
+
+    @property
+    def times(self) -> Floats: ...
+
+    @property
+    def rates(self) -> Floats: ...
+
+    @property
+    def accelerations(self) -> Floats: ...
 
 
-def task_axes(mechanism: Mechanism, poses: Floats) -> Floats:
-    """The components of twists that the task sets, at poses (n, 4, 4), (n, k, 6): along and about axes of the base,
-    tilts about the platform's x and y axes."""
-    task = task_of(mechanism)
-    lines, turns = np.eye(3)[list(task.axes)], np.eye(3)[None]
-    if task.rotations == 2:
-        turns = np.swapaxes(poses[:, :3, :3], 1, 2)
-    turns = turns[:, list(task.turns) if not mechanism.end_effector_is_joint else []]
-    axes = np.zeros((len(poses), len(lines) + turns.shape[1], 6))
-    axes[:, : len(lines), :3], axes[:, len(lines) :, 3:] = lines, turns
-    return axes
-
-
-def are_lengths(mechanism: Mechanism, at: str | tuple[str, ...]) -> Mask:
-    """True for the components of "task", "actuators" or named joints that are lengths, False for angles, (k,)."""
-    if at == "task":
-        axes = task_axes(mechanism, np.eye(4)[None])[0]
-        return np.asarray(axes[:, :3].any(axis=1))
-    drives = mechanism.drives if at == "actuators" else joint_path(mechanism, at).coordinates
-    return np.array([each.kind == "length" for each in drives], bool)
-
-
-def checked_at(mechanism: Mechanism, at: Any) -> str | tuple[str, ...]:
-    """ "task", "actuators", or names of joints in series; raises the errors of `mass_matrix` for others."""
-    if isinstance(at, str) and at in ("task", "actuators"):
-        return at
-    names = names_of("at", at)
-    joint_path(mechanism, names)
-    return names
+def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike | None, at: str) -> MovingRows:
+    """Configurations and how they move, of the arguments of `inverse_dynamics`."""
+    require_choice("at", at, ("task", "actuators"))
+    is_given = twists is not None or accelerations is not None
+    if isinstance(motion, TimedMotion):
+        if is_given:
+            raise InvalidArgument("twists", "twists beside a path with times", "none: the path says how it moves")
+        return MovingRows(motion.solution, "actuators", motion.rates, motion.accelerations, motion.times)
+    solution = checked_solution(motion)
+    if isinstance(motion, Track) and not is_given:
+        return MovingRows(motion, "path", *motion_of(motion), motion.times)
+    n, n_a = len(solution._rows.status), len(solution.mechanism.actuator_names)
+    forms, width = (f"... {n_a}", n_a) if at == "actuators" else ("... 6 | ... 3", 6)
+    values = []
+    for name, given in (("twists", twists), ("accelerations", accelerations)):
+        value = np.zeros(width) if given is None else array(name, given, forms)
+        if value.shape[-1] < width:
+            value = np.concatenate([value, np.zeros(value.shape)], axis=-1)
+        try:
+            values.append(np.broadcast_to(value, (*solution.shape, width)).reshape(n, width))
+        except ValueError:
+            expected = f"one for all, or one for each of batch shape {solution.shape}"
+            raise InvalidArgument(name, f"a batch of {value.shape[:-1]}", expected) from None
+    return MovingRows(solution, at, values[0], values[1], motion.times if isinstance(motion, Track) else None)
 
 
 def motion_of(track: Track) -> tuple[Floats, Floats]:
@@ -89,12 +94,3 @@ def motion_of(track: Track) -> tuple[Floats, Floats]:
     along = np.concatenate([*values, track.actuators[windows]], axis=-1)
     first, second = (np.einsum("nk,nkv->nv", powers[:, p], along) for p in (1, 2))
     return first / span[:, None], 2.0 * second / span[:, None] ** 2
-
-
-def in_lengths(mechanism: Mechanism, at: str | tuple[str, ...]) -> Floats:
-    """Units in L of the numbers that `motion_of` and arguments have: of twists, of actuators, of both, or of joints."""
-    length, actuators = mechanism.characteristic_length, actuator_units(mechanism)
-    twist = np.repeat([length, 1.0], 3)[: 3 if mechanism.end_effector_is_joint else 6]
-    if at in ("task", "path"):
-        return twist if at == "task" else np.append(twist, actuators)
-    return actuators if at == "actuators" else np.where(are_lengths(mechanism, at), length, 1.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..arrays import Floats
@@ -31,13 +29,10 @@ class Drives:
         self.forces = ["N" if length else "N m" for length in is_length]
         self.si = np.where(is_length, metres, 1.0)
         self.units = np.where(is_length, mechanism.characteristic_length, 1.0 / metres)
-        self.limits = np.array([of_drive(drive, "max_torque") or np.inf for drive in mechanism.drives])
-        rotors = [
-            (of_drive(drive, "rotor_inertia") or 0.0) * (of_drive(drive, "gear") or 1.0) ** 2
-            for drive in mechanism.drives
-        ]
+        self.limits = np.array([drive.said("max_torque") or np.inf for drive in mechanism.drives])
+        rotors = [(drive.said("rotor_inertia") or 0.0) * (drive.said("gear") or 1.0) ** 2 for drive in mechanism.drives]
         self.inertia = np.array(rotors)
-        self.friction = np.array([of_drive(drive, "friction") or (0.0, 0.0) for drive in mechanism.drives])
+        self.friction = np.array([drive.said("friction") or (0.0, 0.0) for drive in mechanism.drives])
 
     def taken(self, rates: Floats, gains: Floats) -> Floats:
         """What rotors and friction take at rates and accelerations (n, n_a) of the machine, in N and N m."""
@@ -52,9 +47,3 @@ class Drives:
 def drives_of(mechanism: Mechanism) -> Drives:
     """The actuators of a mechanism."""
     return Drives(mechanism)
-
-
-def of_drive(drive: Any, name: str) -> Any:
-    """What is said of a driven coordinate, of a joint that has one or two."""
-    value = getattr(drive.joint, name)
-    return value[drive.place] if len(drive.joint.driven) == 2 and value is not None else value

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Mask
 from ..errors import InvalidArgument, counted
-from .inertial_fit import IMPOSSIBLE, InertialFit, inverse
+from .inertial_fit import IMPOSSIBLE, InertialFit
 from .regressor import EffortRows
 from .unknowns import Unknowns
 
@@ -36,16 +36,15 @@ class EffortFit:
     """
 
     def __init__(
-        self, unknowns: Unknowns, moved: EffortRows, measured: Floats, rows: Ints, n: int, sigma: Floats | None
+        self, unknowns: Unknowns, moved: EffortRows, measured: Floats, is_used: Mask, sigma: Floats | None
     ) -> None:
         self._columns, self._off = unknowns.columns(moved), measured - moved.described
         n_a = measured.shape[1]
-        self._motions = moved.motions if moved.motions.shape[2] < n_a else None
+        self._motions = moved.motions
         self._least = LEAST_NOISE * float(np.abs(measured).max(initial=0.0))
-        self._spare = np.ones(n_a)
         if sigma is None:
             first = self._fitted(np.ones(n_a))
-            left, spare = self._left(first.likeliest(self._least), np.ones(n_a)), self._spare_of(first)
+            left, spare = self._left(first.likeliest(self._least), np.ones(n_a)), first.spare
             if spare <= 0:
                 found = f"{counted(len(measured), 'row')}, no more than are needed for {first.rank} parameters"
                 raise InvalidArgument("efforts", found, "more rows, or sigma: nothing says how good they are")
@@ -55,18 +54,17 @@ class EffortFit:
         else:
             self.fit = self._fitted(sigma)
             left = self._left(self.fit.likeliest(1.0), sigma) / sigma
-            spare = self._spare_of(self.fit)
+            spare = self.fit.spare
             self.deviation = max(1.0, float(np.sqrt((left**2).sum() / spare))) if spare > 0 else 1.0
-        described = inverse(unknowns.by_scaled) @ unknowns.described
+        described = unknowns.to_scaled @ unknowns.described
         values, broken = self.fit.physical(described, len(unknowns.scales.bodies), self.deviation)
         self.found, self.is_broken = values - described, broken > IMPOSSIBLE
-        units, left = unknowns.drives.units, self._left(self.found, sigma)
+        left = self._left(self.found, sigma)
         self.missed = float(np.sqrt(np.mean((left / sigma) ** 2)))
-        left = left / units
-        self.rms_before = np.sqrt(np.mean((self._left(np.zeros_like(values), sigma) / units) ** 2, axis=0))
-        self.rms, self.largest = np.sqrt(np.mean(left**2, axis=0)), np.abs(measured / units).max(axis=0)
-        self.residuals = np.full((n, n_a), np.nan)
-        self.residuals[rows] = left
+        self.rms_before = np.sqrt(np.mean(self._left(np.zeros_like(values), sigma) ** 2, axis=0))
+        self.rms, self.largest = np.sqrt(np.mean(left**2, axis=0)), np.abs(measured).max(axis=0)
+        self.residuals = np.full((len(is_used), n_a), np.nan)
+        self.residuals[is_used] = left
 
     def sensitivity(self, to_scaled: Floats) -> Floats:
         """How much efforts depend on each parameter, (p,): root mean square by scaled ones (p, p)."""
@@ -74,23 +72,14 @@ class EffortFit:
 
     def _bases(self, sigma: Floats) -> Floats:
         """Orthonormal motions of the actuators, (n, n_a, d), in deviations."""
-        assert self._motions is not None
         return np.linalg.qr(self._motions * sigma[:, None])[0]
 
     def _fitted(self, sigma: Floats) -> InertialFit:
-        columns, off = self._columns / sigma[:, None], self._off / sigma
-        if self._motions is not None:
-            turned = np.swapaxes(self._bases(sigma), 1, 2)
-            columns, off = turned @ columns, (turned @ off[..., None])[..., 0]
+        turned = np.swapaxes(self._bases(sigma), 1, 2)
+        columns, off = turned @ (self._columns / sigma[:, None]), turned @ (self._off / sigma)[..., None]
         return InertialFit(*np.linalg.svd(columns.reshape(-1, columns.shape[2]), full_matrices=False), off.ravel())
 
     def _left(self, found: Floats, sigma: Floats) -> Floats:
         """Residuals with scaled parameters, (n, n_a)."""
-        left = (self._off - self._columns @ found) / sigma
-        if self._motions is not None:
-            bases = self._bases(sigma)
-            left = (bases @ (np.swapaxes(bases, 1, 2) @ left[..., None]))[..., 0]
-        return np.asarray(left * sigma)
-
-    def _spare_of(self, fit: InertialFit) -> int:
-        return len(fit.off) - fit.rank
+        bases, left = self._bases(sigma), (self._off - self._columns @ found) / sigma
+        return np.asarray((bases @ (np.swapaxes(bases, 1, 2) @ left[..., None]))[..., 0] * sigma)

@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from ..arrays import Floats, as_plain
+from ..arrays import Floats, Mask, as_plain, shaped
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
+from ..drawing import curves_over_time
 from ..errors import InvalidArgument
-from ..extras import require
 from ..frozen import FrozenMapping
 from ..kinematics import readouts
 from ..printed import Printed, ResultTable, plain
 from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from ..whole_files import whole_path
-from .drives import Drives
-from .transmitted import TransmittedForces
+from .drives import Drives, drives_of
+from .moving_rows import MovingRows
+from .transmitted import transmitted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,9 +58,19 @@ class Efforts(Printed):
     times: Floats | None
     is_least_norm: bool
     reason: str | Reasons
-    _mechanism: Mechanism = field(repr=False)
-    _drives: Drives = field(repr=False)
-    _reactions: TransmittedForces = field(repr=False)
+    _rows: MovingRows = field(repr=False)
+
+    @property
+    def _mechanism(self) -> Mechanism:
+        return self._rows.solution.mechanism
+
+    @property
+    def _drives(self) -> Drives:
+        return drives_of(self._mechanism)
+
+    @cached_property
+    def _transmitted(self) -> tuple[Floats, Mask]:
+        return transmitted(self._rows, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names))))
 
     @cached_property
     def power(self) -> Floats:
@@ -81,13 +92,13 @@ class Efforts(Printed):
         Moments are about the points that `Forces.reactions` has. NaN where `reason` says why, and where `undetermined`
         does.
         """
-        found = self._reactions.found[0]
-        return FrozenMapping({joint.name: found[..., place, :] for place, joint in enumerate(self._mechanism.joints)})
+        joints, shape = enumerate(self._mechanism.joints), self._rows.solution.shape
+        return FrozenMapping({joint.name: shaped(self._transmitted[0][:, place], shape) for place, joint in joints})
 
     @property
     def undetermined(self) -> str:
         """Which of the reactions the motion does not determine, in words; empty if it determines all."""
-        return open_in_words(self._mechanism, self._reactions.found[1])
+        return open_in_words(self._mechanism, self._transmitted[1])
 
     def table(self) -> ResultTable:
         """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""
@@ -111,7 +122,7 @@ class Efforts(Printed):
         if np.isfinite(limits).any():
             header.append("of its limit")
         remarks = []
-        if self.energy is not None and self.times is not None:
+        if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
             remarks = [f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s"]
         return ResultTable(self._mechanism.name, lines, header, rows, remarks)
 
@@ -159,26 +170,12 @@ class Efforts(Printed):
         InvalidArgument
             Configurations that are no path with times.
         """
-        times = self._require_times()
-        require("pictures", "matplotlib", "plot")
-        from matplotlib.figure import Figure
-
-        figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
-        shown = readouts(self._mechanism)
-        moves = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
-        kinds = sorted({f"{each.unit}/s" for each in shown}), sorted(set(self._drives.forces))
-        labels = f"exerts [{', '.join(kinds[1])}]", f"rate [{', '.join(kinds[0])}]", "power [W]"
-        for axes, label, values in zip(
-            figure.subplots(3, 1, sharex=True), labels, (self.actuators, moves, self.power), strict=True
-        ):
-            for each, column in zip(shown, values.T, strict=True):
-                axes.plot(times, column, label=each.name)
-            axes.set_ylabel(label)
-        axes.set_xlabel("time [s]")
-        handles, names = axes.get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
-        drawn: Figure = figure
-        return drawn
+        times, shown = self._require_times(), readouts(self._mechanism)
+        rates = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
+        forces, units = sorted(set(self._drives.forces)), sorted({f"{each.unit}/s" for each in shown})
+        labels = f"exerts [{', '.join(forces)}]", f"rate [{', '.join(units)}]", "power [W]"
+        panels = dict(zip(labels, (self.actuators, rates, self.power), strict=True))
+        return curves_over_time(times, [each.name for each in shown], panels)
 
 
 def _largest(values: Floats) -> float:

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Mask, as_plain
+from ..arrays import Floats, Ints, Mask, as_plain
 from ..description.mechanism import Mechanism
 from ..printed import Printed, ResultTable, error_text, plain
 from .effort_fit import FAR, EffortFit
-from .inertial_fit import Combinations, combined, inverse, lengths
+from .inertial_fit import combined
 from .unknowns import Unknowns
 
 SHOWN = 3
@@ -20,6 +20,9 @@ SHOWN = 3
 
 UNSEEN = 1e-9
 """Share of the largest, in its scale, up to which efforts do not depend on a parameter at all."""
+
+ABSURD = 10.0
+"""Change of a body, in what it is expected to be off by, from which it is none that anybody describes so."""
 
 
 class BaseParameter(NamedTuple):
@@ -82,7 +85,7 @@ class Identification(Printed):
     def __init__(self, unknowns: Unknowns, fit: EffortFit) -> None:
         self._unknowns, self._fit = unknowns, fit
         self.names, self.units, self.described = unknowns.names, unknowns.units, unknowns.described
-        self.values, self.rank = self.described + unknowns.by_scaled @ fit.found, len(self._combined.leading)
+        self.values, self.rank = self.described + unknowns.by_scaled @ fit.found, len(self._combined[0])
         self.rms_before, self.rms, self.residuals = fit.rms_before, fit.rms, fit.residuals
         self.points = dict(zip(unknowns.scales.bodies, unknowns.scales.points, strict=True))
         owners = (*unknowns.scales.bodies, *unknowns.names[10 * len(self.points) :])
@@ -102,17 +105,22 @@ class Identification(Printed):
         return np.isfinite(self.deviations)
 
     @cached_property
-    def _combined(self) -> Combinations:
+    def _sizes(self) -> Floats:
+        """What the parameters are compared by, (p,)."""
+        return np.asarray(np.linalg.norm(self._unknowns.by_scaled, axis=1))
+
+    @cached_property
+    def _combined(self) -> tuple[Ints, Floats, Floats]:
         directions, spread = self._fit.fit.directions(self._fit.deviation)
-        by_scaled = self._unknowns.by_scaled
-        return combined(directions, spread, inverse(by_scaled), lengths(by_scaled), self.determined)
+        return combined(directions, spread, self._unknowns.to_scaled, self._sizes, self.determined)
 
     @cached_property
     def combinations(self) -> tuple[BaseParameter, ...]:
         """The base parameters: combinations that the efforts determine, r."""
         found = []
         for place, factors, deviation in zip(*self._combined, strict=True):
-            order = [place, *(k for k in self._by_weight(factors) if k != place)]
+            weights = np.abs(factors) * self._sizes
+            order = [place, *(k for k in np.argsort(-weights, kind="stable") if weights[k] > 0.0 and k != place)]
             terms = [f"{factors[k]:+.4g} {self.names[k]}" for k in order[1 : SHOWN + 1]]
             terms += [f"and {len(order) - 1 - SHOWN} more"] * (len(order) > SHOWN + 1)
             found.append(
@@ -127,24 +135,23 @@ class Identification(Printed):
             )
         return tuple(found)
 
-    def _by_weight(self, factors: Floats) -> list[int]:
-        sizes = np.abs(factors) * lengths(self._unknowns.by_scaled)
-        return [int(k) for k in np.argsort(-sizes, kind="stable") if sizes[k] > 0.0]
-
     @cached_property
     def unseen(self) -> tuple[str, ...]:
         """Parameters that no effort of this motion depends on, whatever the noise."""
-        by_scaled = self._unknowns.by_scaled
-        seen = self._fit.sensitivity(inverse(by_scaled)) * lengths(by_scaled)
+        seen = self._fit.sensitivity(self._unknowns.to_scaled) * self._sizes
         return tuple(name for name, size in zip(self.names, seen, strict=True) if size <= UNSEEN * seen.max())
 
     @property
     def doubt(self) -> str:
         """Why these values may be wrong as a whole, in a sentence; "" if nothing says so."""
-        if not self._fit.missed > FAR:
-            return ""
-        off = f"{self._fit.missed:.3g} times their noise"
-        return f"no possible bodies explain these efforts, missed by {off}: are they in N and N m, and of this motion?"
+        bodies, missed, found = tuple(self.points), self._fit.missed, ""
+        changes = np.abs(self._fit.found[: 10 * len(bodies)]).reshape(-1, 10).max(axis=1)
+        if changes.max(initial=0.0) > ABSURD:
+            body, times = bodies[changes.argmax()], f"{changes.max():.3g}"
+            found = f"'{body}' would differ from the file by {times} times what is expected of it"
+        if missed > FAR:
+            found = f"no possible bodies explain these efforts, missed by {missed:.3g} times their noise"
+        return f"{found}: are they in N and N m, with the right signs, and of this motion?" if found else ""
 
     @property
     def undetermined(self) -> tuple[str, ...]:

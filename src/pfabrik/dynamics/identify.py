@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..answers.solution import Solution
 from ..answers.tracked import Track
-from ..arguments import as_floats
+from ..arguments import any_values, array
 from ..arrays import Floats, Mask
 from ..batch import take
 from ..checks import names_of, require_known
@@ -19,15 +20,14 @@ from ..errors import InvalidArgument
 from ..files.units import metres_of
 from ..kinematics import inertias_of
 from ..statics.forces import GRAVITY
-from ..statics.loads import BodyLoads, checked_gravity, checked_loads, positive_values
-from .asked_motion import NEIGHBOURS
+from ..statics.loads import BodyLoads, checked_gravity, positive_values
+from .asked_motion import NEIGHBOURS, TimedMotion, asked_motion
 from .drives import drives_of
 from .effort_fit import EffortFit
 from .identification import Identification
-from .inverse_dynamics import TimedMotion, asked_motion, rows_of
 from .regressor import BodyScales, EffortRows, effort_rows
 from .unknowns import FRICTION, ROTOR, Unknowns
-from .weights import lacking_masses, loads_of, resting_bodies
+from .weights import lacking_masses, moving_bodies, weights_of
 
 LEAST_SIZE = 0.1
 """Size of a body at least, to compare its moments with [L]: of one without joints apart."""
@@ -89,57 +89,41 @@ def identify(
     InvalidArgument or UnknownName
         A motion that `inverse_dynamics` refuses; efforts of another shape; no body or actuator of a name; no row left.
     """
-    asked = asked_motion(motion, twists, accelerations, at)
-    mechanism, n = asked.solution.mechanism, len(asked.rates)
-    metres, names = metres_of(mechanism.length_unit), mechanism.actuator_names
-    drives, carried = drives_of(mechanism), checked_loads(mechanism, loads)
-    measured = _efforts(efforts, asked.solution.shape, names) * drives.units
-    known = None if sigma is None else positive_values("sigma", sigma, names) * drives.units
-    wanted = _bodies(mechanism, bodies)
-    lacking = [Mass(body, 0.0) for body in lacking_masses(mechanism, metres) if body in wanted]
+    rows = asked_motion(motion, twists, accelerations, at)
+    mechanism, solution = rows.solution.mechanism, rows.solution
+    names, movable = mechanism.actuator_names, moving_bodies(mechanism)
+    form, note = (
+        " ".join(map(str, (*solution.shape, len(names)))),
+        f", a row for each of the motion: {', '.join(names)}",
+    )
+    measured = array("efforts", efforts, form, "numbers", note, any_values).reshape(-1, len(names))
+    known = None if sigma is None else positive_values("sigma", sigma, names)
+    chosen = movable if bodies is None else names_of("bodies", bodies)
+    require_known("body that moves", chosen, movable)
+    wanted = tuple(body for body in movable if body in chosen)
+    lacking = [Mass(body, 0.0) for body in lacking_masses(mechanism) if body in wanted]
     whole = mechanism.with_masses([*mechanism.masses, *lacking])
-    weights = loads_of(whole, metres, carried)
-    has_values = np.isfinite(np.concatenate([measured, asked.solution._coordinates], axis=1))
-    is_used: Mask = np.asarray(has_values.all(axis=1))
-    if asked.at == "path":
+    is_used: Mask = np.isfinite(np.concatenate([measured, solution._coordinates], axis=1)).all(axis=1)
+    if rows.at == "path":
         is_used[: NEIGHBOURS // 2] = is_used[-(NEIGHBOURS // 2) :] = False
-    rows = np.flatnonzero(is_used)
-    scales = _scales(whole, metres, wanted, measured[rows])
-    moved = effort_rows(rows_of(asked, rows, weights, checked_gravity(gravity)), scales)
-    if not moved.is_good.any():
+    scales = _scales(whole, wanted, measured[is_used] * drives_of(mechanism).units)
+    moved = effort_rows(replace(rows, weights=weights_of(whole, loads), gravity=checked_gravity(gravity)), scales)
+    is_used &= moved.is_good
+    if not is_used.any():
         raise InvalidArgument("motion", "no row with efforts that the actuators hold", "some, away from singularities")
-    rows, moved = rows[moved.is_good], take(moved, moved.is_good)
+    moved, measured = take(moved, is_used), measured[is_used]
     kinds = (*(FRICTION if friction else ()), *([ROTOR] if rotors else []))
-    unknowns = Unknowns(whole, metres, scales, kinds, _typical(kinds, measured[rows] / drives.units, moved))
-    return Identification(unknowns, EffortFit(unknowns, moved, measured[rows], rows, n, known))
+    unknowns = Unknowns(whole, scales, kinds, _typical(kinds, measured, moved))
+    return Identification(unknowns, EffortFit(unknowns, moved, measured, is_used, known))
 
 
-def _efforts(efforts: Any, shape: tuple[int, ...], names: Sequence[str]) -> Floats:
-    """Efforts in rows, (n, n_a); NaN stays."""
-    expected = f"numbers of shape {(*shape, len(names))}, a row for each of the motion: {', '.join(names)}"
-    found = as_floats("efforts", efforts, expected)
-    if found.shape != (*shape, len(names)):
-        raise InvalidArgument("efforts", f"shape {found.shape}", expected)
-    return found.reshape(-1, len(names))
-
-
-def _bodies(mechanism: Mechanism, given: Any) -> tuple[str, ...]:
-    """The bodies to identify: those given, or all that move."""
-    moving = tuple(body for body in mechanism.bodies if body not in resting_bodies(mechanism))
-    if given is None:
-        return moving
-    names = names_of("bodies", given)
-    require_known("body that moves", names, moving)
-    return tuple(body for body in moving if body in names)
-
-
-def _scales(mechanism: Mechanism, metres: float, bodies: tuple[str, ...], measured: Floats) -> BodyScales:
+def _scales(mechanism: Mechanism, bodies: tuple[str, ...], measured: Floats) -> BodyScales:
     """Where the parameters of bodies are about, and what they are compared with.
 
-    A body without a mass is compared with the mean of the others; without any, with what the efforts would hold at
-    rest on an arm of L.
+    A body without a mass is compared with the mean of the others; without any, with what the efforts, in the units of a
+    `Balance`, would hold at rest on an arm of L.
     """
-    known, length = inertias_of(mechanism, metres), mechanism.characteristic_length
+    known, length = inertias_of(mechanism, metres_of(mechanism.length_unit)), mechanism.characteristic_length
     joints = {body: [j.at for j in mechanism.joints if body in j.connects and j.at is not None] for body in bodies}
     points = [
         known[body].centre if known[body].mass > 0.0 else np.mean(joints[body] or [mechanism.reference_point], axis=0)

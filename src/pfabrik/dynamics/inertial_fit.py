@@ -33,16 +33,6 @@ RELAXED = 1.7
 """How much farther than found a step goes: those to bodies at the edge of what is possible are many."""
 
 
-def inverse(matrix: Floats) -> Floats:
-    """The inverse of a matrix (p, p)."""
-    return np.asarray(np.linalg.inv(matrix), float)
-
-
-def lengths(rows: Floats) -> Floats:
-    """Lengths of the rows of a matrix, (p,)."""
-    return np.asarray(np.linalg.norm(rows, axis=1), float)
-
-
 _R = np.sqrt(0.5)
 _SECOND = np.array([[-0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0.5, 0.5, -0.5]])
 TO_DENSITY = np.zeros((10, 10))
@@ -51,25 +41,25 @@ TO_DENSITY[0, 0] = 1.0
 TO_DENSITY[1:4, 1:4] = np.eye(3) / _R
 TO_DENSITY[4:7, 4:7] = _SECOND
 TO_DENSITY[7:, 7:] = -np.eye(3) / _R
-FROM_DENSITY = inverse(TO_DENSITY)
+FROM_DENSITY = np.linalg.inv(TO_DENSITY)
 
 _ROW, _COLUMN = np.array([3, 0, 1, 2, 0, 1, 2, 0, 0, 1]), np.array([3, 3, 3, 3, 0, 1, 2, 1, 2, 2])
 _HALF = np.where(_ROW == _COLUMN, 1.0, _R)
 
 
-def nearest_bodies(vectors: Floats) -> tuple[Floats, Floats]:
-    """The nearest physical bodies (b, 10) of density matrices as vectors (b, 10), and how far they are off, (b,).
+def nearest_possible(values: Floats, n_bodies: int) -> tuple[Floats, Floats]:
+    """The nearest parameters (p,) that bodies and actuators can have, and how far these are off, (b + drives,).
 
     A body is physical where its density matrix, the integral of [r; 1] [r; 1]' over its mass, is not negative: where
-    its mass and moments of inertia are positive, and none of these is more than the other two together.
+    its mass and moments of inertia are positive, and none of these is more than the other two together. Parameters of
+    actuators are not negative.
     """
-    matrices = np.zeros((len(vectors), 4, 4))
+    vectors, drives = values[: 10 * n_bodies].reshape(-1, 10), values[10 * n_bodies :]
+    matrices = np.zeros((n_bodies, 4, 4))
     matrices[:, _ROW, _COLUMN] = matrices[:, _COLUMN, _ROW] = vectors * _HALF
-    values, axes = np.linalg.eigh(matrices)
-    if values.min(initial=0.0) >= 0.0:
-        return vectors, np.zeros(len(vectors))
-    kept = (axes * np.maximum(values, 0.0)[:, None]) @ np.swapaxes(axes, 1, 2)
-    return kept[:, _ROW, _COLUMN] / _HALF, np.maximum(-values[:, 0], 0.0)
+    sizes, axes = np.linalg.eigh(matrices)
+    kept = ((axes * np.maximum(sizes, 0.0)[:, None]) @ np.swapaxes(axes, 1, 2))[:, _ROW, _COLUMN] / _HALF
+    return np.append(kept, np.maximum(drives, 0.0)), np.maximum(-np.append(sizes[:, 0], drives), 0.0)
 
 
 class InertialFit(NamedTuple):
@@ -95,6 +85,11 @@ class InertialFit(NamedTuple):
         """Number of directions that the efforts depend on."""
         return int((self.values > RANK * self.values.max(initial=0.0)).sum())
 
+    @property
+    def spare(self) -> int:
+        """Number of efforts beyond what determines these."""
+        return len(self.off) - self.rank
+
     def directions(self, deviation: float) -> tuple[Floats, Floats]:
         """Orthonormal directions that the data determine, (r, p), and their deviations, (r,).
 
@@ -108,7 +103,7 @@ class InertialFit(NamedTuple):
 
     def deviations(self, by_scaled: Floats, deviation: float) -> Floats:
         """Standard deviations of parameters by scaled ones, (p, p): infinite where the data do not determine one."""
-        rank, sizes = self.rank, lengths(by_scaled)
+        rank, sizes = self.rank, np.linalg.norm(by_scaled, axis=1)
         along = by_scaled @ self.right[:rank].T
         spread = np.linalg.norm(along * (deviation / self.values[:rank]), axis=1)
         outside = np.linalg.norm(by_scaled - along @ self.right[:rank], axis=1)
@@ -129,13 +124,11 @@ class InertialFit(NamedTuple):
         values, broken : (p,), (b + drives,).
         """
         found = described + self.likeliest(deviation)
-        kept, broken = _projected(found, n_bodies)
+        kept, broken = nearest_possible(found, n_bodies)
         if broken.max(initial=0.0) <= IMPOSSIBLE:
             return found, broken
         weights, pulled = (self.values / deviation) ** 2, (self.left.T @ self.off) * self.values / deviation**2
-        stiff = float(
-            np.sqrt(weights.max() + 1.0)
-        )  # of the pull to the point before: between the stiffest and the rest
+        stiff = float(np.sqrt(weights.max() + 1.0))  # the pull to the point before: between the stiffest and the rest
         apart = np.zeros(len(found))
         for _ in range(STEPS):
             wanted = stiff * (kept - apart - described)
@@ -143,7 +136,7 @@ class InertialFit(NamedTuple):
             inside = (pulled + along) / (weights + 1.0 + stiff)
             found = described + self.right.T @ (inside - along / (1.0 + stiff)) + wanted / (1.0 + stiff)
             farther = RELAXED * found + (1.0 - RELAXED) * kept
-            before, kept = kept, _projected(farther + apart, n_bodies)[0]
+            before, kept = kept, nearest_possible(farther + apart, n_bodies)[0]
             apart = apart + farther - kept
             missed = np.linalg.norm(self.right @ (kept - found) * self.values / deviation)
             if missed <= CLOSE and stiff * np.abs(kept - before).max() <= CLOSE:
@@ -151,29 +144,9 @@ class InertialFit(NamedTuple):
         return kept, broken
 
 
-def _projected(values: Floats, n_bodies: int) -> tuple[Floats, Floats]:
-    """The nearest parameters that bodies and actuators can have, and how far these are off, (b + drives,)."""
-    bodies, broken = nearest_bodies(values[: 10 * n_bodies].reshape(-1, 10))
-    drives = values[10 * n_bodies :]
-    return np.append(bodies, np.maximum(drives, 0.0)), np.append(broken, np.maximum(-drives, 0.0))
-
-
-class Combinations(NamedTuple):
-    """What data determine of parameters, as combinations, each led by a parameter of its own.
-
-    Attributes
-    ----------
-    leading : index of the parameter, (r,).
-    factors : by which the parameters count, (r, p): 1 of the leading one, 0 of all other leading ones.
-    deviations : standard, (r,).
-    """
-
-    leading: Ints
-    factors: Floats
-    deviations: Floats
-
-
-def combined(directions: Floats, spread: Floats, to_scaled: Floats, sizes: Floats, alone: Mask) -> Combinations:
+def combined(
+    directions: Floats, spread: Floats, to_scaled: Floats, sizes: Floats, alone: Mask
+) -> tuple[Ints, Floats, Floats]:
     """The combinations that determined directions (r, p) of scaled parameters, with deviations (r,), stand for.
 
     Parameters
@@ -181,16 +154,21 @@ def combined(directions: Floats, spread: Floats, to_scaled: Floats, sizes: Float
     alone : True for parameters that lead first, as they are determined without others, (p,).
     to_scaled : scaled parameters by parameters, (p, p).
     sizes : of the parameters, to compare them by, (p,).
+
+    Returns
+    -------
+    The parameter that leads each, by its index, (r,); factors by which parameters count, (r, p), 1 of the leading one
+    and 0 of all other leading ones; standard deviations, (r,).
     """
     from scipy.linalg import qr
 
     shown = (directions @ to_scaled) * sizes
     if not len(shown):
-        return Combinations(np.zeros(0, int), shown, np.zeros(0))
+        return np.zeros(0, int), shown, np.zeros(0)
     first = np.where(alone, FIRST, 1.0)
     leading = np.sort(qr(shown * first, mode="r", pivoting=True)[1][: len(shown)])
     back = np.linalg.inv(shown[:, leading])
     factors, deviations = back @ shown, np.linalg.norm(back * spread, axis=1)
     factors[np.abs(factors) <= np.maximum(SLIGHT * deviations[:, None], OPEN)] = 0.0
     own = sizes[leading]
-    return Combinations(leading, factors * (own[:, None] / sizes), own * deviations)
+    return leading, factors * (own[:, None] / sizes), own * deviations

@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..answers.solution import Solution
+from ..arrays import Floats, Mask
 from ..batch import take
 from ..description.mechanism import Mechanism
 from ..files.units import metres_of
 from ..kernels.dynamics.inverse_dynamics import inverse_dynamics
-from ..kernels.dynamics.moving import SHOWN, Exerted, MovingMachine, new_moving_scratch
+from ..kernels.dynamics.moving import Exerted, MovingMachine, new_exerted, new_moving_scratch
 from ..kernels.handle import Handle, Scratch
 from ..kernels.threads import in_blocks
-from ..kinematics import actuator_units, cut_loops, generic_of, joint_path, rate_units
+from ..kinematics import actuator_units, cut_loops, generic_of, joint_path, rate_units, task_of
+from ..statics.transmission import is_redundantly_actuated, twist_units
 from ..tolerances import TOLERANCES
-from .asked_motion import are_lengths, axes_of, in_lengths
 from .drives import drives_of
 from .weights import Weights
 
 ROWS_A_BLOCK = 64
 
+At = str | tuple[str, ...]
+"""What moves: "task", "actuators", "path" for end effector and actuators, or names of joints in series."""
+
 
 class Probes(NamedTuple):
     """Points of bodies at home, in whose efforts a kilogram each results, p of them."""
 
-    bodies: tuple[str, ...]
-    points: Floats  # (p, 3) [length]
-
-
-NO_PROBES = Probes((), np.zeros((0, 3)))
+    bodies: tuple[str, ...] = ()
+    points: Floats = np.zeros((0, 3))  # (p, 3) [length]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,62 +42,42 @@ class MovingRows:
 
     Attributes
     ----------
-    gravity : (3,) [m/s²].
-    at : of what rates and accelerations are: "task", "actuators", "path", or names of joints.
-    q : deviations from home, (n, c) [length or rad]; poses : (n, 4, 4).
+    at : of what rates and accelerations are.
     rates, gains : (n, k), in the machine's units; of a task, twists and accelerations, (n, 6). None is rest.
+    times : of the rows of a path, (n,) [s].
+    gravity : (3,) [m/s²].
     """
 
-    mechanism: Mechanism
-    weights: Weights
-    gravity: Floats
-    at: str | tuple[str, ...]
-    q: Floats
-    poses: Floats
+    solution: Solution
+    at: At
     rates: Floats | None = None
     gains: Floats | None = None
+    times: Floats | None = None
+    weights: Weights = field(default_factory=Weights)
+    gravity: Floats = field(default_factory=lambda: np.zeros(3))
 
-    @property
-    def effort_units(self) -> Floats:
-        """N and N m of the kernel's forces of actuators, (n_a,)."""
-        length = self.mechanism.characteristic_length * metres_of(self.mechanism.length_unit)
-        return np.array([length if drive.kind == "length" else length**2 for drive in self.mechanism.drives])
-
-    def efforts(self, requests: Sequence[str] = (), probes: Probes = NO_PROBES) -> Exerted:
+    def efforts(self, requests: Sequence[str] = (), probes: Probes | None = None) -> Exerted:
         """Forces of the actuators [N, N m], rates and accelerations [machine's units], and what is requested.
 
-        NaN where loops gain a motion. Wrenches are force [N] times L, and moment about the reference point [N length],
-        as of a `Balance`; matrices are in kg L².
+        NaN where there is no configuration, or loops gain a motion. Wrenches are force [N] times L, and moment about
+        the reference point [N length], as of a `Balance`; matrices are in kg L².
 
         Parameters
         ----------
         requests : of "wrenches", "resting", "matrices", "twists", "motions", with `probes` "probes" too.
         """
-        mechanism, n = self.mechanism, len(self.q)
-        moving, axes = moving_of(self, probes), axes_of(mechanism, self.at, self.poses)
-        units, k, n_a = in_lengths(mechanism, self.at), axes.shape[1] + len(moving.asked), len(moving.actuated)
+        mechanism, q = self.solution.mechanism, self.solution._coordinates
+        moving = moving_of(mechanism, self.at, self.weights, self.gravity, probes or Probes())
+        axes, n = axes_of(mechanism, self.at, self.solution._rows.poses), len(q)
+        units, k = in_lengths(mechanism, self.at), axes.shape[1] + len(moving.asked)
         rates, gains = (
-            np.zeros((n, k)) if x is None else self._components(axes, x[:, : len(units)] / units)
-            for x in (self.rates, self.gains)
+            np.zeros((n, len(units))) if x is None else x[:, : len(units)] / units for x in (self.rates, self.gains)
         )
-        shapes = {
-            "actuators": (n_a,),
-            "rates": (n_a,),
-            "gains": (n_a,),
-            "marks": (),
-            "wrenches": (len(moving.frames) + len(moving.loaded), 6),
-            "resting": (n_a,),
-            "matrices": (k, k),
-            "probes": (n_a, len(probes.bodies)),
-            "twists": (6,),
-            "motions": (n_a, int(moving.counts[SHOWN])),
-        }
-        found = Exerted(**{
-            name: np.full((n if place < 4 or name in requests else 0, *shape), 0 if name == "marks" else np.nan)
-            for place, (name, shape) in enumerate(shapes.items())
-        })  # fmt: skip
+        if self.at == "task":
+            rates, gains = ((axes[..., : len(units)] @ x[..., None])[..., 0].copy() for x in (rates, gains))
+        found = new_exerted(moving, n, k, requests)
         machine, scratch = Handle(moving), Scratch(new_moving_scratch, moving, k)
-        coordinates = np.ascontiguousarray(self.q / rate_units(mechanism))
+        coordinates = q / rate_units(mechanism)
 
         def run(block: slice) -> None:
             own = take(found, block) if n > ROWS_A_BLOCK else found
@@ -108,38 +89,55 @@ class MovingRows:
         scale = length**2 * metres_of(mechanism.length_unit)
         return found._replace(rates=found.rates * units, gains=found.gains * units, wrenches=found.wrenches * scale)
 
-    def in_si(self, matrices: Floats) -> Floats:
-        """Mass matrices in kg, kg m and kg m²."""
-        length = self.mechanism.characteristic_length * metres_of(self.mechanism.length_unit)
-        units = np.where(are_lengths(self.mechanism, self.at), length, 1.0)
-        return np.asarray(matrices * length**2 / (units[:, None] * units))
 
-    def _components(self, axes: Floats, values: Floats) -> Floats:
-        """Those of twists that the task sets; else the values as they are."""
-        return np.ascontiguousarray(
-            np.einsum("nki,ni->nk", axes[..., : values.shape[1]], values) if self.at == "task" else values
-        )
+def axes_of(mechanism: Mechanism, at: At, poses: Floats) -> Floats:
+    """The components of the end effector's twist that `at` names, at poses (n, 4, 4), (n, k, 6); those of coordinates
+    are none of these."""
+    if at == "task":
+        return task_of(mechanism).twists(poses)
+    return np.tile(np.eye(len(twist_units(mechanism)) if at == "path" else 0, 6), (len(poses), 1, 1))
 
 
-def moving_of(rows: MovingRows, probes: Probes = NO_PROBES) -> MovingMachine:
+def are_lengths(mechanism: Mechanism, at: At) -> Mask:
+    """True for the components of "task", "actuators" or named joints that are lengths, False for angles, (k,)."""
+    if at == "task":
+        return np.asarray(task_of(mechanism).twists(np.eye(4))[:, :3].any(axis=1))
+    drives = mechanism.drives if at == "actuators" else joint_path(mechanism, at).coordinates
+    return np.array([each.kind == "length" for each in drives], bool)
+
+
+def in_lengths(mechanism: Mechanism, at: At) -> Floats:
+    """Units in L of rates as they are given: of twists, of actuators, of both of a "path", or of joints."""
+    if at == "path":
+        return np.append(twist_units(mechanism), in_lengths(mechanism, "actuators"))
+    lengths = np.where(are_lengths(mechanism, at), mechanism.characteristic_length, 1.0)
+    return twist_units(mechanism) if at == "task" else lengths
+
+
+def in_si(mechanism: Mechanism, at: At, matrices: Floats) -> Floats:
+    """Mass matrices in kg, kg m and kg m², of those in kg L²."""
+    length = mechanism.characteristic_length * metres_of(mechanism.length_unit)
+    units = np.where(are_lengths(mechanism, at), length, 1.0)
+    return np.asarray(matrices * length**2 / (units[:, None] * units))
+
+
+def moving_of(mechanism: Mechanism, at: At, weights: Weights, gravity: Floats, probes: Probes) -> MovingMachine:
     """What the kernel reads."""
-    mechanism, weights = rows.mechanism, rows.weights
     actuated = [drive.column for drive in mechanism.drives]
-    asked: list[int] = [] if rows.at == "task" else actuated
-    if isinstance(rows.at, tuple):
-        asked = joint_path(mechanism, rows.at).columns.tolist()
+    asked = [] if at == "task" else joint_path(mechanism, at).columns.tolist() if isinstance(at, tuple) else actuated
     cut = cut_loops(mechanism, (*actuated, *asked))
     drives, counts = drives_of(mechanism), generic_of(mechanism).mobility
     length, metres = mechanism.characteristic_length, metres_of(mechanism.length_unit)
     shown, by_coordinate = counts.platform + counts.internal, drives.si * actuator_units(mechanism)
     of_drives = (
-        rows.effort_units,
+        (length * metres) ** 2 / by_coordinate,
         drives.inertia * by_coordinate,
         drives.friction[:, 0],
         drives.friction[:, 1] * by_coordinate,
     )
+    has_duty = at == "task" or (at == "actuators" and not is_redundantly_actuated(mechanism))
     least_mass = TOLERANCES.implied * weights.masses.sum()
-    fields, twists = cut._asdict(), 3 if mechanism.end_effector_is_joint else 6
+    fields, twists = cut._asdict(), len(twist_units(mechanism))
     frames, places = fields.pop("frames"), fields.pop("places")
 
     def integers(values: Any) -> Any:
@@ -149,12 +147,12 @@ def moving_of(rows: MovingRows, probes: Probes = NO_PROBES) -> MovingMachine:
         **fields,
         actuated=integers(places[q] for q in actuated),
         asked=integers(places[q] for q in asked),
-        counts=integers((twists, counts.mobility, shown, rows.at == "task", rows.at == "actuators")),
+        counts=integers((twists, counts.mobility, shown, has_duty, at == "actuators")),
         frames=integers(frames[body] for body in weights.bodies),
         masses=weights.masses,
         centres=weights.centres / length,
         inertias=weights.inertias / length**2,
-        gravity=rows.gravity / (length * metres),
+        gravity=gravity / (length * metres),
         probed=integers(frames[body] for body in probes.bodies),
         probes=probes.points / length,
         loaded=integers(frames[body] for body in weights.loaded),

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..kernels.dynamics.moving import FREE_PART
-from ..kinematics import BodyInertia
+from ..kinematics import actuator_units
 from .drives import drives_of
 from .moving_rows import MovingRows, Probes
 
@@ -44,7 +44,7 @@ class BodyScales(NamedTuple):
 
     @property
     def units(self) -> Floats:
-        """kg, kg length and kg length² in those of the columns: lengths in sizes, (b, 10)."""
+        """Units of the parameters with lengths in sizes, in kg, kg length and kg length², (b, 10)."""
         return np.asarray(self.sizes[:, None] ** POWERS)
 
 
@@ -56,21 +56,14 @@ def ten_of(masses: Floats, arms: Floats, inertias: Floats) -> Floats:
     return np.concatenate([masses[:, None], masses[:, None] * arms, moments], axis=1)
 
 
-def body_of(ten: Floats, point: Floats) -> BodyInertia:
-    """The mass, centre and inertia about it of parameters (10,) about a point, all in kg and lengths."""
-    mass, arm = ten[0], ten[1:4] / ten[0] if ten[0] > 0.0 else np.zeros(3)
-    inertia = ten[[4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(3, 3) - mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return BodyInertia(float(mass), point + arm, inertia)
-
-
 class EffortRows(NamedTuple):
-    """Efforts at n configurations in motion, in the units of a `Balance`.
+    """Efforts at n configurations in motion, in SI units.
 
     Attributes
     ----------
     described : of the machine as it is described, (n, n_a).
-    by_bodies : by the parameters of bodies, in kg and sizes, (n, n_a, 10 b).
-    rates, gains : of the actuators, and their accelerations [m or rad, per s and per s²], (n, n_a).
+    by_bodies : by the parameters of bodies, (n, n_a, 10 b).
+    rates, gains : of the actuators, and their accelerations, (n, n_a).
     motions : those that the loops allow the actuators, (n, n_a, d).
     is_good : False where the actuators do not hold the machine, or it does not move so, (n,).
     """
@@ -85,19 +78,13 @@ class EffortRows(NamedTuple):
 
 def effort_rows(rows: MovingRows, scales: BodyScales) -> EffortRows:
     """Efforts of rows, and how they depend on the parameters of bodies."""
-    drives = drives_of(rows.mechanism)
+    mechanism = rows.solution.mechanism
     places = scales.points[:, None] + scales.sizes[:, None, None] * _PLACES
     bodies = tuple(body for body in scales.bodies for _ in _PLACES)
     found = rows.efforts(["motions", "probes"], Probes(bodies, places.reshape(-1, 3)))
     of_places = np.linalg.inv(ten_of(np.ones(10), _PLACES, np.zeros((10, 3, 3))))
     by_places = found.probes.reshape(*found.rates.shape, len(scales.bodies), 10)
-    columns = (by_places @ of_places.T).reshape(*found.rates.shape, len(bodies)) * drives.units[:, None]
-    is_good = (found.marks & ~FREE_PART) == 0
-    return EffortRows(
-        found.actuators * drives.units,
-        columns,
-        found.rates * drives.si,
-        found.gains * drives.si,
-        found.motions,
-        is_good,
-    )
+    columns = (by_places @ of_places.T / scales.units).reshape(*found.rates.shape, -1)
+    si, is_good = drives_of(mechanism).si, (found.marks & ~FREE_PART) == 0
+    motions = found.motions * (si * actuator_units(mechanism))[:, None]
+    return EffortRows(found.actuators, columns, found.rates * si, found.gains * si, motions, is_good)

@@ -11,10 +11,11 @@ import numpy as np
 from ..arrays import Floats
 from ..description.joints import Joint
 from ..description.mechanism import Mass, Mechanism
-from ..kinematics import BodyInertia, inertias_of
-from .drives import Drives, drives_of, of_drive
+from ..files.units import metres_of
+from ..kinematics import inertias_of
+from .drives import Drives, drives_of
 from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
-from .regressor import PARTS, POWERS, BodyScales, EffortRows, body_of, ten_of
+from .regressor import PARTS, POWERS, BodyScales, EffortRows, ten_of
 
 FRICTION, ROTOR = ("dry", "viscous"), "rotor"
 
@@ -25,14 +26,13 @@ class Unknowns:
 
     Attributes
     ----------
-    mechanism : with a mass of all bodies that move; metres : of its unit of length.
+    mechanism : with a mass of all bodies that move.
     scales : of the bodies.
     kinds : of "dry", "viscous" and "rotor".
     typical : what those of actuators are compared with, (kinds, n_a), in their units.
     """
 
     mechanism: Mechanism
-    metres: float
     scales: BodyScales
     kinds: tuple[str, ...]
     typical: Floats
@@ -45,7 +45,7 @@ class Unknowns:
     @cached_property
     def gears(self) -> Floats:
         """Gear ratios, (n_a,)."""
-        return np.array([of_drive(drive, "gear") or 1.0 for drive in self.mechanism.drives])
+        return np.array([drive.said("gear") or 1.0 for drive in self.mechanism.drives])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ class Unknowns:
     @cached_property
     def described(self) -> Floats:
         """Their values in the description, (p,)."""
-        known = inertias_of(self.mechanism, self.metres)
+        known = inertias_of(self.mechanism, metres_of(self.mechanism.length_unit))
         parts = [known[body] for body in self.scales.bodies]
         masses = np.array([each.mass for each in parts])
         arms = np.reshape([each.centre for each in parts], (-1, 3)) - self.scales.points
@@ -88,30 +88,33 @@ class Unknowns:
             found[own, own] = mass * units[:, None] * FROM_DENSITY
         return found
 
-    def columns(self, rows: EffortRows) -> Floats:
-        """Efforts of `EffortRows` by scaled parameters, (n, n_a, p)."""
-        moves = {"dry": np.sign(rows.rates), "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
-        own = [moves[kind][..., None] * np.diag(self.drives.units) for kind in self.kinds]
-        in_sizes = np.append(self.scales.units, np.ones(self.typical.size))
-        return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ (self.by_scaled / in_sizes[:, None]))
+    @cached_property
+    def to_scaled(self) -> Floats:
+        """Scaled parameters by parameters, (p, p)."""
+        return np.asarray(np.linalg.inv(self.by_scaled), float)
 
-    def body(self, values: Floats, place: int) -> BodyInertia:
-        """What a body weighs by parameters (p,); nothing where that is rounding."""
-        ten = values[10 * place : 10 * place + 10]
-        if ten[0] <= IMPOSSIBLE * self.scales.masses[place]:
-            return BodyInertia(0.0, self.scales.points[place], np.zeros((3, 3)))
-        found = body_of(ten, self.scales.points[place])
-        spread, axes = np.linalg.eigh(0.5 * np.trace(found.inertia) * np.eye(3) - found.inertia)  # of mass, by place
-        rounding = IMPOSSIBLE * found.mass * self.scales.sizes[place] ** 2
-        spread = np.where(spread <= rounding, 0.0, spread)
+    def columns(self, rows: EffortRows) -> Floats:
+        """Efforts by scaled parameters, (n, n_a, p)."""
+        moves = {"dry": np.sign(rows.rates), "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
+        own = [moves[kind][..., None] * np.eye(len(self.gears)) for kind in self.kinds]
+        return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ self.by_scaled)
+
+    def mass(self, values: Floats, place: int) -> Mass:
+        """The mass of a body by parameters (p,); none where that is rounding."""
+        body, ten, point = self.scales.bodies[place], values[10 * place :][:10], self.scales.points[place]
+        mass, size = ten[0], self.scales.sizes[place]
+        if mass <= IMPOSSIBLE * self.scales.masses[place]:
+            return Mass(body, 0.0, point, np.zeros((3, 3)))
+        arm, about = ten[1:4] / mass, ten[[4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(3, 3)
+        second = 0.5 * np.trace(about) * np.eye(3) - about - mass * np.outer(arm, arm)  # of mass by place
+        spread, axes = np.linalg.eigh(second)
+        spread = np.where(spread <= IMPOSSIBLE * mass * size**2, 0.0, spread)
         second = (axes * spread) @ axes.T
-        inertia = spread.sum() * np.eye(3) - 0.5 * (second + second.T)
-        return found._replace(inertia=inertia)
+        return Mass(body, float(mass), point + arm, spread.sum() * np.eye(3) - 0.5 * (second + second.T))
 
     def apply(self, values: Floats) -> Mechanism:
         """The machine with parameters (p,)."""
-        found = [(name, self.body(values, place)) for place, name in enumerate(self.scales.bodies)]
-        masses = [Mass(name, each.mass, each.centre, each.inertia) for name, each in found]
+        masses = [self.mass(values, place) for place in range(len(self.scales.bodies))]
         others = [each for each in self.mechanism.masses if each.body not in self.scales.bodies]
         shapes = [
             replace(shape, density=None) if shape.body in self.scales.bodies else shape

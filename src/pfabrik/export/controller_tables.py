@@ -12,9 +12,8 @@ import numpy as np
 from ..arrays import Records
 from ..closure.assemble import is_over_determined
 from ..decomposition.leg_table import COMPLETED_WITHIN
-from ..dynamics.asked_motion import task_axes
-from ..dynamics.moving_rows import MovingRows, moving_of
-from ..dynamics.weights import loads_of
+from ..dynamics.moving_rows import Probes, moving_of
+from ..dynamics.weights import weights_of
 from ..files.units import metres_of
 from ..kernels.clearance.convex import new_polytope
 from ..kernels.clearance.distance_constants import MOST_CORNERS
@@ -27,13 +26,13 @@ from ..kernels.controller.links_on_bodies import LinksOnBodies
 from ..kernels.controller.projected import Projecting
 from ..kernels.controller.rates import Rating
 from ..kernels.controller.reached import Reaching
-from ..kernels.dynamics.moving import Exerted, new_moving_scratch
+from ..kernels.dynamics.moving import new_exerted, new_moving_scratch
 from ..kernels.legs.answer import Completion, new_completion
 from ..kernels.platform.equations import LegEvaluation, new_leg_evaluation
 from ..kernels.platform.forward import NewtonScratch, new_newton_scratch
 from ..kernels.platform.search_records import Starts, new_solutions
 from ..kernels.platform.tables import EXACTLY, NEAREST, QUESTION, Question, Start, new_answer_scratch
-from ..kinematics import JointPath, Model, model_of, tilt_axis
+from ..kinematics import JointPath, Model, model_of, task_of, tilt_axis
 from ..options import Options
 from ..platform.nearest_pose import home_start, no_starts
 from ..platform.rotation import keeps_rotation
@@ -211,13 +210,11 @@ WITHOUT_DOUBT = 1e-4
 
 
 def _driving(machine: Machine) -> Driving:
-    mechanism, n_a = machine.mechanism, len(machine.driven)
-    metres, length = metres_of(mechanism.length_unit), mechanism.characteristic_length
-    weights, home = loads_of(mechanism, metres, {}), mechanism.home_pose[None]
-    rows = MovingRows(mechanism, weights, np.zeros(3), "task", np.zeros((1, len(mechanism.coordinates))), home)
-    moving, axes = moving_of(rows), task_axes(mechanism, home)[0]
+    mechanism, length = machine.mechanism, machine.mechanism.characteristic_length
+    moving = moving_of(mechanism, "task", weights_of(mechanism), np.zeros(3), Probes())
+    axes = task_of(mechanism).twists(mechanism.home_pose)
     moving = moving._replace(limits=np.append(moving.limits[:2], WITHOUT_DOUBT))
-    k, none = len(axes), np.zeros((0, 0, 0))
+    k = len(axes)
     return Driving(
         moving,
         new_moving_scratch(moving, k),
@@ -227,19 +224,8 @@ def _driving(machine: Machine) -> Driving:
         np.zeros((k, 6)),
         np.zeros(k),
         np.zeros(k),
-        Exerted(
-            actuators=np.zeros((1, n_a)),
-            rates=np.zeros((1, n_a)),
-            gains=np.zeros((1, n_a)),
-            marks=np.zeros(1, np.int64),
-            wrenches=none,
-            resting=np.zeros((0, 0)),
-            matrices=none,
-            probes=none,
-            twists=np.zeros((0, 0)),
-            motions=none,
-        ),
-        np.array([length, length * metres]),
+        new_exerted(moving, 1, k, fill=0.0),
+        np.array([length, length * metres_of(mechanism.length_unit)]),
     )
 
 

@@ -54,8 +54,8 @@ def export_c(
         number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
         "rates" the Jacobian, speeds of actuators, and torques of them and back; "nearest", with "ik" and "limits", the
         nearest feasible pose to a target out of reach; "bodies" where every body is at a pose, for pictures;
-        "effort" the forces of the actuators in motion, of a machine with masses. All that the machine has but these
-        two, if left out.
+        "effort" the forces of the actuators in motion, of a machine with masses. By default all but "bodies" and
+        "effort", and without "nearest" where the machine has none.
     name : str, optional
         Prefix of all names in the file; lower-case letters, digits and underscores.
     joints : str or sequence of str, optional

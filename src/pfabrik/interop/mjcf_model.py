@@ -117,14 +117,37 @@ class MjcfModel(CompiledModel):
         """Names of the joints that are driven, in the order of the actuators."""
         return [self.joint(int(index)) for index in self.model.actuator_trnid[:, 0]]
 
-    def rates(self) -> dict[str, Rates]:
-        """The armature and the friction of each hinge and slide, by its name."""
+    def rates(self, notes: list[Note]) -> dict[str, Rates]:
+        """The armature and the friction of each joint, and the most that its actuators exert, by its name."""
         own = (self.model.dof_armature, self.model.dof_frictionloss, self.model.dof_damping)
-        found: dict[str, Rates] = {}
-        for index, kind in enumerate(self.model.jnt_type):
-            if self.is_slide[index] or bool(kind == self.mujoco.mjtJoint.mjJNT_HINGE):
-                armature, dry, viscous = (float(each[self.model.jnt_dofadr[index]]) for each in own)
-                found[self.joint(index)] = Rates(rotor_inertia=armature or None, friction=friction_of(dry, viscous))
+        forces, found, uneven = self._forces(), {}, []
+        for index, (low, high) in enumerate(forces):
+            name, most = self.joint(index), float(min(-low, high))
+            armature, dry, viscous = (float(each[self.model.jnt_dofadr[index]]) for each in own)
+            found[name] = Rates(
+                max_torque=most if 0.0 < most < np.inf else None,
+                rotor_inertia=armature or None,
+                friction=friction_of(dry, viscous),
+            )
+            uneven += [name] * bool(-low != high)
+        note_names(notes, "actuators exert more one way: the smaller limit counts, none where it is 0, of", uneven)
+        return found
+
+    def _forces(self) -> Floats:
+        """The lowest and the highest force of the actuators on each joint, (njnt, 2) [N, N m]; infinite without."""
+        model, mujoco = self.model, self.mujoco
+        found = np.tile([-np.inf, np.inf], (model.njnt, 1))
+        found[model.actuator_trnid[:, 0]] = 0.0
+        for k, joint in enumerate(model.actuator_trnid[:, 0]):
+            ends = model.actuator_forcerange[k] if model.actuator_forcelimited[k] else np.array([-np.inf, np.inf])
+            is_fixed = model.actuator_gaintype[k] == mujoco.mjtGain.mjGAIN_FIXED
+            is_alone = model.actuator_biastype[k] == mujoco.mjtBias.mjBIAS_NONE
+            is_force = is_fixed and is_alone and model.actuator_dyntype[k] != mujoco.mjtDyn.mjDYN_INTEGRATOR
+            if is_force and model.actuator_ctrllimited[k]:
+                ends = np.clip(np.sort(model.actuator_gainprm[k, 0] * model.actuator_ctrlrange[k]), *ends)
+            found[joint] += np.sort(model.actuator_gear[k, 0] * ends)
+        for joint in np.flatnonzero(model.jnt_actfrclimited):
+            found[joint] = np.clip(found[joint], *model.jnt_actfrcrange[joint])
         return found
 
     def places(self) -> dict[str, tuple[str, Floats]]:

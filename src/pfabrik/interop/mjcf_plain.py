@@ -17,7 +17,8 @@ from .xml_reading import fault, number, number_text
 PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 BY_GEOMS = ("inertiafromgeom", "inertiagrouprange")
 WEIGHING = ("mass", "density", "shellinertia", "group")
-OWN = ("armature", "frictionloss", "damping")
+OWN = ("armature", "frictionloss", "damping", "actuatorfrcrange", "actuatorfrclimited")
+DRIVING = ("class", "gear", "ctrlrange", "ctrllimited", "forcerange", "forcelimited")
 KEPT: dict[str, tuple[str, ...]] = {
     "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq", *BY_GEOMS),
     "default": ("class",),
@@ -32,11 +33,18 @@ KEPT: dict[str, tuple[str, ...]] = {
     "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
     "weld": ("name", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
     "joint of equality": ("name", "joint1", "joint2", "polycoef", "active"),
+    "general": (*DRIVING, "dyntype", "gaintype", "biastype", "gainprm"),
+    "motor": DRIVING,
+    "position": DRIVING,
+    "velocity": DRIVING,
     "key": ("name", "qpos"),
 }
 """Elements of the kinematics, and geoms -> their attributes that are kept."""
 
-IN_DEFAULTS = ("default", "joint", "site")
+ACTUATORS = ("general", "motor", "position", "velocity")
+"""Actuators whose limits are read."""
+
+IN_DEFAULTS = ("default", "joint", "site", *ACTUATORS)
 IN_BODIES = ("body", "frame", "replicate")
 REFUSED = {"attach": "a model that attaches others", "composite": "a composite body", "flexcomp": "a flexible body"}
 """Elements that make bodies in ways that are not read -> their description."""
@@ -61,6 +69,7 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     """The kinematics of a model; notes name what is left out."""
     plain = ET.Element("mujoco")
     compiler = ET.SubElement(plain, "compiler")
+    ET.SubElement(compiler, "lengthrange", mode="none")  # of muscles, which MuJoCo would simulate
     omitted: Counter[str] = Counter()
     for section in root:
         if section.tag == "compiler":
@@ -152,12 +161,13 @@ def _require_unlimited(tendon: ET.Element, root: ET.Element) -> None:
 
 
 def _actuators(section: ET.Element, notes: list[Note]) -> ET.Element:
-    """The actuators of joints, without their gains; notes name the others."""
+    """The actuators of joints, with what limits their forces; notes name the others."""
     kept = ET.Element("actuator")
     for child in section:
         joint = child.get("joint") or child.get("jointinparent")
         if joint:
-            ET.SubElement(kept, "general", joint=joint)
+            kind = child.tag if child.tag in ACTUATORS else "position"  # whose control is no force either
+            ET.SubElement(kept, kind, _attributes(child, kind), joint=joint)
         else:
             notes.append(Note("an actuator that drives no joint itself is left out", (transmission_text(child),)))
     return kept

@@ -52,7 +52,9 @@ def from_mjcf(
     motion against the base does not depend on is left out. Loops that are open are closed by moving passive joints.
     Base coordinates are those of the world at the configuration. Geoms that collide become shapes of their bodies; what
     the file lets pass through each other, and what overlaps at home, may touch (`ignore`). Masses are those of
-    inertial elements, or of geoms that are no meshes, as MuJoCo has them.
+    inertial elements, or of geoms that are no meshes, as MuJoCo has them. Of a driven joint, armature, friction, and
+    the most that its actuators exert are read: the smaller side of `forcerange`, of `ctrlrange` where control is a
+    force, both by the gear, and of `actuatorfrcrange`.
 
     Parameters
     ----------
@@ -113,7 +115,7 @@ def from_mjcf(
 def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
     """The model as a robot, with its loops."""
     data, places = _own_notes(root), model.places()
-    written: dict[str, Any] = _written_by_us(data) if data else {"rates": model.rates()}
+    written: dict[str, Any] = _written_by_us(data) if data else {"rates": model.rates(notes)}
     site = places.get(written.pop("reference_point", ""))
     if site is not None and written.get("end_effector") in places:
         places[written["end_effector"]] = (written["end_effector"], site[1])

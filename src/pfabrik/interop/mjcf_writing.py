@@ -134,8 +134,7 @@ def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[
     yield "task", " ".join(mechanism.task)
     for key in DRIVE_FIELDS:
         for drive in mechanism.drives:
-            said = getattr(drive.joint, key)
-            said = said[drive.place] if len(drive.joint.driven) > 1 and said is not None else said
+            said = drive.said(key)
             if said is not None:
                 numbers = np.atleast_1d(said) * (si_unit(drive, metres) if key in MEASURED else 1.0)
                 yield f"{key}.{drive.name}", number_text(numbers)

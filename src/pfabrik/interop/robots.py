@@ -125,6 +125,9 @@ def _between(robot: Robot, base: str, end_effector: str, asked: ImportOptions, n
     require_drives(opened, robot.joints, robot.undriven)
     home = closed(opened, notes)
     mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres_of(asked.length_unit))
+    passive = (joint.name for joint in opened.joints if not joint.driven)
+    rubbing = [name for name in passive if (said := robot.rates.get(name)) and (said.friction or said.rotor_inertia)]
+    note_names(notes, "friction and armature of joints that are not driven are left out, of", rubbing)
     mechanism = with_task(mechanism, asked.task is not None, notes)
     mechanism = with_masses(mechanism, home.collision.masses, robot.places, notes)
     mechanism = with_collision(mechanism, home.collision, notes)

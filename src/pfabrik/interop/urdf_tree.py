@@ -69,8 +69,7 @@ class UrdfTree:
         if joint.range is not None:
             lower, upper = (np.array(coordinate.limits) - (coordinate.home if from_home else 0.0)) * unit
             limit |= {"lower": repr(float(lower)), "upper": repr(float(upper))}
-        speed = joint.max_speed[coordinate.place] if isinstance(joint.max_speed, tuple) else joint.max_speed
-        limit["velocity"] = repr(float((speed or 0.0) * unit))
+        limit["velocity"] = repr(float((coordinate.said("max_speed") or 0.0) * unit))
         ET.SubElement(element, "limit", limit)
 
 

@@ -35,6 +35,7 @@ from .loads import (
     Asked,
     BodyLoads,
     Bounds,
+    Load,
     Reasons,
     acting,
     add_reason,
@@ -61,7 +62,7 @@ class _Question(NamedTuple):
 
     solution: Solution
     asked: Asked
-    loads: BodyLoads
+    loads: list[Load]
     gravity: Floats
     limits: Floats | None
 

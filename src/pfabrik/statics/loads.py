@@ -40,7 +40,7 @@ def _pair(argument: str, given: Any) -> tuple[float, float]:
         return -float(value), float(value)
     if value.shape == (2,) and value[0] <= value[1]:
         return float(value[0]), float(value[1])
-    raise InvalidArgument(argument, reprlib.repr(given if value.shape else float(value)), BOUND)
+    raise InvalidArgument(argument, reprlib.repr(value.tolist()), BOUND)
 
 
 def positive_values(argument: str, given: ArrayLike | Mapping[str, float], names: Sequence[str]) -> Floats:
@@ -90,6 +90,23 @@ BodyLoads: TypeAlias = Mapping[str, tuple[ArrayLike, ArrayLike]]
 """Body -> (mass, centre), (force, point) or (wrench, point): points of the body, at home, in base coordinates."""
 
 OF_LOADS = "body -> (mass, centre), (force, point) or (wrench, point)"
+
+
+class Load(NamedTuple):
+    """What a body carries: a mass, or a wrench that acts on it.
+
+    Attributes
+    ----------
+    body : the body.
+    mass : 0 of a wrench.
+    wrench : force, and moment about the point, (6,); 0 of a mass.
+    point : that they are at, of the body at home, in base coordinates, (3,) [length].
+    """
+
+    body: str
+    mass: float
+    wrench: Floats
+    point: Floats
 
 
 class Asked(NamedTuple):
@@ -153,22 +170,20 @@ class Acting(NamedTuple):
     arm: Floats
 
 
-def acting(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoads, gravity: Floats) -> list[Acting]:
+def acting(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: Sequence[Load], gravity: Floats) -> list[Acting]:
     """All loads at coordinates q (n, c): on the end effector, (n, 6) about the reference point, and on bodies."""
     length, bodies = mechanism.characteristic_length, displacements(mechanism, q)
     reference = (bodies[mechanism.end_effector_body] @ mechanism.home_pose)[:, :3, 3]
     found = [Acting(mechanism.end_effector_body, _scaled(wrenches, length), np.zeros((len(q), 3)))]
-    for body, (load, point) in loads.items():
-        wrench = _load(body, load, gravity)
-        place = array(f"loads['{body}'][1]", point, "3", note=f", the point of {OF_LOADS}")
-        arms = bodies[body][:, :3, :3] @ place + bodies[body][:, :3, 3] - reference
-        moments = wrench[3:] + np.cross(arms, wrench[:3])
-        both = np.concatenate([np.broadcast_to(wrench[:3], moments.shape), moments], axis=1)
+    for body, mass, wrench, point in loads:
+        arms, force = bodies[body][:, :3, :3] @ point + bodies[body][:, :3, 3] - reference, wrench[:3] + mass * gravity
+        moments = wrench[3:] + np.cross(arms, force)
+        both = np.concatenate([np.broadcast_to(force, moments.shape), moments], axis=1)
         found.append(Acting(body, _scaled(both, length), arms / length))
     return found
 
 
-def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoads, gravity: Floats) -> Floats:
+def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: Sequence[Load], gravity: Floats) -> Floats:
     """What each joint carries of loads, by the way of the tree to the base, (n, joints, 6).
 
     As `Acting.wrench`: what screws of `JointRates` do work with.
@@ -182,30 +197,29 @@ def carried_of(mechanism: Mechanism, q: Floats, wrenches: Floats, loads: BodyLoa
     return np.asarray(sum(paths[load.body][:, None] * load.wrench[:, None] for load in found))
 
 
-def checked_loads(mechanism: Mechanism, loads: Any) -> BodyLoads:
-    """Loads by body; raises the errors of `forces` for invalid ones."""
+def checked_loads(mechanism: Mechanism, loads: Any) -> list[Load]:
+    """Loads of bodies; raises the errors of `forces` for invalid ones."""
     given = require_mapping("loads", loads, OF_LOADS)
     known = tuple(body for body in mechanism.bodies if body != mechanism.base)
     require_known("body that moves", given, known)
-    for body, load in given.items():
-        if not isinstance(load, tuple | list) or len(load) != 2:
-            raise InvalidArgument(f"loads['{body}']", reprlib.repr(load), OF_LOADS)
-    return given
+    found = []
+    for body, pair in given.items():
+        name = f"loads['{body}']"
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            raise InvalidArgument(name, reprlib.repr(pair), OF_LOADS)
+        value = array(name, pair[0], "() | 3 | 6", note=f", a mass, force or wrench, in {OF_LOADS}")
+        point = array(f"{name}[1]", pair[1], "3", note=f", the point of {OF_LOADS}")
+        if value.shape == () and value < 0.0:
+            raise InvalidArgument(name, f"a mass of {value}", "a mass that is not negative")
+        is_mass, wrench = value.shape == (), np.zeros(6)
+        wrench[: value.size] = 0.0 if is_mass else value
+        found.append(Load(body, float(value) if is_mass else 0.0, wrench, point))
+    return found
 
 
 def checked_gravity(gravity: Any) -> Floats:
     """The acceleration of free fall, (3,)."""
     return array("gravity", gravity, "3")
-
-
-def _load(body: str, load: ArrayLike, gravity: Floats) -> Floats:
-    """A mass, force or wrench on a body as a wrench, (6,)."""
-    found = array(f"loads['{body}']", load, "() | 3 | 6", note=f", a mass, force or wrench, in {OF_LOADS}")
-    if found.shape == ():
-        if found < 0.0:
-            raise InvalidArgument(f"loads['{body}']", f"a mass of {found}", "a mass that is not negative")
-        found = found * gravity
-    return np.concatenate([found, np.zeros(6 - len(found))])
 
 
 def _wrench(name: str, value: Any, is_at_joint: bool) -> Floats:

@@ -123,7 +123,7 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
         )
     inverse, forward = inverse_jacobian(solution), forward_jacobian(solution)
     sizes = np.repeat([mechanism.characteristic_length, 1.0], 3)[: inverse.shape[1]]
-    twists = _twists(solution)[:, : len(sizes)]
+    twists = task_of(mechanism).twists(solution.pose)[:, : len(sizes)]
     kept = twists @ (forward / sizes[:, None])
     following = np.linalg.pinv(kept, rcond=TOLERANCES.alignment)
     shares, speeds = _Shares(internal_rates(mechanism, solution._coordinates) / limits[:, None]), []
@@ -140,13 +140,6 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
         found = _fastest(slowest, inverse @ slowest / limits, shares, mechanism.actuator_names)
         speeds.append(found._replace(is_slowest=True))
     return PlatformSpeeds(solution.mechanism, speeds)
-
-
-def _twists(solution: Solution) -> Floats:
-    """The motions that a task sets, unit vectors (m, 6), each along or about one axis."""
-    task = task_of(solution.mechanism)
-    lines, turns = np.eye(3)[list(task.axes)], task.turning_axes(solution.pose)
-    return np.block([[lines, np.zeros((len(lines), 3))], [np.zeros((len(turns), 3)), turns]])
 
 
 class _Shares:

@@ -12,15 +12,14 @@ from ..answers.tracked import Track, refuse_leaps
 from ..arrays import Floats
 from ..checks import put_limits, require_positive, require_type
 from ..description.mechanism import Mechanism
-from ..dynamics.torque_rows import torque_rows
-from ..dynamics.weights import lacking_masses
+from ..dynamics.moving_rows import MovingRows
+from ..dynamics.weights import lacking_masses, weights_of
 from ..errors import InvalidArgument
-from ..files.units import metres_of
 from ..fk import solve_fk
 from ..kernels.timing import fastest
 from ..kinematics import actuator_units, readouts
 from ..statics.forces import GRAVITY
-from ..statics.loads import BodyLoads
+from ..statics.loads import BodyLoads, checked_gravity
 from ..tolerances import TOLERANCES
 from .curve import Curve, curve_of, largest_between, refuse_crossings
 from .timed import Timed, What
@@ -88,7 +87,7 @@ def time_path(
     speeds = limits_of(mechanism, "speed", speed)
     accelerations = limits_of(mechanism, "acceleration", acceleration)
     torques = limits_of(mechanism, "torque", torque)
-    if torque is None and lacking_masses(mechanism, metres_of(mechanism.length_unit)):
+    if torque is None and lacking_masses(mechanism):
         torques[:] = np.inf
     most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
     every = 1.0 / require_positive("rate", rate)
@@ -136,17 +135,14 @@ def _torques(
     values, slopes, _ = (x[:, :n] for x in curve.at(s))
     steps = curve.step_of(s)
     solution = solve_fk(mechanism, values, start=track[steps])
-    return TorquePath(solution, s, torque_rows(solution, slopes, gravity, loads, steps), limits)
+    weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
+    rows = MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
+    return TorquePath(rows, s, steps, limits)
 
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
     """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
-    limits = np.full(len(mechanism.drives), np.inf)
-    for place, drive in enumerate(mechanism.drives):
-        limit = getattr(drive.joint, f"max_{what}")
-        value = limit[drive.place] if isinstance(limit, tuple) else limit
-        if value is not None:
-            limits[place] = value
+    limits = np.array([drive.said(f"max_{what}") or np.inf for drive in mechanism.drives])
     put_limits(limits, what, given, mechanism.actuator_names)
     return limits
 
@@ -214,9 +210,8 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         share = np.abs(parts.rest) / parts.most
         place = int(np.argmax(share.max(axis=0)))
         limit = path.limits[place]
-        found = (
-            f"{limit:.6g}, where '{path.names[place]}' has to exert up to {limit * share[:, place].max():.6g} at rest"
-        )
+        most = limit * share[:, place].max()
+        found = f"{limit:.6g}, where '{path.names[place]}' must exert up to {most:.6g} at rest"
         steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 

@@ -14,8 +14,8 @@ from ..answers.tracked import Track
 from ..arrays import Floats, Ints
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
+from ..drawing import curves_over_time
 from ..errors import counted
-from ..extras import require
 from ..fk import solve_fk
 from ..kinematics import readouts
 from ..printed import Printed, ResultTable
@@ -147,23 +147,8 @@ class Timed(Printed):
 
     def plot(self) -> Figure:
         """Actuators, their rates and accelerations over time, one curve each; a Matplotlib figure."""
-        require("pictures", "matplotlib", "plot")
-        from matplotlib.figure import Figure
-
         shown = readouts(self.mechanism)
         units = np.array([float(each.display(np.ones(1))[0]) for each in shown])
-        figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
-        for axes, label, values in zip(
-            figure.subplots(3, 1, sharex=True),
-            ("actuators", "rates [/s]", "accelerations [/s²]"),
-            (self.actuators, self.rates, self.accelerations),
-            strict=True,
-        ):
-            for each, column in zip(shown, (values * units).T, strict=True):
-                axes.plot(self.times, column, label=f"{each.name} [{each.unit}]")
-            axes.set_ylabel(label)
-        axes.set_xlabel("time [s]")
-        handles, names = axes.get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
-        drawn: Figure = figure
-        return drawn
+        panels = {"actuators": self.actuators, "rates [/s]": self.rates, "accelerations [/s²]": self.accelerations}
+        names = [f"{each.name} [{each.unit}]" for each in shown]
+        return curves_over_time(self.times, names, {label: values * units for label, values in panels.items()})

@@ -6,10 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.solution import Solution
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..dynamics.drives import drives_of
+from ..dynamics.inverse_dynamics import reasons_of
+from ..dynamics.moving_rows import MovingRows, in_si
+from ..errors import InvalidArgument
 from ..kinematics import actuator_units
+from ..statics.loads import has_reason
 from ..statics.shared_limits import facets_of, minors_along
 from ..statics.transmission import is_redundantly_actuated
 from .curve import Spline
@@ -37,7 +40,10 @@ class TorqueParts(NamedTuple):
 
 
 class TorquePath:
-    """The torques of a path, of what `torque_rows` says at places s (n,), and their limits (n_a,).
+    """The torques of a path, by what they are at places s (n,), and their limits (n_a,).
+
+    With actuators q(s) they are M (q' s'' + q'' s'^2) + h s'^2 + rest: the mass matrix M, what the motion itself takes
+    at a speed of 1, h, and the torques at rest; of redundant actuators, the least.
 
     Attributes
     ----------
@@ -45,16 +51,36 @@ class TorquePath:
     limits : of the first of these [N m, N].
     """
 
-    def __init__(self, solution: Solution, s: Floats, rows: Floats, limits: Floats) -> None:
-        mechanism = solution.mechanism
+    def __init__(self, rows: MovingRows, s: Floats, steps: Ints, limits: Floats) -> None:
+        """Take configurations at these places whose actuators have the rates q'.
+
+        Parameters
+        ----------
+        steps : the step of the path that each place is at, or after, for errors, (n,).
+
+        Raises
+        ------
+        InvalidArgument : places at which there are no torques, with the reason.
+        """
+        solution, mechanism = rows.solution, rows.solution.mechanism
+        assert rows.rates is not None
+        self._drives, found = drives_of(mechanism), rows.efforts(["resting", "matrices"])
+        reasons = reasons_of(solution, found.marks)
+        bad = np.flatnonzero(has_reason(reasons))
+        if len(bad):
+            what, places = f"no torques: {reasons[bad[0]]}", np.unique(steps[bad])[:5].tolist()
+            raise InvalidArgument("track", what, "a path that its actuators hold", rows=places)
+        moved = found.actuators - found.resting - self._drives.rubbed(rows.rates)
+        masses = in_si(mechanism, "actuators", found.matrices).reshape(len(s), -1)
+        columns = np.hstack([masses, moved, found.resting])
         self.names, self.limits, self._limits, self._motions = mechanism.actuator_names, limits, limits, 0
         if is_redundantly_actuated(mechanism):
             minors, self._motions = minors_along(solution, "timed by torque")
-            rows = np.hstack([rows, minors])
+            columns = np.hstack([columns, minors])
             meeting = [others for others, _ in facets_of(minors[:1], len(limits), self._motions)]
             self.names = tuple(" and ".join(mechanism.actuator_names[i] for i in others) for others in meeting)
             self.limits = limits[[others[0] for others in meeting]]
-        self._spline, self._drives = Spline.through(s, rows), drives_of(mechanism)
+        self._spline = Spline.through(s, columns)
         self._work = self._drives.si * actuator_units(mechanism)  # of a unit of force, by what the minors are in
 
     def at(self, s: Floats, slopes: Floats, bends: Floats) -> TorqueParts:

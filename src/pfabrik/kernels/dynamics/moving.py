@@ -8,6 +8,7 @@ that point] in kg L/s² and kg L²/s².
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -173,6 +174,25 @@ def new_moving_scratch(moving: MovingMachine, k: int) -> MovingScratch:
     return MovingScratch(
         **{name: np.zeros(shape, np.int64 if name in whole else float) for name, shape in shapes.items()}
     )
+
+
+def new_exerted(moving: MovingMachine, n: int, k: int, requests: Sequence[str] = (), fill: float = np.nan) -> Exerted:
+    """Results of n rows, for k components that are asked for; of those after the marks the ones in `requests`."""
+    n_a, loads = len(moving.actuated), len(moving.frames) + len(moving.loaded)
+    shapes = {
+        **dict.fromkeys(("actuators", "rates", "gains", "resting"), (n_a,)),
+        "marks": (),
+        "wrenches": (loads, 6),
+        "matrices": (k, k),
+        "probes": (n_a, len(moving.probed)),
+        "twists": (6,),
+        "motions": (n_a, int(moving.counts[SHOWN])),
+    }
+    always = ("actuators", "rates", "gains", "marks", *requests)
+    return Exerted(**{
+        name: np.full((n if name in always else 0, *shape), 0 if name == "marks" else fill)
+        for name, shape in shapes.items()
+    })  # fmt: skip
 
 
 def _sample(codes: str) -> list[Any]:
