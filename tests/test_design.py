@@ -335,6 +335,7 @@ DELTA = {"base_radius": (50, 200), "arm": (40, 200), "rod": (100, 400), "platfor
 CYLINDER = PoseRegion.cylinder([0, 0, 0], 60, 40)
 
 
+PUSHES = [[0, 0, -20], [20, 0, 0], [0, 20, 0]]
 MEASURES: dict[str, tuple[Any, Any]] = {  # a requirement, and by how much the library's own verbs find it kept
     "margin": (keep.margin(0.2), lambda s: pf.feasibility(s.mechanism, s.pose).margin.min() - 0.2),
     "singularity": (
@@ -344,6 +345,14 @@ MEASURES: dict[str, tuple[Any, Any]] = {  # a requirement, and by how much the l
     "speed": (
         keep.speed([[100, 0, 0], [0, 100, 0]], 1.2),
         lambda s: 1.2 - np.abs(pf.inverse_jacobian(s)[:, :, :2] * 100).max(),
+    ),
+    "force": (
+        keep.force(PUSHES, 1800),
+        lambda s: 1 - max(np.abs(pf.forces(s, push).actuators).max() for push in PUSHES) / 1800,
+    ),
+    "stiffness": (
+        keep.stiffness(7, 1e5),
+        lambda s: 1 / np.diagonal(pf.stiffness(s, 1e5).compliance, axis1=-2, axis2=-1)[:, :3].max() / 7 - 1,
     ),
 }
 
@@ -366,6 +375,32 @@ def test_what_is_kept_is_kept_at_random_poses(name: str, plain: pf.Design) -> No
         answer = pf.solve_ik(each.mechanism, poses)
         assert (np.asarray(answer.status) == Status.REACHED).all()
         assert (measure(answer) >= -1e-3) == holds
+
+
+def test_links_stay_apart_and_nothing_else_is_in_the_way(tmp_path: Path) -> None:
+    text = (TEMPLATES / "6-UPS.toml").read_text(encoding="utf-8")
+    machine = read(tmp_path, text.replace("stroke = [", "thickness = 10\nstroke = ["))
+    poses = np.tile(machine.home_pose, (4, 1, 1))
+    poses[:, :2, 3] += [[20, 20], [-20, 20], [20, -20], [-20, -20]]
+    found = pf.design(machine, {"base_angle": (4, 40)}, poses, keep=[keep.clearance(12)], minimise="base_angle")
+    assert found.verdict == "CHECKED" and {each.requirement for each in found.binding} == {"clearance >= 12"}
+    apart = pf.clearance(pf.solve_ik(found.mechanism, poses)).distance
+    assert np.asarray(apart).min() == pytest.approx(12, rel=1e-6)
+
+
+def test_errors_of_encoders_move_the_tip_no_farther() -> None:
+    poses = np.array([[x, y, 0.0] for x in (-20, 20) for y in (160, 190)])
+    found = pf.design(
+        template("5-bar"), {"crank": (60, 200)}, poses, keep=[keep.accuracy(1e-3, 0.2)], minimise="stroke"
+    )
+    assert found.verdict == "CHECKED" and {each.requirement for each in found.binding} == {"error <= 0.2"}
+    answer = pf.solve_ik(found.mechanism, poses)
+    moved = [
+        pf.solve_fk(found.mechanism, answer.actuators + np.multiply(1e-3, signs), start=answer).pose[:, :3, 3]
+        for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    ]
+    off = np.linalg.norm(np.array(moved) - answer.pose[:, :3, 3], axis=2).max()
+    assert off == pytest.approx(0.2, rel=5e-3)  # errors are to first order
 
 
 def test_a_track_is_proved_between_its_steps() -> None:
@@ -407,6 +442,7 @@ def test_a_tilting_machine_stays_open_and_says_why() -> None:
         ({"reach": np.full((4, 4), np.nan)}, "reach"),
         ({"reach": np.zeros((0, 3))}, "reach"),
         ({"reach": PoseRegion.box([-1] * 3, [1] * 3, rotation=0.1)}, "rotation about x"),
+        ({"mechanism": template("5-bar"), "vary": {"crank": (100, 120)}}, "one plane: 'My five-bar' is planar"),
         ({"about": "origin"}, "origin"),
         ({"keep": "arm"}, "<= or >="),
         ({"keep": "arm >= foo"}, "foo"),

@@ -166,6 +166,7 @@ def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
     return np.asarray(normals if is_forward else normals[::-1])
 
 
+@derived
 def ends_of_default_axes(mechanism: Structure, joint: Joint) -> tuple[list[Joint], bool]:
     """The joints to which the line of a universal joint may be that its default axes are square to, by precedence.
 
@@ -246,6 +247,7 @@ def _rotations(axes: ArrayLike, centre: Floats) -> Floats:
     return np.hstack([directions, np.cross(centre, directions)])
 
 
+@derived
 def _screws(mechanism: Structure) -> Floats:
     """Unit screws of all coordinates at home, (c, 6), with the velocity at the reference point [L]; 0 if locked."""
     screws = np.vstack([joint_screws(mechanism, joint, mechanism.reference_point) for joint in mechanism.joints])

@@ -33,7 +33,7 @@ def design(
     reach: PoseRegion | Target,
     *,
     keep: Iterable[Requirement | str] = ...,
-    minimise: Aim | tuple[Aim, Aim] = ...,
+    minimise: Aim | Sequence[Aim] = ...,
     about: Literal["base", "home"] = ...,
     seed: int = ...,
     executor: Executor | None = ...,
@@ -48,7 +48,7 @@ def design(
     reach: PoseRegion | Target,
     *,
     keep: Iterable[Requirement | str] = ...,
-    minimise: Aim | tuple[Aim, Aim] = ...,
+    minimise: Aim | Sequence[Aim] = ...,
     about: Literal["base", "home"] = ...,
     seed: int = ...,
     executor: Executor | None = ...,
@@ -62,7 +62,7 @@ def design(
     reach: PoseRegion | Target,
     *,
     keep: Iterable[Requirement | str] = (),
-    minimise: Aim | tuple[Aim, Aim] = "size",
+    minimise: Aim | Sequence[Aim] = "size",
     about: Literal["base", "home"] = "base",
     seed: int = 0,
     executor: Executor | None = None,
@@ -86,7 +86,7 @@ def design(
     keep : iterable of Requirement or str, optional
         Requirements of `pfabrik.keep`, and relations of dimensions, "rod >= 1.2*arm". A distance from singularities is
         kept unless `keep.singularity(None)` is among them; a machine with a clearance keeps that.
-    minimise : str or callable or tuple, optional
+    minimise : str or callable or sequence, optional
         "size": the diameter of the smallest sphere about the centres of all joints at home [length]. "stroke": the
         longest way of an actuator over the poses [length, or rad times L]. Or an expression of dimensions, or a
         function of a Mechanism. Two of these give a front.
@@ -136,7 +136,7 @@ def design(
             raise InvalidArgument("vary", f"no dimension of '{name}'", f"one of {', '.join(machine.dimensions)}")
         with telling("design", on_progress) as tell:
             asked = DesignQuestion(machine, own, reach, requirements, about, seed, executor, tell)
-            aims = minimise if isinstance(minimise, tuple) else (minimise,)
+            aims = minimise if isinstance(minimise, tuple | list) else (minimise,)
             if len(aims) not in (1, 2):
                 raise InvalidArgument("minimise", f"{len(aims)} aims", "one, or two for a front")
             answer = _front(asked, *aims) if len(aims) == 2 else SmallestSearch(asked, *aims).answer()

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
+from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..answers.differential import singularity
 from ..answers.solution import Solution
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from ..description.joints import set_fields
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
+from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnsupportedMechanism
 from ..ik import solve_ik
 from ..kinematics import MachineAt, VariedMachine, generic_of, task_of
 from ..tolerances import TOLERANCES
@@ -221,8 +224,7 @@ class Candidate:
     def distances(self) -> Floats:
         """Measures of the nearest serial and parallel singularity, (n, 2), as of `pf.singularity`."""
         if not self.dimensions.is_direct:
-            found = singularity(self.solution)
-            return np.stack([found.serial, np.minimum(found.parallel, found.constraint)], axis=1)
+            return self.measured(_singularities, 2)
         with np.errstate(divide="ignore"):
             return np.stack([1.0 / self.factors[:, 0], self.factors[:, -1]], axis=1)
 
@@ -232,12 +234,30 @@ class Candidate:
         own, source = self.dimensions.mechanism, self.dimensions.source
         sketch = source.sketch_with(self.dimensions.named(self.values))
         joints = [dataclasses.replace(joint, range=None, cone=None) for joint in sketch.joints]
-        found = dataclasses.replace(own, joints=tuple(joints), reference_point=sketch.reference_point)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MobilityWarning)  # of machines that are only tried
+            found = dataclasses.replace(own, joints=tuple(joints), reference_point=sketch.reference_point)
         values = {name: self.value_of(name) for name in own.dimensions}
         set_fields(found, _source=dataclasses.replace(source, dimensions=values))
         return found
 
+    def measured(self, function: Callable[[Solution], Any], width: int = 1) -> Floats:
+        """Values (n, width) of a function of the machine's configurations; NaN at poses where legs do not close."""
+        (closed, solution), found = self._closed, np.full((len(self.poses), width), np.nan)
+        if solution is not None:
+            found[closed] = np.reshape(function(solution), (-1, width))
+        return found
+
     @cached_property
-    def solution(self) -> Solution:
-        """The configurations of the machine without limits at all poses."""
-        return solve_ik(self.unlimited, self.poses)
+    def _closed(self) -> tuple[Mask, Solution | None]:
+        """Where legs close, (n,), and the configurations there, without limits."""
+        closed = np.zeros(len(self.poses), bool)
+        if self._found is not None:
+            closing = [row for row, (_, bound) in enumerate(self.dimensions.limits) if bound in ("reach", "not closed")]
+            closed |= np.isposinf(self._found.margins(self.poses)[:, closing]).all(axis=1)
+        return closed, solve_ik(self.unlimited, self.poses[closed]) if closed.any() else None
+
+
+def _singularities(solution: Solution) -> Floats:
+    found = singularity(solution)
+    return np.stack([found.serial, np.minimum(found.parallel, found.constraint)], axis=1)

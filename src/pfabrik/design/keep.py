@@ -173,7 +173,7 @@ def clearance(distance: float) -> Requirement:
     """
     least = _not_negative("distance", distance)
     words = f"clearance >= {least:g}"
-    return Requirement(words, lambda m: (np.asarray(clearance_of(m.solution).distance) - least) / m.length)
+    return Requirement(words, lambda m: (m.measured(lambda s: clearance_of(s).distance) - least) / m.length)
 
 
 def force(wrenches: ArrayLike, most: float) -> Requirement:
@@ -232,7 +232,7 @@ def accuracy(errors: float | Mapping[str, float], most: float) -> Requirement:
     """
     limit = require_positive("most", most)
     return Requirement(
-        f"error <= {limit:g}", lambda m: 1.0 - np.asarray(accuracy_of(m.solution, errors).position) / limit
+        f"error <= {limit:g}", lambda m: 1.0 - m.measured(lambda s: accuracy_of(s, errors).position) / limit
     )
 
 

@@ -15,9 +15,10 @@ from ..certify.pose_region import PoseRegion
 from ..certify.question import certify, require_task
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
-from ..kinematics import task_of
+from ..kinematics import plane_of, task_of
 from ..poses import are_poses
 from ..targets import as_targets
+from ..tolerances import TOLERANCES
 from ..track import track
 
 SAMPLES, DENSE = 300, 2000
@@ -55,6 +56,11 @@ class PosesToReach:
                 raise InvalidArgument("reach", "no poses, or rows that are none", "a PoseRegion, finite poses, a Track")
             self.poses[:, :3, 3] -= fixed
             self.first = self.poses[:: max(1, len(self.poses) // 8)]
+        plane = plane_of(mechanism)
+        if plane is not None:
+            away = (self.poses - self.poses[0])[:, :3, 3] * task_of(mechanism).axes @ np.cross(*plane)
+            if np.abs(away).max() > TOLERANCES.alignment * mechanism.characteristic_length:
+                raise InvalidArgument("reach", "positions out of one plane", f"one plane: '{mechanism.name}' is planar")
 
     def worst(self, least: Callable[[Floats], Floats], count: int) -> tuple[Floats, Floats]:
         """Poses where a function of poses (n, 4, 4) is about the least, and its values there, the least first.
