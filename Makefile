@@ -41,13 +41,14 @@ docs: prepared
 test: prepared
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
-# The programs of the pages again, with the linear algebra of other processors.
+# The programs of pages, examples and notebooks, with the linear algebra of several processors.
 test-processors: prepared
 	@for core in Haswell Zen Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
-		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal tests/test_docs.py tests/test_transcripts.py || exit 1; done
+		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal -m "not campaign" tests/test_docs.py \
+		tests/test_notebooks.py tests/test_transcripts.py || exit 1; done
 
 test-fast: prepared
-	@$(BIN)/python -m pytest -m "not slow and not campaign"
+	@$(BIN)/python -m pytest -m "not slow and not campaign and not pages"
 
 # Files of tensors in PyTorch and JAX, which are large: in an environment of their own.
 test-tensors: $(STAMP)
@@ -57,7 +58,7 @@ test-tensors: $(STAMP)
 
 # The same tests with the kernels as plain Python: this run sees every line, so it measures coverage.
 test-interpreted: $(STAMP)
-	@PFABRIK_KERNELS=python $(BIN)/python -m pytest -m "not slow and not campaign" --cov --cov-report=term
+	@PFABRIK_KERNELS=python $(BIN)/python -m pytest -m "not slow and not campaign and not pages" --cov --cov-report=term
 
 # Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
 campaign: prepared

@@ -497,7 +497,7 @@ REFUSED = [
     ("workspace stewart -o a.bmp", "-o: found 'a.bmp'; expected a name that ends in"),
     ("workspace stewart --centre 1,2,3", "says nothing without --largest"),
     ("workspace stewart --any-orientation --rpy 0 0 1", "give one of them"),
-    ("time five_bar swing.csv --torque 0.01 --load link1=1,0,0,200", "--torque: found 0.01, where 'p1' has to exert"),
+    ("time five_bar swing.csv --torque 0.01 --load link1=1,0,0,200", "--torque: found 0.01, where 'p1' must exert"),
     # starting files and exports
     ("new 6-UPX", "no kind of machine named '6-UPX'; did you mean '6-UPS'? (known: 3-PRS, "),
     ("new dleta -o my.toml", "did you mean 'delta'?"),

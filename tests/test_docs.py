@@ -86,7 +86,7 @@ ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2", "docs/ros2-node
 """Programs of seconds: exports, a workspace and processes, which tasks, examples and other tests have as well."""
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize(
     "code",
     [
@@ -102,7 +102,7 @@ def test_python_blocks_run_as_they_are_written(code: str) -> None:
     exec(compile(code, "<block>", "exec"), {"__name__": "__main__"})
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 @pytest.mark.usefixtures("folder")
 def test_examples_run(example: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,7 +122,7 @@ def compiler_that_does_not_optimize(folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("program", sorted(ROOT.glob("examples/tasks/*.py")), ids=lambda program: program.stem)
 def test_the_page_of_a_task_is_what_its_program_prints(
@@ -228,7 +228,7 @@ OPENS = ("pf.interop.from_urdf(", "pf.view(")
 """Lines that want a file, or open a window."""
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize("section", SECTIONS, ids=[section.partition("\n")[0] for section in SECTIONS])
 @pytest.mark.usefixtures("folder")
 def test_lines_for_those_who_come_from_elsewhere_run(section: str) -> None:

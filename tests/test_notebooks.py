@@ -51,7 +51,7 @@ def test_notebooks_are_kept_without_outputs(path: Path) -> None:
         assert cell["execution_count"] is None
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=IDS)
 @pytest.mark.usefixtures("folder")
 def test_cells_of_notebooks_run_one_after_the_other(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
