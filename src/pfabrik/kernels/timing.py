@@ -34,6 +34,38 @@ def second_derivatives(s: Floats, values: Floats, curves: Floats) -> None:
             curves[i, j] -= share[i] * curves[i + 1, j]
 
 
+@kernel
+def spline_at(s: Floats, values: Floats, curves: Floats, at: Floats, order: int, derivatives: Floats) -> None:
+    """Fill the derivatives (p, m) of an order, 0 to 2, of cubic splines at places (p,).
+
+    Parameters
+    ----------
+    s, values, curves : of the splines, (n,) and (n, m), as `second_derivatives` has them.
+    """
+    k = 0
+    for i in range(len(at)):
+        while k < len(s) - 2 and at[i] >= s[k + 1]:
+            k += 1
+        while k > 0 and at[i] < s[k]:
+            k -= 1
+        step = s[k + 1] - s[k]
+        after = (at[i] - s[k]) / step
+        before = 1.0 - after
+        begin, rise, bend, bend_after = 0.0, 0.0, before, after
+        if order == 1:
+            rise, bend, bend_after = (
+                1.0 / step,
+                step / 6.0 * (1.0 - 3.0 * before**2),
+                step / 6.0 * (3.0 * after**2 - 1.0),
+            )
+        elif order == 0:
+            begin, rise = 1.0, after
+            bend, bend_after = step**2 / 6.0 * (before**3 - before), step**2 / 6.0 * (after**3 - after)
+        for j in range(values.shape[1]):
+            line = begin * values[k, j] + rise * (values[k + 1, j] - values[k, j])
+            derivatives[i, j] = line + bend * curves[k, j] + bend_after * curves[k + 1, j]
+
+
 @routine
 def put_line(k: int, rate: float, curve: float, low: float, high: float, lines: Floats) -> tuple[int, float]:
     """Add low <= rate u + curve x <= high as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x.
@@ -84,14 +116,20 @@ def fastest(
     for i in range(n - 2, -1, -1):
         step = s[i + 1] - s[i]
         count, bound = put_lines(i, step, slopes, curves, low, high, lines)
-        largest = min(caps[i], bound)
+        largest, before = min(caps[i], bound), math.inf
         # what brings x to the next point: - x <= 2 step u <= reach - x
         lines[count, 0], lines[count, 1], lines[count, 2] = 0.0, reach[i + 1] / (2.0 * step), -0.5 / step
-        for a in range(count + 1):
-            for b in range(count + 1):
-                slope = lines[a, 2] - lines[b, 2]
-                if slope * largest > lines[b, 1] - lines[a, 0]:
-                    largest = (lines[b, 1] - lines[a, 0]) / slope
+        # Newton's method: the highest lower and the lowest upper bound of u meet at the next x, until they leave one
+        while largest < before:
+            before, below, above = largest, 0, 0
+            for a in range(1, count + 1):
+                if lines[a, 0] + lines[a, 2] * largest > lines[below, 0] + lines[below, 2] * largest:
+                    below = a
+                if lines[a, 1] + lines[a, 2] * largest < lines[above, 1] + lines[above, 2] * largest:
+                    above = a
+            slope, room = lines[below, 2] - lines[above, 2], lines[above, 1] - lines[below, 0]
+            if slope * largest > room:
+                largest = room / slope
         reach[i] = largest
     x[0] = 0.0 if at_rest else reach[0]
     for i in range(n - 1):

@@ -132,7 +132,7 @@ def _torques(
     if not np.isfinite(limits).any():
         return None
     mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES), curve.n_actuators
-    values, slopes, _ = (x[:, :n] for x in curve.at(s))
+    values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
     steps = curve.step_of(s)
     solution = solve_fk(mechanism, values, start=track[steps])
     weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
@@ -151,7 +151,7 @@ def refuse_swings(track: Track, curve: Curve) -> None:
     """Refuse a track whose spline, which swings out where steps bend, leaves the range of an actuator between steps."""
     s, mechanism = curve.grid(), track.mechanism
     low, high = np.array([drive.limits for drive in mechanism.drives]).T
-    values = curve.at(s)[0][:, : curve.n_actuators]
+    values = curve.at(s)[:, : curve.n_actuators]
     beyond, units = np.maximum(low - values, values - high), actuator_units(mechanism)
     over = beyond > TOLERANCES.active * units
     if over.any():
@@ -166,7 +166,7 @@ def refuse_swings(track: Track, curve: Curve) -> None:
 def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
     """A grid along s and the largest squared speeds there."""
     s = curve.grid()
-    _, slopes, bends = curve.at(s)
+    slopes, bends = curve.at(s, 1), curve.at(s, 2)
     n, accelerations = curve.n_actuators, limits.accelerations
     slopes_of, bends_of = np.ascontiguousarray(slopes[:, :n]), np.ascontiguousarray(bends[:, :n])
     steepest = largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None])
@@ -245,7 +245,7 @@ def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, 
     late = times - reached[cell]
     pace = np.maximum(np.sqrt(x[cell]) + pushes[cell] * late, 0.0)
     where = np.clip(s[cell] + (np.sqrt(x[cell]) + 0.5 * pushes[cell] * late) * late, s[0], s[-1])
-    values, slopes, bends = curve.at(where)
+    values, slopes, bends = (curve.at(where, order) for order in range(3))
     n = curve.n_actuators
     rates = slopes * pace[:, None]
     gains = slopes[:, :n] * pushes[cell][:, None] + bends[:, :n] * pace[:, None] ** 2

@@ -87,7 +87,7 @@ class TorquePath:
         """The torques at s (n,), where the actuators have these first and second derivatives, (n, n_a)."""
         n_a, drives = slopes.shape[1], self._drives
         ends = np.cumsum([n_a**2, n_a, n_a])
-        masses, by_speed, rest, minors = np.split(self._spline.values_at(s), ends, axis=1)
+        masses, by_speed, rest, minors = np.split(self._spline.at(s), ends, axis=1)
         masses = masses.reshape(-1, n_a, n_a)
         by_push, more = (np.einsum("nab,nb->na", masses, x * drives.si) for x in (slopes, bends))
         dry, viscous = drives.friction.T
