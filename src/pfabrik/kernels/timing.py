@@ -66,6 +66,18 @@ def spline_at(s: Floats, values: Floats, curves: Floats, at: Floats, order: int,
             derivatives[i, j] = line + bend * curves[k, j] + bend_after * curves[k + 1, j]
 
 
+@kernel
+def largest_between(begin: Floats, end: Floats, rise: Floats, largest: Floats) -> None:
+    """Fill the largest magnitudes of parabolas, (n, m), from begin to end, by the share of the way, of which `rise` is
+    the slope at the begin."""
+    for i in range(begin.shape[0]):
+        for j in range(begin.shape[1]):
+            a, b, slope = begin[i, j], end[i, j], rise[i, j]
+            largest[i, j] = max(abs(a), abs(b))
+            if slope * (2.0 * (b - a) - slope) < 0.0:
+                largest[i, j] = max(largest[i, j], abs(a - 0.25 * slope**2 / (b - a - slope)))
+
+
 @routine
 def put_line(k: int, rate: float, curve: float, low: float, high: float, lines: Floats) -> tuple[int, float]:
     """Add low <= rate u + curve x <= high as bounds of u, lines[k] = (low, high, slope by x); the count, a bound of x.

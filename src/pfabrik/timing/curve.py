@@ -69,9 +69,9 @@ class Curve(Spline):
     poses: Floats
     n_actuators: int
 
-    def grid(self, least: int = FINEST) -> Floats:
-        """Points along s, at least so many, the steps among them."""
-        parts = max(-(-least // (len(self.s) - 1)), FEWEST)
+    def grid(self, least: int = FINEST, fewest: int = FEWEST) -> Floats:
+        """Points along s, at least so many, and so many for each step, the steps among them."""
+        parts = max(-((1 - least) // (len(self.s) - 1)), fewest)
         shares = np.arange(parts) / parts
         inner = (self.s[:-1, None] + np.diff(self.s)[:, None] * shares).ravel()
         return np.append(inner, self.s[-1])
@@ -95,16 +95,6 @@ def _curves(s: Floats, values: Floats) -> Floats:
     if len(s) > 1:
         second_derivatives(s, values, curves)
     return curves
-
-
-def largest_between(begin: Floats, end: Floats, rise: Floats) -> Floats:
-    """The largest magnitudes of parabolas from begin to end, of which `rise` is the slope at the begin, by the share
-    of the way."""
-    largest = np.maximum(np.abs(begin), np.abs(end))
-    turns = np.nonzero(rise * (2.0 * (end - begin) - rise) < 0.0)
-    begin, end, rise = begin[turns], end[turns], rise[turns]
-    largest[turns] = np.maximum(largest[turns], np.abs(begin - 0.25 * rise**2 / (end - begin - rise)))
-    return np.asarray(largest)
 
 
 def curve_of(track: Track) -> Curve:

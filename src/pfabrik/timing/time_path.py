@@ -16,12 +16,12 @@ from ..dynamics.moving_rows import MovingRows
 from ..dynamics.weights import lacking_masses, weights_of
 from ..errors import InvalidArgument
 from ..fk import solve_fk
-from ..kernels.timing import fastest
+from ..kernels.timing import fastest, largest_between
 from ..kinematics import actuator_units, readouts
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from ..tolerances import TOLERANCES
-from .curve import Curve, curve_of, largest_between, refuse_crossings
+from .curve import Curve, curve_of, refuse_crossings
 from .timed import Timed, What
 from .torque_path import TorqueParts, TorquePath
 
@@ -131,10 +131,11 @@ def _torques(
     """The torques along a path; None where none is limited."""
     if not np.isfinite(limits).any():
         return None
-    mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES), curve.n_actuators
+    mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES, 1), curve.n_actuators
     values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
     steps = curve.step_of(s)
-    solution = solve_fk(mechanism, values, start=track[steps])
+    is_finer = len(s) > len(curve.s)
+    solution = solve_fk(mechanism, values, start=track[steps]) if is_finer else track[curve.steps]
     weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
     rows = MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
     return TorquePath(rows, s, steps, limits)
@@ -167,18 +168,20 @@ def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
     """A grid along s and the largest squared speeds there."""
     s = curve.grid()
     slopes, bends = curve.at(s, 1), curve.at(s, 2)
-    n, accelerations = curve.n_actuators, limits.accelerations
-    slopes_of, bends_of = np.ascontiguousarray(slopes[:, :n]), np.ascontiguousarray(bends[:, :n])
-    steepest = largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None])
+    n, steepest = curve.n_actuators, np.empty((len(s) - 1, slopes.shape[1]))
+    largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None], steepest)
     with np.errstate(divide="ignore"):
         caps = np.min(limits.speeds / steepest[:, :n], axis=1)
         caps = np.minimum(caps, limits.platform / np.linalg.norm(steepest[:, n:], axis=1)) ** 2
     caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
+    limited = np.flatnonzero(np.isfinite(limits.accelerations))
+    accelerations = limits.accelerations[limited]
+    slopes_of, bends_of = (x.take(limited, axis=1) for x in (slopes, bends))
     by_push, by_speed, most = slopes_of, bends_of, np.tile(accelerations, (len(s), 1))
     rest = viscous = np.zeros(most.shape)
     if limits.path is not None:
-        parts = limits.path.at(s, slopes_of, bends_of)
+        parts = limits.path.at(s, slopes[:, :n], bends[:, :n])
         by_push, by_speed = _beside(slopes_of, parts.by_push), _beside(bends_of, parts.by_speed)
         rest, viscous = _beside(rest, parts.rest), _beside(viscous, parts.viscous)
         most = _beside(most, parts.most)
@@ -225,7 +228,9 @@ def _excess(s: Floats, x: Floats, slopes: Floats, bends: Floats, most: Floats) -
     push = np.diff(x)[:, None] / (2.0 * step)
     begin, end = (slopes[part] * push + bends[part] * x[part, None] for part in (slice(-1), slice(1, None)))
     rise = np.diff(bends, axis=0) * x[:-1, None] + 3.0 * step * bends[:-1] * push
-    return np.asarray((largest_between(begin, end, rise) / most).max(axis=1))
+    largest = np.empty(begin.shape)
+    largest_between(begin, end, rise, largest)
+    return np.asarray((largest / most).max(axis=1, initial=0.0))
 
 
 def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, every: float) -> Timed:
