@@ -16,7 +16,7 @@ from ..dynamics.moving_rows import MovingRows
 from ..dynamics.weights import lacking_masses, weights_of
 from ..errors import InvalidArgument
 from ..fk import solve_fk
-from ..kernels.timing import fastest, largest_between
+from ..kernels.timing import acceleration_shares, fastest, speed_shares
 from ..kinematics import actuator_units, readouts
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
@@ -168,11 +168,10 @@ def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
     """A grid along s and the largest squared speeds there."""
     s = curve.grid()
     slopes, bends = curve.at(s, 1), curve.at(s, 2)
-    n, steepest = curve.n_actuators, np.empty((len(s) - 1, slopes.shape[1]))
-    largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None], steepest)
+    n, shares = curve.n_actuators, np.empty(len(s) - 1)
+    speed_shares(s, slopes, bends, limits.speeds, limits.platform, shares)
     with np.errstate(divide="ignore"):
-        caps = np.min(limits.speeds / steepest[:, :n], axis=1)
-        caps = np.minimum(caps, limits.platform / np.linalg.norm(steepest[:, n:], axis=1)) ** 2
+        caps = shares**-2.0
     caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
     limited = np.flatnonzero(np.isfinite(limits.accelerations))
@@ -188,17 +187,16 @@ def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
         _refuse_heavy(curve, s, parts, limits.path)
     x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
     for _ in range(ROUNDS):
-        low, high = np.minimum(-most - held, 0.0), np.maximum(most - held, 0.0)
-        fastest(s, by_push, by_speed, low, high, caps, at_rest, x)
-        excess = _excess(s, x, slopes_of, bends_of, accelerations)
+        fastest(s, by_push, by_speed, most, held, caps, at_rest, x)
+        acceleration_shares(s, x, slopes_of, bends_of, accelerations, shares)
         before, held = held, rest + viscous * np.sqrt(x)[:, None]
         drag = np.abs(held - before) > TOLERANCES.speed * most
-        if excess.max() <= 1.0 + TOLERANCES.speed and not drag.any():
+        if shares.max() <= 1.0 + TOLERANCES.speed and not drag.any():
             break
-        slower = np.where(excess > 1.0, excess, 0.0) ** 2
+        slower = np.where(shares > 1.0, shares, 0.0) ** 2
         slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
         caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
-    return s, x / max(1.0, excess.max())
+    return s, x / max(1.0, shares.max())
 
 
 def _beside(one: Floats, other: Floats) -> Floats:
@@ -217,20 +215,6 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         found = f"{limit:.6g}, where '{path.names[place]}' must exert up to {most:.6g} at rest"
         steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
-
-
-def _excess(s: Floats, x: Floats, slopes: Floats, bends: Floats, most: Floats) -> Floats:
-    """The largest share of any acceleration's limit between each two of n points of the grid, (n - 1,).
-
-    There s'' is even and the actuators' third derivatives are, so that accelerations are parabolas in s.
-    """
-    step = np.diff(s)[:, None]
-    push = np.diff(x)[:, None] / (2.0 * step)
-    begin, end = (slopes[part] * push + bends[part] * x[part, None] for part in (slice(-1), slice(1, None)))
-    rise = np.diff(bends, axis=0) * x[:-1, None] + 3.0 * step * bends[:-1] * push
-    largest = np.empty(begin.shape)
-    largest_between(begin, end, rise, largest)
-    return np.asarray((largest / most).max(axis=1, initial=0.0))
 
 
 def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, every: float) -> Timed:
