@@ -120,9 +120,9 @@ def put_line(k: int, rate: float, curve: float, low: float, high: float, lines: 
         return k, math.inf
     if abs(rate) * 1e12 <= abs(curve) or rate == 0.0:
         return k, (high if curve > 0.0 else low) / curve if curve != 0.0 else math.inf
-    lines[k, 0] = low / rate if rate > 0.0 else high / rate
-    lines[k, 1] = high / rate if rate > 0.0 else low / rate
-    lines[k, 2] = -curve / rate
+    share = 1.0 / rate
+    lines[k, 0], lines[k, 1] = (low * share, high * share) if rate > 0.0 else (high * share, low * share)
+    lines[k, 2] = -curve * share
     return k + 1, math.inf
 
 

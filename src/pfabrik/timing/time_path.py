@@ -171,24 +171,21 @@ def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
     n, shares = curve.n_actuators, np.empty(len(s) - 1)
     speed_shares(s, slopes, bends, limits.speeds, limits.platform, shares)
     with np.errstate(divide="ignore"):
-        caps = shares**-2.0
+        caps = 1.0 / shares**2
     caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
-    limited = np.flatnonzero(np.isfinite(limits.accelerations))
-    accelerations = limits.accelerations[limited]
-    slopes_of, bends_of = (x.take(limited, axis=1) for x in (slopes, bends))
-    by_push, by_speed, most = slopes_of, bends_of, np.tile(accelerations, (len(s), 1))
+    by_push, by_speed, most = slopes, bends, np.tile(limits.accelerations, (len(s), 1))
     rest = viscous = np.zeros(most.shape)
     if limits.path is not None:
-        parts = limits.path.at(s, slopes[:, :n], bends[:, :n])
-        by_push, by_speed = _beside(slopes_of, parts.by_push), _beside(bends_of, parts.by_speed)
-        rest, viscous = _beside(rest, parts.rest), _beside(viscous, parts.viscous)
-        most = _beside(most, parts.most)
+        parts, limited = limits.path.at(s, slopes[:, :n], bends[:, :n]), np.isfinite(limits.accelerations).nonzero()[0]
+        by_push, by_speed = _beside(slopes[:, limited], parts.by_push), _beside(bends[:, limited], parts.by_speed)
+        rest, viscous = _beside(rest[:, limited], parts.rest), _beside(viscous[:, limited], parts.viscous)
+        most = _beside(most[:, limited], parts.most)
         _refuse_heavy(curve, s, parts, limits.path)
     x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
     for _ in range(ROUNDS):
         fastest(s, by_push, by_speed, most, held, caps, at_rest, x)
-        acceleration_shares(s, x, slopes_of, bends_of, accelerations, shares)
+        acceleration_shares(s, x, slopes, bends, limits.accelerations, shares)
         before, held = held, rest + viscous * np.sqrt(x)[:, None]
         drag = np.abs(held - before) > TOLERANCES.speed * most
         if shares.max() <= 1.0 + TOLERANCES.speed and not drag.any():
