@@ -66,7 +66,7 @@ def test_the_time_is_that_of_toppra(name: str) -> None:
     n_a = curve.n_actuators
     path = toppra.SplineInterpolator(curve.s, track.actuators[curve.steps], bc_type="natural")
     spline = CubicSpline(curve.s, track.actuators[curve.steps], bc_type="natural")
-    np.testing.assert_allclose(curve.at(grid)[0][:, :n_a], spline(grid), atol=1e-9)
+    np.testing.assert_allclose(curve.at(grid)[:, :n_a], spline(grid), atol=1e-9)
     speed, acceleration = (np.array([[-most, most]] * n_a) for most in given.values())
     kinds = toppra.constraint
     both = [kinds.JointVelocityConstraint(speed), kinds.JointAccelerationConstraint(acceleration)]

@@ -34,7 +34,7 @@ from .platform.forward_blocks import assemble_in_blocks
 from .platform.nearest import nearest_pose
 from .replay import replay
 from .rows import Rows
-from .timing import fastest, second_derivatives
+from .timing import acceleration_shares, fastest, second_derivatives, speed_shares, spline_at
 from .walk_path import walk_path
 
 _PLAN_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
@@ -105,6 +105,9 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (prove, tuple(_values("i i"))),
     (walk_path, tuple(_values("F2 F1 F2 f3 f3"))),
     (second_derivatives, tuple(_values("F1 F2 f2"))),
+    (spline_at, tuple(_values("F1 F2 F2 F1 i f2"))),
+    (speed_shares, tuple(_values("F1 F2 F2 F1 f f1"))),
+    (acceleration_shares, tuple(_values("F1 F1 F2 F2 F1 f1"))),
     (fastest, tuple(_values("F1 F2 F2 F2 F2 F1 b f1"))),
 )
 """Every kernel with arguments of its types, the most used first; arrays that it only reads are read-only."""

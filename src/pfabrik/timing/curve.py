@@ -10,7 +10,7 @@ from ..answers.differential import inverse_jacobian
 from ..answers.tracked import Track
 from ..arrays import Floats, Ints, Mask
 from ..errors import InvalidArgument
-from ..kernels.timing import second_derivatives
+from ..kernels.timing import second_derivatives, spline_at
 from ..kinematics import actuator_units
 from ..poses import between
 from ..tolerances import TOLERANCES
@@ -42,29 +42,15 @@ class Spline:
         """Splines through values (k, m)."""
         return cls(s, values, _curves(s, values))
 
-    def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Values, first and second derivatives at s (n,), (n, m) each."""
-        place, step, before, after = self._places(s)
-        bend, bend_after = self.curves[place], self.curves[place + 1]
-        slopes = (self.values[place + 1] - self.values[place]) / step
-        slopes += step / 6.0 * ((1.0 - 3.0 * before**2) * bend + (3.0 * after**2 - 1.0) * bend_after)
-        return self.values_at(s), slopes, before * bend + after * bend_after
+    def at(self, s: Floats, order: int = 0) -> Floats:
+        """Derivatives of an order at s (n,), (n, m): values (0), slopes (1) or second derivatives (2)."""
+        derivatives = np.empty((len(s), self.values.shape[1]))
+        spline_at(self.s, self.values, self.curves, s, order, derivatives)
+        return derivatives
 
-    def values_at(self, s: Floats) -> Floats:
-        """Values at s (n,), (n, m)."""
-        place, step, before, after = self._places(s)
-        values = before * self.values[place]
-        values += after * self.values[place + 1]
-        values += step**2 / 6.0 * (before**3 - before) * self.curves[place]
-        values += step**2 / 6.0 * (after**3 - after) * self.curves[place + 1]
-        return np.asarray(values)
-
-    def _places(self, s: Floats) -> tuple[np.ndarray, Floats, Floats, Floats]:
-        """The step that each s is in, its length, and the shares of its ends, (n, 1)."""
-        place = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-        step = np.diff(self.s)[place]
-        after = ((s - self.s[place]) / step)[:, None]
-        return place, step[:, None], 1.0 - after, after
+    def _places(self, s: Floats) -> Ints:
+        """The step that each s is in, (n,)."""
+        return np.asarray(np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2))
 
 
 @dataclass(frozen=True)
@@ -83,18 +69,19 @@ class Curve(Spline):
     poses: Floats
     n_actuators: int
 
-    def grid(self, least: int = FINEST) -> Floats:
-        """Points along s, at least so many, the steps among them."""
-        parts = max(-(-least // (len(self.s) - 1)), FEWEST)
+    def grid(self, least: int = FINEST, fewest: int = FEWEST) -> Floats:
+        """Points along s, at least so many, and so many for each step, the steps among them."""
+        parts = max(-((1 - least) // (len(self.s) - 1)), fewest)
         shares = np.arange(parts) / parts
         inner = (self.s[:-1, None] + np.diff(self.s)[:, None] * shares).ravel()
         return np.append(inner, self.s[-1])
 
     def poses_at(self, s: Floats) -> Floats:
         """Poses at s (n,): positions on the spline, rotations by the shortest turn from step to step."""
-        place, _, _, after = self._places(s)
-        poses = between(self.poses[place], self.poses[place + 1], after[:, None])
-        poses[:, :3, 3] = self.values_at(s)[:, self.n_actuators :]
+        place = self._places(s)
+        shares = (s - self.s[place]) / np.diff(self.s)[place]
+        poses = between(self.poses[place], self.poses[place + 1], shares[:, None, None])
+        poses[:, :3, 3] = self.at(s)[:, self.n_actuators :]
         return poses
 
     def step_of(self, s: Floats) -> np.ndarray:
@@ -108,16 +95,6 @@ def _curves(s: Floats, values: Floats) -> Floats:
     if len(s) > 1:
         second_derivatives(s, values, curves)
     return curves
-
-
-def largest_between(begin: Floats, end: Floats, rise: Floats) -> Floats:
-    """The largest magnitudes of parabolas from begin to end, of which `rise` is the slope at the begin, by the share
-    of the way."""
-    bend = end - begin - rise
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turn = -0.5 * rise / bend
-        inner = np.where((turn > 0.0) & (turn < 1.0), begin + 0.5 * rise * turn, 0.0)
-    return np.asarray(np.maximum(np.maximum(np.abs(begin), np.abs(end)), np.abs(inner)))
 
 
 def curve_of(track: Track) -> Curve:

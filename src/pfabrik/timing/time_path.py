@@ -16,12 +16,12 @@ from ..dynamics.moving_rows import MovingRows
 from ..dynamics.weights import lacking_masses, weights_of
 from ..errors import InvalidArgument
 from ..fk import solve_fk
-from ..kernels.timing import fastest
+from ..kernels.timing import acceleration_shares, fastest, speed_shares
 from ..kinematics import actuator_units, readouts
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from ..tolerances import TOLERANCES
-from .curve import Curve, curve_of, largest_between, refuse_crossings
+from .curve import Curve, curve_of, refuse_crossings
 from .timed import Timed, What
 from .torque_path import TorqueParts, TorquePath
 
@@ -131,10 +131,11 @@ def _torques(
     """The torques along a path; None where none is limited."""
     if not np.isfinite(limits).any():
         return None
-    mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES), curve.n_actuators
-    values, slopes, _ = (x[:, :n] for x in curve.at(s))
+    mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES, 1), curve.n_actuators
+    values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
     steps = curve.step_of(s)
-    solution = solve_fk(mechanism, values, start=track[steps])
+    is_finer = len(s) > len(curve.s)
+    solution = solve_fk(mechanism, values, start=track[steps]) if is_finer else track[curve.steps]
     weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
     rows = MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
     return TorquePath(rows, s, steps, limits)
@@ -151,7 +152,7 @@ def refuse_swings(track: Track, curve: Curve) -> None:
     """Refuse a track whose spline, which swings out where steps bend, leaves the range of an actuator between steps."""
     s, mechanism = curve.grid(), track.mechanism
     low, high = np.array([drive.limits for drive in mechanism.drives]).T
-    values = curve.at(s)[0][:, : curve.n_actuators]
+    values = curve.at(s)[:, : curve.n_actuators]
     beyond, units = np.maximum(low - values, values - high), actuator_units(mechanism)
     over = beyond > TOLERANCES.active * units
     if over.any():
@@ -166,36 +167,33 @@ def refuse_swings(track: Track, curve: Curve) -> None:
 def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
     """A grid along s and the largest squared speeds there."""
     s = curve.grid()
-    _, slopes, bends = curve.at(s)
-    n, accelerations = curve.n_actuators, limits.accelerations
-    slopes_of, bends_of = np.ascontiguousarray(slopes[:, :n]), np.ascontiguousarray(bends[:, :n])
-    steepest = largest_between(slopes[:-1], slopes[1:], bends[:-1] * np.diff(s)[:, None])
+    slopes, bends = curve.at(s, 1), curve.at(s, 2)
+    n, shares = curve.n_actuators, np.empty(len(s) - 1)
+    speed_shares(s, slopes, bends, limits.speeds, limits.platform, shares)
     with np.errstate(divide="ignore"):
-        caps = np.min(limits.speeds / steepest[:, :n], axis=1)
-        caps = np.minimum(caps, limits.platform / np.linalg.norm(steepest[:, n:], axis=1)) ** 2
+        caps = 1.0 / shares**2
     caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
-    by_push, by_speed, most = slopes_of, bends_of, np.tile(accelerations, (len(s), 1))
+    by_push, by_speed, most = slopes, bends, np.tile(limits.accelerations, (len(s), 1))
     rest = viscous = np.zeros(most.shape)
     if limits.path is not None:
-        parts = limits.path.at(s, slopes_of, bends_of)
-        by_push, by_speed = _beside(slopes_of, parts.by_push), _beside(bends_of, parts.by_speed)
-        rest, viscous = _beside(rest, parts.rest), _beside(viscous, parts.viscous)
-        most = _beside(most, parts.most)
+        parts, limited = limits.path.at(s, slopes[:, :n], bends[:, :n]), np.isfinite(limits.accelerations).nonzero()[0]
+        by_push, by_speed = _beside(slopes[:, limited], parts.by_push), _beside(bends[:, limited], parts.by_speed)
+        rest, viscous = _beside(rest[:, limited], parts.rest), _beside(viscous[:, limited], parts.viscous)
+        most = _beside(most[:, limited], parts.most)
         _refuse_heavy(curve, s, parts, limits.path)
     x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
     for _ in range(ROUNDS):
-        low, high = np.minimum(-most - held, 0.0), np.maximum(most - held, 0.0)
-        fastest(s, by_push, by_speed, low, high, caps, at_rest, x)
-        excess = _excess(s, x, slopes_of, bends_of, accelerations)
+        fastest(s, by_push, by_speed, most, held, caps, at_rest, x)
+        acceleration_shares(s, x, slopes, bends, limits.accelerations, shares)
         before, held = held, rest + viscous * np.sqrt(x)[:, None]
         drag = np.abs(held - before) > TOLERANCES.speed * most
-        if excess.max() <= 1.0 + TOLERANCES.speed and not drag.any():
+        if shares.max() <= 1.0 + TOLERANCES.speed and not drag.any():
             break
-        slower = np.where(excess > 1.0, excess, 0.0) ** 2
+        slower = np.where(shares > 1.0, shares, 0.0) ** 2
         slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
         caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
-    return s, x / max(1.0, excess.max())
+    return s, x / max(1.0, shares.max())
 
 
 def _beside(one: Floats, other: Floats) -> Floats:
@@ -216,18 +214,6 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
 
-def _excess(s: Floats, x: Floats, slopes: Floats, bends: Floats, most: Floats) -> Floats:
-    """The largest share of any acceleration's limit between each two of n points of the grid, (n - 1,).
-
-    There s'' is even and the actuators' third derivatives are, so that accelerations are parabolas in s.
-    """
-    step = np.diff(s)[:, None]
-    push = np.diff(x)[:, None] / (2.0 * step)
-    begin, end = (slopes[part] * push + bends[part] * x[part, None] for part in (slice(-1), slice(1, None)))
-    rise = np.diff(bends, axis=0) * x[:-1, None] + 3.0 * step * bends[:-1] * push
-    return np.asarray((largest_between(begin, end, rise) / most).max(axis=1))
-
-
 def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, every: float) -> Timed:
     """Samples at a rate, and at the very end."""
     steps, mean = np.diff(s), 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
@@ -245,7 +231,7 @@ def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, 
     late = times - reached[cell]
     pace = np.maximum(np.sqrt(x[cell]) + pushes[cell] * late, 0.0)
     where = np.clip(s[cell] + (np.sqrt(x[cell]) + 0.5 * pushes[cell] * late) * late, s[0], s[-1])
-    values, slopes, bends = curve.at(where)
+    values, slopes, bends = (curve.at(where, order) for order in range(3))
     n = curve.n_actuators
     rates = slopes * pace[:, None]
     gains = slopes[:, :n] * pushes[cell][:, None] + bends[:, :n] * pace[:, None] ** 2

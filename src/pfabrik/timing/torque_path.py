@@ -71,7 +71,7 @@ class TorquePath:
             what, places = f"no torques: {reasons[bad[0]]}", np.unique(steps[bad])[:5].tolist()
             raise InvalidArgument("track", what, "a path that its actuators hold", rows=places)
         moved = found.actuators - found.resting - self._drives.rubbed(rows.rates)
-        masses = in_si(mechanism, "actuators", found.matrices).reshape(len(s), -1)
+        masses = (in_si(mechanism, "actuators", found.matrices) * self._drives.si).reshape(len(s), -1)
         columns = np.hstack([masses, moved, found.resting])
         self.names, self.limits, self._limits, self._motions = mechanism.actuator_names, limits, limits, 0
         if is_redundantly_actuated(mechanism):
@@ -87,12 +87,12 @@ class TorquePath:
         """The torques at s (n,), where the actuators have these first and second derivatives, (n, n_a)."""
         n_a, drives = slopes.shape[1], self._drives
         ends = np.cumsum([n_a**2, n_a, n_a])
-        masses, by_speed, rest, minors = np.split(self._spline.values_at(s), ends, axis=1)
+        masses, by_speed, rest, minors = np.split(self._spline.at(s), ends, axis=1)
         masses = masses.reshape(-1, n_a, n_a)
-        by_push, more = (np.einsum("nab,nb->na", masses, x * drives.si) for x in (slopes, bends))
+        by_push, more = (np.einsum("nab,nb->na", masses, x) for x in (slopes, bends))
         dry, viscous = drives.friction.T
         most = np.broadcast_to(self._limits, slopes.shape)
-        own = TorqueParts(by_push, by_speed + more, viscous * slopes * drives.si, rest + dry * np.sign(slopes), most)
+        own = TorqueParts(by_push, by_speed + more, slopes * (viscous * drives.si), rest + dry * np.sign(slopes), most)
         return self._together(own, minors) if self._motions else own
 
     def _together(self, own: TorqueParts, minors: Floats) -> TorqueParts:
