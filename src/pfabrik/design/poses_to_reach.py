@@ -56,11 +56,19 @@ class PosesToReach:
                 raise InvalidArgument("reach", "no poses, or rows that are none", "a PoseRegion, finite poses, a Track")
             self.poses[:, :3, 3] -= fixed
             self.first = self.poses[:: max(1, len(self.poses) // 8)]
-        plane = plane_of(mechanism)
-        if plane is not None:
-            away = (self.poses - self.poses[0])[:, :3, 3] * task_of(mechanism).axes @ np.cross(*plane)
-            if np.abs(away).max() > TOLERANCES.alignment * mechanism.characteristic_length:
-                raise InvalidArgument("reach", "positions out of one plane", f"one plane: '{mechanism.name}' is planar")
+
+    def require_plane(self, mechanism: Mechanism, homes: Floats) -> None:
+        """Raise if poses are out of the plane of a planar machine, whose reference point may be at homes (k, 3)."""
+        plane, task = plane_of(mechanism), task_of(mechanism)
+        if plane is None:
+            return
+        normal, length = np.cross(*plane), mechanism.characteristic_length
+        heights, planes = self.poses[:, :3, 3] * task.axes @ normal, homes * (1.0 - self.moves) @ normal
+        if np.ptp(planes) > TOLERANCES.alignment * length:  # dimensions move the plane
+            planes = heights
+        turned = length * (self.poses[:, :3, :3] @ normal - normal) * (task.rotations == 3)
+        if max(np.abs(heights - planes[0]).max(), np.abs(turned).max()) > TOLERANCES.alignment * length:
+            raise InvalidArgument("reach", "poses out of its plane", f"poses in one plane: '{mechanism.name}' is planar")
 
     def worst(self, least: Callable[[Floats], Floats], count: int) -> tuple[Floats, Floats]:
         """Poses where a function of poses (n, 4, 4) is about the least, and its values there, the least first.
