@@ -68,7 +68,7 @@ class PosesToReach:
             planes = heights
         turned = length * (self.poses[:, :3, :3] @ normal - normal) * (task.rotations == 3)
         if max(np.abs(heights - planes[0]).max(), np.abs(turned).max()) > TOLERANCES.alignment * length:
-            raise InvalidArgument("reach", "poses out of its plane", f"poses in one plane: '{mechanism.name}' is planar")
+            raise InvalidArgument("reach", "poses out of its plane", f"one plane: '{mechanism.name}' is planar")
 
     def worst(self, least: Callable[[Floats], Floats], count: int) -> tuple[Floats, Floats]:
         """Poses where a function of poses (n, 4, 4) is about the least, and its values there, the least first.

@@ -41,7 +41,7 @@ class VariedGeometry:
         reading = NotedReading(mechanism, names, np.array([mechanism.dimensions[name] for name in names]))
         decisions = list(reading.trace.decisions.values())
         self._decided = np.array(decisions, float)
-        self._formulas = Formulas([*decisions, *reading.numbers], reading.given, 0, np.zeros((len(names), 0), bool))
+        self._formulas = Formulas([*decisions, *reading.numbers], reading.given, 0)
         self._own, joints = geometry_of(mechanism), mechanism.joints
         self._has_axes = np.array([[j.axis is not None or j.axes is not None, j.axes is not None] for j in joints])
 

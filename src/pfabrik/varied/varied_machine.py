@@ -153,9 +153,9 @@ class NotedMachine:
         self.is_coupled = self.table.is_completed and (
             not self.table.is_for_blocks or has_parasitic_motion(model_of(mechanism).path_closure)
         )
-        self._programs: dict[tuple[str, int, bool], Formulas] = {}
+        self._programs: dict[str, Formulas] = {}
         self.uniform = uniform_parts([*legs.margins, *legs.rows, *legs.actuators])
-        self._centres = Formulas(centres, given, p, np.ones((p, p), bool))
+        self._centres = Formulas(centres, given, p)
         self._decided = np.array(list(trace.decisions.values()), float).tobytes()
         parts: list[list[Any]] = [list(trace.decisions.values()), [length], numbers[:3], self.uniform]
         recording: Any = self.table.recording
@@ -166,7 +166,7 @@ class NotedMachine:
         parts.append([end for end, is_one in zip(ends, self.is_ended.tolist(), strict=True) if is_one])
         self._spans = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
         outputs = [number for part in parts for number in part]
-        self._uniform = Formulas(outputs, [*given, length], p + 1, np.ones((p + 1, p), bool))
+        self._uniform = Formulas(outputs, [*given, length], p + 1)
 
     def at(self, values: Floats) -> MachineAt | None:
         """The machine at values of the dimensions; None if a decision comes out otherwise there."""
@@ -192,16 +192,14 @@ class NotedMachine:
         _, _, (a, b), (c, d), *_ = self._spans
         return slopes[0, a:b], slopes[0, c:d]
 
-    def program(self, name: str, by_dimensions: int, by_pose: bool) -> Formulas:
-        """Formulas of the legs at poses, with slopes as of `tangents`."""
-        key = name, by_dimensions, by_pose
-        if key not in self._programs:
-            legs, m = self.legs, len(self.uniform)
+    def program(self, name: str) -> Formulas:
+        """Formulas of the legs at poses: margins or actuators, constraints, and margins of the reach of legs."""
+        if name not in self._programs:
+            legs = self.legs
             outputs = [*(legs.margins if name == "margins" else legs.actuators), *legs.rows, *legs.reach]
             inputs = [*self.uniform, *legs.twist, *legs.pose, *legs.q]
-            depends = self.tangents(np.ones((m, by_dimensions)), by_pose) != 0.0
-            self._programs[key] = Formulas(outputs, inputs, m + 6, depends)
-        return self._programs[key]
+            self._programs[name] = Formulas(outputs, inputs, len(self.uniform) + 6)
+        return self._programs[name]
 
     def tangents(self, moved: Floats, by_pose: bool) -> Floats:
         """Slopes of all inputs: of what is the same at all poses by p dimensions, (m, p), then by twists and q."""
@@ -353,7 +351,7 @@ class MachineAt:
         """Expressions of the legs at targets, with slopes: by dimensions, where these move what is the same at all
         poses, then by the pose."""
         noted, legs = self._noted, self._noted.legs
-        program, tangents = noted.program(name, 0 if moved is None else moved.shape[1], by_pose), None
+        program, tangents = noted.program(name), None
         if moved is not None or by_pose:
             tangents = noted.tangents(np.empty((len(self._uniform), 0)) if moved is None else moved, by_pose)
         uniform = np.concatenate([self._uniform, AT_REST])
