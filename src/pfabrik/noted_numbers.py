@@ -280,13 +280,15 @@ class Formulas:
         self._columns: dict[tuple[int, bytes], tuple[Ints, Ints]] = {}
         self._without_slopes = np.zeros((n_inputs, 0))
 
-    def __call__(self, uniform: Floats, varying: Floats = NOTHING, tangents: Floats | None = None) -> Any:
-        """Values (n, r) of the expressions; with tangents, also their slopes (n, r, c).
+    def __call__(
+        self, uniform: Floats, varying: Floats = NOTHING, tangents: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Values (n, r) of the expressions, and their slopes (n, r, c).
 
         Parameters
         ----------
         uniform, varying : the inputs: those that are the same at all rows, then the others (n, v).
-        tangents : slopes of the inputs in all columns (inputs, c); those that are 0 cost nothing.
+        tangents : slopes of the inputs in all columns (inputs, c); those that are 0 cost nothing. By default c is 0.
         """
         n, r = len(varying), len(self._outputs)
         given, own = np.concatenate([uniform, self._constants]), self._without_slopes
@@ -296,7 +298,7 @@ class Formulas:
         hulls, outputs = self._columns_of(own)
         values, slopes = np.empty((n, r)), np.zeros((n, r, own.shape[1]))
         K.evaluate(self._steps, hulls, outputs, self._n_values, given, varying, own, values, slopes)
-        return values if tangents is None else (values, slopes)
+        return values, slopes
 
     def _columns_of(self, slopes: Floats) -> tuple[Ints, Ints]:
         """Columns of steps and outputs, as of `evaluate`, from the slopes of all inputs and constants."""

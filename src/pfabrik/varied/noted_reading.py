@@ -47,7 +47,7 @@ class VariedGeometry:
 
     def at(self, values: Floats) -> Geometry:
         """Geometries at values (b, n), every array with the batch in front; InvalidMechanism where there is none."""
-        found, n = self._formulas(np.empty(0), values), len(self._decided)
+        (found, _), n = self._formulas(np.empty(0), values), len(self._decided)
         for row in np.flatnonzero((found[:, :n] != self._decided).any(axis=1)):
             found[row, n:] = NotedReading(self._mechanism, self._names, values[row]).numbers
         own, joints = self._own, len(self._has_axes)
