@@ -44,7 +44,7 @@ from ..telling import OnProgress, telling
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .links_over_cells import bounded_pairs, links_without_bounds
-from .pose_region import PoseRegion
+from .pose_region import PoseRegion, drawn
 from .subdividing import (
     MOST_LEFT,
     MOST_PROVED,
@@ -325,17 +325,11 @@ class _RegionQuestion:
         limits: links may be too near where the worst corners of cells keep them apart."""
         rng = np.random.default_rng(0)
         if self.region is not None:
-            low, high = self.region.low, self.region.high
-            points = rng.uniform(low, high, (SAMPLES, 6))
-            ends = np.where(rng.random(points.shape) < 0.5, low, high)
-            points[::2] = np.where(rng.random(points.shape) < 0.5, points, ends)[::2]
-            poses = self.region.pose(points[np.asarray(self.region.contains(points))])
+            poses = self.region.pose(drawn(self.region, SAMPLES, rng))
         else:
             steps = rng.integers(len(self.parameters.steps), size=SAMPLES)
             points = np.stack([steps.astype(float), rng.random(SAMPLES)], axis=1)
             poses = step_poses(self.model, self.parameters, points)
-        if not len(poses):
-            return None
         feasible = feasibility(self.model.mechanism, poses)
         worst = int(np.argmin(feasible.margin))
         return self._refuted_by(poses[worst], 0) if feasible.margin[worst] < -BREAKS else None
