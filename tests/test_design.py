@@ -17,6 +17,7 @@ from pfabrik import PoseRegion, Status, keep
 pytestmark = pytest.mark.skipif(INTERPRETED, reason="thousands of machines")
 TEMPLATES = Path(pf.__file__).parent / "catalog" / "templates"
 ABOUT_HOME = PoseRegion.box([-30, -30, -30], [30, 30, 30], rotation=math.radians(8))
+TURNED = PoseRegion.box([-5, -5, 0], [5, 5, 0], rotation=[0.1, 0, 0])
 SLIGHT = PoseRegion.box([-10, -10, -10], [10, 10, 10])
 HEXAPOD: dict[str, Any] = {
     "vary": {
@@ -425,12 +426,15 @@ def test_proofs_of_three_freedoms_are_not_refuted(name: str) -> None:
     assert (np.asarray(pf.solve_ik(found.mechanism, poses).status) == Status.REACHED).all()
 
 
-def test_a_tilting_machine_stays_open_and_says_why() -> None:
-    machine = template("3-RPS")
-    region = PoseRegion.box([0, 0, -10], [0, 0, 10], tilt=0.1)
-    asked: dict[str, Any] = {"keep": [keep.singularity(None)], "about": "home"}
-    found = pf.design(machine, {"height": (150, 250), "longest": (200, 400)}, region, **asked)
-    assert found.verdict == "OPEN" and "yaw" in found.reason
+@pytest.mark.parametrize(
+    "name, vary, height",
+    [("3-RPS", {"height": (150, 250), "longest": (200, 400)}, 10), ("ankle", {"crank": (20, 60)}, 0)],
+)
+def test_a_tilting_machine_stays_open_and_says_why(name: str, vary: dict[str, Any], height: float) -> None:
+    region = PoseRegion.box([0, 0, -height], [0, 0, height], tilt=0.1)
+    found = pf.design(template(name), vary, region, keep=[keep.singularity(None)], about="home")
+    assert found.verdict == "OPEN" and "yaw" in found.reason and "ask for poses" in found.reason
+    assert [each.verdict for each in found.rounds].count("OPEN") == 1
 
 
 @pytest.mark.parametrize(
@@ -443,6 +447,8 @@ def test_a_tilting_machine_stays_open_and_says_why() -> None:
         ({"reach": np.zeros((0, 3))}, "reach"),
         ({"reach": PoseRegion.box([-1] * 3, [1] * 3, rotation=0.1)}, "rotation about x"),
         ({"mechanism": template("5-bar"), "vary": {"crank": (100, 120)}}, "one plane: 'My five-bar' is planar"),
+        ({"mechanism": template("5-bar"), "vary": {"crank": (100, 120)}, "reach": [0, 160, 50]}, "one plane"),
+        ({"mechanism": template("3-RRR"), "vary": {"crank": (100, 130)}, "reach": TURNED}, "one plane"),
         ({"about": "origin"}, "origin"),
         ({"keep": "arm"}, "<= or >="),
         ({"keep": "arm >= foo"}, "foo"),

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Floats, Mask
+from .arrays import Floats, Ints
 from .kernels import noted_steps as K
 
 
@@ -250,59 +250,71 @@ class Formulas:
     inputs : the numbers that are given, those that are the same at all rows first; what they were computed from counts
         no more.
     n_uniform : how many are the same at all rows.
-    depends : mask (inputs, columns) of the columns in which inputs have slopes.
     """
 
-    def __init__(self, outputs: Sequence[Any], inputs: Sequence[Any], n_uniform: int, depends: Mask) -> None:
-        given = {number.place: k for k, number in enumerate(inputs)}
-        order = _ordered(outputs, given)
-        parts = [each for number in order for each in number.trace.steps[number.place][1]]
-        constants = list(dict.fromkeys(_name(each) for each in [*outputs, *parts] if not isinstance(each, Number)))
-        self._constants = np.array([float.fromhex(str(name)) for name in constants])
-        self._n_uniform = n_uniform
-        shift = [k if k < n_uniform else k + len(constants) for k in range(len(inputs))]
-        at: dict[int | str, int] = {name: n_uniform + k for k, name in enumerate(constants)}
-        hulls = [NOWHERE * 3] * (len(inputs) + len(constants))
-        hull_of: dict[int | str, tuple[int, int]] = dict.fromkeys(constants, NOWHERE)
-        for place, k in given.items():
-            at[place], hull_of[place] = shift[k], _hull(np.flatnonzero(depends[k]).tolist())
-            hulls[shift[k]] = (*hull_of[place], *NOWHERE, *NOWHERE)
-        last = {_name(each): k for k, number in enumerate(order) for each in number.trace.steps[number.place][1]}
-        last |= {_name(each): len(order) for each in outputs}
+    def __init__(self, outputs: Sequence[Any], inputs: Sequence[Number], n_uniform: int) -> None:
+        given = [number.place for number in inputs]
+        at: dict[int | str, int] = dict.fromkeys(given, 0)
+        order = [each for each in _behind(outputs, lambda each: each.place in at) if each.place not in at]
+        steps_of = [(each.place, each.trace.steps[each.place]) for each in order]
+        self._order = [(place, operation, list(map(_name, parts))) for place, (operation, parts) in steps_of]
+        results = [_name(each) for each in outputs]
+        used = [*results, *(name for _, _, names in self._order for name in names)]
+        constants = list(dict.fromkeys(name for name in used if isinstance(name, str)))
+        self._constants, self._n_uniform = np.array([float.fromhex(name) for name in constants]), n_uniform
+        self._inputs: list[int | str] = [*given[:n_uniform], *constants, *given[n_uniform:]]
+        at |= {name: k for k, name in enumerate(self._inputs)}
+        last: dict[int | str, int] = {name: k for k, (_, _, names) in enumerate(self._order) for name in names}
+        last |= dict.fromkeys(results, len(self._order))
         free: list[int] = []
-        steps, n_inputs = [], len(hulls)
+        steps, n_inputs = [], len(at)
         n_values = n_inputs
-        for k, number in enumerate(order):
-            operation, operands = number.trace.steps[number.place]
-            names = [_name(each) for each in operands]
+        for k, (place, operation, names) in enumerate(self._order):
             to = free.pop() if free else n_values
             n_values = max(n_values, to + 1)
             steps.append((operation, *([at[name] for name in names] + [0, 0])[:3], to))
-            x, y = ([hull_of[name] for name in _with_slopes(operation, names)] + [NOWHERE, NOWHERE])[:2]
-            at[number.place], hull_of[number.place] = to, _union(x, y)
-            hulls.append((*_union(x, y), *x, *y))
+            at[place] = to
             free += [at[name] for name in dict.fromkeys(names) if last[name] == k and at[name] >= n_inputs]
-        self._steps, self._hulls = np.array(steps, np.int64).reshape(-1, 5), np.array(hulls, np.int64).reshape(-1, 6)
-        self._outputs = np.array([(at[name], *hull_of[name]) for name in map(_name, outputs)], np.int64).reshape(-1, 3)
-        self._n_values, self._n_inputs, self._n_columns = n_values, n_inputs, depends.shape[1]
+        self._steps, self._n_values = np.array(steps, np.int64).reshape(-1, 5), n_values
+        self._outputs = [(at[name], name) for name in results]
+        self._columns: dict[tuple[int, bytes], tuple[Ints, Ints]] = {}
         self._without_slopes = np.zeros((n_inputs, 0))
 
-    def __call__(self, uniform: Floats, varying: Floats = NOTHING, tangents: Floats | None = None) -> Any:
-        """Values (n, r) of the expressions; with tangents, also their slopes (n, r, c).
+    def __call__(
+        self, uniform: Floats, varying: Floats = NOTHING, tangents: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Values (n, r) of the expressions, and their slopes (n, r, c).
 
         Parameters
         ----------
         uniform, varying : the inputs: those that are the same at all rows, then the others (n, v).
-        tangents : slopes of the inputs in all columns (inputs, c).
+        tangents : slopes of the inputs in all columns (inputs, c); those that are 0 cost nothing. By default c is 0.
         """
-        n, r, m = len(varying), len(self._outputs), self._n_uniform
+        n, r = len(varying), len(self._outputs)
         given, own = np.concatenate([uniform, self._constants]), self._without_slopes
         if tangents is not None:
-            own = np.concatenate([tangents[:m], np.zeros((len(self._constants), tangents.shape[1])), tangents[m:]])
-        assert own.shape[1] in (0, self._n_columns) and len(own) == self._n_inputs
+            of_constants, m = np.zeros((len(self._constants), tangents.shape[1])), self._n_uniform
+            own = np.concatenate([tangents[:m], of_constants, tangents[m:]])
+        hulls, outputs = self._columns_of(own)
         values, slopes = np.empty((n, r)), np.zeros((n, r, own.shape[1]))
-        K.evaluate(self._steps, self._hulls, self._outputs, self._n_values, given, varying, own, values, slopes)
-        return values if tangents is None else (values, slopes)
+        K.evaluate(self._steps, hulls, outputs, self._n_values, given, varying, own, values, slopes)
+        return values, slopes
+
+    def _columns_of(self, slopes: Floats) -> tuple[Ints, Ints]:
+        """Columns of steps and outputs, as of `evaluate`, from the slopes of all inputs and constants."""
+        key = slopes.shape[1], (slopes != 0.0).tobytes()
+        if key not in self._columns:
+            hulls = [_hull(np.flatnonzero(row).tolist()) for row in slopes]
+            rows = [(*hull, *NOWHERE, *NOWHERE) for hull in hulls]
+            hull_of = dict(zip(self._inputs, hulls, strict=True))
+            for place, operation, names in self._order:
+                moving = [] if operation in (K.FLOOR, *_TRUTHS) else names[1:] if operation == K.CHOOSE else names
+                x, y = ([hull_of[name] for name in moving] + [NOWHERE, NOWHERE])[:2]
+                hull_of[place] = _union(x, y)
+                rows.append((*hull_of[place], *x, *y))
+            ends = [(at, *hull_of[name]) for at, name in self._outputs]
+            self._columns[key] = np.array(rows, np.int64).reshape(-1, 6), np.array(ends, np.int64).reshape(-1, 3)
+        return self._columns[key]
 
 
 NOWHERE = (0, 0)
@@ -319,36 +331,19 @@ def _name(number: Number | float) -> int | str:
 
 def uniform_parts(outputs: Sequence[Any]) -> list[Number]:
     """The numbers that are the same at all rows and that those which differ are computed from, or that are outputs."""
+    return [number for number in _behind(outputs, lambda each: not each.is_open) if not number.is_open]
+
+
+def _behind(outputs: Sequence[Any], is_end: Callable[[Number], bool]) -> list[Number]:
+    """All numbers that outputs are computed from, these included, in the order of their places; none behind an end."""
     found: dict[int, Number] = {}
-    seen: set[int] = set()
-    waiting = [each for each in outputs if isinstance(each, Number)]
+    waiting = [*outputs]
     while waiting:
         number = waiting.pop()
-        if number.place in seen:
-            continue
-        seen.add(number.place)
-        if number.is_open:
-            waiting += [each for each in number.trace.steps[number.place][1] if isinstance(each, Number)]
-        else:
+        if isinstance(number, Number) and number.place not in found:
             found[number.place] = number
+            waiting += () if is_end(number) else number.trace.steps[number.place][1]
     return [found[place] for place in sorted(found)]
-
-
-def _ordered(outputs: Sequence[Any], given: dict[int, int]) -> list[Number]:
-    """All numbers that outputs are computed from and that are not given, in the order of their places."""
-    found: dict[int, Number] = {}
-    waiting = [each for each in outputs if isinstance(each, Number)]
-    while waiting:
-        number = waiting.pop()
-        if number.place not in given and number.place not in found:
-            found[number.place] = number
-            waiting += [each for each in number.trace.steps[number.place][1] if isinstance(each, Number)]
-    return [found[place] for place in sorted(found)]
-
-
-def _with_slopes(operation: int, names: list[int | str]) -> list[int | str]:
-    """The operands, at most two, by which a step has derivatives."""
-    return [] if operation in (K.FLOOR, *_TRUTHS) else names[1:] if operation == K.CHOOSE else names
 
 
 def _hull(columns: list[int]) -> tuple[int, int]:

@@ -82,6 +82,8 @@ class Certificate(Printed):
         Number of cells looked at.
     is_whole : bool
         True if all proved boxes were kept; beyond 100,000 they are not.
+    has_bounds : bool
+        False if it is open whatever the budget: legs, limits or links have no bounds over this region.
     """
 
     mechanism: Mechanism
@@ -94,6 +96,7 @@ class Certificate(Printed):
     refutation: Refutation | None
     n_cells: int
     is_whole: bool
+    has_bounds: bool
     _parameters: CellParameters
     _proved: Floats
     _left: Floats

@@ -183,6 +183,28 @@ def _is_turn(angles: Floats) -> Mask:
     return np.asarray(np.abs(angles) <= MOST_TURN)
 
 
+def drawn(region: PoseRegion, count: int, rng: np.random.Generator) -> Floats:
+    """Random parameters in a region, (count, 6), half of them on its border."""
+    found = rng.uniform(region.low, region.high, (count, 6))
+    ends = np.where(rng.random((count, 6)) < 0.5, region.low, region.high)
+    at_end = rng.random((count, 6)) < np.where(np.arange(count) % 2, 0.7, 0.0)[:, None]
+    return rounded(region, np.where(at_end, ends, found))
+
+
+def rounded(region: PoseRegion, parameters: Floats) -> Floats:
+    """Parameters moved into the round parts of a region."""
+    found = parameters.copy()
+    axes = {"box": [], "cylinder": [0, 1], "ball": [0, 1, 2]}[region.shape]
+    round_parts = [(axes, region.middle[axes], region.half[0])] if axes else []
+    if region.turning == "tilt":
+        round_parts.append(([3, 4], np.zeros(2), region.high[3]))
+    for places, middle, radius in round_parts:
+        off = found[..., places] - middle
+        sizes = np.maximum(np.linalg.norm(off, axis=-1, keepdims=True), np.finfo(float).tiny)
+        found[..., places] = middle + off * np.minimum(1.0, radius / sizes)
+    return found
+
+
 PAD = 1e-9
 """Share by which a box is larger than computed, for rounding."""
 

@@ -44,7 +44,7 @@ from ..telling import OnProgress, telling
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .links_over_cells import bounded_pairs, links_without_bounds
-from .pose_region import PoseRegion
+from .pose_region import PoseRegion, drawn
 from .subdividing import (
     MOST_LEFT,
     MOST_PROVED,
@@ -189,12 +189,13 @@ class _RegionQuestion:
                 min(looked.found_margin, refutation.margin) if looked.refutation is None else looked.found_margin
             )
             return self._certificate(REFUTED, looked._replace(found_margin=least_found), "", refutation)
+        has_bounds = not reason
         if looked.n_doubts:
             reason = reason or "some poses are reached in another working mode than home's"
         elif looked.ending != DONE:
             spent = f"after {looked.n_cells} cells" if looked.ending == SPENT else "cells became too small"
             reason = reason or spent
-        return self._certificate(OPEN if reason else PROVED, looked, reason, None)
+        return self._certificate(OPEN if reason else PROVED, looked, reason, None, has_bounds)
 
     def look(self, cells: Floats, gap: float, budget: int, tell: OnProgress | None = None) -> _Looked:
         """Subdivide cells until they are proved, a pose refutes them, or the budget is spent."""
@@ -258,7 +259,12 @@ class _RegionQuestion:
         )
 
     def _certificate(
-        self, verdict: Verdict, looked: _Looked, reason: str, refutation: Refutation | None
+        self,
+        verdict: Verdict,
+        looked: _Looked,
+        reason: str,
+        refutation: Refutation | None,
+        has_bounds: bool = True,
     ) -> Certificate:
         return Certificate(
             self.model.mechanism,
@@ -271,6 +277,7 @@ class _RegionQuestion:
             refutation,
             looked.n_cells,
             len(looked.proved) == looked.n_proved,
+            has_bounds,
             self.parameters,
             looked.proved,
             np.concatenate([looked.open, looked.left[:, :PROVED_LEGS]]),
@@ -291,7 +298,7 @@ class _RegionQuestion:
             shifts = (self.poses[:, :3, 3] - home[:3, 3]) / model.length
             turns = np.concatenate([to_rotvec(self.poses[:, :3, :3]), self.parameters.moves[:, 3:]])
         if task_of(model.mechanism).rotations == 2 and np.any(turns):
-            return "the task leaves the yaw of the platform open"
+            return "the yaw of the platform follows from its legs, without bounds over regions yet"
         leg = leg_that_restricts(table, shifts, turns)
         if leg >= 0:
             return f"the leg with {names_of_leg(table, leg)} restricts the platform in this region, or carries others"
@@ -318,17 +325,11 @@ class _RegionQuestion:
         limits: links may be too near where the worst corners of cells keep them apart."""
         rng = np.random.default_rng(0)
         if self.region is not None:
-            low, high = self.region.low, self.region.high
-            points = rng.uniform(low, high, (SAMPLES, 6))
-            ends = np.where(rng.random(points.shape) < 0.5, low, high)
-            points[::2] = np.where(rng.random(points.shape) < 0.5, points, ends)[::2]
-            poses = self.region.pose(points[np.asarray(self.region.contains(points))])
+            poses = self.region.pose(drawn(self.region, SAMPLES, rng))
         else:
             steps = rng.integers(len(self.parameters.steps), size=SAMPLES)
             points = np.stack([steps.astype(float), rng.random(SAMPLES)], axis=1)
             poses = step_poses(self.model, self.parameters, points)
-        if not len(poses):
-            return None
         feasible = feasibility(self.model.mechanism, poses)
         worst = int(np.argmin(feasible.margin))
         return self._refuted_by(poses[worst], 0) if feasible.margin[worst] < -BREAKS else None

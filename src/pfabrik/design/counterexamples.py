@@ -67,6 +67,10 @@ class DesignQuestion:
         self.dimensions = Dimensions(varied(alone, tuple(bounds)), low, high)
         self.rng = np.random.default_rng(require_count("seed", seed, 0))
         self.reach = PosesToReach(mechanism, reach, about, self.rng)
+        own = self.dimensions.own
+        ends = [np.where(one, end, own) for one in np.eye(len(own), dtype=bool) for end in (low, high)]
+        machines = [self.dimensions.at(values) for values in (own, *ends)]
+        self.reach.require_plane(mechanism, np.array([m.home_pose[:3, 3] for m in machines if m is not None]))
         for text in (text for each in requirements for text in each.expressions):
             self.dimensions.source.value_of(text, {}, "keep")
         own = [each for each in requirements if each.name]
@@ -254,8 +258,9 @@ class SmallestSearch:
             self.look_at(reach.at(mechanism, pose[None], -1.0), found.z)
             return CheckedMachine("REFUTED", found, mechanism, certificate, pose, "a pose is not reached")
         if not certificate:
-            is_final = not len(certificate.open_boxes)
-            return CheckedMachine("OPEN", found, mechanism, certificate, None, certificate.reason, is_final)
+            is_final = not (certificate.has_bounds and len(certificate.open_boxes))
+            advice = "" if certificate.has_bounds else ": ask for poses, which are checked"
+            return CheckedMachine("OPEN", found, mechanism, certificate, None, certificate.reason + advice, is_final)
         if certificate.margin < least:
             return CheckedMachine(
                 "OPEN", found, mechanism, certificate, None, f"the margin is proved to {certificate.margin:.6g}"

@@ -11,7 +11,7 @@ import numpy as np
 from ..answers.tracked import Track
 from ..arrays import Floats
 from ..certify.certificates import Certificate
-from ..certify.pose_region import PoseRegion
+from ..certify.pose_region import PoseRegion, drawn, rounded
 from ..certify.question import certify, require_task
 from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument
@@ -56,11 +56,19 @@ class PosesToReach:
                 raise InvalidArgument("reach", "no poses, or rows that are none", "a PoseRegion, finite poses, a Track")
             self.poses[:, :3, 3] -= fixed
             self.first = self.poses[:: max(1, len(self.poses) // 8)]
-        plane = plane_of(mechanism)
-        if plane is not None:
-            away = (self.poses - self.poses[0])[:, :3, 3] * task_of(mechanism).axes @ np.cross(*plane)
-            if np.abs(away).max() > TOLERANCES.alignment * mechanism.characteristic_length:
-                raise InvalidArgument("reach", "positions out of one plane", f"one plane: '{mechanism.name}' is planar")
+
+    def require_plane(self, mechanism: Mechanism, homes: Floats) -> None:
+        """Raise if poses are out of the plane of a planar machine, whose reference point may be at homes (k, 3)."""
+        plane, task = plane_of(mechanism), task_of(mechanism)
+        if plane is None:
+            return
+        normal, length = np.cross(*plane), mechanism.characteristic_length
+        heights, planes = self.poses[:, :3, 3] * task.axes @ normal, homes * (1.0 - self.moves) @ normal
+        if np.ptp(planes) > TOLERANCES.alignment * length:  # dimensions move the plane
+            planes = heights
+        turned = length * (self.poses[:, :3, :3] @ normal - normal) * (task.rotations == 3)
+        if max(np.abs(heights - planes[0]).max(), np.abs(turned).max()) > TOLERANCES.alignment * length:
+            raise InvalidArgument("reach", "poses out of its plane", f"one plane: '{mechanism.name}' is planar")
 
     def worst(self, least: Callable[[Floats], Floats], count: int) -> tuple[Floats, Floats]:
         """Poses where a function of poses (n, 4, 4) is about the least, and its values there, the least first.
@@ -119,25 +127,3 @@ def corners(region: PoseRegion) -> Floats:
     sides = [np.unique([low, high]) for low, high in zip(region.low, region.high, strict=True)]
     found = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 6)
     return rounded(region, found)
-
-
-def drawn(region: PoseRegion, count: int, rng: np.random.Generator) -> Floats:
-    """Random parameters in a region, (count, 6), half of them on its border."""
-    found = rng.uniform(region.low, region.high, (count, 6))
-    ends = np.where(rng.random((count, 6)) < 0.5, region.low, region.high)
-    at_end = rng.random((count, 6)) < np.where(np.arange(count) % 2, 0.7, 0.0)[:, None]
-    return rounded(region, np.where(at_end, ends, found))
-
-
-def rounded(region: PoseRegion, parameters: Floats) -> Floats:
-    """Parameters moved into the round parts of a region."""
-    found = parameters.copy()
-    axes = {"box": [], "cylinder": [0, 1], "ball": [0, 1, 2]}[region.shape]
-    round_parts = [(axes, region.middle[axes], region.half[0])] if axes else []
-    if region.turning == "tilt":
-        round_parts.append(([3, 4], np.zeros(2), region.high[3]))
-    for places, middle, radius in round_parts:
-        off = found[..., places] - middle
-        sizes = np.maximum(np.linalg.norm(off, axis=-1, keepdims=True), np.finfo(float).tiny)
-        found[..., places] = middle + off * np.minimum(1.0, radius / sizes)
-    return found

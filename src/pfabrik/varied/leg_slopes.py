@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats
 from ..closure.configurations import Configurations
 from ..derived import derived
 from ..description.geometry import Geometry, home_numbers
 from ..description.mechanism import Mechanism
 from ..model import Model, model_of
-from ..noted_numbers import Formulas, Trace, uniform_parts
+from ..noted_numbers import Formulas, Trace
 from ..platform.answers import sides_at
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
-from .placed_legs import PlacedLegs, open_motions, replayed
+from .placed_legs import PlacedLegs, open_motions
 
 APART = 1e-3
 """Share of a parameter's scale by which it is changed to see if legs stay the same: far beyond the tolerances within
@@ -50,16 +49,14 @@ class LegSlopes:
         given = [trace.input(numbers[place]) for place in self._used]
         for place, number in zip(self._used.tolist(), given, strict=True):
             numbers[place] = number
-        self._legs = legs = PlacedLegs(trace, self._table, replayed(self._table, numbers), numbers[0], has_sides=True)
+        self._legs = legs = PlacedLegs(trace, self._table, numbers, has_sides=True)
         decisions = list(trace.decisions.values())
-        self._uniform = uniform_parts([*legs.actuators, *legs.rows])
         self._decided = np.array(decisions, float)
-        self._home = Formulas([*decisions, *self._uniform], given, 0, np.ones((len(given), 1), bool))
-        self._given = given
+        self._decisions, self._uniform = Formulas(decisions, given, 0), Formulas(legs.uniform, given, 0)
+        self._formulas = legs.formulas([*legs.actuators, *legs.rows])
         is_angle = np.array([drive.kind == "angle" for drive in model.mechanism.drives])
         self._turns = np.where(is_angle, 2.0 * np.pi, 0.0)
         self._close = TOLERANCES.position * np.r_[np.where(is_angle, 1.0, model.length), np.ones(len(legs.rows))]
-        self._programs: dict[tuple[Any, ...], Formulas] = {}
 
     def keeps(self, mechanism: Mechanism, slopes: Geometry, scales: Floats) -> bool:
         """True if legs stay the same when parameters change, by `APART` of their scales (p,), both ways.
@@ -68,8 +65,8 @@ class LegSlopes:
         """
         changes = APART * scales[:, None] * _numbers_by(slopes)
         numbers = home_numbers(mechanism) + np.concatenate([changes, -changes])
-        found = self._home(np.empty(0), np.ascontiguousarray(numbers[:, self._used]))
-        return bool((found[:, : len(self._decided)] == self._decided).all())
+        found, _ = self._decisions(np.empty(0), np.ascontiguousarray(numbers[:, self._used]))
+        return bool((found == self._decided).all())
 
     def at(
         self, mechanism: Mechanism, at: Configurations, slopes: Geometry, moved: Floats | float = 0.0
@@ -84,11 +81,11 @@ class LegSlopes:
         slopes : derivatives of the geometry by the parameters.
         moved : how far parameters move actuators that read the same, (n, n_a, p) [rad or length]; by default not.
         """
-        legs, m, n_a = self._legs, len(self._uniform), len(self._legs.actuators)
+        legs, m, n_a = self._legs, len(self._legs.uniform), len(self._legs.actuators)
         model, poses, changes = model_of(mechanism), at.rows.poses, _numbers_by(slopes)
         sides = np.broadcast_to(sides_at(model, at), (len(poses), len(model.legs.legs)))
-        home = self._program(np.ones((len(self._given), len(changes)), bool), self._uniform, self._given, 0)
-        values, slopes_of_parts = home(np.empty(0), home_numbers(mechanism)[None, self._used], changes[:, self._used].T)
+        own = home_numbers(mechanism)[None, self._used]
+        values, slopes_of_parts = self._uniform(np.empty(0), own, changes[:, self._used].T)
         order = np.argsort((slopes_of_parts[0] != 0.0).argmax(axis=0), kind="stable")  # those of one leg side by side
         uniform, n_q = np.concatenate([values[0], np.zeros(6)]), len(legs.implicit)
         given = np.concatenate([poses[:, :3].reshape(-1, 12), sides], axis=1)
@@ -96,13 +93,12 @@ class LegSlopes:
         by_home[:m] = slopes_of_parts[0][:, order]
         by_pose[m : m + 6, :6] = np.eye(6)
         by_pose[[m + 18 + k for k in legs.implicit], 6:] = np.eye(n_q)
-        outputs, inputs = [*legs.actuators, *legs.rows], [*self._uniform, *legs.twist, *legs.pose, *legs.q]
-        found, G = self._program(by_home != 0.0, outputs, inputs, m + 6)(uniform, given, by_home)
+        found, G = self._formulas(uniform, given, by_home)
         apart = found - np.pad(at.rows.actuators, ((0, 0), (0, len(legs.rows))))
         apart[:, :n_a] -= self._turns * np.rint(apart[:, :n_a] / (2.0 * np.pi))
         if not (np.abs(apart) <= self._close).all():
             return None
-        M = self._program(by_pose != 0.0, outputs, inputs, m + 6)(uniform, given, by_pose)[1]
+        M = self._formulas(uniform, given, by_pose)[1]
         if not (np.isfinite(M).all() and np.isfinite(G).all()):
             return None
         motions, held = open_motions(self._table, poses[:, :3, :3], n_q), G[:, :n_a].copy()
@@ -113,12 +109,6 @@ class LegSlopes:
         moves, opened = _solved(M, G)
         back = np.argsort(order)
         return PoseSlopes(-moves[:, :6, back], held[:, :, back], opened[back])
-
-    def _program(self, depends: Mask, outputs: Sequence[Any], inputs: Sequence[Any], n_uniform: int) -> Formulas:
-        key = depends.shape, depends.tobytes()
-        if key not in self._programs:
-            self._programs[key] = Formulas(outputs, inputs, n_uniform, depends)
-        return self._programs[key]
 
 
 @derived

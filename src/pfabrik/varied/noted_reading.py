@@ -41,13 +41,13 @@ class VariedGeometry:
         reading = NotedReading(mechanism, names, np.array([mechanism.dimensions[name] for name in names]))
         decisions = list(reading.trace.decisions.values())
         self._decided = np.array(decisions, float)
-        self._formulas = Formulas([*decisions, *reading.numbers], reading.given, 0, np.zeros((len(names), 0), bool))
+        self._formulas = Formulas([*decisions, *reading.numbers], reading.given, 0)
         self._own, joints = geometry_of(mechanism), mechanism.joints
         self._has_axes = np.array([[j.axis is not None or j.axes is not None, j.axes is not None] for j in joints])
 
     def at(self, values: Floats) -> Geometry:
         """Geometries at values (b, n), every array with the batch in front; InvalidMechanism where there is none."""
-        found, n = self._formulas(np.empty(0), values), len(self._decided)
+        (found, _), n = self._formulas(np.empty(0), values), len(self._decided)
         for row in np.flatnonzero((found[:, :n] != self._decided).any(axis=1)):
             found[row, n:] = NotedReading(self._mechanism, self._names, values[row]).numbers
         own, joints = self._own, len(self._has_axes)

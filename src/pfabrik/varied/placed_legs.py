@@ -15,7 +15,7 @@ from ..kernels import tape, vectors
 from ..kernels.legs import answer, feasibility, frames
 from ..kernels.legs import records as K
 from ..kernels.search_constants import NEARLY_CLOSED
-from ..noted_numbers import Number, Trace, of_numbers, where
+from ..noted_numbers import Formulas, Number, Trace, of_numbers, uniform_parts, where
 
 
 class PlacedLegs:
@@ -31,13 +31,15 @@ class PlacedLegs:
     reach : the margins of the reach of legs among them.
     actuators : values of the actuators [length or rad].
     rows : the constraints [L or rad].
+    words : those of the table's records.
+    uniform : the numbers, the same at all poses, that all these are computed from.
     """
 
-    def __init__(
-        self, trace: Trace, table: LegTable, words: list[Any], length: Number, *, has_sides: bool = False
-    ) -> None:
+    def __init__(self, trace: Trace, table: LegTable, numbers: Sequence[Any], *, has_sides: bool = False) -> None:
+        """The legs of a table, whose tape begins with numbers: L, all else of home, and limits."""
         recording: Any = table.recording
-        records = {name: _records(getattr(table, name), words, start) for name, _, _, start in recording.layouts}
+        self.words, length = _replayed(table, numbers), numbers[0]
+        records = {name: _records(getattr(table, name), self.words, start) for name, _, _, start in recording.layouts}
         legs, task = records["legs"], records["task"][0]
         n = len(legs)
         home = [[float(i == j) for j in range(3)] + [float(task["reference"][i]) * float(length)] for i in range(3)]
@@ -62,6 +64,11 @@ class PlacedLegs:
         deviation = of_numbers(answer.deviation)
         driven = sorted(records["driven"], key=lambda each: each["column"])
         self.actuators = [each["home"] + deviation(each, values) * each["unit"] for each in driven]
+        self.uniform = uniform_parts([*self.margins, *self.rows, *self.actuators])
+
+    def formulas(self, outputs: Sequence[Any]) -> Formulas:
+        """Formulas by the inputs `uniform` and `twist`, the same at all poses, then `pose` and `q`."""
+        return Formulas(outputs, [*self.uniform, *self.twist, *self.pose, *self.q], len(self.uniform) + 6)
 
     def _moved(self, length: Number) -> Any:
         """The pose [L], moved by the twist."""
@@ -115,7 +122,7 @@ def open_motions(table: LegTable, rotations: Floats, n_implicit: int) -> Floats:
     return motions
 
 
-def replayed(table: LegTable, given: Sequence[Any]) -> list[Any]:
+def _replayed(table: LegTable, given: Sequence[Any]) -> list[Any]:
     """The words of a table's records, with what the table's tape computes from given numbers."""
     recording: Any = table.recording
     values: list[Any] = [*given, *recording.values[len(given) :].tolist()]

@@ -33,12 +33,12 @@ from ..kernels.legs.feasibility import feasibility, read_targets
 from ..kernels.search_constants import CLOSED, NEARLY_CLOSED
 from ..model import model_of
 from ..motion.mobility import generic_of
-from ..noted_numbers import NOTHING, Formulas, uniform_parts
+from ..noted_numbers import NOTHING, Formulas
 from ..platform.table import kernel_table, table_handle
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
 from .noted_reading import NotedReading
-from .placed_legs import PlacedLegs, open_motions, replayed
+from .placed_legs import PlacedLegs, open_motions
 
 STEP = 1e-6
 """Share of L in its central differences, by which only the margins of legs that do not close have slopes."""
@@ -148,32 +148,29 @@ class NotedMachine:
             centres += numbers[:3]
         self._size = 0.0 if _radii(np.array([centres], float))[0] else sketch.characteristic_length
         length = trace.input(sketch.characteristic_length)
-        words = replayed(self.table, [length, *numbers, *reading.limits])
-        self.legs = legs = PlacedLegs(trace, self.table, words, length)
+        self.legs = legs = PlacedLegs(trace, self.table, [length, *numbers, *reading.limits])
         self.is_coupled = self.table.is_completed and (
             not self.table.is_for_blocks or has_parasitic_motion(model_of(mechanism).path_closure)
         )
-        self._programs: dict[tuple[str, int, bool], Formulas] = {}
-        self.uniform = uniform_parts([*legs.margins, *legs.rows, *legs.actuators])
-        self._centres = Formulas(centres, given, p, np.ones((p, p), bool))
+        self._centres = Formulas(centres, given, p)
         self._decided = np.array(list(trace.decisions.values()), float).tobytes()
-        parts: list[list[Any]] = [list(trace.decisions.values()), [length], numbers[:3], self.uniform]
+        parts: list[list[Any]] = [list(trace.decisions.values()), [length], numbers[:3], legs.uniform]
         recording: Any = self.table.recording
         self.written = [word + k for word, _, size in recording.writes.tolist() for k in range(size)]
-        parts.append([words[word] for word in self.written] if self.table.is_completed else [])
+        parts.append([legs.words[word] for word in self.written] if self.table.is_completed else [])
         ends = [reading.limits[2 * drive.column + end] for drive in mechanism.drives for end in (0, 1)]
         self.is_ended = np.isfinite(np.array(ends, float))
         parts.append([end for end, is_one in zip(ends, self.is_ended.tolist(), strict=True) if is_one])
         self._spans = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
         outputs = [number for part in parts for number in part]
-        self._uniform = Formulas(outputs, [*given, length], p + 1, np.ones((p + 1, p), bool))
+        self._uniform = Formulas(outputs, [*given, length], p + 1)
 
     def at(self, values: Floats) -> MachineAt | None:
         """The machine at values of the dimensions; None if a decision comes out otherwise there."""
-        length = self._size or _radii(self._centres(values))[0]
+        length = self._size or _radii(self._centres(values)[0])[0]
         given = np.empty(len(values) + 1)
         given[:-1], given[-1] = values, length
-        found = self._uniform(given)[0]
+        found = self._uniform(given)[0][0]
         decided, *parts = [found[a:b] for a, b in self._spans]
         if decided.tobytes() != self._decided or not math.isfinite(np.add.reduce(found[: self._spans[3][1]])):
             return None
@@ -192,16 +189,12 @@ class NotedMachine:
         _, _, (a, b), (c, d), *_ = self._spans
         return slopes[0, a:b], slopes[0, c:d]
 
-    def program(self, name: str, by_dimensions: int, by_pose: bool) -> Formulas:
-        """Formulas of the legs at poses, with slopes as of `tangents`."""
-        key = name, by_dimensions, by_pose
-        if key not in self._programs:
-            legs, m = self.legs, len(self.uniform)
-            outputs = [*(legs.margins if name == "margins" else legs.actuators), *legs.rows, *legs.reach]
-            inputs = [*self.uniform, *legs.twist, *legs.pose, *legs.q]
-            depends = self.tangents(np.ones((m, by_dimensions)), by_pose) != 0.0
-            self._programs[key] = Formulas(outputs, inputs, m + 6, depends)
-        return self._programs[key]
+    @derived
+    def program(self, name: str) -> Formulas:
+        """Formulas of the legs at poses: margins or actuators, constraints, and margins of the reach of legs."""
+        legs = self.legs
+        asked = legs.margins if name == "margins" else legs.actuators
+        return legs.formulas([*asked, *legs.rows, *legs.reach])
 
     def tangents(self, moved: Floats, by_pose: bool) -> Floats:
         """Slopes of all inputs: of what is the same at all poses by p dimensions, (m, p), then by twists and q."""
@@ -244,14 +237,6 @@ class PlacedValues(NamedTuple):
     slopes: Floats
     row_slopes: Floats
     completed: Floats
-
-    @classmethod
-    def of(cls, found: Any, legs: PlacedLegs, completed: Floats) -> PlacedValues:
-        """Split what expressions gave."""
-        values, slopes = found if isinstance(found, tuple) else (found, found)
-        end = values.shape[1] - len(legs.reach)
-        n = end - len(legs.rows)
-        return cls(values[:, :n], values[:, n:end], values[:, end:], slopes[:, :n], slopes[:, n:end], completed)
 
 
 class MachineAt:
@@ -353,7 +338,7 @@ class MachineAt:
         """Expressions of the legs at targets, with slopes: by dimensions, where these move what is the same at all
         poses, then by the pose."""
         noted, legs = self._noted, self._noted.legs
-        program, tangents = noted.program(name, 0 if moved is None else moved.shape[1], by_pose), None
+        program, tangents = noted.program(name), None
         if moved is not None or by_pose:
             tangents = noted.tangents(np.empty((len(self._uniform), 0)) if moved is None else moved, by_pose)
         uniform = np.concatenate([self._uniform, AT_REST])
@@ -363,15 +348,17 @@ class MachineAt:
         else:
             completed = np.empty((len(targets), 12))
             read_targets(table_handle(noted.table).address, targets, begin, completed)
-        found = program(uniform, completed, tangents)
-        placed = PlacedValues.of(found, legs, completed)
+        values, slopes = program(uniform, completed, tangents)
+        end = values.shape[1] - len(legs.reach)
+        n = end - len(legs.rows)
+        placed = PlacedValues(
+            values[:, :n], values[:, n:end], values[:, end:], slopes[:, :n], slopes[:, n:end], completed
+        )
         if noted.table.is_completed and not noted.is_coupled and not np.abs(placed.rows).max(initial=0.0) <= CLOSED:
             is_open = (np.abs(placed.rows) > CLOSED).any(axis=1) & (placed.reach == math.inf).all(axis=1)
             if is_open.any():
                 completed[is_open] = self._completed(targets[is_open], begin)
-                again = program(uniform, completed[is_open], tangents)
-                for to, part in zip(found, again, strict=True) if tangents is not None else [(found, again)]:
-                    to[is_open] = part
+                values[is_open], slopes[is_open] = program(uniform, completed[is_open], tangents)
         return placed
 
     def _completed(self, targets: Floats, begin: Floats) -> Floats:
