@@ -19,11 +19,15 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnsupportedMechanism
 from ..ik import solve_ik
 from ..kinematics import MachineAt, VariedMachine, generic_of, task_of
+from ..statics.accuracy import largest
 from ..tolerances import TOLERANCES
 
 NOWHERE, IMPOSSIBLE, UNKNOWN, REACHED = -1e3, -1.0, -0.01, 1.0
 """Rows where there is no machine, where a margin is infinitely broken, where what is no margin has no value, as a leg
 does not reach, and of a leg that reaches by far."""
+
+HELD = 1e-9
+"""Part of a unit of twist, or of a wrench, that actuators may leave loose by rounding [1 or L]."""
 
 NARROW = 0.01
 """Half of a range below which margins are shares of this [L or rad]."""
@@ -175,18 +179,31 @@ class Candidate:
         known = np.asarray(np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2)))
         return known, rates[known] / self.units[:, None], twists[known]
 
-    def forces(self, wrenches: Floats) -> Floats:
-        """Actuator forces (n, w, n_a) that hold wrenches (w, 6) or forces (w, 3); of redundant actuators, the least.
+    @cached_property
+    def forward(self) -> tuple[Floats, Floats]:
+        """Forward Jacobians F = T A^+ (n, 6, n_a), from motions' twists T and actuator rates A, and what actuators do
+        not hold, T - F A (n, 6, f); lengths in L, NaN where motions are unknown."""
+        known, rates, twists = self.motions
+        maps = twists @ np.linalg.pinv(rates, TOLERANCES.rank)
+        forward, loose = (np.full((len(known), *part.shape[1:]), np.nan) for part in (maps, twists))
+        forward[known], loose[known] = maps, twists - maps @ rates
+        return forward, loose
 
-        With motions' rates A and twists T, A' f = -T' w: they do no work together.
-        """
-        (known, rates, twists), found = self.motions, np.full((len(self.poses), len(wrenches), self._n_drives), np.nan)
-        scaled = wrenches / np.repeat([1.0, self.length], 3)[: wrenches.shape[1]]
-        asked = -scaled @ twists[:, : wrenches.shape[1]]
-        held = asked @ np.linalg.pinv(rates, TOLERANCES.rank)
-        is_held = np.isclose(held @ rates, asked, rtol=0.0, atol=1e-9 * np.abs(scaled).max())
-        held[~is_held.all(axis=2)] = np.nan
-        found[known] = held * (self.length / self.units)
+    def forces(self, wrenches: Floats) -> Floats:
+        """Actuator forces -F' w (n, w, n_a) that hold wrenches (w, 6) or (w, 3); of redundant actuators, the least."""
+        (forward, loose), r = self.forward, wrenches.shape[1]
+        scaled = wrenches / np.repeat([1.0, self.length], 3)[:r]
+        gives_way = np.abs(scaled @ loose[:, :r]).max(axis=2) > HELD * np.abs(scaled).max()
+        held = -scaled @ forward[:, :r] * (self.length / self.units)
+        return np.where(gives_way[:, :, None], np.nan, held)
+
+    def position_errors(self, errors: Floats) -> Floats:
+        """Largest errors of the position, (n,) [length], by errors of actuators, (n_a,) [length or rad]."""
+        forward, loose = self.forward
+        by_actuator = self.length * forward[:, :3] * (errors / self.units)
+        known = np.asarray((np.abs(loose[:, :3]) <= HELD).all(axis=(1, 2)))
+        found = np.full(len(known), np.nan)
+        found[known] = largest(by_actuator[known], np.zeros((np.count_nonzero(known), 0, 3, 3)))[0]
         return found
 
     def compliance(self, stiffness: Floats) -> Floats:

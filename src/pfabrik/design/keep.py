@@ -16,6 +16,7 @@ from ..checks import require_finite, require_positive
 from ..clearance.clearance import clearance as clearance_of
 from ..errors import InvalidArgument
 from ..statics.accuracy import accuracy as accuracy_of
+from ..statics.accuracy import errors_of
 from ..statics.loads import positive_values
 from .candidate import IMPOSSIBLE, NOWHERE, REACHED, UNKNOWN, Candidate
 
@@ -225,9 +226,14 @@ def accuracy(errors: float | Mapping[str, float], most: float) -> Requirement:
         How far off the reference point may be [length].
     """
     limit = require_positive("most", most)
-    return Requirement(
-        f"error <= {limit:g}", lambda m: 1.0 - m.measured(lambda s: accuracy_of(s, errors).position) / limit
-    )
+
+    def rows(machine: Candidate) -> Floats:
+        of_actuators, of_joints = errors_of(machine.dimensions.mechanism, errors)
+        if of_joints:
+            return np.asarray(1.0 - machine.measured(lambda s: accuracy_of(s, errors).position) / limit)
+        return np.asarray(1.0 - machine.position_errors(of_actuators) / limit)
+
+    return Requirement(f"error <= {limit:g}", rows)
 
 
 def speed(twists: ArrayLike, most: float) -> Requirement:
