@@ -351,6 +351,7 @@ MEASURES: dict[str, tuple[Any, Any]] = {  # a requirement, and by how much the l
         keep.force(PUSHES, 1800),
         lambda s: 1 - max(np.abs(pf.forces(s, push).actuators).max() for push in PUSHES) / 1800,
     ),
+    "accuracy": (keep.accuracy(1e-3, 0.2), lambda s: 1 - pf.accuracy(s, 1e-3).position.max() / 0.2),
     "stiffness": (
         keep.stiffness(7, 1e5),
         lambda s: 1 / np.diagonal(pf.stiffness(s, 1e5).compliance, axis1=-2, axis2=-1)[:, :3].max() / 7 - 1,

@@ -19,11 +19,15 @@ from ..description.mechanism import Mechanism
 from ..errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnsupportedMechanism
 from ..ik import solve_ik
 from ..kinematics import MachineAt, VariedMachine, generic_of, task_of
+from ..statics.accuracy import largest
 from ..tolerances import TOLERANCES
 
 NOWHERE, IMPOSSIBLE, UNKNOWN, REACHED = -1e3, -1.0, -0.01, 1.0
 """Rows where there is no machine, where a margin is infinitely broken, where what is no margin has no value, as a leg
 does not reach, and of a leg that reaches by far."""
+
+HELD = 1e-9
+"""Part of a unit of twist, or of a wrench, that actuators may leave loose by rounding [1 or L]."""
 
 NARROW = 0.01
 """Half of a range below which margins are shares of this [L or rad]."""
@@ -34,7 +38,7 @@ class Dimensions:
 
     Attributes
     ----------
-    mechanism : the machine as described; own : its values, (p,).
+    mechanism : the machine as described; own : its values, (p,); own_machine : the varied machine there.
     names, low, high : of the p dimensions, and their bounds, (p,).
     limits : pairs (joint, bound) of the r limits; reaching : pairs (row, actuator) of those that are reaches.
     ends : triples (row, actuator, is the lower) of those that are ends of an actuator.
@@ -55,7 +59,8 @@ class Dimensions:
         self.reaching = [(row, drive) for row, drive, bound in of_drives if bound == "reach"]
         self.ends = [(row, drive, bound == "min") for row, drive, bound in of_drives if bound in ("min", "max")]
         self.is_length = np.array([drive.kind == "length" for drive in mechanism.drives])
-        is_ended = np.isfinite(varied.at(self.own).ranges).all(axis=1)
+        self.own_machine = varied.at(self.own)
+        is_ended = np.isfinite(self.own_machine.ranges).all(axis=1)
         self.sliding = np.flatnonzero(self.is_length & is_ended)
         self.sliding_names = [mechanism.actuator_names[drive] for drive in self.sliding]
         task = task_of(mechanism)
@@ -76,12 +81,19 @@ class Dimensions:
 
 
 class Candidate:
-    """A machine at values of its dimensions, and poses that it is to reach, (n, 4, 4) [length]."""
+    """A machine at values of its dimensions, and poses that it is to reach, (n, 4, 4) [length].
+
+    Attributes
+    ----------
+    is_machine : False where the file's expressions give no machine: all but `value_of` is of the machine as described.
+    """
 
     def __init__(self, dimensions: Dimensions, values: Floats, poses: Floats, moves: Floats) -> None:
         """Positions of the poses count from home's along axes where `moves` (3,) is 1."""
-        self.dimensions, self.values, self._found = dimensions, values, dimensions.at(values)
-        home = dimensions.mechanism.home_pose if self._found is None else self._found.home_pose
+        found = dimensions.at(values)
+        self.dimensions, self.values, self.is_machine = dimensions, values, found is not None
+        self._found = dimensions.own_machine if found is None else found
+        home = self._found.home_pose
         self._all = np.concatenate([poses, home[None]])
         self._all[:-1, :3, 3] += moves * home[:3, 3]
         self.poses, self._n_drives = self._all[:-1], len(dimensions.is_length)
@@ -94,25 +106,19 @@ class Candidate:
             return math.nan
 
     @property
-    def is_machine(self) -> bool:
-        """False where the file's expressions give no machine."""
-        return self._found is not None
-
-    @property
     def length(self) -> float:
         """L: the radius of the smallest sphere about the centres of all joints at home [length]."""
-        return np.inf if self._found is None else self._found.characteristic_length
+        return self._found.characteristic_length
+
+    @property
+    def units(self) -> Floats:
+        """L for actuators that slide, 1 for others, (n_a,)."""
+        return np.where(self.dimensions.is_length, self.length, 1.0)
 
     @property
     def sliding_ranges(self) -> Floats:
         """Ends of the actuators that slide between two, (n, 2) [length]."""
-        places = self.dimensions.sliding
-        return np.full((len(places), 2), np.nan) if self._found is None else self._ranges[places]
-
-    @cached_property
-    def _ranges(self) -> Floats:
-        assert self._found is not None
-        return self._found.ranges
+        return self._found.ranges[self.dimensions.sliding]
 
     @property
     def margins(self) -> Floats:
@@ -131,23 +137,21 @@ class Candidate:
     @cached_property
     def _margins(self) -> Floats:
         dimensions, found = self.dimensions, self._found
-        if found is None:
-            return np.full((len(self._all), len(dimensions.limits)), NOWHERE)
-        margins = found.margins(self._all)
+        margins, ranges = found.margins(self._all), found.ranges
         if dimensions.reaching:
             rows, drives = np.array(dimensions.reaching).T
             rates = self._rates[:, drives][:, :, dimensions.axes[dimensions.axes < 3]]
-            units = np.where(dimensions.is_length, 1.0, found.characteristic_length)[drives]
+            units = (self.length / self.units)[drives]
             with np.errstate(all="ignore"):
                 near = np.fmin(1.0 / (np.square(rates).sum(axis=2) * units**2), REACHED)
             margins[:, rows] = np.where(np.isposinf(margins[:, rows]), np.nan_to_num(near), margins[:, rows])
-        units = np.where(dimensions.is_length, found.characteristic_length, 1.0) * NARROW
-        narrow = self._ranges[:, 1] - self._ranges[:, 0] < 2.0 * units
+        units = self.units * NARROW
+        narrow = ranges[:, 1] - ranges[:, 0] < 2.0 * units
         if narrow.any():  # so the margin of a range that ends before it begins falls with its ends
             values = found.actuators(self._all)
             for row, drive, is_low in dimensions.ends:
                 if narrow[drive]:
-                    low, high = self._ranges[drive]
+                    low, high = ranges[drive]
                     gap = values[:, drive] - low if is_low else high - values[:, drive]
                     margins[:, row] = gap / units[drive]
         margins[np.isposinf(margins)] = REACHED
@@ -157,8 +161,6 @@ class Candidate:
     @cached_property
     def actuators(self) -> Floats:
         """Values of the actuators at all poses, (n, n_a) [length or rad]."""
-        if self._found is None:
-            return np.full((len(self.poses), self._n_drives), np.nan)
         return self._found.actuators(self.poses)
 
     @property
@@ -168,42 +170,48 @@ class Candidate:
 
     @cached_property
     def _rates(self) -> Floats:
-        if self._found is None:
-            return np.full((len(self._all), self._n_drives, 6), np.nan)
         return self._found.inverse_jacobians(self._all)
 
     @cached_property
-    def motions(self) -> tuple[Floats, Floats]:
-        """Actuator rates (n, n_a, f) and twists (n, 6, f) of the motions at all poses, lengths in L; NaN without."""
-        if self._found is None:
-            return np.full((len(self.poses), self._n_drives, 1), np.nan), np.full((len(self.poses), 6, 1), np.nan)
+    def motions(self) -> tuple[Mask, Floats, Floats]:
+        """Where motions are known, (n,), and there actuator rates (k, n_a, f) and twists (k, 6, f); lengths in L."""
         rates, twists = self._found.motions(self.poses)
-        return rates / np.where(self.dimensions.is_length, self.length, 1.0)[:, None], twists
+        known = np.asarray(np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2)))
+        return known, rates[known] / self.units[:, None], twists[known]
+
+    @cached_property
+    def forward(self) -> tuple[Floats, Floats]:
+        """Forward Jacobians F = T A^+ (n, 6, n_a), from motions' twists T and actuator rates A, and what actuators do
+        not hold, T - F A (n, 6, f); lengths in L, NaN where motions are unknown."""
+        known, rates, twists = self.motions
+        maps = twists @ np.linalg.pinv(rates, TOLERANCES.rank)
+        forward, loose = (np.full((len(known), *part.shape[1:]), np.nan) for part in (maps, twists))
+        forward[known], loose[known] = maps, twists - maps @ rates
+        return forward, loose
 
     def forces(self, wrenches: Floats) -> Floats:
-        """Actuator forces (n, w, n_a) that hold wrenches (w, 6) or forces (w, 3); of redundant actuators, the least.
+        """Actuator forces -F' w (n, w, n_a) that hold wrenches (w, 6) or (w, 3); of redundant actuators, the least."""
+        (forward, loose), r = self.forward, wrenches.shape[1]
+        scaled = wrenches / np.repeat([1.0, self.length], 3)[:r]
+        gives_way = np.abs(scaled @ loose[:, :r]).max(axis=2) > HELD * np.abs(scaled).max()
+        held = -scaled @ forward[:, :r] * (self.length / self.units)
+        return np.where(gives_way[:, :, None], np.nan, held)
 
-        With motions' rates A and twists T, A' f = -T' w: they do no work together.
-        """
-        (rates, twists), found = self.motions, np.full((len(self.poses), len(wrenches), self._n_drives), np.nan)
-        known = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2))
-        units = np.append(np.ones(3), np.full(3, 1.0 / self.length))
-        units = units[: wrenches.shape[1]]
-        asked = -wrenches * units @ twists[known, : len(units)]
-        held = asked @ np.linalg.pinv(rates[known], TOLERANCES.rank)
-        is_held = np.isclose(held @ rates[known], asked, rtol=0.0, atol=1e-9 * np.abs(wrenches * units).max())
-        held[~is_held.all(axis=2)] = np.nan
-        found[known] = held * np.where(self.dimensions.is_length, 1.0, self.length)
+    def position_errors(self, errors: Floats) -> Floats:
+        """Largest errors of the position, (n,) [length], by errors of actuators, (n_a,) [length or rad]."""
+        forward, loose = self.forward
+        by_actuator = self.length * forward[:, :3] * (errors / self.units)
+        known = np.asarray((np.abs(loose[:, :3]) <= HELD).all(axis=(1, 2)))
+        found = np.full(len(known), np.nan)
+        found[known] = largest(by_actuator[known], np.zeros((np.count_nonzero(known), 0, 3, 3)))[0]
         return found
 
     def compliance(self, stiffness: Floats) -> Floats:
         """Compliance T (A' k A)^-1 T' of positions, (n, 3, 3), by actuators of stiffness k, (n_a,)."""
-        rates, twists = self.motions
-        rates = rates * np.where(self.dimensions.is_length, self.length, 1.0)[:, None]
-        found = np.full((len(rates), 3, 3), np.nan)
-        known = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2))
-        gives, directions = np.linalg.eigh(np.swapaxes(rates[known], 1, 2) * stiffness @ rates[known])
-        moved = self.length * twists[known, :3] @ directions
+        (known, rates, twists), found = self.motions, np.full((len(self.poses), 3, 3), np.nan)
+        rates = rates * self.units[:, None]
+        gives, directions = np.linalg.eigh(np.swapaxes(rates, 1, 2) * stiffness @ rates)
+        moved = self.length * twists[:, :3] @ directions
         with np.errstate(all="ignore"):
             found[known] = moved / gives[:, None] @ np.swapaxes(moved, 1, 2)
         return found
@@ -211,9 +219,9 @@ class Candidate:
     @cached_property
     def factors(self) -> Floats:
         """Actuator speeds per speed along what the task sets, (n, k): singular values, L the unit of mixed lengths."""
-        axes, is_length = self.dimensions.axes, self.dimensions.is_length
+        axes = self.dimensions.axes
         with np.errstate(all="ignore"):
-            units = np.where(axes < 3, self.length, 1.0) / np.where(is_length, self.length, 1.0)[:, None]
+            units = np.where(axes < 3, self.length, 1.0) / self.units[:, None]
             found = self.rates[:, :, axes] * units
         is_known = np.isfinite(found).all(axis=(1, 2))
         values = np.full((len(found), min(found.shape[1:])), np.nan)
@@ -250,12 +258,13 @@ class Candidate:
 
     @cached_property
     def _closed(self) -> tuple[Mask, Solution | None]:
-        """Where legs close, (n,), and the configurations there, without limits."""
-        closed = np.zeros(len(self.poses), bool)
-        if self._found is not None:
-            closing = [row for row, (_, bound) in enumerate(self.dimensions.limits) if bound in ("reach", "not closed")]
-            closed |= np.isposinf(self._found.margins(self.poses)[:, closing]).all(axis=1)
-        return closed, solve_ik(self.unlimited, self.poses[closed]) if closed.any() else None
+        """Where legs close, (n,), and the configurations there, without limits; none of what cannot be built."""
+        closing = [row for row, (_, bound) in enumerate(self.dimensions.limits) if bound in ("reach", "not closed")]
+        closed = np.asarray(np.isposinf(self._found.margins(self.poses)[:, closing]).all(axis=1))
+        try:
+            return closed, solve_ik(self.unlimited, self.poses[closed]) if closed.any() else None
+        except InvalidMechanism:
+            return closed, None
 
 
 def _singularities(solution: Solution) -> Floats:

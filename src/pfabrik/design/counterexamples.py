@@ -67,9 +67,9 @@ class DesignQuestion:
         self.dimensions = Dimensions(varied(alone, tuple(bounds)), low, high)
         self.rng = np.random.default_rng(require_count("seed", seed, 0))
         self.reach = PosesToReach(mechanism, reach, about, self.rng)
-        own = self.dimensions.own
-        ends = [np.where(one, end, own) for one in np.eye(len(own), dtype=bool) for end in (low, high)]
-        machines = [self.dimensions.at(values) for values in (own, *ends)]
+        drawn = self.dimensions.own
+        ends = [np.where(one, end, drawn) for one in np.eye(len(drawn), dtype=bool) for end in (low, high)]
+        machines = [self.dimensions.at(values) for values in (drawn, *ends)]
         self.reach.require_plane(mechanism, np.array([m.home_pose[:3, 3] for m in machines if m is not None]))
         for text in (text for each in requirements for text in each.expressions):
             self.dimensions.source.value_of(text, {}, "keep")
@@ -339,12 +339,12 @@ def aim_of(asked: DesignQuestion, minimise: Any) -> tuple[str, Callable[[Candida
 
         return getattr(minimise, "__name__", "aim"), of_machine
     if minimise == "size":
-        return "size", lambda machine: 2.0 * machine.length
+        return "size", lambda machine: 2.0 * machine.length if machine.is_machine else np.inf
     if minimise == "stroke":
 
         def stroke(machine: Candidate) -> float:
-            units = np.where(machine.dimensions.is_length, 1.0, machine.length)
-            return float((np.ptp(machine.actuators, axis=0) * units).max())
+            strokes = np.ptp(machine.actuators, axis=0) * machine.length / machine.units
+            return float(strokes.max()) if machine.is_machine else np.inf
 
         return "stroke", stroke
     if not isinstance(minimise, str):

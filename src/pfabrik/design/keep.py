@@ -14,8 +14,9 @@ from ..arguments import array
 from ..arrays import Floats
 from ..checks import require_finite, require_positive
 from ..clearance.clearance import clearance as clearance_of
-from ..errors import InvalidArgument, InvalidMechanism
+from ..errors import InvalidArgument
 from ..statics.accuracy import accuracy as accuracy_of
+from ..statics.accuracy import errors_of
 from ..statics.loads import positive_values
 from .candidate import IMPOSSIBLE, NOWHERE, REACHED, UNKNOWN, Candidate
 
@@ -51,8 +52,6 @@ class Requirement:
         "margin", proved by `certify` over a region; "singularity", in place of what is kept by default; or "".
     has_poses : bool
         False if it is of the dimensions alone.
-    width : int
-        k, of a function that raises where there is no machine.
     columns : callable or None
         Names of what the k columns are of; none if they have no names.
     expressions : tuple of str
@@ -65,7 +64,6 @@ class Requirement:
     function: Callable[[Candidate], Floats]
     kind: str = ""
     has_poses: bool = True
-    width: int = 1
     columns: Callable[[Candidate], Sequence[str]] | None = None
     expressions: tuple[str, ...] = ()
     least: float = 0.0
@@ -75,14 +73,11 @@ class Requirement:
 
     def rows(self, machine: Candidate) -> Floats:
         """Rows at poses (n, k), or without poses (k,): finite, and negative where there is no machine."""
-        try:
-            found = np.asarray(self.function(machine), float)
-        except InvalidMechanism:
-            found = np.full((len(machine.poses), self.width) if self.has_poses else self.width, np.nan)
+        found = np.asarray(self.function(machine), float)
         if found.ndim == 1 and self.has_poses:
             found = found[:, None]
-        if np.isfinite(found).all():
-            return found
+        if not (machine.is_machine or self.expressions):
+            return np.full_like(found, NOWHERE)
         unknown = UNKNOWN if machine.is_machine else NOWHERE
         return np.asarray(np.nan_to_num(found, nan=unknown, posinf=REACHED, neginf=IMPOSSIBLE))
 
@@ -145,7 +140,7 @@ def singularity(least: float | None = DEFAULT_SINGULARITY) -> Requirement:
     """
     value = _not_negative("least", 0.0 if least is None else least)
     words = f"singularity >= {value:g}" if value else ""
-    return Requirement(words, lambda m: m.distances / (value or 1.0) - 1.0, "singularity", width=2)
+    return Requirement(words, lambda m: m.distances / (value or 1.0) - 1.0, "singularity")
 
 
 def factors(least: float, most: float) -> Requirement:
@@ -192,7 +187,7 @@ def force(wrenches: ArrayLike, most: float) -> Requirement:
     def rows(machine: Candidate) -> Floats:
         return np.asarray(1.0 - np.abs(machine.forces(given)).max(axis=2) / limit)
 
-    return Requirement(f"actuator force <= {limit:g}", rows, width=len(given))
+    return Requirement(f"actuator force <= {limit:g}", rows)
 
 
 def stiffness(least: float, k: float | Mapping[str, float], axes: str = "xyz") -> Requirement:
@@ -217,7 +212,7 @@ def stiffness(least: float, k: float | Mapping[str, float], axes: str = "xyz") -
         gives = np.diagonal(machine.compliance(values), axis1=-2, axis2=-1)[:, places]
         return np.asarray(1.0 - wanted * gives)
 
-    return Requirement(f"stiffness along {axes} >= {wanted:g}", rows, width=len(places))
+    return Requirement(f"stiffness along {axes} >= {wanted:g}", rows)
 
 
 def accuracy(errors: float | Mapping[str, float], most: float) -> Requirement:
@@ -231,9 +226,14 @@ def accuracy(errors: float | Mapping[str, float], most: float) -> Requirement:
         How far off the reference point may be [length].
     """
     limit = require_positive("most", most)
-    return Requirement(
-        f"error <= {limit:g}", lambda m: 1.0 - m.measured(lambda s: accuracy_of(s, errors).position) / limit
-    )
+
+    def rows(machine: Candidate) -> Floats:
+        of_actuators, of_joints = errors_of(machine.dimensions.mechanism, errors)
+        if of_joints:
+            return np.asarray(1.0 - machine.measured(lambda s: accuracy_of(s, errors).position) / limit)
+        return np.asarray(1.0 - machine.position_errors(of_actuators) / limit)
+
+    return Requirement(f"error <= {limit:g}", rows)
 
 
 def speed(twists: ArrayLike, most: float) -> Requirement:

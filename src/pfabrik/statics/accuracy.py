@@ -122,7 +122,7 @@ def accuracy(
     mechanism = checked_solution(solution).mechanism
     require_choice("kind", kind, ("worst", "rms"))
     tolerances, errors = _tolerances(solution, errors, sensitivity)
-    of_actuators, of_joints = _errors(mechanism, errors)
+    of_actuators, of_joints = errors_of(mechanism, errors)
     maps = maps_of(solution)
     reasons = maps.reasons
     by_actuator = np.concatenate([maps.forward * of_actuators, tolerances], axis=-1)
@@ -139,7 +139,7 @@ def accuracy(
         found += [np.sqrt(squares), products]
     else:
         components = np.abs(by_actuator).sum(axis=-1) + np.linalg.norm(by_joint, axis=-1).sum(axis=1)
-        parts = [_largest(by_actuator[:, part], by_joint[:, :, part]) for part in (slice(0, 3), slice(3, 6))]
+        parts = [largest(by_actuator[:, part], by_joint[:, :, part]) for part in (slice(0, 3), slice(3, 6))]
         found = [
             *(sizes for sizes, _ in parts),
             components,
@@ -169,7 +169,7 @@ def _tolerances(
     return columns * bounds, {name: error for name, error in errors.items() if name not in named}
 
 
-def _errors(mechanism: Mechanism, given: float | Mapping[str, float]) -> tuple[Floats, dict[int, float]]:
+def errors_of(mechanism: Mechanism, given: float | Mapping[str, float]) -> tuple[Floats, dict[int, float]]:
     """Errors of actuators (n_a,), and of other joints by their index."""
     names = mechanism.actuator_names
     if not isinstance(given, Mapping):
@@ -206,7 +206,7 @@ def _by_joint(solution: Solution, maps: Maps, errors: Mapping[int, float]) -> tu
     return twists, is_loose
 
 
-def _largest(by_actuator: Floats, by_joint: Floats) -> tuple[Floats, Floats]:
+def largest(by_actuator: Floats, by_joint: Floats) -> tuple[Floats, Floats]:
     """The largest |A s + sum B_j d_j| with s of signs and |d_j| <= 1, (n,), and these signs, (n, n_a).
 
     Without play it is at a corner of the box of errors, and all are compared. With play, or where these are too many,
