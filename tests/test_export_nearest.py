@@ -37,7 +37,7 @@ class Said(NamedTuple):
     holding: Array
 
 
-def said(name: str, precision: str, targets: Array, *, steps: int = 200, starts: int = 99, warm: int = 0) -> Said:
+def said(name: str, precision: str, targets: Array, *, steps: int = 200, starts: int = 24, warm: int = 0) -> Said:
     """What a machine's file answers to targets, each from home, or from the answer before."""
     told, _ = asked(program_of(name, precision), flat(targets), "nearest", steps, starts, warm)
     assert told[:, 1].all()  # there are words for every code
@@ -45,7 +45,7 @@ def said(name: str, precision: str, targets: Array, *, steps: int = 200, starts:
 
 
 @cache
-def known(name: str, n: int = 80) -> tuple[Array, pf.Solution]:
+def known(name: str, n: int = 40) -> tuple[Array, pf.Solution]:
     """Targets around home, half of them mostly out of reach, and the library's answers from home in its mode."""
     mechanism, rng = machine(name), np.random.default_rng(3)
     targets = targets_around_home(mechanism, n, rng)
