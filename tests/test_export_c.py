@@ -218,7 +218,8 @@ def test_the_file_reaches_what_is_feasible_where_more_than_one_pose_closes(made:
 
 
 @needs_compiler
-def test_a_file_checks_itself_with_poses_that_have_one_answer_alone() -> None:
+def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source, "N_TRIED", 150)
     text = c_source(closure.stretched_wrist(), parts=("ik", "limits"))
     assert checks_itself(compiled(text, driver=None)) == (0, PASSED)
 
@@ -284,7 +285,7 @@ def test_the_command_that_the_file_and_the_page_tell_runs_the_self_test(folder: 
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler here")
 def test_the_file_is_cpp_too_and_arms_that_follow_in_more_than_one_way_do_so_in_home_s() -> None:
-    built = compiled(text_of(AMBIGUOUS), "-std=c++11", "-xc++", compiler="g++", driver=None)
+    built = compiled(text_of(AMBIGUOUS, parts=WITHOUT_NEAREST), "-std=c++11", "-xc++", compiler="g++", driver=None)
     assert checks_itself(built) == (0, PASSED)
 
 
