@@ -103,9 +103,9 @@ class CheckedMachine(NamedTuple):
     verdict: str
     found: Found
     mechanism: Mechanism | None = None
+    reason: str = ""
     certificate: Certificate | None = None
     refuted_by: Floats | None = None
-    reason: str = ""
     is_final: bool = False
 
 
@@ -171,10 +171,13 @@ class SmallestSearch:
             if found.violation > KEPT:
                 return self._result(last if last.verdict == "OPEN" else CheckedMachine("NOT FOUND", found))
             last = self._checked(found)
-            self.rounds.append(DesignRound(self._named(found), self._value(found), len(self.poses), *last[0:5:4]))
-            if last.verdict in ("PROVED", "CHECKED") or last.is_final or self.slack > MOST_SLACK:
+            self.rounds.append(
+                DesignRound(self._named(found), self._value(found), len(self.poses), last.verdict, last.refuted_by)
+            )
+            is_open = last.verdict == "OPEN"
+            if last.verdict in ("PROVED", "CHECKED") or last.is_final or (is_open and self.slack > MOST_SLACK):
                 return self._result(last)
-            if last.verdict == "OPEN":
+            if is_open:
                 self.ask(max(4.0 * self.slack, SLACK * 1e-3))
             found = smallest(self.aim, self.rows, found.z)
         if last.verdict == "REFUTED":
@@ -242,12 +245,11 @@ class SmallestSearch:
         poses, worst = self._worst(found, DENSE, 0.0)
         if worst[0] < -10.0 * KEPT:
             self.look_at(poses[:WORST], found.z)
-            refuted_by = reach.at(mechanism, poses)[0]
-            return CheckedMachine("REFUTED", found, mechanism, None, refuted_by, "a sample breaks a requirement")
+            return CheckedMachine("REFUTED", found, mechanism, refuted_by=reach.at(mechanism, poses)[0])
         if reach.region is None:
             statuses = np.array(solve_ik(mechanism, reach.at(mechanism, reach.poses)).status)
             if (statuses != Status.REACHED).any():
-                return CheckedMachine("OPEN", found, mechanism, reason="a pose is not quite reached")
+                return CheckedMachine("OPEN", found, mechanism, "a pose is not quite reached")
         least = max(each.least for each in self.requirements)
         gap = max(0.5 * self.slack, 1e-6) if least else None
         certificate = reach.certificate(mechanism, tolerance=gap, executor=asked.executor, on_progress=_silent)
@@ -256,16 +258,13 @@ class SmallestSearch:
         if certificate.refutation is not None:
             pose = certificate.refutation.pose
             self.look_at(reach.at(mechanism, pose[None], -1.0), found.z)
-            return CheckedMachine("REFUTED", found, mechanism, certificate, pose, "a pose is not reached")
-        if not certificate:
-            is_final = not (certificate.has_bounds and len(certificate.open_boxes))
-            advice = "" if certificate.has_bounds else ": ask for poses, which are checked"
-            return CheckedMachine("OPEN", found, mechanism, certificate, None, certificate.reason + advice, is_final)
-        if certificate.margin < least:
-            return CheckedMachine(
-                "OPEN", found, mechanism, certificate, None, f"the margin is proved to {certificate.margin:.6g}"
-            )
-        return CheckedMachine("PROVED", found, mechanism, certificate)
+            return CheckedMachine("REFUTED", found, mechanism, "", certificate, pose)
+        if certificate.margin >= least:
+            return CheckedMachine("PROVED", found, mechanism, "", certificate)
+        reason = certificate.reason or f"the margin is proved to {certificate.margin:.6g}"
+        reason += "" if certificate.has_bounds else ": ask for poses, which are checked"
+        is_final = not (certificate or (certificate.has_bounds and len(certificate.open_boxes)))
+        return CheckedMachine("OPEN", found, mechanism, reason, certificate, None, is_final)
 
     def _named(self, found: Found) -> dict[str, float]:
         return self.asked.dimensions.named(self.asked.values(found.z))

@@ -158,9 +158,7 @@ class NotedMachine:
         recording: Any = self.table.recording
         self.written = [word + k for word, _, size in recording.writes.tolist() for k in range(size)]
         parts.append([legs.words[word] for word in self.written] if self.table.is_completed else [])
-        ends = [reading.limits[2 * drive.column + end] for drive in mechanism.drives for end in (0, 1)]
-        self.is_ended = np.isfinite(np.array(ends, float))
-        parts.append([end for end, is_one in zip(ends, self.is_ended.tolist(), strict=True) if is_one])
+        parts.append([reading.limits[2 * drive.column + end] for drive in mechanism.drives for end in (0, 1)])
         self._spans = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
         outputs = [number for part in parts for number in part]
         self._uniform = Formulas(outputs, [*given, length], p + 1)
@@ -174,7 +172,7 @@ class NotedMachine:
         decided, *parts = [found[a:b] for a, b in self._spans]
         if decided.tobytes() != self._decided or not math.isfinite(np.add.reduce(found[: self._spans[3][1]])):
             return None
-        return MachineAt(self, values, *parts)
+        return MachineAt(self, values, parts)
 
     def slopes_at(self, values: Floats, length: float) -> tuple[Floats, Floats]:
         """Slopes of the reference point, and of what is the same at all poses, by the dimensions: (3, p), (m, p)."""
@@ -242,18 +240,10 @@ class PlacedValues(NamedTuple):
 class MachineAt:
     """A varied machine at values of its dimensions; poses are targets (n, 4, 4) [length], reached in home's mode."""
 
-    def __init__(
-        self,
-        noted: NotedMachine,
-        values: Floats,
-        length: Floats,
-        reference: Floats,
-        uniform: Floats,
-        written: Floats,
-        ends: Floats,
-    ) -> None:
-        self._noted, self._values, self._length, self._reference = noted, values, float(length[0]), reference
-        self._uniform, self._written, self._ends = uniform, written, ends
+    def __init__(self, noted: NotedMachine, values: Floats, parts: Sequence[Floats]) -> None:
+        self._noted, self._values = noted, values
+        (length,), self._reference, self._uniform, self._written, self._ends = parts
+        self._length = float(length)
 
     @property
     def characteristic_length(self) -> float:
@@ -263,9 +253,7 @@ class MachineAt:
     @property
     def ranges(self) -> Floats:
         """Lowest and highest values of the actuators, (n_a, 2) [length or rad]; infinite where they have no end."""
-        ranges = np.tile([-np.inf, np.inf], len(self._noted.is_ended) // 2)
-        ranges[self._noted.is_ended] = self._ends
-        return ranges.reshape(-1, 2)
+        return self._ends.reshape(-1, 2)
 
     @cached_property
     def home_pose(self) -> Floats:
