@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tomllib
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +41,7 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
         The file does not describe a mechanism; carries every fault found.
     """
     if isinstance(source, str) and source in catalog():
-        return _from_catalog(source)
+        return loads(catalog_file(source).read_text(encoding="utf-8"), source)
     if not isinstance(source, str | os.PathLike):
         raise InvalidArgument("source", shown(source), "a path or a catalogue name")
     path = Path(source)
@@ -52,12 +51,6 @@ def load(source: str | os.PathLike[str]) -> Mechanism:
         return read_mechanism(_parsed(text_of(path), path.parent), path.parent)
     except InvalidMechanism as error:
         raise InvalidMechanism(error.faults, str(path)) from None
-
-
-@cache
-def _from_catalog(name: str) -> Mechanism:
-    """A catalogue machine, read once in a process: what is derived from it is kept in it."""
-    return loads(catalog_file(name).read_text(encoding="utf-8"), name)
 
 
 def loads(text: str, source: str | None = None) -> Mechanism:
