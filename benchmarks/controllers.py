@@ -4,8 +4,9 @@ python benchmarks/controllers.py [--targets 60] [NAME ...]
 
 Bytes and stack are those of arm-none-eabi-gcc -Os for a Cortex-M4F in single precision; instructions those that
 qemu-system-arm counts, there and on a Cortex-M7 in double precision. Without these programs it says so, and compares
-what the C compiler here makes of the file. It ends with 1 where a status differs, or a pose is farther from its target
-than the library's by more than the tolerance.
+what the C compiler here makes of the file with integers of 32 bits. It ends with 1 where a status differs, a pose is
+farther from its target than the library's by more than the tolerance, or no target was searched for. On Debian:
+apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
 """
 
 from __future__ import annotations
@@ -210,6 +211,7 @@ def told(
     given = ['-DEXPORTED="exported.c"', '-DTARGETS="targets.h"', f"-DSTEPS={STEPS}", f"-DSTARTS={starts}", "main.c"]
     if not on_board:
         compiler = next(name for name in ("cc", "gcc", "clang") if shutil.which(name))
+        given = ["-DPFK_INTEGER=int32_t", *given]
         subprocess.run([compiler, *C, "-O2", *given, "-lm", "-o", "main"], cwd=folder, check=True)
         run = subprocess.run([str(folder / "main")], capture_output=True, text=True, check=True)
     else:
@@ -223,14 +225,14 @@ def told(
     return np.array([line.split() for line in run.stdout.splitlines()], float)
 
 
-def compared(machine: pf.Mechanism, known: Truth, said: Array) -> tuple[int, float]:
-    """How many statuses differ from the library's, and how much farther from its target a nearest pose is [L]."""
+def compared(machine: pf.Mechanism, known: Truth, said: Array) -> tuple[int, int, float]:
+    """How many statuses differ from the library's, and how many nearest poses were found; how much farther [L]."""
     status = np.where(said[:, 0] == 0, 0, np.where(said[:, 2] == 0, 0, np.where(said[:, 2] == -4, 1, 9)))
     poses = said[:, 6:].reshape(-1, 3, 4)
     distance = [np.linalg.norm(each[:, :3, 3] - known.targets[:, :3, 3], axis=1) for each in (poses, known.poses)]
     both = (status == 1) & (known.status == 1)
     above = (distance[0] - distance[1])[both] / machine.characteristic_length
-    return int(np.count_nonzero(status != known.status)), float(above.max(initial=0.0))
+    return int(np.count_nonzero(status != known.status)), int(both.sum()), float(above.max(initial=0.0))
 
 
 def counts(said: Array, column: int) -> str:
@@ -264,10 +266,13 @@ def main() -> int:
                 )
             for precision in ("float", "double"):
                 said = told(machine, known, precision, folder, on_board=has_gcc and has_qemu, starts=given.starts)
-                differ, above = compared(machine, known, said)
-                is_wrong |= differ > 0 or above > TOLERANCE[precision]
+                differ, n_nearest, above = compared(machine, known, said)
+                is_wrong |= differ > 0 or n_nearest == 0 or above > TOLERANCE[precision]
                 of = f"IK {counts(said, 3)}, FK {counts(said, 4)}, nearest {counts(said, 5)}"
-                print(f"  {precision:<6} statuses that differ {differ}, farther by {above:.1e} L; instructions {of}")
+                print(
+                    f"  {precision:<6} statuses that differ {differ}, nearest poses {n_nearest}, farther by {above:.1e} L;"
+                    f" instructions {of}"
+                )
     return int(is_wrong)
 
 

@@ -14,10 +14,12 @@ from click.testing import CliRunner
 
 import pfabrik as pf
 from exported import (
+    CATALOGUE,
     COMPILERS,
     EXACT,
     KEEP,
     PASSED,
+    REFUSED,
     STRICT,
     WITHOUT_NEAREST,
     Answers,
@@ -49,15 +51,6 @@ ROUNDED = 1e-6
 MATHEMATICS = {"sin", "cos", "sincos", "tan", "atan2", "acos", "hypot", "sqrt", "floor", "rint", "memset", "memcpy"}
 """What an exported file may need of the C library; the last two compilers write of themselves."""
 
-REFUSED = {
-    "nrpm": "poses leave joints A1, B1",
-    "H4": "singular at home, where joints Q1, Q2",
-    "panda": "a joint between the ends of its rod",
-    "snake60": "a joint between the ends of its rod",
-}
-"""Machines that have no code, and what the refusal says."""
-
-CATALOGUE = [name for name in pf.catalog() if name not in REFUSED]
 OTHERS = ["exechon", "upu", "ankle", "closure.tricept", "planar_4rpr", "puu", "hinge", "slider", "seven_struts"]
 OTHERS += [name for name in closure.ON_ARMS if name not in REFUSED]
 AMBIGUOUS = "R + 3-RPS + RR"

@@ -29,6 +29,7 @@ from exported import (
     needs_compiler,
     sanitizers_of,
     slack_of,
+    survives,
 )
 from pfabrik.description.links import links_of
 from pfabrik.errors import UnsupportedMechanism
@@ -189,6 +190,7 @@ def test_the_file_measures_what_the_library_does_and_answers_where_links_are_apa
     size, exact = mechanism.characteristic_length, EXACT[precision]
     options = sanitizers_of(COMPILERS[0]) if name == "solids" else ()
     program = compiled(text_of(name, precision), *options)
+    survives(program)
     said = answers_of(program, mechanism, known, "there")
     codes, measured_there, numbers = said.distances.T
     np.testing.assert_allclose(measured_there / size, distances / size, rtol=0, atol=exact)
@@ -270,9 +272,13 @@ JOINTS_DRIVER = """
 #undef PFK_SELF_TEST
 #include EXPORTED
 #include <stdio.h>
-int main(void)
+#include <string.h>
+#include HOSTILE
+int main(int argc, char **argv)
 {
     double q[PFK_JOINTS], rates[PFK_JOINTS] = {1.0, 2.0};
+    if (argc > 1 && !strcmp(argv[1], "hostile"))
+        return hostile_all() != 0;
     while (fread(q, sizeof(double), PFK_JOINTS, stdin) == PFK_JOINTS) {
         double x[PFK_ACTUATORS] = {0}, given[PFK_ACTUATORS], back[PFK_JOINTS] = {0}, power = 0.0, codes[2];
         double J[PFK_ACTUATORS][PFK_JOINTS], speeds[PFK_ACTUATORS], torques[PFK_ACTUATORS];
@@ -315,6 +321,7 @@ def test_joints_in_series_are_coordinates_too_and_answered_where_links_are_apart
     compiler, options = ("g++", ("-std=c++11", "-xc++")) if shutil.which("g++") else (COMPILERS[0], ())
     text = c_source(mechanism, joints=joints)
     program = compiled(text, *options, compiler=compiler, driver=tmp_path / "driver.c")
+    survives(program)
     said, _ = asked(program, np.concatenate([q, found.actuators], axis=1))
     for codes in said[:, :2].T:
         np.testing.assert_array_equal(codes == 0, is_apart)

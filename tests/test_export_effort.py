@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from exported import STRICT, compiled, needs_compiler
+from exported import STRICT, compiled, needs_compiler, survives
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.export.export_c import c_source
 from pfabrik.export.source import targets_around_home
@@ -89,7 +89,8 @@ def asked(program: Path, poses: Any, twists: Any, accelerations: Any) -> Any:
 )
 def test_forces_of_a_compiled_file_are_those_of_inverse_dynamics(name: str, precision: Any) -> None:
     machine = weighed(pf.load(name).without_limits())
-    program = compiled(c_source(machine, parts=("effort",), precision=precision), *STRICT, driver=DRIVER)
+    program = compiled(c_source(machine, parts=("bodies", "effort"), precision=precision), *STRICT, driver=DRIVER)
+    survives(program)
     solution, twists, accelerations, expected = moving(machine)
     said = asked(program, solution.pose, twists, accelerations)
     is_made = np.asarray(expected.reason) == ""

@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import pfabrik as pf
-from exported import KEEP, asked, flat, home_of, limit_units, machine, matrices, needs_compiler, program_of, slack_of
+from exported import (
+    CATALOGUE,
+    KEEP,
+    asked,
+    compiled,
+    flat,
+    home_of,
+    limit_units,
+    machine,
+    matrices,
+    needs_compiler,
+    program_of,
+    slack_of,
+    survives,
+)
+from pfabrik.export import source
+from pfabrik.export.export_c import c_source
 from pfabrik.export.source import targets_around_home
+from pfabrik.export.static_data import Precision
 from pfabrik.model import model_of
 
 Array = np.ndarray
@@ -28,6 +46,16 @@ every_file = pytest.mark.parametrize(
     ("name", "precision"), [*FILES, *(pytest.param(*each, marks=pytest.mark.campaign) for each in LONG)]
 )
 
+PRECISIONS = dict(FILES) | {
+    name: ("double", "float")[place % 2] for place, name in enumerate(CATALOGUE) if name not in dict(FILES)
+}
+EVERY = [
+    pytest.param(name, precision, marks=() if precision == PRECISIONS[name] else pytest.mark.campaign)
+    for name in CATALOGUE
+    for precision in FARTHER
+]
+"""Machines of the catalogue, every other one in single precision; the others in a campaign."""
+
 
 class Said(NamedTuple):
     """What a file said, one row a target."""
@@ -39,9 +67,19 @@ class Said(NamedTuple):
 
 def said(name: str, precision: str, targets: Array, *, steps: int = 200, starts: int = 24, warm: int = 0) -> Said:
     """What a machine's file answers to targets, each from home, or from the answer before."""
-    told, _ = asked(program_of(name, precision), flat(targets), "nearest", steps, starts, warm)
+    return said_by(program_of(name, precision), targets, steps, starts, warm)
+
+
+def said_by(program: Path, targets: Array, steps: int = 200, starts: int = 24, warm: int = 0) -> Said:
+    """What a program answers."""
+    told, _ = asked(program, flat(targets), "nearest", steps, starts, warm)
     assert told[:, 1].all()  # there are words for every code
     return Said(told[:, 0].astype(int), matrices(told[:, 2:14]), told[:, 14:] > 0.0)
+
+
+def statuses(told: Said) -> Array:
+    """The library's statuses of codes; a code that none has stays."""
+    return np.where(told.codes == 0, 0, np.where(told.codes == PROJECTED, 1, told.codes))
 
 
 @cache
@@ -62,9 +100,8 @@ def distances(poses: Array, targets: Array) -> Array:
 def test_what_is_out_of_reach_is_answered_as_the_library_does(name: str, precision: str) -> None:
     targets, found = known(name)
     mechanism, told = machine(name), said(name, precision, targets)
-    status = np.where(told.codes == 0, 0, np.where(told.codes == PROJECTED, 1, told.codes))
-    np.testing.assert_array_equal(status, found.status)
-    away = status == 1
+    np.testing.assert_array_equal(statuses(told), found.status)
+    away = found.status == 1
     assert away.sum() > 5 and (~away).sum() > 5
     farther = distances(told.poses, targets) - distances(found.pose, targets)
     assert farther[away].max() <= FARTHER[precision] * mechanism.characteristic_length
@@ -124,3 +161,24 @@ def test_nothing_that_is_asked_breaks_it(name: str, precision: str) -> None:
     assert (told.codes[~is_pose & (np.abs(hostile[:, :3, 3]) > 1e300).any(axis=1)] == NO_POSE).all()
     ignores_rotation = "rotation" not in machine(name).task
     assert ignores_rotation or (told.codes[~is_pose] == NO_POSE).all()
+
+
+@needs_compiler
+@pytest.mark.parametrize(("name", "precision"), EVERY)
+def test_every_machine_is_searched_and_survives_with_integers_of_32_bits(
+    name: str, precision: Precision, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In and out of reach the library's answers; and whatever any function is given, finite results or a code."""
+    if (name, precision) in FILES:
+        program = program_of(name, precision)
+    else:
+        monkeypatch.setattr(source, "N_TRIED", 3)  # for the self-test, which is not of interest here
+        program = compiled(c_source(machine(name), precision=precision))
+    targets, found = known(name, 12)
+    told = said_by(program, targets)
+    np.testing.assert_array_equal(statuses(told), found.status)
+    away = found.status == 1
+    assert away.any() or name == "agile_eye"  # which turns about its centre, as far as these targets are
+    farther = distances(told.poses, targets) - distances(found.pose, targets)
+    assert (farther[away] <= FARTHER[precision] * machine(name).characteristic_length).all()
+    survives(program)

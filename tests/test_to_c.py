@@ -180,6 +180,12 @@ REFUSED = {
     "an index that is computed twice, and changes": "x[int(x[0])] += move(x)",
     "an index that changes what it is an index of": "x[0] = pair_of(x)[int(move(x) - move(x)) % 2]",
     "`in` of what is not a tuple": "x[0] = 1.0 if x[0] in () else 0.0",
+    "more than an integer of 32 bits": "x[0] = x[2147483648 - x.shape[0]]",
+    "more than an integer of 32 bits: 65536 * 65536": "x[0] = 65536 * 65536",
+    "more than an integer of 32 bits: 1 << 31": "x[0] = 1 << 31",
+    "more than an integer of 32 bits: 2 ** 40": "x[0] = -(2**40)",
+    "MANY of refused does not fit in an integer of 32 bits: 4294967296": "x[0] = MANY",
+    "PAIR of refused does not fit in an integer of 32 bits": "x[0] = PAIR[1]",
 }
 """What the subset has not: what the refusal says, and the body of a function."""
 
@@ -192,6 +198,7 @@ import numpy as np
 from pfabrik.kernels._jit import routine
 
 SIZES = np.zeros(3)
+MANY, PAIR = 2**32, (1, 2**32)
 
 
 class Pair(NamedTuple):
@@ -224,11 +231,18 @@ def test_what_the_subset_lacks_is_refused_with_its_place(what: str, tmp_path: Pa
     made_of = imported(tmp_path / "refused.py", AROUND.format(arguments=arguments, body=body))
     samples = [made_of.Pair(x, x), x] if "Pair(" in body else [x]
     with pytest.raises(Unsupported) as told:
-        Program().add(made_of.refused, *samples)
+        Program(integer="int_fast32_t").add(made_of.refused, *samples)
     assert what in str(told.value)
-    if "calls itself" not in what and "global" not in what:
+    if "calls itself" not in what and "global" not in what and "fit" not in what:
         file, line = str(told.value).split(":")[:2]
         assert file == "refused.py" and int(line) > AROUND.count("\n") - 3
+
+
+def test_integers_of_64_bits_hold_what_those_of_32_do_not(tmp_path: Path) -> None:
+    text = AROUND.format(arguments="x", body="    x[0] = MANY + PAIR[1] + 65536 * 65536 + (1 << 31) + 2**40")
+    made_of, program = imported(tmp_path / "refused.py", text), Program()
+    program.add(made_of.refused, np.zeros(3))
+    assert f"INT64_C({3 * 2**32 + 2**31 + 2**40})" in program.text()
 
 
 def test_elements_outside_an_array_are_found(tmp_path: Path) -> None:

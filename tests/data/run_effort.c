@@ -1,13 +1,18 @@
-/* Reads poses, twists, accelerations and gravity, and prints the code and the forces of actuators. */
+/* Reads poses, twists, accelerations and gravity, and prints the code and the forces of actuators. With `hostile` it asks
+   all functions, whatever they are given. */
 #include EXPORTED
 #include <stdio.h>
+#include <string.h>
+#include HOSTILE
 
-int main(void)
+int main(int argc, char **argv)
 {
     double in[27];
     pfk_real twist[6], gain[6], gravity[3], effort[PFK_ACTUATORS];
     pfk_pose pose;
     int i, code;
+    if (argc > 1 && !strcmp(argv[1], "hostile"))
+        return hostile_all() != 0;
     for (;;) {
         for (i = 0; i < 27; ++i)
             if (scanf("%lf", &in[i]) != 1)

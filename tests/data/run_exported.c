@@ -1,6 +1,7 @@
 /* Runs an exported file: see tests/exported.py.
        check                          its own test
        nearest STEPS STARTS IS_WARM   the nearest poses to targets, each from home or from the one before
+       hostile                        all functions, whatever they are given
        home, there                    all else; forward kinematics start there
    Numbers are read and written in double precision, whatever the file's. */
 
@@ -11,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include HOSTILE
 
 static int read_numbers(pfk_real *numbers, int n)
 {
@@ -99,6 +101,8 @@ int main(int argc, char **argv)
     int i, steps;
     if (argc > 1 && !strcmp(argv[1], "check"))
         return pfk_checks_itself();
+    if (argc > 1 && !strcmp(argv[1], "hostile"))
+        return hostile_all() != 0;
 #ifdef HAS_nearest
     if (argc > 4 && !strcmp(argv[1], "nearest"))
         return find_nearest(atoi(argv[2]), atoi(argv[3]), atoi(argv[4]));

@@ -1,6 +1,8 @@
 /* What surrounds the kernels in every exported file. `source.py` puts the machine's constants, the kernels, tables and
    checks in place of the included files, keeps the blocks between #if and #endif whose conditions hold, and writes names
-   and numbers with the prefix and in the precision asked for. */
+   and numbers with the prefix and in the precision asked for. `finite_results.py` has every function that returns a code
+   compute in memory of its own and give what is finite: what it takes by a pointer it reads and writes, an array it
+   writes alone. */
 
 #ifndef PFK_H
 #define PFK_H
@@ -17,7 +19,8 @@ typedef struct {
 } pfk_pose;
 
 /* Return codes: 0 on success, the number of the limit that is exceeded most, PFK_LEG + the number of a leg that does
-   not reach or close, or one of those below. */
+   not reach or close, or one of those below. Whatever a function is asked, the numbers that it writes are finite; where
+   a result is not it returns PFK_NOT_FINITE. */
 enum {
     PFK_LEG = 1000,
 #if CLEARANCE
@@ -27,6 +30,7 @@ enum {
     PFK_NO_ACTUATORS = -2, /* not finite */
     PFK_OTHER_MODE = -3,   /* closed, but not in the working mode of home */
     PFK_PROJECTED = -4,    /* out of reach: the nearest feasible pose */
+    PFK_NOT_FINITE = -10,  /* a result is not finite, for an argument is not, or is too large; nothing is written */
 #if EFFORT
     PFK_GAINS_MOTION = -6, /* no forces: the loops let the machine move in more ways than elsewhere */
     PFK_NEVER_MADE = -7,   /* no forces: it cannot move so, at a serial singularity */
@@ -41,9 +45,9 @@ enum {
 /* The pose at home. */
 void pfk_home(pfk_pose *pose);
 /* A pose from a position and from turns about the fixed x, y and z axes, in this order [rad]. */
-void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose);
+int pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose pose[1]);
 /* The angles of a pose: roll, pitch, yaw [rad]. */
-void pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
+int pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
 /* The meaning of a return code, in words. */
 const char *pfk_what(int code);
 #if IK
@@ -64,7 +68,7 @@ int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuator
 #endif
 #if TURNS
 /* Adds whole turns to actuators that may turn more than once: nearest to those before. */
-void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS]);
+int pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real *now);
 #endif
 #if LIMITS
 /* Fills the slack of a whole pose in each of PFK_LIMITS limits, negative beyond it [length or rad]. */
@@ -74,7 +78,7 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
 /* The least distance between two links of a whole pose, negative where they overlap, and the number of their pair, from
    1; where it is less than PFK_CLEARANCE, PFK_PAIR + this number is returned. Nothing is written where legs do not
    reach or close. */
-int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair);
+int pfk_clearance(const pfk_pose *pose, pfk_real distance[1], int *pair);
 #endif
 #if BODIES
 /* Fills the displacements from home of the bodies in the list at the top, at a whole pose: what is at x at home is at
@@ -100,7 +104,7 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #endif
 #if JOINTS
 /* The pose at coordinates of the joints in series from the base to the end effector. */
-void pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose *pose);
+int pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose pose[1]);
 #endif
 #if TO_ACTUATORS
 /* Actuators at joint coordinates; nothing is written unless 0 is returned. */
@@ -112,7 +116,7 @@ int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_A
 #if CLEARANCE
 /* Where links are too near the coordinates are written too, and PFK_PAIR + the number of their pair returned. */
 #endif
-int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps);
+int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps);
 #endif
 #if RATES
 /* Return codes are those of pfk_limits without its limits; nothing is written unless 0 is returned. A crank or carriage at
@@ -143,6 +147,30 @@ int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real 
 
 #include "kernels.h"
 #include "tables.h"
+
+/* Results of a call until all are finite: what it does not write stays NaN. */
+static void pfk_unset(void *results, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i)
+        ((pfk_real *)results)[i] = (pfk_real)NAN;
+}
+
+static bool pfk_is_finite(const void *results, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i)
+        if (!(fabs(((const pfk_real *)results)[i]) < (pfk_real)INFINITY))
+            return false;
+    return true;
+}
+
+static void pfk_give(const void *results, void *to, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i)
+        ((pfk_real *)to)[i] = ((const pfk_real *)results)[i];
+}
 
 /* A pose as kernels take it. */
 static pfk_Floats2 pfk_opened(const pfk_pose *pose, pfk_real at[16])
@@ -193,7 +221,7 @@ void pfk_home(pfk_pose *pose)
     }
 }
 
-void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose *pose)
+int pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pitch, pfk_real yaw, pfk_pose pose[1])
 {
     const pfk_real cr = cos(roll), sr = sin(roll), cp = cos(pitch), sp = sin(pitch), cy = cos(yaw), sy = sin(yaw);
     pose->p[0] = x;
@@ -208,14 +236,16 @@ void pfk_pose_rpy(pfk_real x, pfk_real y, pfk_real z, pfk_real roll, pfk_real pi
     pose->R[2][0] = -sp;
     pose->R[2][1] = cp * sr;
     pose->R[2][2] = cp * cr;
+    return 0;
 }
 
-void pfk_rpy(const pfk_pose *pose, pfk_real angles[3])
+int pfk_rpy(const pfk_pose *pose, pfk_real angles[3])
 {
     const pfk_real level = sqrt(pose->R[0][0] * pose->R[0][0] + pose->R[1][0] * pose->R[1][0]);
     angles[0] = atan2(pose->R[2][1], pose->R[2][2]);
     angles[1] = atan2(-pose->R[2][0], level);
     angles[2] = atan2(pose->R[1][0], pose->R[0][0]);
+    return 0;
 }
 
 const char *pfk_what(int code)
@@ -232,6 +262,8 @@ const char *pfk_what(int code)
         return "out of reach: the nearest feasible pose";
     if (code == PFK_BUDGET)
         return "steps were spent before the search ended";
+    if (code == PFK_NOT_FINITE)
+        return "a result that is not finite";
 #if EFFORT
     if (code == PFK_GAINS_MOTION)
         return "no forces: a constraint singularity";
@@ -306,9 +338,10 @@ int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuator
 
 #endif
 #if TURNS
-void pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real now[PFK_ACTUATORS])
+int pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real *now)
 {
     pfk_put_turns(&pfk_reaching, pfk_opened_row(before, PFK_ACTUATORS), pfk_opened_row(now, PFK_ACTUATORS));
+    return 0;
 }
 
 #endif
@@ -325,7 +358,7 @@ int pfk_limits(const pfk_pose *pose, pfk_real slack[])
 
 #endif
 #if CLEARANCE
-int pfk_clearance(const pfk_pose *pose, pfk_real *distance, int *pair)
+int pfk_clearance(const pfk_pose *pose, pfk_real distance[1], int *pair)
 {
     pfk_real own[16];
     int code = (int)pfk_rest(&pfk_reaching, pfk_opened(pose, own));
@@ -377,10 +410,12 @@ int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 
 #endif
 #if JOINTS
-void pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose *pose)
+int pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose pose[1])
 {
-    pfk_walk(&pfk_series, pfk_opened_row(joints, PFK_JOINTS));
+    if (!pfk_walk(&pfk_series, pfk_opened_row(joints, PFK_JOINTS)))
+        return PFK_NO_POSE;
     pfk_close(pfk_series_pose, pose);
+    return 0;
 }
 
 #endif
@@ -402,7 +437,7 @@ int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_A
 
 #endif
 #if TO_JOINTS
-int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real joints[PFK_JOINTS], int *steps)
+int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps)
 {
     const int code = (int)pfk_put_joints(&pfk_series, &pfk_assembling, &pfk_reaching,
                                          pfk_opened_row(actuators, PFK_ACTUATORS), pfk_opened_row(joints, PFK_JOINTS));

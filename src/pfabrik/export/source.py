@@ -20,6 +20,7 @@ from ..options import Options
 from ..poses import pose
 from ..tolerances import TOLERANCES
 from .controller_tables import ControllerTables, controller_tables
+from .finite_results import with_finite_results
 from .machine_data import Machine
 from .static_data import Precision, comment, in_words, literal, table, words
 from .translated import Translated, translated
@@ -170,7 +171,7 @@ def source(
     }
     if checks is not None:
         included["checks.h"] = _checks_h(checks, _units(machine), AGREEMENT[precision])
-    text = selected(routines[routines.index("#ifndef") :], conditions)
+    text = with_finite_results(selected(routines[routines.index("#ifndef") :], conditions))
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
     body = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, made, parts, path)}\n{text}"), name, precision)
     return body.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..to_c import Unsupported
 from .machine_data import Number
 
 Precision = Literal["double", "float"]
@@ -75,9 +76,6 @@ def words(name: str, texts: Sequence[str]) -> Iterator[str]:
 PER_LINE = 120
 """Most characters of a line of numbers."""
 
-MOST = 2**31 - 1
-"""Largest integer on a controller."""
-
 NUMBERS_PER_LINE = 6
 """Most numbers of a record in a line."""
 
@@ -125,6 +123,7 @@ class StaticData:
         name = f"pfk_{path.replace('.', '_')}"
         self._arrays[id(array)] = name, array
         element = self._element(array)
+        self._require_fitting(path, array)
         if read := [field for field in array.dtype.names or () if self._is_read(f".{field}")]:
             array = array[read]
         fields = [array.dtype[field] for field in array.dtype.names or ()] or [array.dtype]
@@ -134,6 +133,12 @@ class StaticData:
         is_zero = not is_constant and not any(np.any(array[field]) for field in array.dtype.names or [()])
         declared = f"{qualifier} {element} {name}[{array.size}]"
         self.lines.append(f"{declared};" if is_zero else f"{declared} = {{\n{_values(array)}\n}};")
+
+    def _require_fitting(self, path: str, array: Any) -> None:
+        fields = [array[name] for name in array.dtype.names or ()] or [array]
+        for value in (value for field in fields if field.dtype.kind == "i" for value in np.ravel(field)):
+            if not self._program.fits(value):
+                raise Unsupported(f"{path} does not fit in an integer of {self._program.bits} bits: {value}")
 
     def _element(self, array: Any) -> str:
         return str(self._program.spell.value(self._program.type_of(array).element))
@@ -193,6 +198,6 @@ def _number(value: Any) -> str:
     if np.ndim(value):
         return "{" + ", ".join(map(_number, np.ravel(value))) + "}"
     if isinstance(value, (np.integer, int)):
-        return str(max(min(int(value), MOST), -MOST))
+        return str(int(value))
     number = float(value)
     return "INFINITY" if number == np.inf else "-INFINITY" if number == -np.inf else literal(number)

@@ -70,7 +70,7 @@ class Translated(NamedTuple):
 
 def translated(tables: ControllerTables, conditions: set[str], precision: Precision) -> Translated:
     """The kernels that a file needs, and its static data."""
-    program = Program(precision, "intptr_t", _facts(tables), _everywhere(SINGLE) if precision == "float" else {})
+    program = Program(precision, INTEGER, _facts(tables), _everywhere(SINGLE) if precision == "float" else {})
     matrix, row, number = np.zeros((0, 0)), np.zeros(0), 0
     reaching, assembling = tables.reaching, tables.assembling
     calls: list[tuple[str, Any, tuple[Any, ...]]] = [
@@ -201,9 +201,21 @@ OWN = """\
 """What the kernels of a machine need to be C++ too, and no warning."""
 
 
+INTEGER = "int_fast32_t"
+"""The C type of integers: of 32 bits on a controller, of 64 where these are as fast."""
+
+OWN_INTEGER = f"""\
+#ifndef PFK_INTEGER
+#define PFK_INTEGER {INTEGER} /* int32_t computes on any machine what a controller of 32 bits does */
+#endif
+typedef PFK_INTEGER pfk_integer;
+"""
+
+
 def _own(text: str) -> str:
     """Kernels as part of a file in C and C++."""
     text = re.sub(r"(?m)^typedef \w+ pfk_real;\n", "", text)
+    text = text.replace(f"typedef {INTEGER} pfk_integer;\n", OWN_INTEGER)
     text = re.sub(r"(?m)^ *(\w+) = \1;\n", "", text)
     text = re.sub(r"/\* Memory of one call: .*?\n\}\n", "", text, flags=re.DOTALL)
     text = re.sub(r"\((pfk_\w+)\)\{", r"PFK_MADE(\1){", text)

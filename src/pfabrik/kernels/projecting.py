@@ -44,8 +44,8 @@ ATTEMPT = np.dtype(
 )
 """One search in a log of all."""
 
-UNBOUNDED = 2**62
-"""More steps than are ever taken."""
+UNBOUNDED = 2**31 - 1
+"""More steps than are ever taken; an integer of a controller has 32 bits."""
 
 
 @routine

@@ -30,6 +30,7 @@ class File:
     ) -> None:
         self.real, self.integer, self.facts, self.tolerances = real, integer, facts or {}, tolerances or {}
         self.suffix = "f" if real == "float" else ""
+        self.bits = int(re.sub(r"\D", "", integer))  # that an integer has at least
         self.records = named_records()
         self.items: dict[str, str] = {}  # C text by the name that it declares
         self.spell = Spelling(self._declare)
@@ -56,6 +57,12 @@ class File:
         """A function in C for arguments of these types."""
         raise NotImplementedError
 
+    def fits(self, value: Any) -> bool:
+        """True if an integer, or every one in a tuple, is one of the C type; True for what is no integer."""
+        if isinstance(value, tuple):
+            return all(map(self.fits, value))
+        return self.type_of(value) != INTEGER or abs(int(value)) < 2 ** (self.bits - 1)
+
     def number(self, value: float) -> str:
         """A number as a constant of C."""
         return number(value, bool(self.suffix))
@@ -77,6 +84,8 @@ class File:
         if isinstance(t, (Array, Struct)):
             raise Unsupported(f"a global array: {name}")
         value = self.tolerances.get((module.partition(".")[2], name), value)
+        if not self.fits(value):
+            raise Unsupported(f"{name} of {module} does not fit in an integer of {self.bits} bits: {value}")
         own, short = name.lstrip("_"), module.rpartition(".")[2].upper()
         plain = [own] if len(own) > 1 else []  # a variable may have a letter as its name
         for wanted in chain(plain, [f"{own}_{short}"], (f"{own}_{short}_{k}" for k in range(2, 99))):

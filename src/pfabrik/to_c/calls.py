@@ -134,7 +134,7 @@ class Calls(Subscripts):
         if name in MATH:
             return Value(f"{name}{suffix}({inner})", REAL, **more)
         if name == "floor":
-            return Value(f"(integer)floor{suffix}({inner})", INTEGER, UNARY, **more)
+            return rounded(f"floor{suffix}({inner})", values)
         if name in ("isnan", "isfinite"):
             return Value(f"({name}({inner}) != 0)", BOOL, **more)
         raise self.fault(node, "a function of math that is not in the subset")
@@ -167,5 +167,10 @@ class Calls(Subscripts):
         if called in (int, float, bool):
             return self.cast(v, ANNOTATED[called.__name__], node)
         if called is round:
-            return Value(f"(integer)rint{suffix}({v.text})", INTEGER, UNARY, **more)
+            return rounded(f"rint{suffix}({v.text})", [v])
         raise self.fault(node, "a call of what is no part of kernels")
+
+
+def rounded(text: str, of: list[Value]) -> Value:
+    """A rounded number as an integer."""
+    return Value(f"(integer){text}", INTEGER, UNARY, rounded=text, **effects(of))

@@ -12,7 +12,7 @@ from typing import Any
 from .c_file import File
 from .flow import Flow
 from .types import BOOL, INTEGER, NUMBERS, REAL, Array, Struct, Tuple, Unsupported, join
-from .values import EQUAL, NONE, POSTFIX, UNARY, UNKNOWN, Value, c_name, conflict, effects, is_simple
+from .values import EQUAL, NONE, POSTFIX, SUM, UNARY, UNKNOWN, Value, c_name, conflict, effects, is_simple
 
 ANNOTATED = {"float": REAL, "int": INTEGER, "bool": BOOL}
 
@@ -100,6 +100,8 @@ class Expressions:
         if v.type in NUMBERS and t in NUMBERS:
             if t == REAL and v.is_constant and v.type == INTEGER and v.text.lstrip("-").isdigit():
                 return Value(self.program.number(v.constant), REAL, v.level, float(v.constant))
+            if t == REAL and v.rounded:  # without the sign of zero, which integers have not
+                return Value(f"{v.rounded} + {self.program.number(0.0)}", REAL, SUM, **more)
             constant = {REAL: float, INTEGER: int, BOOL: bool}[t](v.constant) if v.is_constant else UNKNOWN
             if t == BOOL:
                 return Value(f"{v.at(EQUAL + 1)} != 0", BOOL, EQUAL, constant, **more)
@@ -150,9 +152,16 @@ class Expressions:
     def on_Constant(self, node: ast.Constant, want: Any) -> Value:
         value = node.value
         if isinstance(value, (bool, int, float)):
-            t = self.program.type_of(value)
-            return Value(self.program.literal(value, t), t, constant=value)
+            return self.fitting(value, node)
         raise self.fault(node, "a constant that is no number")
+
+    def fitting(self, value: Any, node: ast.AST) -> Value:
+        """A number that is known; integers that C has no room for are refused."""
+        t = self.program.type_of(value)
+        if not self.program.fits(value):
+            raise self.fault(node, f"more than an integer of {self.program.bits} bits")
+        text = self.program.literal(value, t)
+        return Value(text, t, UNARY if text.startswith("-") else POSTFIX, value)
 
     def on_Name(self, node: ast.Name, want: Any) -> Value:
         name = node.id

@@ -222,10 +222,11 @@ class Operators(Expressions):
             raise self.fault(node, "a negative power of an integer")
         a, b = self.cast(a, t, node), self.cast(b, t, node)
         constant = UNKNOWN
-        if a.is_constant and b.is_constant and t == INTEGER and not isinstance(op, ast.Pow):
+        if a.is_constant and b.is_constant and t == INTEGER:
             constant = int(operate(a.constant, b.constant))
+            known = self.fitting(constant, node)
             if abs(constant) >= SMALL:  # constants of C are narrower than integers
-                return Value(self.program.literal(constant, INTEGER), INTEGER, UNARY, constant)
+                return known
         if (
             isinstance(op, (ast.FloorDiv, ast.Mod))
             and self.is_never_negative(node)

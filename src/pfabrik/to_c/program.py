@@ -90,7 +90,8 @@ class Program(File):
 
     Parameters
     ----------
-    real, integer : C types of numbers: `double` or `float`; `int64_t`, or `intptr_t` for a controller.
+    real, integer : C types of numbers: `double` or `float`; `int64_t`, or `int_fast32_t` for a controller. Constants
+        that do not fit in the bits that the name of the integer has are refused.
     facts : what is known of the tables that the code is for: values of an integer field, by the names of its record and
         of itself, or lengths of an array, by its NamedTuple and its field. Code that no value reaches is left out.
     tolerances : values of constants that single precision needs, by module, without the package, and name.
