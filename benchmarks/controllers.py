@@ -270,7 +270,7 @@ def main() -> int:
                 is_wrong |= differ > 0 or n_nearest == 0 or above > TOLERANCE[precision]
                 of = f"IK {counts(said, 3)}, FK {counts(said, 4)}, nearest {counts(said, 5)}"
                 print(
-                    f"  {precision:<6} statuses that differ {differ}, nearest poses {n_nearest}, farther by {above:.1e} L;"
+                    f"  {precision:<6} statuses that differ {differ}, nearest {n_nearest}, farther by {above:.1e} L;"
                     f" instructions {of}"
                 )
     return int(is_wrong)

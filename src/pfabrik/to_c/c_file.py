@@ -61,7 +61,7 @@ class File:
         """True if an integer, or every one in a tuple, is one of the C type; True for what is no integer."""
         if isinstance(value, tuple):
             return all(map(self.fits, value))
-        return self.type_of(value) != INTEGER or abs(int(value)) < 2 ** (self.bits - 1)
+        return bool(self.type_of(value) != INTEGER or abs(int(value)) < 2 ** (self.bits - 1))
 
     def number(self, value: float) -> str:
         """A number as a constant of C."""
