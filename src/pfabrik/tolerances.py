@@ -34,7 +34,7 @@ class Tolerances:
         1e-3 of what should follow from others.
     implied : singular value [L and rad] up to which a condition of the loops at home follows from the others exactly:
         rounding leaves 1e-15. From 1e-11 on, searches for nearest poses take conditions that miss each other for ones
-        to keep, and stop early.
+        to keep, and stop early: rods of a pair that differ by more are different rods, and may turn the platform.
     independent : conditioning [L and rad] below which coordinates of a task hardly vary independently: in machines that
         are made to set them they have 0.3 and more, and parasitic motions leave a few hundredths.
     speed : share by which an actuator may be faster than its limit: a path that just keeps it must not be refused for

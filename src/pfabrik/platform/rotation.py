@@ -34,7 +34,7 @@ def keeps_rotation(model: Model) -> bool:
     rows, slopes = constraints_at(model.legs, _shifted_about_home(model.legs))
     if not len(rows):
         return False
-    is_kept = np.abs(rows).max(initial=0.0) <= TOLERANCES.position
+    is_kept = _holds_in_shifts(rows, slopes).all()
     return bool(is_kept and (np.linalg.svd(slopes[:, :, 3:])[1][:, -1] > TOLERANCES.nearly_implied).all())
 
 
@@ -69,7 +69,7 @@ def without_idle_legs(table: LegTable) -> TableHandle:
     values, slopes = constraints_at(table, _shifted_about_home(table))
     if not len(values):
         return search_table(table)
-    is_idle = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0) <= TOLERANCES.implied
+    is_idle = _holds_in_shifts(values, slopes)
     row_ends = np.append(legs["first_row"][1:], rows)
     limited = np.concatenate([table.limited["leg"], table.driven["leg"]])
     cones, first_leg = table.cones.copy(), 0
@@ -82,6 +82,15 @@ def without_idle_legs(table: LegTable) -> TableHandle:
             legs["kind"][k], legs["has_proximal"][k] = K.IDLE, 0
             cones["leg"][cones["leg"] == k] = first_leg
     return Handle(kernel_table(table)._replace(legs=legs, cones=with_pointing_cones(legs, cones[_is_tightest(cones)])))
+
+
+def _holds_in_shifts(values: Floats, slopes: Floats) -> Mask:
+    """Mask of the constraints (rows,) that hold wherever a platform that does not turn is, by samples around home.
+
+    By their slopes, too: of what they leave open far away these tell more than values near home.
+    """
+    left_open = np.maximum(np.abs(values), np.abs(slopes[:, :, :3]).max(axis=2)).max(axis=0)
+    return np.asarray(left_open <= TOLERANCES.implied)
 
 
 def _is_tightest(cones: NDArray[np.void]) -> Mask:
