@@ -70,7 +70,7 @@ class TorquePath:
         if len(bad):
             what, places = f"no torques: {reasons[bad[0]]}", np.unique(steps[bad])[:5].tolist()
             raise InvalidArgument("track", what, "a path that its actuators hold", rows=places)
-        moved = found.actuators - found.resting - self._drives.rubbed(rows.rates)
+        moved = found.actuators - found.resting - self._drives.rubbed(rows.rates, found.signs)
         masses = (in_si(mechanism, "actuators", found.matrices) * self._drives.si).reshape(len(s), -1)
         columns = np.hstack([masses, moved, found.resting])
         self.names, self.limits, self._limits, self._motions = mechanism.actuator_names, limits, limits, 0
@@ -92,7 +92,8 @@ class TorquePath:
         by_push, more = (np.einsum("nab,nb->na", masses, x) for x in (slopes, bends))
         dry, viscous = drives.friction.T
         most = np.broadcast_to(self._limits, slopes.shape)
-        own = TorqueParts(by_push, by_speed + more, slopes * (viscous * drives.si), rest + dry * np.sign(slopes), most)
+        rest += dry * drives.signs(slopes)
+        own = TorqueParts(by_push, by_speed + more, slopes * (viscous * drives.si), rest, most)
         return self._together(own, minors) if self._motions else own
 
     def _together(self, own: TorqueParts, minors: Floats) -> TorqueParts:
