@@ -93,8 +93,9 @@ def inverse_dynamics(
         exerted[over] = within_limits(least, found.motions[over], both)[0] / drives.units
     for each in (exerted, found.rates, found.gains, found.signs):
         each[has_reason(reasons)] = np.nan
-    parts = (shaped(each, shape) for each in (exerted, found.rates, found.gains, found.signs == 0.0))
-    return Efforts(*parts, rows.times, is_redundant, in_shape(reasons, shape), rows)
+    exerted, rates, gains = (shaped(each, shape) for each in (exerted, found.rates, found.gains))
+    at_rest, reason = shaped(found.signs == 0.0, shape), in_shape(reasons, shape)
+    return Efforts(exerted, rates, gains, at_rest, rows.times, is_redundant, reason, rows)
 
 
 def reasons_of(solution: Solution, marks: Ints) -> Reasons:
