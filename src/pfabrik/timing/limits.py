@@ -143,7 +143,8 @@ def exceeded(curve: Curve, pace: Pace, limits: Limits, actuators: tuple[str, ...
     found: dict[int, Exceeded] = {}
     durations = np.zeros(len(named))
     signs = np.sign(curve.at(pace.s, 1)[:, : curve.n_actuators])
-    turns_back = (signs[1:] != signs[:-1]).any(axis=1)
+    rubs = False if limits.path is None else limits.path.rubs
+    turns_back = ((signs[1:] != signs[:-1]) & rubs).any(axis=1)
     for first in range(0, len(turns_back), CELLS_A_BLOCK):
         cells = np.arange(first, min(first + CELLS_A_BLOCK, len(turns_back)))
         is_over = (_used(curve, pace, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))

@@ -66,7 +66,8 @@ def time_path(
         The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
         `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
         are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline. Redundant
-        actuators share what they do in any way that keeps their limits: at these are several at once.
+        actuators share what they do in any way that keeps their limits: at these are several at once. What the timing
+        exceeds is in `exceeded`.
     loads : mapping of str to tuple, optional
         For torques, as in `inverse_dynamics`.
     gravity : array (3,), optional

@@ -100,6 +100,7 @@ class TorquePath:
     s : the places.
     names : of the actuators; where they are redundant, of those that are at their limits together.
     limits : of the first of these [N m, N].
+    rubs : True for actuators with dry friction, (n_a,).
     """
 
     def __init__(self, limits: Floats, source: TorqueSource, s: Floats, samples: TorqueSamples | None = None) -> None:
@@ -113,6 +114,7 @@ class TorquePath:
         self._source, self._samples = source, samples or source.at(s)
         self.s, self._limits, self._drives, self._motions = s, limits, drives_of(mechanism), self._samples.motions
         self.names, self.limits, columns, minors = mechanism.actuator_names, limits, *self._samples[:2]
+        self.rubs = self._drives.friction[:, 0] > 0.0
         if self._motions:
             minors = along(minors)
             columns = np.hstack([columns, minors])
