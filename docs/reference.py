@@ -114,7 +114,7 @@ PAGES = {
         "`read_path` makes targets of a table or of G-code, which `track` follows; `time_path` is how fast that "
         "may be. `platform_speed` is the highest speed at one configuration.",
         "read_path time_path Timed platform_speed PlatformSpeed",
-        "paths.path.Path timing.platform_speed.PlatformSpeeds",
+        "paths.path.Path timing.platform_speed.PlatformSpeeds timing.timed.Exceeded",
     ),
     "controllers": Page(
         "Controllers and learning",

@@ -201,7 +201,7 @@ def test_json_of_check_and_time_is_one_object() -> None:
     assert not found["ok"] and len(found["faults"]) == 5
     assert printed_json("info hundred_legs.toml")["mobility"] is None
     timed = printed_json("time linear_delta edge.csv --speed 300")
-    assert set(timed) == {"duration", "samples", "held_back"}
+    assert set(timed) == {"duration", "samples", "held_back", "exceeded"}
 
 
 # Numbers

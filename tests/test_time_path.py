@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from command import pfabrik
 from machines import closure, planar
 from pfabrik.arrays import Floats
 from pfabrik.description.task import task_of
@@ -110,6 +112,7 @@ def test_limits_are_kept_between_steps_that_zigzag(speed: float | None, accelera
     most_speed, most_acceleration = (np.inf if most is None else KEPT * most for most in (speed, acceleration))
     assert np.abs(timed.rates).max() <= most_speed
     assert np.abs(timed.accelerations).max() <= most_acceleration
+    assert timed.exceeded == ()
     velocities = np.diff(timed.actuators, axis=0)[:-1] * 50_000  # what the samples say themselves
     assert np.abs(velocities).max() <= most_speed
     assert np.abs(np.diff(velocities, axis=0)).max() * 50_000 <= 1.001 * most_acceleration
@@ -443,3 +446,66 @@ def test_limits_of_torque_that_no_timing_keeps_are_refused() -> None:
     )
     with pytest.raises(InvalidArgument, match="without max_speed"):  # without masses, motors of a file say nothing
         pf.time_path(pf.track(limited, track.pose))
+
+
+def wound(machine: pf.Mechanism, turns: int, count: int, noise: float) -> pf.Track:
+    """Turns of all actuators around home, in phases of their own."""
+    random, units = np.random.default_rng(1), actuator_units(machine)
+    home, phases = pf.solve_ik(machine, machine.home_pose).actuators, random.uniform(0.0, 6.0, len(units))
+    angles = np.linspace(0.0, 2.0 * np.pi * turns, count)[:, None] * np.linspace(1.0, 1.5, len(units))
+    offsets = 0.05 * (np.sin(angles + phases) - np.sin(phases)) + noise * random.standard_normal((count, len(units)))
+    return pf.track(machine, pf.solve_fk(machine, home + offsets * units).pose)
+
+
+@pytest.mark.parametrize(
+    ("name", "friction", "turns", "count", "noise", "is_kept"),
+    [
+        ("five_bar", (0.0, 0.0), 3, 80, 1e-3, True),
+        ("five_bar", (0.0, 0.0), 20, 400, 0.0, False),  # torques change more between its steps than splines do
+        ("five_bar", (0.0, 0.0), 5, 2000, 1e-5, False),  # and so do they within them, of so short ones
+        ("five_bar", (0.05, 0.01), 3, 80, 1e-4, False),  # dry friction leaps where an actuator turns back
+        ("linear_delta", (0.0, 0.0), 3, 80, 1e-3, True),
+    ],
+)
+def test_what_a_timing_exceeds_is_what_inverse_dynamics_measures_there(
+    name: str, friction: tuple[float, float], turns: int, count: int, noise: float, is_kept: bool
+) -> None:
+    track = wound(heavy(name, friction), turns, count, noise)
+    machine, rest = track.mechanism, np.zeros(3 if name == "five_bar" else 6)
+    most = 1.5 * np.abs(pf.inverse_dynamics(track, twists=rest).actuators).max()
+    timed = pf.time_path(track, torque=most)
+    assert (timed.exceeded == ()) == is_kept
+    assert ("exceeds its limit of torque by" in str(timed)) != is_kept
+    shares = measured(track, most, 8_000.0 / timed.duration)
+    assert shares.max() <= (timed.exceeded[0].share if timed.exceeded else 1.0 + 1e-3) + 1e-4
+    for each in timed.exceeded:
+        place, samples = machine.actuator_names.index(each.actuator), 20 + int(10.0 * each.time)
+        sides = [
+            measured(track, most, samples / (each.time * (1.0 + side)))[samples, place] for side in (-1e-8, 1e-8)
+        ]  # of where s'' or friction leaps
+        assert max(sides) == pytest.approx(each.share, abs=1e-4)
+        assert each.what == "torque" and each.share > 1.001
+        assert 0.0 < each.duration < 0.2 * timed.duration
+        assert timed.steps[np.searchsorted(timed.times, each.time) - 1] <= each.step
+
+
+def measured(track: pf.Track, most: float, rate: float) -> Floats:
+    """Shares of a limit of torque that actuators exert in samples of a rate; none in those at rest."""
+    efforts = pf.inverse_dynamics(pf.time_path(track, torque=most, rate=rate))
+    return np.abs(np.where(efforts.at_rest.any(axis=1, keepdims=True), 0.0, efforts.actuators)) / most
+
+
+def test_the_command_says_what_is_exceeded(tmp_path: Path) -> None:
+    machine = heavy("five_bar")
+    pf.save(machine, tmp_path / "m.toml")
+    track = wound(machine, 20, 400, 0.0)
+    np.savetxt(tmp_path / "path.csv", track.pose[:, :3, 3], "%.17g", ",", header="x,y,z", comments="")
+    most = float(1.5 * np.abs(pf.inverse_dynamics(track, twists=np.zeros(3)).actuators).max())
+    line = f"time {tmp_path / 'm.toml'} {tmp_path / 'path.csv'} --torque {most!r}"
+    said = pfabrik(line)
+    assert said.exit_code == 0, said.output
+    exceeded = pf.time_path(track, torque=most).exceeded
+    assert [line.split(", at")[0] for line in said.stdout.splitlines() if "exceeds" in line] == [
+        f"{each.actuator} exceeds its limit of torque by {each.share - 1.0:.2%}" for each in exceeded
+    ]
+    assert json.loads(pfabrik(f"{line} --json").stdout)["exceeded"][0]["step"] == exceeded[0].step

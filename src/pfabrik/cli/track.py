@@ -294,8 +294,8 @@ def time(
     """Find the fastest way along a path.
 
     PATH is a CSV file or G-code; - is standard input. Every actuator stays within its speed, acceleration and torque;
-    at both ends the machine is at rest. A path with steps that are not reached, that leaps or crosses a parallel
-    singularity is refused.
+    where a torque does not, on a long or rough path, the answer says by how much. At both ends the machine is at rest.
+    A path with steps that are not reached, that leaps or crosses a parallel singularity is refused.
 
     Torques move the masses of the file [kg], and those of --load; gravity is in m/s².
     """

@@ -153,8 +153,8 @@ class Joint:
         coordinate: on that, gear² times the inertia acts. Without a gear it is that of the coordinate, of a slide a
         mass [kg].
     friction : tuple of float or None
-        Friction of the coordinate, dry and viscous: a force against the motion [N m, N], and one per speed
-        [N m s/rad, N s/m]; two such pairs where a C has both driven.
+        Friction of the coordinate, dry and viscous: a force against the motion [N m, N], none at rest, and one per
+        speed [N m s/rad, N s/m]; two such pairs where a C has both driven.
     """
 
     name: str

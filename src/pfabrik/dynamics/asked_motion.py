@@ -13,7 +13,9 @@ from ..arguments import array
 from ..arrays import Floats
 from ..checks import require_choice
 from ..errors import InvalidArgument
+from ..kinematics import actuator_units
 from ..rotations import to_rotvec
+from ..tolerances import TOLERANCES
 from .moving_rows import MovingRows
 
 NEIGHBOURS = 5
@@ -47,7 +49,8 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
         return MovingRows(motion.solution, "actuators", motion.rates, motion.accelerations, motion.times)
     solution = checked_solution(motion)
     if isinstance(motion, Track) and not is_given:
-        return MovingRows(motion, "path", *motion_of(motion), motion.times)
+        rates, gains, still = motion_of(motion)
+        return MovingRows(motion, "path", rates, gains, motion.times, still)
     n, n_a = len(solution._rows.status), len(solution.mechanism.actuator_names)
     forms, width = (f"... {n_a}", n_a) if at == "actuators" else ("... 6 | ... 3", 6)
     values = []
@@ -63,10 +66,12 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
     return MovingRows(solution, at, values[0], values[1], motion.times if isinstance(motion, Track) else None)
 
 
-def motion_of(track: Track) -> tuple[Floats, Floats]:
+def motion_of(track: Track) -> tuple[Floats, Floats, Floats]:
     """Rates and accelerations of a path with times, (n, r + n_a) each: of its end effector, and of its actuators.
 
-    In the machine's units; those of the polynomial through each step and its neighbours, as the times have them.
+    In the machine's units; those of the polynomial through each step and its neighbours, as the times have them. Also
+    the rates up to which actuators are at rest, (n, n_a): what the tolerance of positions makes of none, and any where
+    an actuator is in one place for three steps on end.
 
     Raises
     ------
@@ -93,4 +98,10 @@ def motion_of(track: Track) -> tuple[Floats, Floats]:
         values.append(to_rotvec(turns))  # from the step itself: so their second derivative is its acceleration
     along = np.concatenate([*values, track.actuators[windows]], axis=-1)
     first, second = (np.einsum("nk,nkv->nv", powers[:, p], along) for p in (1, 2))
-    return first / span[:, None], 2.0 * second / span[:, None] ** 2
+    same = TOLERANCES.position * actuator_units(mechanism)
+    still = np.outer(np.abs(powers[:, 1]).sum(axis=1) / span, same)
+    stays = np.abs(np.diff(track.actuators, axis=0)) <= same
+    stays = stays[1:] & stays[:-1]
+    for place in range(3):
+        still[place : len(still) - 2 + place][stays] = np.inf
+    return first / span[:, None], 2.0 * second / span[:, None] ** 2, still

@@ -13,7 +13,7 @@ from ..arrays import Floats, Mask, as_plain, shaped
 from ..cells import CsvWriter
 from ..description.mechanism import Mechanism
 from ..drawing import curves_over_time
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, counted
 from ..frozen import FrozenMapping
 from ..kinematics import readouts
 from ..printed import Printed, ResultTable, plain
@@ -39,6 +39,9 @@ class Efforts(Printed):
         drives it up. NaN where `reason` says why.
     rates, accelerations : array (..., n_a)
         Those of the actuators [length or rad, per s and per s²].
+    at_rest : array of bool (..., n_a)
+        True for actuators that stand still, to rounding: dry friction counts as 0 there, and may be anything up to its
+        size.
     power : array (..., n_a)
         What each actuator gives to the machine, negative where it brakes [W].
     times : array (n,) or None
@@ -55,6 +58,7 @@ class Efforts(Printed):
     actuators: Floats
     rates: Floats
     accelerations: Floats
+    at_rest: Mask
     times: Floats | None
     is_least_norm: bool
     reason: str | Reasons
@@ -121,10 +125,22 @@ class Efforts(Printed):
             rows.append(cells)
         if np.isfinite(limits).any():
             header.append("of its limit")
-        remarks = []
+        remarks = self._resting
         if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
-            remarks = [f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s"]
+            remarks.append(f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s")
         return ResultTable(self._mechanism.name, lines, header, rows, remarks)
+
+    @property
+    def _resting(self) -> list[str]:
+        """What dry friction at rest may be, a sentence if there is any."""
+        names, units, dry = self._mechanism.actuator_names, self._drives.forces, self._drives.friction[:, 0]
+        counts = np.reshape(self.at_rest, (-1, len(names))).sum(axis=0)
+        where: dict[str, list[str]] = {}
+        for place in np.flatnonzero((counts > 0) & (dry > 0.0)):
+            rows = "" if np.ndim(self.actuators) == 1 else f", in {counted(int(counts[place]), 'row')}"
+            where.setdefault(f"{dry[place]:.6g} {units[place]}{rows}", []).append(names[place])
+        most = "; ".join(f"{', '.join(actuators)} ({size})" for size, actuators in where.items())
+        return [f"at rest dry friction counts as 0, and may be up to its size either way: {most}"] * bool(where)
 
     def to_dict(self) -> dict[str, Any]:
         """Its fields, with power and energy, as plain numbers, lists and texts, ready for JSON."""

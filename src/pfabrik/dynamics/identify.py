@@ -60,7 +60,8 @@ def identify(
         or configurations with rates and accelerations, of the actuators for example. At rest, efforts of gravity say
         what they can.
     efforts : array (n, n_a)
-        Force or torque that each actuator exerted [N, N m], at each row of the motion; rows with NaN are left out, and
+        Force or torque that each actuator exerted [N, N m], at each row of the motion; rows with NaN are left out, as
+        those of pauses should be, where an actuator with dry friction may exert anything up to that besides, and
         the first and last two steps of a track, whose accelerations are the least exact.
     twists, accelerations : array (..., 6) or (..., 3), optional
         How configurations move, as in `inverse_dynamics`; with `at` "actuators", (..., n_a).

@@ -44,6 +44,11 @@ def inverse_dynamics(
     Parts that neither the end effector nor an actuator holds, such as a rod that spins between two ball joints, have
     no momentum along the motions that are left to them, and move on as the forces on them will.
 
+    Dry friction acts against the rate of its actuator. At rest it counts as 0, and may be anything up to its size:
+    `at_rest` says where. At rest is what rounding makes of it: rates up to 1e-8 L/s or rad/s, or 1e-8 of the fastest
+    actuator's; on a path with times also those that places exact to 1e-9 L or rad do not tell from 0, and all steps of
+    an actuator that stays within that for three on end.
+
     Parameters
     ----------
     motion : Solution or Track or Timed
@@ -86,9 +91,11 @@ def inverse_dynamics(
         limits = drives.limits * drives.units
         least, both = exerted[over] * drives.units, np.stack([-limits, limits], axis=1)
         exerted[over] = within_limits(least, found.motions[over], both)[0] / drives.units
-    exerted[has_reason(reasons)] = found.rates[has_reason(reasons)] = found.gains[has_reason(reasons)] = np.nan
+    for each in (exerted, found.rates, found.gains, found.signs):
+        each[has_reason(reasons)] = np.nan
     exerted, rates, gains = (shaped(each, shape) for each in (exerted, found.rates, found.gains))
-    return Efforts(exerted, rates, gains, rows.times, is_redundant, in_shape(reasons, shape), rows)
+    at_rest, reason = shaped(found.signs == 0.0, shape), in_shape(reasons, shape)
+    return Efforts(exerted, rates, gains, at_rest, rows.times, is_redundant, reason, rows)
 
 
 def reasons_of(solution: Solution, marks: Ints) -> Reasons:

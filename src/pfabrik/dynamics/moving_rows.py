@@ -45,6 +45,8 @@ class MovingRows:
     at : of what rates and accelerations are.
     rates, gains : (n, k), in the machine's units; of a task, twists and accelerations, (n, 6). None is rest.
     times : of the rows of a path, (n,) [s].
+    still : rates up to which actuators are at rest, by how exactly their places are known, (n, n_a), in the machine's
+        units.
     gravity : (3,) [m/s²].
     """
 
@@ -53,6 +55,7 @@ class MovingRows:
     rates: Floats | None = None
     gains: Floats | None = None
     times: Floats | None = None
+    still: Floats | None = None
     weights: Weights = field(default_factory=Weights)
     gravity: Floats = field(default_factory=lambda: np.zeros(3))
 
@@ -75,19 +78,20 @@ class MovingRows:
         )
         if self.at == "task":
             rates, gains = ((axes[..., : len(units)] @ x[..., None])[..., 0].copy() for x in (rates, gains))
-        found = new_exerted(moving, n, k, requests)
+        found, drives = new_exerted(moving, n, k, requests), actuator_units(mechanism)
+        still = np.zeros((0, len(drives))) if self.still is None else self.still / drives
         machine, scratch = Handle(moving), Scratch(new_moving_scratch, moving, k)
         coordinates = q / rate_units(mechanism)
 
         def run(block: slice) -> None:
             own = take(found, block) if n > ROWS_A_BLOCK else found
-            rows = coordinates[block], axes[block], rates[block], gains[block]
+            rows = coordinates[block], axes[block], rates[block], gains[block], still[block]
             inverse_dynamics(machine.address, scratch.address, *rows, own)
 
         in_blocks(run, n, ROWS_A_BLOCK)
-        length, units = mechanism.characteristic_length, actuator_units(mechanism)
+        length = mechanism.characteristic_length
         scale = length**2 * metres_of(mechanism.length_unit)
-        return found._replace(rates=found.rates * units, gains=found.gains * units, wrenches=found.wrenches * scale)
+        return found._replace(rates=found.rates * drives, gains=found.gains * drives, wrenches=found.wrenches * scale)
 
 
 def axes_of(mechanism: Mechanism, at: At, poses: Floats) -> Floats:

@@ -63,7 +63,7 @@ class EffortRows(NamedTuple):
     ----------
     described : of the machine as it is described, (n, n_a).
     by_bodies : by the parameters of bodies, (n, n_a, 10 b).
-    rates, gains : of the actuators, and their accelerations, (n, n_a).
+    rates, gains, signs : of the actuators, their accelerations, and the signs of their rates, 0 at rest, (n, n_a).
     motions : those that the loops allow the actuators, (n, n_a, d).
     is_good : False where the actuators do not hold the machine, or it does not move so, (n,).
     """
@@ -72,6 +72,7 @@ class EffortRows(NamedTuple):
     by_bodies: Floats
     rates: Floats
     gains: Floats
+    signs: Floats
     motions: Floats
     is_good: Mask
 
@@ -87,4 +88,4 @@ def effort_rows(rows: MovingRows, scales: BodyScales) -> EffortRows:
     columns = (by_places @ of_places.T / scales.units).reshape(*found.rates.shape, -1)
     si, is_good = drives_of(mechanism).si, (found.marks & ~FREE_PART) == 0
     motions = found.motions * (si * actuator_units(mechanism))[:, None]
-    return EffortRows(found.actuators, columns, found.rates * si, found.gains * si, motions, is_good)
+    return EffortRows(found.actuators, columns, found.rates * si, found.gains * si, found.signs, motions, is_good)

@@ -22,7 +22,7 @@ def transmitted(rows: MovingRows, exerted: Floats) -> tuple[Floats, Mask]:
     mechanism, weights, found = rows.solution.mechanism, rows.weights, rows.efforts(["wrenches"])
     drives, paths = drives_of(mechanism), tree_of(mechanism).paths
     by_body = np.reshape([paths[body] for body in (*weights.bodies, *weights.loaded)], (-1, len(mechanism.joints)))
-    given = exerted - drives.taken(found.rates, found.gains)
+    given = exerted - drives.taken(found.rates, found.gains, found.signs)
     reactions = np.full((len(given), len(mechanism.joints), 6), np.nan)
     is_open = np.zeros(reactions.shape, bool)
     has_answer = np.flatnonzero(~np.isnan(given).any(axis=1))

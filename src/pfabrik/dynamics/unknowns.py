@@ -95,7 +95,7 @@ class Unknowns:
 
     def columns(self, rows: EffortRows) -> Floats:
         """Efforts by scaled parameters, (n, n_a, p)."""
-        moves = {"dry": np.sign(rows.rates), "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
+        moves = {"dry": rows.signs, "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
         own = [moves[kind][..., None] * np.eye(len(self.gears)) for kind in self.kinds]
         return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ self.by_scaled)
 

@@ -47,6 +47,7 @@ SINGLE = {
     ("kernels.closure.first_order", "ORTHOGONAL"): 1e-6,
     ("kernels.closure.first_order", "NEARLY"): 1e-3,
     ("kernels.controller.rates", "RANK"): 1e-5,
+    ("kernels.dynamics.signs", "STILL"): 1e-5,
     ("kernels.controller.joints_in_series", "FITTED"): 1e-6,
     ("kernels.controller.joints_in_series", "NEARLY_FITTED"): 1e-5,
 }

@@ -18,6 +18,7 @@ from .closure.joint_tables import Answered
 from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Objective, PoseObjective
 from .dynamics.inverse_dynamics import inverse_dynamics
 from .dynamics.moving import Exerted
+from .dynamics.signs import signs_of
 from .home import measure_home
 from .lattice import join, number_points
 from .legs.answer import answer
@@ -86,7 +87,8 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (rates, (*_values("i i"), _FIRST_ORDER_PLAN, *_values("F2"), _FIRST_ORDER)),
     (feasibility, tuple(_values("i F3 F3 F2 f1 i1 f2"))),
     (read_targets, tuple(_values("i F3 F3 f2"))),
-    (inverse_dynamics, (*_values("i i F2 F3 F2 F2"), Exerted(*_values("f2 f2 f2 i1 f3 f2 f3 f3 f2 f3")))),
+    (inverse_dynamics, (*_values("i i F2 F3 F2 F2 F2"), Exerted(*_values("f2 f2 f2 f2 i1 f3 f2 f3 f3 f2 f3")))),
+    (signs_of, tuple(_values("F2 f2"))),
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
     (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
     (assemble, tuple(_values("i i F2 i b i1 f2 f3 f2 f2 f2"))),

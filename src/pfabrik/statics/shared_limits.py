@@ -26,8 +26,8 @@ MOST_FACETS = 500
 """Most pairs of half-spaces that a path is given."""
 
 
-def minors_along(solution: Solution, doing: str) -> tuple[Floats, int]:
-    """The minors of A at the places of a path, (n, C(n_a, d)), with one sign throughout, and d.
+def minors_of(solution: Solution, doing: str) -> tuple[Floats, int]:
+    """The minors of A, (n, C(n_a, d)), each row but for its sign, and d.
 
     Raises
     ------
@@ -39,9 +39,13 @@ def minors_along(solution: Solution, doing: str) -> tuple[Floats, int]:
     if comb(n_a, d - 1) > MOST_FACETS:
         raise UnsupportedMechanism(mechanism.name, [f"{n_a} actuators share {d} motions in too many ways"], doing)
     rows = np.array(list(combinations(range(n_a), d)))
-    minors = np.linalg.det(np.linalg.qr(rates)[0][:, rows])
+    return np.asarray(np.linalg.det(np.linalg.qr(rates)[0][:, rows])), d
+
+
+def along(minors: Floats) -> Floats:
+    """Minors at the places of a path (n, k), with one sign throughout."""
     turned = np.where(np.einsum("nk,nk->n", minors[1:], minors[:-1]) < 0.0, -1.0, 1.0)
-    return minors * np.cumprod(np.append(1.0, turned))[:, None], d
+    return np.asarray(minors * np.cumprod(np.append(1.0, turned))[:, None])
 
 
 def facets_of(minors: Floats, n_a: int, d: int) -> Iterator[tuple[tuple[int, ...], Floats]]:

@@ -19,9 +19,6 @@ FINEST, FEWEST = 20_000, 2
 """Grid points that a path is given at least, and each of its steps: that speeds are kept between them too costs less
 than 1e-3 of the time."""
 
-STANDS = 1e-9
-"""Motion [L or rad] below which two steps are the same place."""
-
 
 @dataclass(frozen=True)
 class Spline:
@@ -101,7 +98,7 @@ def curve_of(track: Track) -> Curve:
     """The curve through a path."""
     mechanism = track.mechanism
     moves = np.linalg.norm(np.diff(track.actuators, axis=0) / actuator_units(mechanism), axis=1)
-    steps = np.concatenate([[0], 1 + np.flatnonzero(moves > STANDS)])
+    steps = np.concatenate([[0], 1 + np.flatnonzero(moves > TOLERANCES.position)])
     s = np.concatenate([[0.0], np.cumsum(moves[steps[1:] - 1])])
     poses = np.ascontiguousarray(track.pose[steps])
     values = np.ascontiguousarray(np.concatenate([track.actuators[steps], poses[:, :3, 3]], axis=1))

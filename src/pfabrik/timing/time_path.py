@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..answers.solution import Solution
 from ..answers.tracked import Track, refuse_leaps
 from ..arrays import Floats
 from ..checks import put_limits, require_positive, require_type
@@ -22,8 +22,9 @@ from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from ..tolerances import TOLERANCES
 from .curve import Curve, curve_of, refuse_crossings
-from .timed import Timed, What
-from .torque_path import TorqueParts, TorquePath
+from .limits import Limits, Pace, exceeded, motion_at, with_exact_torques
+from .timed import Timed
+from .torque_path import TorqueParts, TorquePath, TorqueSource
 
 MOST_SAMPLES = 10_000_000
 
@@ -65,7 +66,8 @@ def time_path(
         The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
         `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
         are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline. Redundant
-        actuators share what they do in any way that keeps their limits: at these are several at once.
+        actuators share what they do in any way that keeps their limits: at these are several at once. What the timing
+        exceeds is in `exceeded`.
     loads : mapping of str to tuple, optional
         For torques, as in `inverse_dynamics`.
     gravity : array (3,), optional
@@ -104,25 +106,9 @@ def time_path(
         raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
     refuse_crossings(track)
     refuse_swings(track, curve)
-    limits = _Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
-    s, x = _fastest(curve, limits)
-    return _sampled(track, curve, s, x, limits, every)
-
-
-class _Limits(NamedTuple):
-    """What a timing keeps.
-
-    Attributes
-    ----------
-    speeds, accelerations, torques : of the actuators, (n_a,); platform : the highest speed of the reference point.
-    path : the torques along the path.
-    """
-
-    speeds: Floats
-    accelerations: Floats
-    platform: float
-    torques: Floats
-    path: TorquePath | None
+    limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
+    pace = _fastest(curve, limits)
+    return _sampled(track, curve, pace, with_exact_torques(curve, pace, limits), every)
 
 
 def _torques(
@@ -131,14 +117,19 @@ def _torques(
     """The torques along a path; None where none is limited."""
     if not np.isfinite(limits).any():
         return None
-    mechanism, s, n = track.mechanism, curve.grid(TORQUE_PLACES, 1), curve.n_actuators
-    values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
-    steps = curve.step_of(s)
-    is_finer = len(s) > len(curve.s)
-    solution = solve_fk(mechanism, values, start=track[steps]) if is_finer else track[curve.steps]
+    mechanism, n = track.mechanism, curve.n_actuators
     weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
-    rows = MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
-    return TorquePath(rows, s, steps, limits)
+
+    def rows_at(s: Floats) -> MovingRows:
+        values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
+        if np.array_equal(s, curve.s):
+            solution: Solution = track[curve.steps]
+        else:
+            solution = solve_fk(mechanism, values, start=track[curve.step_of(s)])
+        return MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
+
+    source = TorqueSource(mechanism, rows_at, curve.step_of)
+    return TorquePath(limits, source, curve.grid(TORQUE_PLACES, 1))
 
 
 def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
@@ -164,8 +155,8 @@ def refuse_swings(track: Track, curve: Curve) -> None:
         raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
 
 
-def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
-    """A grid along s and the largest squared speeds there."""
+def _fastest(curve: Curve, limits: Limits) -> Pace:
+    """The largest squared speeds on a grid along s."""
     s = curve.grid()
     slopes, bends = curve.at(s, 1), curve.at(s, 2)
     n, shares = curve.n_actuators, np.empty(len(s) - 1)
@@ -193,7 +184,12 @@ def _fastest(curve: Curve, limits: _Limits) -> tuple[Floats, Floats]:
         slower = np.where(shares > 1.0, shares, 0.0) ** 2
         slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
         caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
-    return s, x / max(1.0, shares.max())
+    pace = Pace(s, x / max(1.0, shares.max()))
+    stuck = pace.speeds[1:] + pace.speeds[:-1] <= 0.0
+    if stuck.any():
+        rows = curve.step_of(s[:-1][stuck])[:5].tolist()
+        raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=rows)
+    return pace
 
 
 def _beside(one: Floats, other: Floats) -> Floats:
@@ -214,46 +210,29 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
 
-def _sampled(track: Track, curve: Curve, s: Floats, x: Floats, limits: _Limits, every: float) -> Timed:
+def _sampled(track: Track, curve: Curve, pace: Pace, limits: Limits, every: float) -> Timed:
     """Samples at a rate, and at the very end."""
-    steps, mean = np.diff(s), 0.5 * (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
-    if not (mean > 0.0).all():
-        stuck = curve.step_of(s[:-1][mean <= 0.0])
-        raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=stuck[:5].tolist())
-    reached = np.concatenate([[0.0], np.cumsum(steps / mean)])
+    reached, names = pace.reached, track.mechanism.actuator_names
     if reached[-1] / every > MOST_SAMPLES:
         found = f"{1.0 / every:g} samples per second for {reached[-1]:g} s"
         raise InvalidArgument("rate", found, f"at most {MOST_SAMPLES} samples")
     times = np.arange(0.0, reached[-1], every)
     times = np.append(times[times < reached[-1] - 1e-9 * every], reached[-1])
-    cell = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(steps) - 1)
-    pushes = np.diff(x) / (2.0 * steps)
-    late = times - reached[cell]
-    pace = np.maximum(np.sqrt(x[cell]) + pushes[cell] * late, 0.0)
-    where = np.clip(s[cell] + (np.sqrt(x[cell]) + 0.5 * pushes[cell] * late) * late, s[0], s[-1])
-    values, slopes, bends = (curve.at(where, order) for order in range(3))
-    n = curve.n_actuators
-    rates = slopes * pace[:, None]
-    gains = slopes[:, :n] * pushes[cell][:, None] + bends[:, :n] * pace[:, None] ** 2
-    platform, names = np.linalg.norm(rates[:, n:], axis=1), track.mechanism.actuator_names
-    shares = [np.abs(rates[:, :n]) / limits.speeds, np.abs(gains) / limits.accelerations]
-    kinds: list[tuple[str, What]] = [*((name, "speed") for name in names), *((name, "acceleration") for name in names)]
-    if limits.path is not None:
-        parts = limits.path.at(where, slopes[:, :n], bends[:, :n])
-        shares.append(np.abs(parts.torques(pace, pushes[cell])) / parts.most)
-        kinds += [(name, "torque") for name in limits.path.names]
-    used = np.concatenate([*shares, platform[:, None] / limits.platform], axis=1)
+    cells = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(reached) - 2)
+    places, *motion = pace.at(cells, times - reached[cells])
+    sampled = motion_at(curve, limits, places, *motion)
     return Timed(
         mechanism=track.mechanism,
         times=times,
-        steps=curve.step_of(where),
-        poses=curve.poses_at(where),
-        actuators=values[:, :n],
-        rates=rates[:, :n],
-        accelerations=gains,
-        platform_speeds=platform,
-        used=used.max(axis=1),
-        binding=used.argmax(axis=1),
-        limits=(*kinds, ("platform", "speed")),
+        steps=curve.step_of(places),
+        poses=curve.poses_at(places),
+        actuators=curve.at(places)[:, : curve.n_actuators],
+        rates=sampled.rates,
+        accelerations=sampled.accelerations,
+        platform_speeds=sampled.platform_speeds,
+        used=sampled.used.max(axis=1),
+        binding=sampled.used.argmax(axis=1),
+        limits=limits.named(names),
+        exceeded=exceeded(curve, pace, limits, names),
         _track=track,
     )

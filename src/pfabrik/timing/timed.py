@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, TextIO, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TextIO, TypeAlias
 
 import numpy as np
 
@@ -27,8 +27,38 @@ if TYPE_CHECKING:
 
 What: TypeAlias = Literal["speed", "acceleration", "torque"]
 
+EXCEEDED = 1e-3
+"""Share of a limit by which it is exceeded: what a grid between whose points speeds are kept costs of the time."""
+
 REACHED = 0.99
 """Share of a limit from which on a sample counts as held back by it; some limits bind only at the next grid point."""
+
+
+class Exceeded(NamedTuple):
+    """A limit that a timing exceeds, where it does most.
+
+    Attributes
+    ----------
+    actuator : str
+        The actuator, several of redundant ones, or "platform".
+    what : {"speed", "acceleration", "torque"}
+        What is limited.
+    share : float
+        The largest share of the limit.
+    time : float
+        When that is [s].
+    step : int
+        The step of the track that it is at, or after.
+    duration : float
+        For how long the limit is exceeded in all, to a few steps of the grid [s].
+    """
+
+    actuator: str
+    what: What
+    share: float
+    time: float
+    step: int
+    duration: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,6 +86,10 @@ class Timed(Printed):
     limits : tuple of tuple of str
         Pairs (actuator, "speed", "acceleration" or "torque") of all actuators, and ("platform", "speed"). Redundant
         actuators are at their limits of torque several at once: "A1 and A3".
+    exceeded : tuple of Exceeded
+        Those that are exceeded by more than a thousandth, by how much, when and where, the most first; empty where all
+        are kept. It is looked for between the samples too. So may torques be, where they change faster than the grid
+        that the timing is computed on.
     """
 
     mechanism: Mechanism
@@ -69,6 +103,7 @@ class Timed(Printed):
     used: Floats
     binding: Ints
     limits: tuple[tuple[str, What], ...]
+    exceeded: tuple[Exceeded, ...]
     _track: Track = field(repr=False)
 
     @cached_property
@@ -96,15 +131,22 @@ class Timed(Printed):
         return f"<Timed path of '{name}': {self.duration:.6g} s, {counted(len(self.times), 'sample')}>"
 
     def table(self) -> ResultTable:
-        """Duration, and the limits that hold the path back."""
+        """Duration, the limits that hold the path back, and those that it exceeds."""
         lines = [f"{self.duration:.6g} s, {counted(len(self.times), 'sample')}"]
         rows = [(name, what, f"{share:.1%}") for (name, what), share in self.held_back.items()]
-        return ResultTable(self.mechanism.name, lines, ("held back by", "limit", "share of the time"), rows)
+        beyond = [
+            f"{each.actuator} exceeds its limit of {each.what} by {each.share - 1.0:.2%}, at {each.time:.6g} s, step "
+            f"{each.step}; by more than {EXCEEDED:.1%} for {each.duration:.2g} s in all"
+            for each in self.exceeded
+        ]
+        header = ("held back by", "limit", "share of the time")
+        return ResultTable(self.mechanism.name, lines, header, rows, ["\n".join(beyond)] * bool(beyond))
 
     def to_dict(self) -> dict[str, Any]:
-        """Duration, number of samples and the limits that hold the path back, ready for JSON."""
+        """Duration, number of samples, the limits that hold the path back and those exceeded, ready for JSON."""
         held = [{"actuator": name, "what": what, "share": share} for (name, what), share in self.held_back.items()]
-        return {"duration": self.duration, "samples": len(self.times), "held_back": held}
+        exceeded = [each._asdict() for each in self.exceeded]
+        return {"duration": self.duration, "samples": len(self.times), "held_back": held, "exceeded": exceeded}
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write times, poses, actuators, their rates and accelerations; angles in degrees.

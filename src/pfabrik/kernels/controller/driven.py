@@ -53,7 +53,7 @@ def put_exerted(
                 own.shown[k, 3 + i] = dot(vec(own.axes[k, 3:]), (pose[i, 0], pose[i, 1], pose[i, 2]))
         own.rates[k] = dot(vec(own.shown[k]), vec(twist)) / own.units[0] + dot(vec(own.shown[k, 3:]), vec(twist[3:]))
         own.gains[k] = dot(vec(own.shown[k]), vec(gain)) / own.units[0] + dot(vec(own.shown[k, 3:]), vec(gain[3:]))
-    marks = put_efforts(moving, own.scratch, own.shown, own.rates, own.gains, 0, own.results)
+    marks = put_efforts(moving, own.scratch, own.shown, own.rates, own.gains, own.rates[:0], 0, own.results)
     if marks != 0:
         if marks & SINGULAR != 0:
             return GAINS_MOTION

@@ -44,6 +44,7 @@ from .moving import (
     open_moving_scratch,
 )
 from .placing import place, put_screws
+from .signs import put_signs
 
 REGULAR = 1e3
 """Norm of a matrix times that of its inverse up to which no singular value is near none."""
@@ -57,6 +58,7 @@ def inverse_dynamics(
     axes: Floats,
     rates: Floats,
     gains: Floats,
+    still: Floats,
     results: Exerted,
 ) -> None:
     """Fill efforts at joint coordinates (n, columns of q), in L.
@@ -66,17 +68,26 @@ def inverse_dynamics(
     machine, scratch_address : see `MovingMachine` and `new_moving_scratch`.
     axes : components of the end effector's twist that are asked for, (n, components, 6); then the columns `asked`.
     rates, gains : of these, and their accelerations, (n, k): of the reference point, and angular.
+    still : rates up to which actuators are at rest, see `put_signs`, (n, n_a); or no rows.
     """
     moving, own = open_moving(machine), open_moving_scratch(scratch_address)
     for row in range(coordinates.shape[0]):
         if place(moving, own, coordinates[row]):
             put_screws(moving, own)
-            results.marks[row] = put_efforts(moving, own, axes[row], rates[row], gains[row], row, results)
+            least = still[row] if still.shape[0] > 0 else own.z[:0]
+            results.marks[row] = put_efforts(moving, own, axes[row], rates[row], gains[row], least, row, results)
 
 
 @routine
 def put_efforts(
-    moving: MovingMachine, own: MovingScratch, axes: Floats, rates: Floats, gains: Floats, row: int, results: Exerted
+    moving: MovingMachine,
+    own: MovingScratch,
+    axes: Floats,
+    rates: Floats,
+    gains: Floats,
+    still: Floats,
+    row: int,
+    results: Exerted,
 ) -> int:
     """Fill the efforts of a row whose frames and screws are known; its marks."""
     if not close_rates(moving, own):
@@ -109,10 +120,11 @@ def put_efforts(
             put_gains(moving, own, own.dV, own.u, own.du)
             put_all_work(moving, own, wrenches)
     for a in range(own.efforts.shape[0]):
-        rate, gain = own.u[moving.actuated[a]], own.du[moving.actuated[a]]
-        results.rates[row, a], results.gains[row, a] = rate, gain
-        rubbed = moving.drives[a, 2] if rate > 0.0 else -moving.drives[a, 2] if rate < 0.0 else 0.0
-        taken = moving.drives[a, 1] * gain + rubbed + moving.drives[a, 3] * rate
+        results.rates[row, a], results.gains[row, a] = own.u[moving.actuated[a]], own.du[moving.actuated[a]]
+    put_signs(results.rates[row], still, results.signs[row])
+    for a in range(own.efforts.shape[0]):
+        taken = moving.drives[a, 1] * results.gains[row, a] + moving.drives[a, 3] * results.rates[row, a]
+        taken += moving.drives[a, 2] * results.signs[row, a]
         add_share(-taken / moving.drives[a, 0], own.shown[moving.counts[TWISTS] + a, :n], own.work[:n])
     put_forces(moving, own, results.actuators[row])
     if not is_regular and left_undone(moving, own, results.actuators[row]) > moving.limits[ALIGNED] * size:

@@ -80,6 +80,7 @@ class Exerted(NamedTuple):
     actuators: Floats  # (n, n_a): forces that make the motion [N, N m]
     rates: Floats  # (n, n_a): of the actuators [L or rad]
     gains: Floats  # (n, n_a): their accelerations
+    signs: Floats  # (n, n_a): of the rates, 0 at rest
     marks: Ints  # (n,)
     wrenches: Floats  # (n, b + loads, 6): of masses and loads
     resting: Floats  # (n, n_a): forces at rest [N, N m]
@@ -180,7 +181,7 @@ def new_exerted(moving: MovingMachine, n: int, k: int, requests: Sequence[str] =
     """Results of n rows, for k components that are asked for; of those after the marks the ones in `requests`."""
     n_a, loads = len(moving.actuated), len(moving.frames) + len(moving.loaded)
     shapes = {
-        **dict.fromkeys(("actuators", "rates", "gains", "resting"), (n_a,)),
+        **dict.fromkeys(("actuators", "rates", "gains", "signs", "resting"), (n_a,)),
         "marks": (),
         "wrenches": (loads, 6),
         "matrices": (k, k),
@@ -188,7 +189,7 @@ def new_exerted(moving: MovingMachine, n: int, k: int, requests: Sequence[str] =
         "twists": (6,),
         "motions": (n_a, int(moving.counts[SHOWN])),
     }
-    always = ("actuators", "rates", "gains", "marks", *requests)
+    always = ("actuators", "rates", "gains", "signs", "marks", *requests)
     return Exerted(**{
         name: np.full((n if name in always else 0, *shape), 0 if name == "marks" else fill)
         for name, shape in shapes.items()
