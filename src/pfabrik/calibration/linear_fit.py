@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, Mask
 
 RANK = 1e-8
 """Singular value, as a share of the largest, up to which a direction of parameters leaves measurements unchanged:
@@ -67,6 +67,17 @@ class LinearFit:
         _, values, right = self._decomposed
         kept = right[: self.rank] / values[: self.rank, None]
         return np.asarray(kept.T @ kept)
+
+    def spreads(self, kept: Mask) -> Floats:
+        """Deviations (k,) of some of the scaled parameters beside which the others are held, by the variance.
+
+        Infinite where some direction of them changes no measurement.
+        """
+        _, values, right = self._decomposed
+        _, sizes, turned = decomposed((values[:, None] * right[: len(values)])[:, kept])
+        if len(sizes) < kept.sum() or sizes.min(initial=np.inf) <= RANK * values.max(initial=0.0):
+            return np.full(int(kept.sum()), np.inf)
+        return np.asarray(np.sqrt(((turned / sizes[:, None]) ** 2).sum(axis=0)))
 
     @cached_property
     def covariance(self) -> Floats:
