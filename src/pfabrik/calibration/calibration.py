@@ -37,8 +37,6 @@ class ParameterValue(NamedTuple):
         What it was expected to be, and the standard deviation of that.
     determined : bool
         True if the measurements determine it, beside what stays as described.
-    alone : bool
-        True if they determine it whatever the other parameters are.
     unit : str
         Unit of the values.
     """
@@ -49,7 +47,6 @@ class ParameterValue(NamedTuple):
     deviation: float
     prior: tuple[float, float] | None
     determined: bool
-    alone: bool
     unit: str
 
 
@@ -98,7 +95,7 @@ def _cells(each: ParameterValue, mechanism: Mechanism) -> tuple[str, ...]:
         shown(each.value * factor, TOLERANCES.implied * size, ".9g"),
         deviation or error_text(each.deviation * factor, ".2g", size),
         "deg" if degrees else each.unit,
-        "" if each.alone else "beside others" if each.determined else "not determined",
+        "" if each.determined else "not determined",
     )
 
 
@@ -118,7 +115,7 @@ LIKELY = 0.75
 MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
 """Measurements that are named as not fitting: the most, and from how many standard deviations."""
 
-AS_DESCRIBED = "what is not determined stays as described, beside which the deviations of the others hold"
+AS_DESCRIBED = f"what is not determined stays as described; deviations of the others take it to be right to {WEAK:.1%}"
 """What becomes of parameters that are not determined."""
 
 TOGETHER = 0.1
@@ -133,8 +130,9 @@ class Calibration(Printed):
     values : array (p,)
         Calibrated values, in the order of `names`; as described where the measurements do not determine them.
     deviations : array (p,)
-        Standard deviations, beside what stays as described; of that, as far as the measurements tell: infinite where
-        they leave it open, or nothing is left to say how good they are. Residuals larger than `sigma` make them larger.
+        Standard deviations, with what stays as described taken to be right to 3 in 1000; of that itself, as far as the
+        measurements tell: infinite where they leave it open, or nothing is left to say how good they are. Residuals
+        larger than `sigma` make them larger.
     determined : array of bool (p,)
         True for the parameters that the measurements determine, beside what stays as described.
     rank : int
@@ -156,12 +154,13 @@ class Calibration(Printed):
         priors: dict[str, tuple[float, float]],
         data: LinearFit,
         fitted: LinearFit,
+        slopes: Floats,
         before: Floats,
         residuals: dict[str, Floats],
         whole: Calibration | None = None,
     ) -> None:
         self._parameters, self.measurements, self.values, self._priors = parameters, measurements, values, priors
-        self._data, self._fitted, self._before, self.residuals = data, fitted, before, residuals
+        self._data, self._fitted, self._slopes, self._before, self.residuals = data, fitted, slopes, before, residuals
         self._whole = whole or self  # with all parameters free
         self.names, self.rank = parameters.names, self._whole._data.rank
 
@@ -185,16 +184,18 @@ class Calibration(Printed):
 
     @cached_property
     def deviations(self) -> Floats:
-        fit = self._fitted
-        own = np.sqrt(np.diag(fit.covariance)) * self._parameters.scales
-        own[_parts(fit.open_directions) > OPEN] = np.inf
+        own = np.sqrt(np.diag(self.covariance))
+        own[_parts(self._fitted.open_directions) > OPEN] = np.inf
         return np.asarray(own if self._whole is self else np.where(self._whole.kept, own, self._whole.deviations))
 
     @cached_property
     def covariance(self) -> Floats:
-        """Covariance (p, p) of the values, in the directions that are determined."""
-        scales = self._parameters.scales
-        return np.asarray(self._fitted.covariance * scales[:, None] * scales)
+        """Covariance (p, p) of the values that are determined."""
+        fit, scales = self._fitted, self._parameters.scales
+        scaled = fit.covariance
+        if np.isfinite(fit.variance) and fit.variance > 0.0:
+            scaled = scaled + fit.by_held(self._slopes, WEAK)
+        return np.asarray(scaled * scales[:, None] * scales)
 
     @cached_property
     def determined(self) -> Mask:
@@ -262,9 +263,9 @@ class Calibration(Printed):
         own = self._parameters
         rows = zip(own.names, self.values.tolist(), own.values.tolist(), self.deviations.tolist(), strict=True)
         return tuple(
-            ParameterValue(*row[:4], self._priors.get(row[0]), *flags, unit)
-            for row, *flags, unit in zip(
-                rows, self.determined.tolist(), self._whole.determined.tolist(), own.units, strict=True
+            ParameterValue(name, value, drawn, deviation, self._priors.get(name), bool(is_determined), unit)
+            for (name, value, drawn, deviation), is_determined, unit in zip(
+                rows, self.determined, own.units, strict=True
             )
         )
 

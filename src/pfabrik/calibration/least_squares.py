@@ -182,21 +182,21 @@ class _Problem:
     def _result(self, values: Floats, whole: Calibration | None) -> Calibration:
         """The calibration at these values."""
         blocks = self._blocks(values, slopes=True)
-        scaled = self._scaled(blocks)
+        every = self.factors[:, None] * slopes_of(blocks) * self.own.scales
         groups = np.concatenate([block.groups for block in blocks])
         has_sigma = self.fit.measurements.has_deviations
         residual = self.factors * residuals(blocks)
-        data = LinearFit(scaled, residual, groups, has_sigma)
+        data = LinearFit(every * self.free, residual, groups, has_sigma)
         fitted = data
         if self.priors:
-            jacobian = np.concatenate([scaled, self._prior_slopes()])
+            every = np.concatenate([every, self._prior_slopes()])
             left = np.concatenate([residual, (values[self.places] - self.prior_values) / self.prior_sigmas])
             numbers = np.concatenate([groups, np.full(len(self.places), -1)])
-            fitted = LinearFit(jacobian, left, numbers, has_sigma)
+            fitted = LinearFit(every * self.free, left, numbers, has_sigma)
         before = self.factors * residuals(self.before)
         by_quantity = {block.quantity: block.residual for block in blocks}
         given = self.own, self.fit.measurements, values, self.priors
-        return Calibration(*given, data, fitted, before, by_quantity, whole)
+        return Calibration(*given, data, fitted, every, before, by_quantity, whole)
 
     def _blocks(self, values: Floats, *, slopes: bool = False) -> list[Residuals]:
         return self.fit.blocks(values, slopes=slopes)
@@ -207,11 +207,9 @@ class _Problem:
 
     def _jacobian(self, values: Floats) -> Floats:
         """Derivatives by scaled parameters."""
-        return np.concatenate([self._scaled(self._blocks(values, slopes=True)), self._prior_slopes()])
-
-    def _scaled(self, blocks: list[Residuals]) -> Floats:
-        """Derivatives of the data by scaled parameters, 0 of those that are held."""
-        return np.asarray(self.factors[:, None] * slopes_of(blocks) * self.own.scales * self.free)
+        slopes = slopes_of(self._blocks(values, slopes=True))
+        every = np.concatenate([self.factors[:, None] * slopes * self.own.scales, self._prior_slopes()])
+        return np.asarray(every * self.free)
 
     def _prior_slopes(self) -> Floats:
         rows = np.zeros((len(self.places), len(self.own)))

@@ -86,6 +86,28 @@ class LinearFit:
             return np.where(self.cofactors == 0.0, 0.0, np.copysign(np.inf, self.cofactors))
         return np.asarray(self.cofactors * self.variance)
 
+    def by_held(self, jacobian: Floats, expected: float) -> Floats:
+        """Covariance (p, p) of scaled parameters by what those that are held may be off.
+
+        By h they change the others by S h, S = -J⁺ J_h. Of h it is known that it is about 0, with a deviation, and
+        what the residual r says that the others leave over: its mean square is U = V + d d^T, V = (R^T R / v + 1/e²)^-1,
+        d = -V R^T r / v, with R = J_h + J S.
+
+        Parameters
+        ----------
+        jacobian : (m, p), with the parameters that are held, whose columns are 0 in that of this fit.
+        expected : deviation of scaled parameters that are held from what they are held at.
+        """
+        held = jacobian.any(axis=0) & ~self.jacobian.any(axis=0)
+        left, values, right = self._decomposed
+        across = left[:, : self.rank].T @ jacobian[:, held]
+        moved = -(right[: self.rank] / values[: self.rank, None]).T @ across
+        rest = jacobian[:, held] - left[:, : self.rank] @ across
+        information = rest.T @ rest / self.variance + np.eye(int(held.sum())) / expected**2
+        spread = np.linalg.inv(information)
+        shift = spread @ (rest.T @ self.residual) / self.variance
+        return np.asarray(moved @ (spread + np.outer(shift, shift)) @ moved.T)
+
     def left_out(self) -> tuple[Ints, Floats, Floats]:
         """Measurements, and the root mean square residual of each from what the others predict, also studentised."""
         left = self._decomposed[0][:, : self.rank]

@@ -23,7 +23,7 @@ from ..files.reading import read_mechanism
 from .calibration import Calibration
 from .least_squares import calibrate, largest_determined
 from .measurements import Measurements, Sigma
-from .parameters import Free, parameters
+from .parameters import Free, independent_dimensions, parameters
 
 STAGES = (
     ("position_endstop_a", "position_endstop_b", "position_endstop_c", "highest_a", "highest_b", "highest_c"),
@@ -111,7 +111,7 @@ class Printer:
         return found.mechanism.with_limits({name: limits for name, limits in ends.items() if limits is not None})
 
     def _are_dimensions(self, free: Free) -> bool:
-        return set(names_of("free", free)) <= {"dimensions", *self.mechanism.dimensions}
+        return set(names_of("free", free)) <= {"dimensions", *independent_dimensions(self.mechanism)}
 
 
 def read_printer(path: str | PathLike[str], *, sigma: Sigma = None) -> Printer:
@@ -147,7 +147,8 @@ def read_printer(path: str | PathLike[str], *, sigma: Sigma = None) -> Printer:
 
 def _known(mechanism: Mechanism, stages: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """The dimensions of stages that a machine has, in the order of its own."""
-    return tuple(name for stage in stages for name in stage if name in mechanism.dimensions)
+    own = independent_dimensions(mechanism)
+    return tuple(name for stage in stages for name in stage if name in own)
 
 
 def _are_heights(measurements: Measurements) -> bool:
