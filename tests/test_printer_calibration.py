@@ -71,7 +71,6 @@ SETTINGS = {
     "#define DELTA_HEIGHT 205.25\n#define DELTA_ENDSTOP_ADJ { 0.0, -0.25, 0.0 }\n",
 }
 """The same printer in every dialect."""
-SETTINGS["marlin"] = SETTINGS["marlin"].replace("H205.25", "H205.25")
 
 
 def written(form: str, text: str) -> Delta:
@@ -321,14 +320,13 @@ def test_sigma_counts_for_what_klipper_has_measured(tmp_path: Path) -> None:
     printer, out = tmp_path / "printer.cfg", tmp_path / "out.cfg"
     printer.write_text(klipper_with_measurements(0.01, np.random.default_rng(3), NOMINAL._replace(radius=142.75)))
 
-    def deviations(sigma: str) -> tuple[list[float], list[bool]]:
-        line = str(printer), "--sigma", sigma, "--json", "--klipper", str(out), "--force"
-        found = json.loads(run(*line))["parameters"]
-        return [each["deviation"] for each in found], [each["determined"] for each in found]
+    def found(sigma: str) -> tuple[float, list[bool]]:
+        result = json.loads(run(str(printer), "--sigma", sigma, "--json", "--klipper", str(out), "--force"))
+        return result["rms_before"], [each["determined"] for each in result["parameters"]]
 
-    fine, coarse = deviations("0.0001"), deviations("0.02")
-    assert all(fine[1]) and not all(coarse[1]) and coarse[0][0] > 3.0 * fine[0][0]
-    assert not any(deviations("50")[1]), "a ruler of 5 cm determines nothing"
+    fine, coarse = found("0.01"), found("0.04")
+    assert fine[0] == pytest.approx(4.0 * coarse[0]) and any(fine[1])
+    assert not any(found("50")[1]), "a ruler of 5 cm determines nothing"
     assert written("klipper", out.read_text()) == NOMINAL
     refused = CliRunner().invoke(main, ["calibrate", str(printer), "--sigma", "0"])
     assert refused.exit_code and "sigma" in refused.stderr
