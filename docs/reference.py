@@ -106,8 +106,7 @@ PAGES = {
         "result says which of them the measurements determine, and how well.",
         "parameters Parameters sensitivity Sensitivity Measurements read_measurements read_printer calibrate "
         "Calibration plot_calibration",
-        "calibration.calibration.ParameterValue calibration.calibration.Suspect "
-        "calibration.printer_settings.Printer",
+        "calibration.calibration.ParameterValue calibration.calibration.Suspect calibration.printer_settings.Printer",
     ),
     "paths": Page(
         "Paths and time",

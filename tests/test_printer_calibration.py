@@ -42,7 +42,11 @@ class Delta(NamedTuple):
     @property
     def dimensions(self) -> dict[str, float]:
         towers = {"angle": self.angles, "arm_length": self.arms, "position_endstop": self.tops}
-        named = {f"{name}_{letter}": value for name, three in towers.items() for letter, value in zip("abc", three)}
+        named = {
+            f"{name}_{letter}": value
+            for name, three in towers.items()
+            for letter, value in zip("abc", three, strict=True)
+        }
         return {"delta_radius": self.radius, **named}
 
     def place(self, carriages: np.ndarray) -> np.ndarray:
@@ -78,8 +82,7 @@ def written(form: str, text: str) -> Delta:
     says = numbers(text)
     if form == "klipper":
         each = [
-            tuple(says[f"[stepper_{k}] {key}"][0] for k in "abc")
-            for key in ("angle", "arm_length", "position_endstop")
+            tuple(says[f"[stepper_{k}] {key}"][0] for k in "abc") for key in ("angle", "arm_length", "position_endstop")
         ]
         return Delta(says["[printer] delta_radius"][0], *each)
     height, rods = says["M665 H"][0], says["M665 L"]
@@ -206,7 +209,7 @@ def test_a_rotary_printer_is_found_too(name: str, has_positions: bool, tmp_path:
     truth |= {f"shoulder_height_{k}": value for k, value in zip("abc", built.heights, strict=True)}
     truth |= {"shoulder_radius": built.radius, "shoulder_height": built.heights[0]}
     for stem, three in (("position_endstop", built.tops), ("highest", built.highest)):
-        truth |= {f"{stem}_{k}": value for k, value in zip("abc", three or (), strict=False)}
+        truth |= {f"{stem}_{k}": value for k, value in zip("abc" if three else "", three or (), strict=True)}
     form, out = "klipper" if name.endswith("cfg") else "reprap", tmp_path / "out"
     line = (str(FILES / name), str(tmp_path / "data.csv"), "--json", f"--{form}", str(out), "-o", str(tmp_path / "m"))
     found = check_found(run(*line), truth)

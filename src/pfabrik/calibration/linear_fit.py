@@ -89,14 +89,14 @@ class LinearFit:
     def by_held(self, jacobian: Floats, expected: float) -> Floats:
         """Covariance (p, p) of scaled parameters by what those that are held may be off.
 
-        By h they change the others by S h, S = -J⁺ J_h. Of h it is known that it is about 0, with a deviation, and
-        what the residual r says that the others leave over: its mean square is U = V + d d^T, V = (R^T R / v + 1/e²)^-1,
-        d = -V R^T r / v, with R = J_h + J S.
+        If they are off by h, the others are off by S h, with S = -J⁺ J_h. Of h two things are known: it is about 0,
+        within e, and what it leaves of the residual r, of variance v. So the mean of h h^T is V + d d^T, with
+        R = J_h + J S, V = (R^T R / v + 1 / e²)^-1 and d = -V R^T r / v.
 
         Parameters
         ----------
         jacobian : (m, p), with the parameters that are held, whose columns are 0 in that of this fit.
-        expected : deviation of scaled parameters that are held from what they are held at.
+        expected : e, deviation of scaled parameters that are held from what they are held at.
         """
         held = jacobian.any(axis=0) & ~self.jacobian.any(axis=0)
         left, values, right = self._decomposed

@@ -122,7 +122,7 @@ class Fit:
         return self._last[1:]
 
     def blocks(self, values: Floats, *, slopes: bool = False) -> list[Residuals]:
-        """Residuals at values (p,), quantity by quantity; NaN where the machine cannot be assembled, or none has them."""
+        """Residuals at values (p,), quantity by quantity; NaN where no machine has them, or it cannot be assembled."""
         if slopes and self._last_slopes is not None and self._last_slopes[0] == values.tobytes():
             return self._last_slopes[1]
         try:
