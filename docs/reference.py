@@ -104,10 +104,9 @@ PAGES = {
         "Calibration",
         "A real machine differs from its drawing by `parameters`; `calibrate` finds them from `Measurements`. The "
         "result says which of them the measurements determine, and how well.",
-        "parameters Parameters sensitivity Sensitivity Measurements read_measurements read_klipper calibrate "
+        "parameters Parameters sensitivity Sensitivity Measurements read_measurements read_printer calibrate "
         "Calibration plot_calibration",
-        "calibration.calibration.ParameterValue calibration.calibration.Suspect "
-        "calibration.printer_settings.KlipperDelta",
+        "calibration.calibration.ParameterValue calibration.calibration.Suspect calibration.printer_settings.Printer",
     ),
     "paths": Page(
         "Paths and time",

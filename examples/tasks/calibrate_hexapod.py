@@ -42,7 +42,8 @@ print(f"rank {found.rank}, largest error below 1e-9: {np.abs(found.values - trut
 # ## Without tilt
 #
 # The same number of poses, all of one orientation. A leg then has the same length if its two ends move together, so 18
-# of the 42 directions change nothing. The result names them; their values stay near the drawing.
+# of the 42 directions change nothing. The result names them: of two ends the one named last stays as described, and
+# the other is where the leg's length says. `flat.mechanism` does what the built machine does at this orientation.
 readings, poses = measured(tilt=0, noise=0)
 flat = pf.calibrate(drawing, pf.Measurements(readings, pose=poses), free=everything)
 print(f"rank {flat.rank}, {flat.determined.sum()} determined")

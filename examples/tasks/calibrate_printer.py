@@ -91,15 +91,15 @@ position_endstop: 418
 #*# distance11_pos2 = 31321.245,35402.376,35798.667
 """)
 
-# `read_klipper` makes the machine and the measurements of it.
-printer = pf.read_klipper("printer.cfg")
+# `read_printer` makes the machine and the measurements of it; of another firmware's file, the machine alone.
+printer = pf.read_printer("printer.cfg")
 print(printer.mechanism)
 print(printer.measurements)
 
 # ## All nine dimensions
 #
 # Least squares with exact derivatives: radius, two tower angles (the third fixes the frame), endstops and arms.
-found = pf.calibrate(printer.mechanism, printer.measurements, free=printer.free)
+found = printer.calibrate()
 print(found.table())
 
 # The residuals before and after, and how far each dimension moved with its standard deviation:
@@ -107,23 +107,37 @@ pf.plot_calibration(found).savefig("calibrated.png", dpi=110)
 
 # ## Heights alone do not do it
 #
-# The same without the printed part. The residual is zero, and the answer would be worth nothing: seven numbers cannot
-# determine nine. A small residual is no proof. The result says so, instead of rods that are wrong by centimetres.
+# The same without the printed part. Values that explain seven heights exactly would be worth nothing: seven numbers
+# cannot determine nine. So all nine stay as described, instead of rods that are wrong by centimetres.
 heights = printer.measurements.without(range(7, printer.measurements.rows))
 guess = pf.calibrate(printer.mechanism, heights, free=printer.free)
 print(repr(guess), guess.determined.sum(), "determined")
 print(guess.undetermined)
 
 # Would more heights help? Thirty of them, simulated with a probe that repeats to 0.01 mm, determine radius, angles and
-# endstops. The arms stay open: a longer arm and a larger radius touch the bed in the same places.
+# endstops. The arms stay open: a longer arm and a larger radius touch the bed in the same places. `printer.calibrate`
+# knows, and keeps them as described. Deviations of the others reckon with arms that may be off by 3 in 1000.
 rng = np.random.default_rng(0)
 angles, radii = rng.uniform(0, 2 * np.pi, 30), 100 * np.sqrt(rng.uniform(0, 1, 30))
 touched = np.stack([radii * np.cos(angles), radii * np.sin(angles), np.zeros(30)], axis=1)
 readings = pf.solve_ik(found.mechanism, touched).actuators
 probed = pf.Measurements(readings, height=rng.normal(0, 0.01, 30))
-thirty = pf.calibrate(printer.mechanism, probed, free=printer.free)
+thirty = printer.calibrate(probed)
 for parameter in thirty.parameters:
     print(f"{parameter.name:18} {parameter.deviation:5.2f}", "" if parameter.determined else " not determined")
+
+# `printer.corrected` is the machine of the corrected settings; `pfabrik export` and `--klipper` write them.
+print(printer.corrected(thirty).dimensions["arm_length_a"])
+
+# ## Other firmwares
+#
+# `pfabrik calibrate config.g data.csv --reprap corrected.g` does the same with a table, and so do `printer.cfg` and
+# `Configuration.h`. A row has the carriages' heights (`carriage_a`) as the firmware counts them with the settings of
+# the file, and what was measured there: `height`, or `x`, `y`, `z`. A comment at the top of what is written names the
+# parameters that stay as described.
+#
+# An endstop is given as Klipper gives it, for the nozzle in the middle: `position_endstop_a` also changes with the
+# radius. `--free NAME` frees what you name, and nothing else; then deviations take all the rest to be exact.
 
 # ## Any other machine
 #

@@ -57,7 +57,7 @@ _NAMES = {
     "calibration.least_squares": ("calibrate",),
     "calibration.calibration": ("Calibration",),
     "calibration.csv_measurements": ("read_measurements",),
-    "calibration.printer_settings": ("read_klipper",),
+    "calibration.printer_settings": ("read_printer",),
     "calibration.measurements": ("Measurements",),
     "calibration.parameters": ("Parameters", "parameters"),
     "calibration.plot_calibration": ("plot_calibration",),
@@ -143,7 +143,7 @@ if TYPE_CHECKING:
     from .calibration.least_squares import calibrate as calibrate
     from .calibration.calibration import Calibration as Calibration
     from .calibration.csv_measurements import read_measurements as read_measurements
-    from .calibration.printer_settings import read_klipper as read_klipper
+    from .calibration.printer_settings import read_printer as read_printer
     from .calibration.measurements import Measurements as Measurements
     from .calibration.parameters import Parameters as Parameters, parameters as parameters
     from .calibration.plot_calibration import plot_calibration as plot_calibration

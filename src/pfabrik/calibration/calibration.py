@@ -36,7 +36,7 @@ class ParameterValue(NamedTuple):
     prior : tuple of float or None
         What it was expected to be, and the standard deviation of that.
     determined : bool
-        True if the measurements alone determine it.
+        True if the measurements determine it, beside what stays as described.
     unit : str
         Unit of the values.
     """
@@ -115,6 +115,9 @@ LIKELY = 0.75
 MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
 """Measurements that are named as not fitting: the most, and from how many standard deviations."""
 
+AS_DESCRIBED = f"what is not determined stays as described; deviations of the others take it to be right to {WEAK:.1%}"
+"""What becomes of parameters that are not determined."""
+
 TOGETHER = 0.1
 """Part of an open direction from which a parameter is named as one of those that change together."""
 
@@ -125,12 +128,13 @@ class Calibration(Printed):
     Attributes
     ----------
     values : array (p,)
-        Calibrated values, in the order of `names`.
+        Calibrated values, in the order of `names`; as described where the measurements do not determine them.
     deviations : array (p,)
-        Standard deviations; infinite where the data leave a parameter open, or nothing is left to say how good they
-        are. Residuals larger than `sigma` make them larger.
+        Standard deviations, with what stays as described taken to be right to 3 in 1000; of that itself, as far as the
+        measurements tell: infinite where they leave it open, or nothing is left to say how good they are. Residuals
+        larger than `sigma` make them larger.
     determined : array of bool (p,)
-        True for the parameters that the measurements determine.
+        True for the parameters that the measurements determine, beside what stays as described.
     rank : int
         Number of directions of parameters that they determine.
     rms_before, rms : float
@@ -150,12 +154,15 @@ class Calibration(Printed):
         priors: dict[str, tuple[float, float]],
         data: LinearFit,
         fitted: LinearFit,
+        slopes: Floats,
         before: Floats,
         residuals: dict[str, Floats],
+        whole: Calibration | None = None,
     ) -> None:
         self._parameters, self.measurements, self.values, self._priors = parameters, measurements, values, priors
-        self._data, self._fitted, self._before, self.residuals = data, fitted, before, residuals
-        self.names, self.rank = parameters.names, data.rank
+        self._data, self._fitted, self._slopes, self._before, self.residuals = data, fitted, slopes, before, residuals
+        self._whole = whole or self  # with all parameters free
+        self.names, self.rank = parameters.names, self._whole._data.rank
 
     @cached_property
     def mechanism(self) -> Mechanism:
@@ -177,22 +184,44 @@ class Calibration(Printed):
 
     @cached_property
     def deviations(self) -> Floats:
-        fit = self._fitted
-        own = np.sqrt(np.diag(fit.covariance)) * self._parameters.scales
-        own[_parts(fit.open_directions) > OPEN] = np.inf
-        return np.asarray(own)
+        own = np.sqrt(np.diag(self.covariance))
+        own[_parts(self._fitted.open_directions) > OPEN] = np.inf
+        return np.asarray(own if self._whole is self else np.where(self._whole.kept, own, self._whole.deviations))
 
     @cached_property
     def covariance(self) -> Floats:
-        """Covariance (p, p) of the values, in the directions that are determined."""
-        scales = self._parameters.scales
-        return np.asarray(self._fitted.covariance * scales[:, None] * scales)
+        """Covariance (p, p) of the values that are determined."""
+        fit, scales = self._fitted, self._parameters.scales
+        scaled = fit.covariance
+        if np.isfinite(fit.variance) and fit.variance > 0.0:
+            scaled = scaled + fit.by_held(self._slopes, WEAK)
+        return np.asarray(scaled * scales[:, None] * scales)
 
     @cached_property
     def determined(self) -> Mask:
+        if self._whole is not self and not self._priors:
+            return self._whole.kept
         closed = _parts(self._data.open_directions) <= OPEN
         spread = np.sqrt(np.diag(self._data.cofactors) * self._cautious_variance)
         return np.asarray(closed & (spread <= WEAK) & (not self._is_exhausted))
+
+    @cached_property
+    def kept(self) -> Mask:
+        """Parameters (p,) that measurements and priors determine if the others stay as described.
+
+        Those that are determined anyway come first, then the instrument's, then the others as they are named.
+        """
+        expected = np.isin(self.names, [*self._priors])
+        kept = self.determined | expected
+        if kept.all() or self._is_exhausted:
+            return np.asarray(kept)
+        is_instrument = np.asarray(self._parameters.moves.any(axis=(1, 2)))
+        most = np.where(expected | is_instrument, np.inf, WEAK / np.sqrt(self._cautious_variance))
+        for p in (*np.flatnonzero(is_instrument & ~kept), *np.flatnonzero(~is_instrument & ~kept)):
+            kept[p] = True
+            spreads = self._fitted.spreads(kept)
+            kept[p] = np.isfinite(spreads).all() and bool((spreads <= most[kept]).all())
+        return np.asarray(kept)
 
     @property
     def _is_exhausted(self) -> bool:
@@ -202,6 +231,8 @@ class Calibration(Printed):
     @property
     def doubt(self) -> str:
         """Why these values may be wrong as a whole, in a sentence: the fit explains little; "" if nothing says so."""
+        if self._whole is not self:
+            return self._whole.doubt
         known, length = self.measurements.has_deviations, self._parameters.mechanism.characteristic_length
         if not self.rms > (SUSPICIOUS if known else np.inf if self.measurements.sigma else WEAK * length):
             return ""
@@ -241,6 +272,8 @@ class Calibration(Printed):
     @property
     def undetermined(self) -> tuple[str, ...]:
         """What the measurements leave open, in words: one sentence for parameters that change together."""
+        if self._whole is not self:
+            return self._whole.undetermined
         directions = self._open_directions()
         if not self._is_exhausted:
             return tuple(_sentences(self.names, directions, self.determined))
@@ -288,7 +321,7 @@ class Calibration(Printed):
             Seed of the feasible configurations that are chosen from.
         """
         return suggested(
-            self.mechanism, self._parameters, self.values, self.measurements, self._data, n, criterion, seed
+            self.mechanism, self._parameters, self.values, self.measurements, self._whole._data, n, criterion, seed
         )
 
     def __repr__(self) -> str:
@@ -320,17 +353,22 @@ class Calibration(Printed):
         return error_text(rms, ".3g", max(length, 1.0) / least if self.measurements.sigma else length)
 
     @property
+    def residual_unit(self) -> str:
+        """Unit of root mean squares."""
+        if self.measurements.sigma:
+            return "standard deviations" if self.measurements.has_deviations else "weighted"
+        return self._parameters.mechanism.length_unit
+
+    @property
     def _facts(self) -> list[str]:
         """What is left, what is open, and what does not fit, a sentence each."""
-        unit = self._parameters.mechanism.length_unit
-        if self.measurements.sigma:
-            unit = "standard deviations" if self.measurements.has_deviations else "weighted"
         left_out = f", {self._size(self.rms_left_out)} where the others predict" if self.rms_left_out > 0.0 else ""
         suspects = [each for each in self.worst_rows[:MOST_SUSPECTS] if each.residual > SUSPICIOUS]
         return [
-            f"rms {self._size(self.rms_before)} before, {self._size(self.rms)} after{left_out} [{unit}]",
+            f"rms {self._size(self.rms_before)} before, {self._size(self.rms)} after{left_out} [{self.residual_unit}]",
             *([self.doubt] if self.doubt else []),
             *self.undetermined,
+            *([] if self.determined.all() else [AS_DESCRIBED]),
             *(
                 f"{each.quantity} {each.row + 1} does not fit: off by {each.residual:.1f} standard deviations"
                 for each in suspects

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -42,9 +42,10 @@ def calibrate(
     """Parameters of a machine that explain measurements best, by least squares.
 
     Measured values minus those of the machine with other parameters, over their standard deviations, are made small by
-    SciPy's `least_squares` with exact derivatives. Directions of parameters that change no measurement stay as
-    described, and are reported: a small residual is no proof of a parameter. A frame and a target of the instrument
-    that may vary are aligned first, in closed form. A fit that misses by far warns: see `Calibration.doubt`.
+    SciPy's `least_squares` with exact derivatives. A parameter that they do not determine stays as described, and is
+    reported: a small residual is no proof of it. Of parameters that only change together, those named last stay, and
+    the others are what the measurements say beside them. A frame and a target of the instrument that may vary are
+    aligned first, in closed form. A fit that misses by far warns: see `Calibration.doubt`.
 
     Parameters
     ----------
@@ -79,6 +80,27 @@ def calibrate(
     own = free if isinstance(free, Parameters) else parameters(mechanism, free, ties=ties)
     if own.mechanism != mechanism:
         raise InvalidArgument("free", "parameters of another machine", f"parameters of '{mechanism.name}'")
+    return largest_determined(own, measurements, [own.names], priors=priors, weights=weights, start=start)
+
+
+def largest_determined(
+    own: Parameters,
+    measurements: Measurements,
+    sets: Sequence[Sequence[str]],
+    *,
+    priors: Priors | None = None,
+    weights: ArrayLike | None = None,
+    start: Solution | None = None,
+) -> Calibration:
+    """Calibration by the first of several sets of parameters that measurements determine.
+
+    What the set leaves out stays as described; of the last set, also what is not determined.
+
+    Parameters
+    ----------
+    sets : names of parameters, the largest set first.
+    priors, weights, start : as of `calibrate`.
+    """
     require("calibration", "scipy", "calibrate")
     _check_sigma(measurements)
     expected = _priors(own, priors, measurements)
@@ -86,14 +108,26 @@ def calibrate(
     row_weights = _weights(weights, measurements.rows)
     fit.begin(start)
     problem = _Problem(own, fit, expected, row_weights)
-    found = problem.result(problem.solved())
+    for names in sets:
+        problem.free = np.isin(own.names, names)
+        found = problem.fitted()
+        if found.kept[problem.free].all():
+            break
+    else:
+        problem.free = found.kept
+        found = problem.fitted(found)
     if found.doubt:
-        warnings.warn(f"'{mechanism.name}': {found.doubt}", stacklevel=2)
+        warnings.warn(f"'{own.mechanism.name}': {found.doubt}", stacklevel=3)
     return found
 
 
 class _Problem:
-    """The least-squares problem in scaled parameters: rows of the data, then those of the priors."""
+    """The least-squares problem in scaled parameters: rows of the data, then those of the priors.
+
+    Attributes
+    ----------
+    free : parameters that vary, (p,); the others are held.
+    """
 
     def __init__(
         self, own: Parameters, fit: Fit, priors: dict[str, tuple[float, float]], weights: Floats | None
@@ -102,11 +136,16 @@ class _Problem:
         self.places = [own.names.index(name) for name in priors]
         self.prior_values = np.array([value for value, _ in priors.values()])
         self.prior_sigmas = np.array([sigma for _, sigma in priors.values()])
+        self.free = np.ones(len(own), dtype=bool)
         self.base = fit.aligned_values()
         self.before = self._blocks(self.base)
         self.factors = whitened(self.before, fit.measurements.sigma, fit.length, weights)
 
-    def solved(self) -> Floats:
+    def fitted(self, whole: Calibration | None = None) -> Calibration:
+        """The calibration by what is free; `whole` is the one that says what is determined."""
+        return self._result(self._solved(), whole)
+
+    def _solved(self) -> Floats:
         """The values that fit best, (p,); in directions that nothing determines, those as described."""
         from scipy.optimize import least_squares
 
@@ -116,7 +155,7 @@ class _Problem:
             kept = right[: len(sizes)][sizes > RANK * sizes.max(initial=0.0)]
             if len(kept) == rank:
                 break
-            rank, basis = len(kept), self.own.scales[:, None] * kept.T
+            rank, basis = len(kept), self.own.scales[:, None] * kept.T * self.free[:, None]
 
             def residual(y: Floats, basis: Floats = basis) -> Floats:
                 return self._residual(base + basis @ y)
@@ -140,23 +179,24 @@ class _Problem:
             values = base + basis @ found.x
         return values
 
-    def result(self, values: Floats) -> Calibration:
+    def _result(self, values: Floats, whole: Calibration | None) -> Calibration:
         """The calibration at these values."""
         blocks = self._blocks(values, slopes=True)
-        scaled = self.factors[:, None] * slopes_of(blocks) * self.own.scales
+        every = self.factors[:, None] * slopes_of(blocks) * self.own.scales
         groups = np.concatenate([block.groups for block in blocks])
         has_sigma = self.fit.measurements.has_deviations
         residual = self.factors * residuals(blocks)
-        data = LinearFit(scaled, residual, groups, has_sigma)
+        data = LinearFit(every * self.free, residual, groups, has_sigma)
         fitted = data
         if self.priors:
-            jacobian = np.concatenate([scaled, self._prior_slopes()])
+            every = np.concatenate([every, self._prior_slopes()])
             left = np.concatenate([residual, (values[self.places] - self.prior_values) / self.prior_sigmas])
             numbers = np.concatenate([groups, np.full(len(self.places), -1)])
-            fitted = LinearFit(jacobian, left, numbers, has_sigma)
+            fitted = LinearFit(every * self.free, left, numbers, has_sigma)
         before = self.factors * residuals(self.before)
         by_quantity = {block.quantity: block.residual for block in blocks}
-        return Calibration(self.own, self.fit.measurements, values, self.priors, data, fitted, before, by_quantity)
+        given = self.own, self.fit.measurements, values, self.priors
+        return Calibration(*given, data, fitted, every, before, by_quantity, whole)
 
     def _blocks(self, values: Floats, *, slopes: bool = False) -> list[Residuals]:
         return self.fit.blocks(values, slopes=slopes)
@@ -168,7 +208,8 @@ class _Problem:
     def _jacobian(self, values: Floats) -> Floats:
         """Derivatives by scaled parameters."""
         slopes = slopes_of(self._blocks(values, slopes=True))
-        return np.concatenate([self.factors[:, None] * slopes * self.own.scales, self._prior_slopes()])
+        every = np.concatenate([self.factors[:, None] * slopes * self.own.scales, self._prior_slopes()])
+        return np.asarray(every * self.free)
 
     def _prior_slopes(self) -> Floats:
         rows = np.zeros((len(self.places), len(self.own)))

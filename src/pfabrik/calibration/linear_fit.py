@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, Mask
 
 RANK = 1e-8
 """Singular value, as a share of the largest, up to which a direction of parameters leaves measurements unchanged:
@@ -68,12 +68,45 @@ class LinearFit:
         kept = right[: self.rank] / values[: self.rank, None]
         return np.asarray(kept.T @ kept)
 
+    def spreads(self, kept: Mask) -> Floats:
+        """Deviations (k,) of some of the scaled parameters beside which the others are held, by the variance.
+
+        Infinite where some direction of them changes no measurement.
+        """
+        _, values, right = self._decomposed
+        _, sizes, turned = decomposed((values[:, None] * right[: len(values)])[:, kept])
+        if len(sizes) < kept.sum() or sizes.min(initial=np.inf) <= RANK * values.max(initial=0.0):
+            return np.full(int(kept.sum()), np.inf)
+        return np.asarray(np.sqrt(((turned / sizes[:, None]) ** 2).sum(axis=0)))
+
     @cached_property
     def covariance(self) -> Floats:
         """Of the scaled parameters, (p, p), within the directions that are determined."""
         if np.isinf(self.variance):
             return np.where(self.cofactors == 0.0, 0.0, np.copysign(np.inf, self.cofactors))
         return np.asarray(self.cofactors * self.variance)
+
+    def by_held(self, jacobian: Floats, expected: float) -> Floats:
+        """Covariance (p, p) of scaled parameters by what those that are held may be off.
+
+        If they are off by h, the others are off by S h, with S = -J⁺ J_h. Of h two things are known: it is about 0,
+        within e, and what it leaves of the residual r, of variance v. So the mean of h h^T is V + d d^T, with
+        R = J_h + J S, V = (R^T R / v + 1 / e²)^-1 and d = -V R^T r / v.
+
+        Parameters
+        ----------
+        jacobian : (m, p), with the parameters that are held, whose columns are 0 in that of this fit.
+        expected : e, deviation of scaled parameters that are held from what they are held at.
+        """
+        held = jacobian.any(axis=0) & ~self.jacobian.any(axis=0)
+        left, values, right = self._decomposed
+        across = left[:, : self.rank].T @ jacobian[:, held]
+        moved = -(right[: self.rank] / values[: self.rank, None]).T @ across
+        rest = jacobian[:, held] - left[:, : self.rank] @ across
+        information = rest.T @ rest / self.variance + np.eye(int(held.sum())) / expected**2
+        spread = np.linalg.inv(information)
+        shift = spread @ (rest.T @ self.residual) / self.variance
+        return np.asarray(moved @ (spread + np.outer(shift, shift)) @ moved.T)
 
     def left_out(self) -> tuple[Ints, Floats, Floats]:
         """Measurements, and the root mean square residual of each from what the others predict, also studentised."""

@@ -13,7 +13,7 @@ from ..answers.start_configuration import start_of
 from ..answers.status import Status
 from ..arrays import Floats, Ints
 from ..description.mechanism import Mechanism
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, InvalidMechanism
 from ..ik import solve_ik
 from ..kinematics import Configurations, engine_of, home_coordinates, model_of
 from ..options import Options
@@ -122,10 +122,16 @@ class Fit:
         return self._last[1:]
 
     def blocks(self, values: Floats, *, slopes: bool = False) -> list[Residuals]:
-        """Residuals at values (p,), quantity by quantity; NaN where the machine cannot be assembled."""
+        """Residuals at values (p,), quantity by quantity; NaN where no machine has them, or it cannot be assembled."""
         if slopes and self._last_slopes is not None and self._last_slopes[0] == values.tobytes():
             return self._last_slopes[1]
-        mechanism, solution = self._assembled(values)
+        try:
+            mechanism, solution = self._assembled(values)
+        except InvalidMechanism:
+            if values.tobytes() == self.parameters.values.tobytes():
+                raise
+            described = self.blocks(self.parameters.values)
+            return [block._replace(residual=np.full_like(block.residual, np.nan)) for block in described]
         missing = np.ravel(solution.status) != Status.REACHED
         poses = np.array(solution.pose)
         poses[missing] = np.nan

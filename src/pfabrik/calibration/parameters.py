@@ -193,10 +193,15 @@ def parameters(mechanism: Mechanism, free: Free = None, *, ties: Literal["copies
     return _parameters(checked_mechanism(mechanism), chosen, ties)
 
 
+def independent_dimensions(mechanism: Mechanism) -> tuple[str, ...]:
+    """The dimensions of a machine's file that are numbers."""
+    source = mechanism.__dict__.get("_source")
+    return () if source is None else tuple(source.independent)
+
+
 @derived
 def _parameters(mechanism: Mechanism, chosen: tuple[str, ...], ties: str | None) -> Parameters:
-    source = mechanism.__dict__.get("_source")
-    independent: tuple[str, ...] = () if source is None else source.independent
+    independent = independent_dimensions(mechanism)
     candidates = Candidates(mechanism)
     dimensions: list[str] = []
     shifts: list[Shift] = []

@@ -51,8 +51,7 @@ def _residuals(ax: Axes, calibration: Calibration) -> None:
     ax.plot(rows, after, "o", color=AFTER, markersize=3.0, label=f"after, rms {calibration.rms:.3g}")
     ax.set_yscale("log")
     ax.set_xlabel("measurement", fontsize=SMALL)
-    unit = "std. deviations" if calibration.measurements.sigma else calibration._parameters.mechanism.length_unit
-    ax.set_ylabel(f"residual [{unit}]", fontsize=SMALL)
+    ax.set_ylabel(f"residual [{calibration.residual_unit}]", fontsize=SMALL)
     ax.tick_params(labelsize=SMALL)
     ax.legend(fontsize=SMALL, frameon=False)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -49,6 +49,8 @@ def calibrate(
 
     DATA is a CSV file with a column for each actuator and for what was measured: x, y, z, roll, pitch, yaw, height,
     distance and distance_to, other joints. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it.
+    Of a printer's settings, actuators are what the firmware counts with them, and endstops, radius, angles and arms may
+    vary. What the measurements do not determine stays as described, also in the files that are written.
     """
     written = {form: path for form, path in settings.items() if path is not None}
     outputs = [("-o", output), ("--plot", plot), *((f"--{form}", path) for form, path in written.items())]
@@ -57,38 +59,57 @@ def calibrate(
     for path in (output, *written.values()):
         if path is not None:
             refuse_existing(path, force)
-    mechanism, measurements, names = _given(mech, data, free, sigma)
-    result = pf.calibrate(mechanism, measurements, free=names, ties="copies" if tied else None)
+    result, machine = _calibrated(mech, data, free or None, "copies" if tied else None, sigma)
+    held = [each.name for each in result.parameters if not each.determined]
     if output is not None:
         from ..files import dumps
 
         with whole_file(output) as file:
-            file.write(dumps(result.mechanism))
+            file.write(_said_of(held, "#") + dumps(machine))
     for form, path in written.items():
-        text = text_of(result.mechanism, form, "")
+        text = _said_of(held, "#" if form == "klipper" else ";") + text_of(machine, form, "")
         with whole_file(path) as file:
             file.write(text)
     if plot is not None:
         with picture(plot):
             pf.plot_calibration(result)
     print_result(as_json, result)
-    if not result.determined.all():
-        note("the data leave parameters open: measure other poses or quantities, or free fewer")
+    if held:
+        note(
+            "the data leave parameters open, which stay as described: measure other poses or quantities, or free fewer"
+        )
     return 0
 
 
-def _given(
-    mech: str, data: Path | None, free: tuple[str, ...], sigma: float | None
-) -> tuple[pf.Mechanism, pf.Measurements, tuple[str, ...] | None]:
-    """The machine, what was measured of it, and what may vary."""
-    if data is None and mech.endswith(".cfg"):
-        printer = pf.read_klipper(mech)
-        if printer.measurements is None:
+def _calibrated(
+    mech: str, data: Path | None, free: tuple[str, ...] | None, ties: Literal["copies"] | None, sigma: float | None
+) -> tuple[pf.Calibration, pf.Mechanism]:
+    """The calibration, and the machine to write."""
+    from ..files import printer_settings_of
+
+    if printer_settings_of(mech) is not None:
+        printer = pf.read_printer(mech, sigma=sigma)
+        measured = printer.measurements if data is None else _read(data, printer.mechanism, sigma)
+        if measured is not None:
+            result = printer.calibrate(measured, free, ties=ties)
+            return result, printer.corrected(result)
+        if mech.endswith(".cfg"):
             raise click.ClickException(f"{mech}: no measurements; run DELTA_CALIBRATE and SAVE_CONFIG first")
-        return printer.mechanism, printer.measurements, free or printer.free
+    mechanism = load(mech)
     if data is None:
         raise click.UsageError("Missing argument 'DATA': a CSV file of measurements")
-    if not os.path.exists(data):
+    result = pf.calibrate(mechanism, _read(data, mechanism, sigma), free=free, ties=ties)
+    return result, result.mechanism
+
+
+def _read(data: Path, mechanism: pf.Mechanism, sigma: float | None) -> pf.Measurements:
+    if not data.exists():
         raise click.ClickException(f"{data}: no such file")
-    mechanism = load(mech)
-    return mechanism, pf.read_measurements(data, mechanism, sigma=sigma), free or None
+    return pf.read_measurements(data, mechanism, sigma=sigma)
+
+
+def _said_of(held: list[str], mark: str) -> str:
+    """A comment on parameters that are as described, before what is written."""
+    if not held:
+        return ""
+    return f"{mark} Not determined by the measurements, and so as described: {', '.join(held)}.\n"

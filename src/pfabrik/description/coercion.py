@@ -87,9 +87,11 @@ def unit_vectors(value: Any) -> Any:
 def home_value(value: Any, type_: Any) -> Any:
     """The home coordinate; zero, however it is written, is (0, 0) where there are two coordinates and 0 elsewhere."""
     home = numbers(value)
+    two = isinstance(type_, str) and type_ in ("universal", "cylindrical")
+    if isinstance(home, float) and not two:
+        return home + 0.0  # without asking if it is 0: a formula of dimensions then holds at other values, too
     if isinstance(home, bool) or home not in (0.0, (0.0, 0.0)):
         return home
-    two = isinstance(type_, str) and type_ in ("universal", "cylindrical")
     return (0.0, 0.0) if two else 0.0
 
 

@@ -12,13 +12,13 @@ from ..description.form_faults import shown
 from ..description.mechanism import Mechanism, checked_mechanism
 from ..errors import InvalidArgument, InvalidMechanism, UnknownName
 from ..whole_files import whole_path
-from .printers import print_region, printer_table
+from .printers import are_settings, print_region, printer_table
 from .printers.print_region import PrintRegion
 from .reading import read_mechanism
 from .texts import LARGEST_FILE, refuse_large, text_of, unusable
 from .writing import dumps
 
-__all__ = ["LARGEST_FILE", "dumps", "load", "loads", "print_region_of", "save"]
+__all__ = ["LARGEST_FILE", "dumps", "load", "loads", "print_region_of", "printer_settings_of", "save"]
 
 MOST_DOTS = 200
 """Most dots in one line: no line needs more than a few, and a key of many parts takes the parser quadratic time."""
@@ -74,16 +74,21 @@ def loads(text: str, source: str | None = None) -> Mechanism:
 
 def print_region_of(source: str) -> PrintRegion | None:
     """What a printer's settings say beside the machine that `load` makes of them; None of any other source."""
-    path = Path(source)
-    if source in catalog() or not os.path.isfile(path):
+    text = printer_settings_of(source)
+    return None if text is None else print_region(text, Path(source).parent)
+
+
+def printer_settings_of(source: str) -> str | None:
+    """The text of a printer's settings; None of any other source."""
+    if source in catalog() or not os.path.isfile(source):
         return None
-    text = text_of(path)
+    text = text_of(Path(source))
     try:
         if tomllib.loads(text):
             return None
     except (RecursionError, ValueError):
         pass
-    return print_region(text, path.parent)
+    return text if are_settings(text) else None
 
 
 def save(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .klipper import klipper_region, klipper_table
+from .klipper import BEGIN, klipper_region, klipper_table
 from .m_codes import m_codes_region, m_codes_table
 from .marlin import marlin_region, marlin_table
 from .print_region import PrintRegion
@@ -22,7 +22,7 @@ class _Reader(NamedTuple):
 
 
 _READERS = (
-    _Reader(r"^\[(printer|stepper_\w+)\]", klipper_table, klipper_region),
+    _Reader(BEGIN, klipper_table, klipper_region),
     _Reader(r"^[ \t]*#define[ \t]+[A-Z]", marlin_table, marlin_region),
     _Reader(r"^[^;\n]*\bM(665|666|669)\b|^[ \t]*[GM]\d+\b", m_codes_table, m_codes_region),
 )
@@ -47,6 +47,11 @@ def print_region(text: str, folder: Path | None) -> PrintRegion | None:
     """What a printer's settings say beside the machine; None for a text that is no such settings."""
     reader = _reader_of(text)
     return None if reader is None else reader.region(text, folder)
+
+
+def are_settings(text: str) -> bool:
+    """True for the text of a printer's settings, whatever its kinematics are."""
+    return _reader_of(text) is not None
 
 
 def _reader_of(text: str) -> _Reader | None:

@@ -30,7 +30,7 @@ def fault(place: str, found: str, expected: str) -> InvalidMechanism:
     return InvalidMechanism([Fault(place, found, expected)])
 
 
-def linear_delta(radius: float, towers: Three, lowest: float = 0.0, *, from_endstops: bool = False) -> Table:
+def linear_delta(radius: float, towers: Three, lowest: float = 0.0) -> Table:
     """Carriages on upright towers, with the nozzle at the origin at home.
 
     A carriage at (r cos angle, r sin angle) is at sqrt(arm_length² - (x - its x)² - (y - its y)²) + z.
@@ -41,7 +41,6 @@ def linear_delta(radius: float, towers: Three, lowest: float = 0.0, *, from_ends
     towers : "angle" [deg], "arm_length" and "position_endstop" [mm], of the nozzle in the middle with this carriage at
         its endstop; "radius_trim" [mm], what the tower is farther out, if any is.
     lowest : of carriages [mm].
-    from_endstops : count carriages from their endstops, as steps are counted, in place of from the bed.
     """
     dimensions: Table = {"delta_radius": radius} | _drawn(radius)
     joints: list[Table] = []
@@ -52,8 +51,6 @@ def linear_delta(radius: float, towers: Three, lowest: float = 0.0, *, from_ends
         height, stop = f"height_{letter}", f"position_endstop_{letter}"
         dimensions[height] = f"sqrt(arm_length_{letter}**2 - {out}**2)"
         rail = {"home": height, "range": [lowest, f"{height} + {stop}"]}
-        if from_endstops:
-            rail = {"home": f"-{stop}", "range": [f"{lowest:.17g} - {height} - {stop}", 0]}
         carriage = {"type": "prismatic", "actuated": True, "connects": ["base", f"slide_{letter}"], "axis": [0, 0, 1]}
         joints.append({"name": f"carriage_{letter}"} | carriage | rail)
         joints += _pair(letter, f"slide_{letter}", (f"({out} + platform_radius)", height), "0")
@@ -99,6 +96,25 @@ def rotary_delta(radius: float, arms: Three) -> Table:
         across = [f"sin({raised})*cos({angle})", f"sin({raised})*sin({angle})", f"-cos({raised})"]
         joints += _pair(letter, f"upper_arm_{letter}", elbow, "home_height", across)
     return _machine("Rotary delta printer", dimensions, joints, "home_height")
+
+
+def counted_from_endstops(table: Table, tops: Mapping[str, float]) -> Table:
+    """The same machine with its actuators counted as steps are: at its endstop each has a value that never changes.
+
+    A machine's own actuators count from the bed, or from level: where the endstop then is follows from its dimensions.
+
+    Parameters
+    ----------
+    tops : an actuator's value at its endstop, by name [mm or deg].
+    """
+    joints = []
+    for joint in table["joint"]:
+        if joint.get("actuated"):
+            lowest, highest = joint["range"]
+            top = tops[joint["name"]]
+            joint = joint | {"home": f"{top:.17g} - (({highest}) - ({joint['home']}))", "range": [lowest, top]}
+        joints.append(joint)
+    return table | {"joint": joints}
 
 
 def _require_rail(radius: float, letter: str, tower: Mapping[str, float], lowest: float) -> None:

@@ -122,6 +122,15 @@ def _included(text: str, folder: Path | None, read: Iterator[int]) -> str:
     return _INCLUDE.sub(content, text)
 
 
+BEGIN = r"^\[(printer|stepper_\w+)\]"
+"""Beginning of a line that Klipper's settings have."""
+
+
+def settings_of(text: str, folder: Path | None) -> KlipperSettings | None:
+    """The settings in a text; None if it is another firmware's."""
+    return KlipperSettings(text, folder) if re.search(BEGIN, text, re.MULTILINE) else None
+
+
 def klipper_table(text: str, folder: Path | None) -> Table:
     """The machine of a `printer.cfg`: kinematics delta, with the carriages' heights, or rotary_delta, with angles."""
     return _machine_of(KlipperSettings(text, folder))
@@ -143,14 +152,14 @@ def klipper_region(text: str, folder: Path | None) -> PrintRegion:
 def _machine_of(settings: KlipperSettings) -> Table:
     kinematics = settings.text("printer", "kinematics")
     if kinematics == "delta":
-        return delta_of(settings)
+        return _delta_of(settings)
     if kinematics == "rotary_delta":
         return _rotary_delta_of(settings)
     found = "nothing" if kinematics is None else f"'{kinematics}', {LOOPLESS}"
     raise fault("[printer] kinematics", found, "delta or rotary_delta")
 
 
-def delta_of(settings: KlipperSettings, *, from_endstops: bool = False) -> Table:
+def _delta_of(settings: KlipperSettings) -> Table:
     """The machine of kinematics delta; see `linear_delta`."""
     radius = settings.number("printer", "delta_radius", above=0.0)
     towers = {
@@ -159,7 +168,7 @@ def delta_of(settings: KlipperSettings, *, from_endstops: bool = False) -> Table
         "position_endstop": settings.of_towers("position_endstop"),
     }
     lowest = settings.number("printer", "minimum_z_position", 0.0)
-    return linear_delta(radius, towers, lowest, from_endstops=from_endstops)
+    return linear_delta(radius, towers, lowest)
 
 
 def _rotary_delta_of(settings: KlipperSettings) -> Table:
