@@ -18,9 +18,9 @@ PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 BY_GEOMS = ("inertiafromgeom", "inertiagrouprange")
 WEIGHING = ("mass", "density", "shellinertia", "group")
 OWN = ("armature", "frictionloss", "damping", "actuatorfrcrange", "actuatorfrclimited")
-DRIVING = ("class", "gear", "ctrlrange", "ctrllimited", "forcerange", "forcelimited")
+DRIVING = ("class", "gear", "ctrlrange", "ctrllimited", "forcerange", "forcelimited", "armature", "damping")
 KEPT: dict[str, tuple[str, ...]] = {
-    "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq", *BY_GEOMS),
+    "compiler": ("angle", "autolimits", "balanceinertia", "boundinertia", "boundmass", "eulerseq", *BY_GEOMS),
     "default": ("class",),
     "body": ("name", "childclass", *PLACE),
     "frame": ("name", "childclass", *PLACE),
@@ -30,9 +30,10 @@ KEPT: dict[str, tuple[str, ...]] = {
     "inertial": ("mass", "diaginertia", "fullinertia", *PLACE),
     "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *WEIGHING, *PLACE),
     "site": ("name", "class", "type", "size", "fromto", *PLACE),
-    "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
-    "weld": ("name", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
-    "joint of equality": ("name", "joint1", "joint2", "polycoef", "active"),
+    "equality": ("active",),
+    "connect": ("name", "class", "body1", "body2", "anchor", "site1", "site2", "active"),
+    "weld": ("name", "class", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
+    "joint of equality": ("name", "class", "joint1", "joint2", "polycoef", "active"),
     "general": (*DRIVING, "dyntype", "gaintype", "biastype", "gainprm"),
     "motor": DRIVING,
     "position": DRIVING,
@@ -44,7 +45,7 @@ KEPT: dict[str, tuple[str, ...]] = {
 ACTUATORS = ("general", "motor", "position", "velocity")
 """Actuators whose limits are read."""
 
-IN_DEFAULTS = ("default", "joint", "site", *ACTUATORS)
+IN_DEFAULTS = ("default", "joint", "site", "equality", *ACTUATORS)
 IN_BODIES = ("body", "frame", "replicate")
 REFUSED = {"attach": "a model that attaches others", "composite": "a composite body", "flexcomp": "a flexible body"}
 """Elements that make bodies in ways that are not read -> their description."""
