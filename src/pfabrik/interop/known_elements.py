@@ -40,7 +40,7 @@ FLAGS = {"1": "true", "0": "false"}
 
 IN_SDF = {
     "joint": "@type parent child parent_frame child_frame pose axis axis2 mimic sensor plugin physics provide_feedback"
-    " gear_ratio rotor_inertia gearbox_ratio gearbox_reference_body thread_pitch screw_thread_pitch",
+    " gear_ratio rotor_inertia controller_gains gearbox_ratio gearbox_reference_body thread_pitch screw_thread_pitch",
     "joint/parent": "",
     "joint/child": "",
     "joint/parent_frame": "",
@@ -53,13 +53,13 @@ IN_SDF = {
     "axis2/dynamics": "damping~0 friction~0 spring_reference spring_stiffness~0",
     "axis/limit": "lower upper effort velocity acceleration stiffness dissipation",
     "axis2/limit": "lower~-1e16|-inf upper~1e16|inf effort~-1|inf velocity~-1|inf acceleration~inf stiffness dissipation",
-    "mimic": "@joint @axis!axis multiplier offset reference",
+    "mimic": "@joint @axis!axis @multiplier @offset @reference multiplier offset reference",
 }
 """Joints of SDF, which a URDF may have too."""
 
 SDF: Table = {
     **IN_SDF,
-    "model": "@canonical_link @placement_frame @namespace static!false self_collide allow_auto_disable enable_wind"
+    "model": "@canonical_link @placement_frame @namespace static~false self_collide allow_auto_disable enable_wind"
     " pose frame link joint plugin gripper include model ball_constraint weld_constraint loop_joint constraint loop"
     " linear_spring_damper linear_bushing_rpy~ collision_filter_group sensor",
     "world": "include model light physics scene gui plugin road population actor wind atmosphere magnetic_field audio"
@@ -67,7 +67,7 @@ SDF: Table = {
     "world/model": None,
     "world/frame": None,
     "frame": "@attached_to pose",
-    "link": "gravity~true enable_wind self_collide kinematic!false must_be_base_link velocity_decay~ pose inertial"
+    "link": "gravity~true enable_wind self_collide kinematic~false must_be_base_link velocity_decay~ pose inertial"
     " collision visual sensor projector audio_sink audio_source battery light particle_emitter plugin",
     "inertial": "@auto mass density auto_inertia_params pose inertia fluid_added_mass~",
     "inertia": "ixx iyy izz ixy ixz iyz",
@@ -79,23 +79,25 @@ URDF: Table = {
     " loop_joint constraint loop ball_constraint weld_constraint linear_spring_damper linear_bushing_rpy~"
     " collision_filter_group group disable_collisions mujoco",
     "link": "@type @concave visual collision inertial sensor contact contact_coefficients self_collision_checking"
-    " verbose material plugin gravity~true",
+    " collision_checking self_filter surface verbose material plugin gravity~true kinematic~false"
+    " origin~",
     "inertial": "origin mass inertia",
     "mass": "@value",
-    "inertia": "@ixx @iyy @izz @ixy @ixz @iyz",
+    "inertia": "@ixx @iyy @izz @ixy @ixz @iyz @iyx~0 @izx~0 @izy~0",
     "origin": "@xyz @rpy",
-    "joint": "@type parent child origin axis limit dynamics mimic calibration safety_controller~ hardwareInterface"
-    " sensor plugin",
+    "joint": "@type @dont_collapse @dontCollapse parent child origin axis limit dynamics mimic calibration"
+    " safety_controller~ controller_gains traits~ anchor~ joint_properties hardwareInterface sensor plugin",
+    "joint_properties": "@friction~0 @damping~0",
     "joint/parent": "@link",
     "joint/child": "@link",
-    "joint/axis": "@xyz",
-    "joint/limit": "@lower @upper @effort @velocity @acceleration @deceleration~ @jerk~",
-    "joint/dynamics": "@damping @friction @spring_reference @spring_stiffness~0",
+    "joint/axis": "@xyz @rpy!0_0_0",
+    "joint/limit": "@lower @upper @effort @velocity @acceleration @deceleration~ @jerk~ @command_effort~ @gear_velocity~ @current~ @k_velocity~",
+    "joint/dynamics": "@damping @friction @spring_reference @spring_stiffness~0 @mu_coulomb~0 @mu_viscous~0 @K~0 @D~0",
     "joint/mimic": "@joint @multiplier @offset",
     "gazebo/joint": None,
     "gazebo": "@reference joint turnGravityOff~false gravity~true springStiffness~0 springReference"
-    " initial_joint_position~0 dampingFactor~0 velocity_decay~ static!false pose! axis! axis2! limit! dynamics!"
-    " inertial! mass! link! model! frame! include! parent! child! kinematic!false",
+    " initial_joint_position~0 dampingFactor~0 velocity_decay~ static~false kinematic~false pose~ axis! axis2! limit! dynamics!"
+    " inertial! mass! link~ model! frame! include! parent! child!",
     "mujoco": "compiler option size",
     "mujoco/compiler": "@angle @strippath @meshdir @assetdir @texturedir @discardvisual @fusestatic @balanceinertia"
     " @autolimits @eulerseq @boundmass~0 @boundinertia~0 @settotalmass~-1 @inertiafromgeom~auto|false",

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from .known_elements import Table
-from .mjcf_plain import KEPT
+from .mjcf_plain import ACTUATORS, ALL_ACTUATORS, KEPT
 
 CONTACT = "@group @user @solref @solimp @margin @gap @material @rgba"
-ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "orientation", "pid", "damper", "cylinder")
-OTHERS = ("muscle", "adhesion", "dcmotor", "plugin")
+EVERY = (*ALL_ACTUATORS, "plugin")
 BONDS = ("connect", "weld", "joint", "tendon", "flex", "flexstrain", "flexvert", "distance")
 
 # of an actuator: what it drives, how control becomes force, and settings of the simulation
@@ -35,19 +34,19 @@ MJCF: Table = {
     "option": "@timestep @apirate @impratio @tolerance @ls_tolerance @noslip_tolerance @mpr_tolerance @ccd_tolerance"
     " @sleep_tolerance @gravity~0_0_-9.81 @wind @magnetic @density @viscosity @o_margin @o_solref @o_solimp @o_friction"
     " @integrator @cone @jacobian @solver @iterations @ls_iterations @noslip_iterations @mpr_iterations @ccd_iterations"
-    " @sdf_iterations @sdf_initpoints @actuatorgroupdisable! @collision flag",
-    "flag": "@equality!enable @constraint!enable @limit!enable @actuation~enable @frictionloss~enable @clampctrl~enable"
+    " @sdf_iterations @sdf_initpoints @actuatorgroupdisable~ @collision flag",
+    "flag": "@equality~enable @constraint~enable @limit~enable @actuation~enable @frictionloss~enable @clampctrl~enable"
     " @damper~enable @spring @passive @gravity~enable @contact @energy @fwdinv @invdiscrete @override @warmstart @filterparent"
     " @refsafe @sensor @midphase @nativeccd @eulerdamp @autoreset @multiccd @island @sensornoise @diagexact @ipc @sleep"
     " @speculative",
     "default": "@class default mesh material texture joint geom site camera light pair equality tendon "
-    + " ".join((*ACTUATORS, *OTHERS)),
+    + " ".join(EVERY),
     "worldbody": "@childclass body frame replicate inertial geom site camera light plugin composite flexcomp attach",
     "body": _kept("body", "@gravcomp~0 @mocap~false @user @sleep @simple @fuse body frame replicate joint freejoint")
     + " inertial geom site camera light plugin composite flexcomp attach",
     "frame": _kept("frame", "body frame replicate joint freejoint inertial geom site camera light plugin composite")
     + " flexcomp attach",
-    "replicate": _kept("replicate", "body frame replicate geom site camera light composite flexcomp attach"),
+    "replicate": _kept("replicate", "@prefix body frame replicate geom site camera light composite flexcomp attach"),
     "joint": _kept("joint", "@group @user @margin @solreflimit @solimplimit @solreffriction @solimpfriction @stiffness")
     + " @springref @springyield @springdamper~0_0 @actuatorgravcomp~false",
     "freejoint": _kept("freejoint", "@group @align!false|auto"),
@@ -62,14 +61,14 @@ MJCF: Table = {
     "equality/tendon": None,
     "default/tendon": None,
     "tendon": None,
-    **{f"default/{kind}": f"{DRIVE} @armature @damping" for kind in KEPT if kind in ACTUATORS},
+    **{f"default/{kind}": f"{DRIVE} @armature @damping" for kind in ACTUATORS},
     **{
         f"default/{kind}": f"{DRIVE} @armature!0 @damping!0"
-        for kind in (*ACTUATORS, *OTHERS)
-        if kind not in KEPT
+        for kind in EVERY
+        if kind not in ACTUATORS
     },
-    "actuator": " ".join((*ACTUATORS, *OTHERS)),
-    **{f"actuator/{kind}": f"{DRIVE} @armature @damping" for kind in (*ACTUATORS, *OTHERS)},
+    "actuator": " ".join(EVERY),
+    **{f"actuator/{kind}": f"{DRIVE} @armature @damping" for kind in EVERY},
     "keyframe": "key",
     "key": _kept("key", "@time @qvel @act @ctrl @mpos~ @mquat~ @plastic"),
     "config": None,

@@ -24,6 +24,16 @@ from .urdf_links import friction_of
 from .xml_reading import fault
 
 
+NEWTON_STEPS = 30
+"""Most steps to close the loops; one or two are usual, from where the joints' values put them."""
+
+SAME_ROW = 1e-4
+"""Singular value, relative to the largest, below which a row of the loops follows from others, up to rounding."""
+
+CLOSED = 1e-15
+"""Gap that is none [m or rad]."""
+
+
 class CompiledModel:
     """A model that is compiled, of a text or as a copy of another, and its state; sites are where the text puts them.
 
@@ -69,6 +79,15 @@ class CompiledModel:
         """Move the joints by (nv,) [rad or m]."""
         self.mujoco.mj_integratePos(self.model, self.data.qpos, motion, 1.0)
         self.update()
+
+    def close_all(self) -> float:
+        """Close all loops by Newton's method on all joints; the largest error that is left [m or rad]."""
+        for _ in range(NEWTON_STEPS):
+            errors, jacobian, _ = self.rows()
+            if np.abs(errors).max(initial=0.0) <= CLOSED:
+                break
+            self.move(-np.linalg.lstsq(jacobian, errors, rcond=SAME_ROW)[0])
+        return float(np.abs(self.rows()[0]).max(initial=0.0))
 
     def rows(self) -> tuple[Floats, Floats, Ints]:
         """Errors (r,) [m or rad] of the rows of equalities, their Jacobian (r, nv), and their equalities (r,)."""
