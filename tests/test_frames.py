@@ -132,14 +132,14 @@ class Drawing:
             pose = within(self.links[parent] @ helper, at)
             return (
                 f'<frame {place(helper)}><body name="{name}" {place(pose)}><joint name="{joint}" pos="{point}" {axis}/>'
-                f'{inner}</body></frame>'
+                f"{inner}</body></frame>"
             )
 
         one, two = (place(within(self.links[link], self.joints["C"])) for link in JOINTS["C"])
         rod = body("rod", "crank", "B", f'<site name="1" {one}/>')
         rocker = body("rocker", "base", "D", f'<site name="2" {two}/>')
         return (
-            f'<mujoco><worldbody>{body("crank", "base", "A", rod)}{rocker}</worldbody>'
+            f"<mujoco><worldbody>{body('crank', 'base', 'A', rod)}{rocker}</worldbody>"
             '<equality><connect name="C" site1="1" site2="2"/></equality></mujoco>'
         )
 
@@ -156,12 +156,11 @@ def _origin(at: Frame, tag: str = "origin") -> str:
 ROD, ROCKER = 'link1 link="rod"', 'link2 link="rocker"'
 TOLD: dict[str, Callable[[Frame, Frame], str]] = {
     "loop_joint": lambda one, two: (
-        f'<loop_joint name="C" type="spherical">{_origin(one, ROD)}{_origin(two, ROCKER)}'
-        "</loop_joint>"
+        f'<loop_joint name="C" type="spherical">{_origin(one, ROD)}{_origin(two, ROCKER)}</loop_joint>'
     ),
     "constraint": lambda one, two: (
         '<constraint name="C" type="ball"><parent link="rod"/><child link="rocker"/>'
-        f'{_origin(one, "parent_origin")}{_origin(two, "child_origin")}</constraint>'
+        f"{_origin(one, 'parent_origin')}{_origin(two, 'child_origin')}</constraint>"
     ),
     "drake": lambda one, two: (
         '<drake:ball_constraint><drake:ball_constraint_body_A name="rod"/><drake:ball_constraint_body_B name="rocker"/>'
@@ -169,7 +168,9 @@ TOLD: dict[str, Callable[[Frame, Frame], str]] = {
         f'<drake:ball_constraint_p_BQ value="{numbers(two[:3, 3])}"/></drake:ball_constraint>'
     ),
     "gazebo": lambda _, two: (
-        '<gazebo><joint name="C" type="ball"><parent>rod</parent><child>rocker</child>' + _pose(two) + "</joint></gazebo>"
+        '<gazebo><joint name="C" type="ball"><parent>rod</parent><child>rocker</child>'
+        + _pose(two)
+        + "</joint></gazebo>"
     ),
 }
 

@@ -137,7 +137,9 @@ def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> 
         raise InvalidMechanism(_faults(opened, loops, best, largest))
     if best.other <= ABOUT_AS_NEAR * best.distance:
         off = f"{best.other:.3g} L off for {best.distance:.3g} L"
-        notes.append(Note(f"another pose closes the loops about as near to the drawing, {off}: draw the one that is meant"))
+        notes.append(
+            Note(f"another pose closes the loops about as near to the drawing, {off}: draw the one that is meant")
+        )
     beyond = _outside(loops, best.q)
     note_names(notes, "home is outside the range, which is left out", sorted(beyond))
     joints = [dataclasses.replace(each, range=None) if each.name in beyond else each for each in opened.joints]

@@ -43,8 +43,9 @@ out, or lie on one another, have no direction to begin with."""
 FARTHEST, MOST = 1.2, 3
 """Times the distance of the nearest one up to which closed configurations are let come nearer, and most of them."""
 
-SAME = 1e-4
-"""Difference of coordinates up to which two configurations are one [rad or L]."""
+SAME, APART = 1e-4, 0.1
+"""Difference of coordinates up to which two configurations are one [rad or L]; as a share of the distance of the
+nearest from the drawing, once they have come as near as a few steps get them."""
 
 NOTHING = 1e-15
 """Deviation from home that is rounding of none [rad or L]."""
@@ -320,15 +321,20 @@ class _Search:
                 break
             best = nearest
         least = float(self._loops.distances(best.q[None])[0])
-        self.found = [self._settled(each) for each in self._apart(self.nearest(), FARTHEST * least)]
-        self.found = self._apart(self.nearest(), np.inf)
+        self.found = [self._settled(each) for each in self._apart(FARTHEST * least, SAME)]
+        self.found = self._apart(FARTHEST * least, APART * least)
 
-    def _apart(self, found: Sequence[ClosedHome], most: float) -> list[ClosedHome]:
-        """Those of some that are no farther from the drawing than at most, each once; a few."""
+    def _apart(self, most: float, least: float) -> list[ClosedHome]:
+        """The nearest ones, a few, that are at most so far from the drawing [L], and apart in some coordinate by more.
+
+        Parameters
+        ----------
+        least : difference of coordinates from which two are apart [rad or L].
+        """
         chosen: list[ClosedHome] = []
-        for each in found:
-            near = [other for other in chosen if (np.abs(each.q - other.q) <= SAME * self._units).all()]
-            if not near and len(chosen) < MOST and (not chosen or self._loops.distances(each.q[None])[0] <= most):
+        for each in self.nearest():
+            is_apart = all((np.abs(each.q - other.q) > least * self._units).any() for other in chosen)
+            if is_apart and len(chosen) < MOST and (not chosen or self._loops.distances(each.q[None])[0] <= most):
                 chosen.append(each)
         return chosen
 

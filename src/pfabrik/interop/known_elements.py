@@ -134,9 +134,7 @@ def _words(entry: str) -> dict[str, Word]:
     return words
 
 
-def require_known(
-    element: ET.Element, table: Table, kind: str, notes: list[Note], parts: Collection[str] = ()
-) -> None:
+def require_known(element: ET.Element, table: Table, kind: str, notes: list[Note], parts: Collection[str] = ()) -> None:
     """Refuse what is not known in an element, with every fault; notes name what is left out.
 
     Parameters

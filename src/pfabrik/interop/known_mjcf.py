@@ -62,11 +62,7 @@ MJCF: Table = {
     "default/tendon": None,
     "tendon": None,
     **{f"default/{kind}": f"{DRIVE} @armature @damping" for kind in ACTUATORS},
-    **{
-        f"default/{kind}": f"{DRIVE} @armature!0 @damping!0"
-        for kind in EVERY
-        if kind not in ACTUATORS
-    },
+    **{f"default/{kind}": f"{DRIVE} @armature!0 @damping!0" for kind in EVERY if kind not in ACTUATORS},
     "actuator": " ".join(EVERY),
     **{f"actuator/{kind}": f"{DRIVE} @armature @damping" for kind in EVERY},
     "keyframe": "key",

@@ -129,9 +129,7 @@ def _placed(
         base = base or ("" if xyz is None else xyz.get("expressed_in", "")) or name
         axis = place(name)[:3, :3].T @ place(base)[:3, :3] @ axis
         kind = joint.get("type", "")
-        yield SaidJoint(
-            name, STIFF.get(kind, kind), (on[0], on[1]), np.array(sides), axis / np.linalg.norm(axis)
-        )
+        yield SaidJoint(name, STIFF.get(kind, kind), (on[0], on[1]), np.array(sides), axis / np.linalg.norm(axis))
 
 
 def _pose(pose: ET.Element | None) -> Floats:
