@@ -1,4 +1,4 @@
-"""Frames in random places, in every dialect: read as they are meant, and where the importer errs, `verify` disagrees."""
+"""Frames in random places, in every dialect, are read as they are meant; where the importer errs, `verify` disagrees."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from pfabrik.interop import (
     sdf_links,
     told_loops,
     urdf_links,
-    urdf_reading,
     verify,
 )
 

@@ -68,10 +68,10 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
     """The mechanism of a description whose loops may be open at its home values.
 
     The passive joints are moved until all loops meet; where that does not do, the actuated ones too. Joints stay within
-    their ranges. Joints that the end effector does not depend on stay. Of the closed poses that are found from where all
-    bodies are drawn, and from mirror images, the nearest to the drawing is taken: the root mean square over bodies of
-    how far the middle of their joints shifts [L], and of the chord of their turns, is least. A note says if another is
-    about as near.
+    their ranges. Joints that the end effector does not depend on stay. Of the closed poses that are found from where
+    all bodies are drawn, and from mirror images, the nearest to the drawing is taken: the root mean square over bodies
+    of how far the middle of their joints shifts [L], and of the chord of their turns, is least. A note says if another
+    is about as near.
 
     Parameters
     ----------

@@ -100,10 +100,10 @@ class OpenLoops:
     @cached_property
     def middles(self) -> Mapping[str, Floats]:
         """Body -> the middle of its joints and loops, (3,) [length]; bodies between slides have none."""
-        points: dict[str, list[ArrayLike]] = defaultdict(list)
+        points: dict[str, list[Floats]] = defaultdict(list)
         for joint in self.tree.joints:
             for body in joint.connects if joint.at is not None else ():
-                points[body].append(joint.at)
+                points[body].append(np.array(joint.at))
         for loop in self.loops:
             for body, point in zip(loop.connects, loop.at, strict=True):
                 points[body].append(point)
@@ -157,7 +157,7 @@ class OpenLoops:
 
     @cached_property
     def columns_of_loops(self) -> Mask:
-        """Coordinates (n, c) that mirror images turn about: all, and those around each loop that are around no other."""
+        """Coordinates (n, c) that mirror images turn about: all, and those around each loop, or around no other."""
         paths = tree_of(self.tree).paths
         around = [np.not_equal(*(paths[body] for body in loop.connects)) for loop in self.loops]
         alone = [each & (np.sum(around, axis=0) == 1) for each in around]
@@ -375,6 +375,7 @@ class _Search:
             if np.abs(errors.values).max() <= 0.5 * CLOSED:
                 break
             free = errors.slopes[:, self._free]
-            q = self._moved(q, -np.linalg.lstsq(free, errors.values, rcond=TOLERANCES.alignment)[0])
+            step: Floats = -np.linalg.lstsq(free, errors.values, rcond=TOLERANCES.alignment)[0]
+            q = self._moved(q, step)
         q = np.where(np.abs(q) <= NOTHING * self._units, 0.0, q)
         return ClosedHome(q, self._loops.gap(q))

@@ -52,7 +52,8 @@ IN_SDF = {
     "axis/dynamics": "damping friction spring_reference spring_stiffness~0",
     "axis2/dynamics": "damping~0 friction~0 spring_reference spring_stiffness~0",
     "axis/limit": "lower upper effort velocity acceleration stiffness dissipation",
-    "axis2/limit": "lower~-1e16|-inf upper~1e16|inf effort~-1|inf velocity~-1|inf acceleration~inf stiffness dissipation",
+    "axis2/limit": "lower~-1e16|-inf upper~1e16|inf effort~-1|inf velocity~-1|inf acceleration~inf stiffness"
+    " dissipation",
     "mimic": "@joint @axis!axis @multiplier @offset @reference multiplier offset reference",
 }
 """Joints of SDF, which a URDF may have too."""
@@ -91,13 +92,14 @@ URDF: Table = {
     "joint/parent": "@link",
     "joint/child": "@link",
     "joint/axis": "@xyz @rpy!0_0_0",
-    "joint/limit": "@lower @upper @effort @velocity @acceleration @deceleration~ @jerk~ @command_effort~ @gear_velocity~ @current~ @k_velocity~",
+    "joint/limit": "@lower @upper @effort @velocity @acceleration @deceleration~ @jerk~"
+    " @command_effort~ @gear_velocity~ @current~ @k_velocity~",
     "joint/dynamics": "@damping @friction @spring_reference @spring_stiffness~0 @mu_coulomb~0 @mu_viscous~0 @K~0 @D~0",
     "joint/mimic": "@joint @multiplier @offset",
     "gazebo/joint": None,
     "gazebo": "@reference joint turnGravityOff~false gravity~true springStiffness~0 springReference"
-    " initial_joint_position~0 dampingFactor~0 velocity_decay~ static~false kinematic~false pose~ axis! axis2! limit! dynamics!"
-    " inertial! mass! link~ model! frame! include! parent! child!",
+    " initial_joint_position~0 dampingFactor~0 velocity_decay~ static~false kinematic~false pose~ axis! axis2!"
+    " limit! dynamics! inertial! mass! link~ model! frame! include! parent! child!",
     "mujoco": "compiler option size",
     "mujoco/compiler": "@angle @strippath @meshdir @assetdir @texturedir @discardvisual @fusestatic @balanceinertia"
     " @autolimits @eulerseq @boundmass~0 @boundinertia~0 @settotalmass~-1 @inertiafromgeom~auto|false",
@@ -193,7 +195,7 @@ def _faults(
             continue
         what = f"{key} of {element.tag}" if word[0] == "@" else f"<{key}>"
         if known is not None and known.sign == "~":
-            left_out[what].append(place if not name else name)
+            left_out[what].append(name or place)
             continue
         others = [each.removeprefix("@") for each, of in words.items() if of.sign != "!" and each[1:] not in NAMING]
         said = f" ({shown(text)})" if text and known is not None else near_miss(key, others)

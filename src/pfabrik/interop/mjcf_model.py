@@ -23,7 +23,6 @@ from .opened import Loop
 from .urdf_links import friction_of
 from .xml_reading import fault
 
-
 NEWTON_STEPS = 30
 """Most steps to close the loops; one or two are usual, from where the joints' values put them."""
 

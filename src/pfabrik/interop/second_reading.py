@@ -194,9 +194,7 @@ def _bonds(model: ET.Element, frames: Mapping[str, Floats]) -> Iterator[SaidJoin
     ----------
     frames : link -> where it is at zero, (4, 4) [m].
     """
-    number = 0
-    for each in (child for child in model if child.tag in CLOSING and len(child)):
-        number += 1
+    for number, each in enumerate((child for child in model if child.tag in CLOSING and len(child)), 1):
         ends = [(child, link) for child in each for link in _link_in(child, frames)]
         sides, axes = [], []
         for end, _ in ends:

@@ -182,9 +182,9 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
             coupling = Coupling(follower.name, leader.name, (0.0, float(ratio[0])))
             first[follower.child] = replace(follower, mimic=coupling)
     for element in root.iterfind("transmission"):
-        names = {each.get("name", "") for each in element.iterfind("joint")}
+        moved = {each.get("name", "") for each in element.iterfind("joint")}
         rotor = rotor_of(element.find("actuator"))
-        for joint in [each for each in first.values() if rotor != (None, None) and each.name in names]:
+        for joint in [each for each in first.values() if rotor != (None, None) and each.name in moved]:
             first[joint.child] = replace(joint, rotor=rotor)
     names = [link.get("name", "") for link in root.iterfind("link")]
     roots = [name for name in names if name not in first]
