@@ -1,4 +1,4 @@
-"""Frames in random places, in every dialect, are read as they are meant; where the importer errs, `verify` disagrees."""
+"""Frames in random places are read as they are meant, in every dialect; where the importer errs, `verify` disagrees."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def test_a_machine_that_is_drawn_open_closes_in_the_pose_nearest_to_the_drawing(
     assert found.mechanism.joint("A1").home == 0.0
     apart = [(float(np.abs(corners_of(found) - at).max()), distance) for at, distance in poses]
     ours = min(apart)
-    assert ours[0] <= 1e-7 and ours[1] <= poses[0][1] + 1e-9
+    assert ours[0] <= 1e-7 and ours[1] <= poses[0][1] + 1e-7  # what `root` leaves open
     others = [distance for at, distance in poses if np.abs(at - poses[0][0]).max() > 1e-3]
     if others and others[0] <= 1.02 * poses[0][1]:
         assert "another pose closes the loops about as near" in notes_of(found)

@@ -22,7 +22,8 @@ from ..kinematics import column_joints, columns, displacements
 from ..motion.displacements import centres, screws
 from ..motion.loops import loop_slopes
 from ..tolerances import TOLERANCES
-from .closing import CLOSED, ClosedHome, OpenLoops, close_home
+from .closed_home import ClosedHome, close_home
+from .closing import CLOSED, OpenLoops
 from .collision import Collision
 from .digits import worst
 from .imported_masses import with_masses

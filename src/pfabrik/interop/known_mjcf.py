@@ -13,10 +13,10 @@ BONDS = ("connect", "weld", "joint", "tendon", "flex", "flexstrain", "flexvert",
 DRIVE = (
     "@joint @jointinparent @tendon @body @site @refsite @cranksite @slidersite @cranklength @lengthrange @user @group"
     " @ctrlrange @ctrllimited @forcerange @forcelimited @actrange @actlimited @gear @dyntype @gaintype @biastype"
-    " @dynprm @gainprm @biasprm @actdim @actearly @kp @kv @ki @imax @dampratio @timeconst @inheritrange @area @diameter @bias"
-    " @force @fpmax @fvmax @lmax @lmin @range @scale @tausmooth @vmax @gain @plugin @instance config @nsample @interp"
-    " @delay @input @ffrange @velrange @posrange @slewmax @class @cogging @controller @inductance @lugre @motorconst"
-    " @nominal @resistance @saturation @thermal"
+    " @dynprm @gainprm @biasprm @actdim @actearly @kp @kv @ki @imax @dampratio @timeconst @inheritrange @area @diameter"
+    " @bias @force @fpmax @fvmax @lmax @lmin @range @scale @tausmooth @vmax @gain @plugin @instance config"
+    " @nsample @interp @delay @input @ffrange @velrange @posrange @slewmax @class @cogging @controller @inductance"
+    " @lugre @motorconst @nominal @resistance @saturation @thermal"
 )
 
 
@@ -37,8 +37,8 @@ MJCF: Table = {
     " @sdf_iterations @sdf_initpoints @actuatorgroupdisable~ @collision flag",
     "flag": "@equality~enable @constraint~enable @limit~enable @actuation~enable @frictionloss~enable @clampctrl~enable"
     " @damper~enable @spring @passive @gravity~enable @contact @energy @fwdinv @invdiscrete @override @warmstart"
-    " @filterparent @refsafe @sensor @midphase @nativeccd @eulerdamp @autoreset @multiccd @island @sensornoise @diagexact @ipc @sleep"
-    " @speculative",
+    " @filterparent @refsafe @sensor @midphase @nativeccd @eulerdamp @autoreset @multiccd @island @sensornoise"
+    " @diagexact @ipc @sleep @speculative",
     "default": "@class default mesh material texture joint geom site camera light pair equality tendon "
     + " ".join(EVERY),
     "worldbody": "@childclass body frame replicate inertial geom site camera light plugin composite flexcomp attach",
