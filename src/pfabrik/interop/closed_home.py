@@ -30,6 +30,9 @@ nearest from the drawing, once they have come as near as a few steps get them.""
 NOTHING = 1e-15
 """Deviation from home that is rounding of none [rad or L]."""
 
+NEARER = 1.0 - 1e-3
+"""Share of the distance of the nearest one below which another is worth one more round of mirror images."""
+
 SETTLING, SETTLED = 20, 1e-9
 """Most steps by which a configuration comes nearer, and the share of its distance by which a last one does."""
 
@@ -124,16 +127,18 @@ class _Closings:
         return found
 
     def mirror(self, home: Floats) -> None:
-        """Start from mirror images of the nearest one, across home, until none is nearer; then let all come nearer."""
-        best = self.nearest()[0]
+        """Start from mirror images of the nearest one, across home, as near as each can come, until none is nearer."""
+        least = np.inf
         while True:
+            nearest = float(self._loops.distances(self.nearest()[0].q[None])[0])
+            self.found += [self._settled(each) for each in self._apart(FARTHEST * nearest, SAME)]
+            best = self.nearest()[0]
+            nearest = float(self._loops.distances(best.q[None])[0])
+            if nearest > NEARER * least:
+                break
+            least = nearest
             images = np.where(self._loops.columns_of_loops, 2.0 * home - best.q, best.q)
             self.start(np.where(self._free, images, home))
-            if (nearest := self.nearest()[0]) is best:
-                break
-            best = nearest
-        least = float(self._loops.distances(best.q[None])[0])
-        self.found = [self._settled(each) for each in self._apart(FARTHEST * least, SAME)]
         self.found = self._apart(FARTHEST * least, APART * least)
 
     def _apart(self, most: float, least: float) -> list[ClosedHome]:
