@@ -674,7 +674,7 @@ def test_equalities_of_joints_in_a_model_couple_hold_or_rest() -> None:
 
 
 def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_candidates(tmp_path: Path) -> None:
-    winch, loose = '<motor name="winch" tendon="cable"/>', MIMIC.replace("mimic", "x")
+    winch, loose = '<motor name="winch" tendon="cable"/>', MIMIC.replace("mimic", "calibration")
     error = refused(lambda: geared("", winch, end_effector="b"))
     assert "winch (through tendon cable)" in str(error)
     assert "`actuated` (--actuated A,B,...), from the base outward: qa, qb" in str(error)
@@ -686,7 +686,7 @@ def test_a_machine_without_drives_is_refused_with_the_cause_the_flag_and_the_can
     assert "the model has no actuators" in str(refused(lambda: geared("", "", end_effector="b")))
     elsewhere = refused(lambda: from_urdf(loose, base="arm", end_effector="fore"))
     assert "drives elsewhere only: shoulder" in str(elsewhere)
-    untold = refused(lambda: from_urdf(loose.replace("transmission", "x"), end_effector="fore"))
+    untold = refused(lambda: from_urdf(loose.replace("transmission", "sensor"), end_effector="fore"))
     assert "no transmission" in str(untold)
 
 

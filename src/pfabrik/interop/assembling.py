@@ -22,7 +22,8 @@ from ..kinematics import column_joints, columns, displacements
 from ..motion.displacements import centres, screws
 from ..motion.loops import loop_slopes
 from ..tolerances import TOLERANCES
-from .closing import CLOSED, ClosedHome, OpenLoops, close_home
+from .closed_home import ClosedHome, close_home
+from .closing import CLOSED, OpenLoops
 from .collision import Collision
 from .digits import worst
 from .imported_masses import with_masses
@@ -34,6 +35,9 @@ from .straighten import straighten
 
 SHOWN = 0.01
 """Share of the largest component of a gap from which another is shown."""
+
+ABOUT_AS_NEAR = 1.1
+"""Times the distance of the closed pose that is taken up to which another one is noted."""
 
 MENDED = 0.1
 """Gap [L or rad] up to which closing a loop midway is proposed: more is another machine."""
@@ -65,7 +69,10 @@ def assemble(opened: OpenMechanism, notes: Iterable[Note] = ()) -> Imported:
     """The mechanism of a description whose loops may be open at its home values.
 
     The passive joints are moved until all loops meet; where that does not do, the actuated ones too. Joints stay within
-    their ranges. Joints that the end effector does not depend on stay.
+    their ranges. Joints that the end effector does not depend on stay. Of the closed poses that are found from where
+    all bodies are drawn, and from mirror images, the nearest to the drawing is taken: the root mean square over bodies
+    of how far the middle of their joints shifts [L], and of the chord of their turns, is least. A note says if another
+    is about as near.
 
     Parameters
     ----------
@@ -129,6 +136,11 @@ def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> 
     best = next((home for home in homes if home.gap <= CLOSED), min(homes, key=lambda home: home.gap))
     if best.gap > largest:
         raise InvalidMechanism(_faults(opened, loops, best, largest))
+    if best.other <= ABOUT_AS_NEAR * best.distance:
+        off = f"{best.other:.3g} L off for {best.distance:.3g} L"
+        notes.append(
+            Note(f"another pose closes the loops about as near to the drawing, {off}: draw the one that is meant")
+        )
     beyond = _outside(loops, best.q)
     note_names(notes, "home is outside the range, which is left out", sorted(beyond))
     joints = [dataclasses.replace(each, range=None) if each.name in beyond else each for each in opened.joints]

@@ -6,20 +6,20 @@ slide and a hinge of no other use bridge the gap; locked where this is gone, the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Mask
-from ..closure.close import close, platform_poses
 from ..description.joints import Joint, JointType
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
-from ..kinematics import column_joints, columns, displacements, home_coordinates, rate_units, tree_of
+from ..kinematics import column_joints, columns, displacements, home_coordinates, tree_of
 from ..motion.displacements import screws
 from ..motion.loops import Closure, closure_of
 from ..rotations import shortest_turns, to_rotvec
@@ -29,29 +29,15 @@ from .opened import Loop, OpenMechanism
 CLOSED = 1e-13
 """Gap that counts as none [L and rad]: rounding."""
 
-POLISH = 10
-"""Newton's steps at the end, where least squares stall: those of a closed loop end at rounding."""
-
 BRIDGE = "bridge of loop"
 """What bodies and joints in the gap of a loop are called."""
 
-STARTS, STRAY = 6, 0.3
-"""Attempts from elsewhere, where the first ends open, and how far off they start [rad or L]: legs that are stretched
-out, or lie on one another, have no direction to begin with."""
 
+class Linear(NamedTuple):
+    """Values (m,) and their slopes (m, c)."""
 
-@dataclass(frozen=True)
-class ClosedHome:
-    """Coordinates at which the loops meet, or are least open.
-
-    Attributes
-    ----------
-    q : coordinates of the tree's joints, deviations from home, (c,) [rad or length].
-    gap : of all loops, the largest distance [L] or angle [rad].
-    """
-
-    q: Floats
-    gap: float
+    values: Floats
+    slopes: Floats
 
 
 class OpenLoops:
@@ -71,6 +57,73 @@ class OpenLoops:
         self.low, self.high = limits - home_coordinates(self.tree)
         points = [joint.at for joint in opened.joints if joint.at is not None]
         self.length = radius_around([*points, *(point for loop in opened.loops for point in loop.at)])
+
+    @cached_property
+    def middles(self) -> Mapping[str, Floats]:
+        """Body -> the middle of its joints and loops, (3,) [length]; bodies between slides have none."""
+        points: dict[str, list[Floats]] = defaultdict(list)
+        for joint in self.tree.joints:
+            for body in joint.connects if joint.at is not None else ():
+                points[body].append(np.array(joint.at))
+        for loop in self.loops:
+            for body, point in zip(loop.connects, loop.at, strict=True):
+                points[body].append(point)
+        points.pop(self.tree.base, None)
+        return {body: np.mean(own, axis=0) for body, own in points.items()}
+
+    def distances(self, q: Floats) -> Floats:
+        """How far the bodies are from where they are drawn, at coordinates (n, c): (n,) [L].
+
+        sqrt(mean over bodies of (shift / L)^2 + (2 sin(turn / 2))^2), with the shift of the middle of a body's joints.
+        """
+        moved, squares = displacements(self.tree, q), np.zeros(len(q))
+        for body, middle in self.middles.items():
+            turn = moved[body][:, :3, :3]
+            shifts = turn @ middle + moved[body][:, :3, 3] - middle
+            squares += (shifts**2).sum(axis=1) / self.length**2 + 3.0 - np.trace(turn, axis1=1, axis2=2)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0) / max(len(self.middles), 1)))
+
+    def linearised(self, q: Floats) -> tuple[Linear, Linear]:
+        """The loops' errors, and the bodies' shifts and turns that `distances` sums up, near coordinates (c,).
+
+        Slopes are by the rates of `screws`; those of errors hold where these are small.
+        """
+        present, moved, unit = screws(self.tree, q[None])[0], displacements(self.tree, q[None]), self.length
+        scale = self.tree.characteristic_length / unit
+        signs = {body: path[column_joints(self.tree)] for body, path in tree_of(self.tree).paths.items()}
+
+        def rates(body: str, point: Floats) -> tuple[Floats, Floats]:
+            """Angular velocities and velocities of a point (3,) on a body, (3, c) each."""
+            own = (present * signs[body][:, None]).T
+            return own[:3], scale * own[3:] + _crossing(point / unit) @ own[:3]
+
+        errors: list[Floats] = []
+        gaps: list[Floats] = []
+        for loop in self.loops:
+            points, frames = _sides(loop, moved)
+            turns, shifts = zip(*(rates(*each) for each in zip(loop.connects, points, strict=True)), strict=True)
+            across = {"spherical": np.zeros((0, 3)), "revolute": frames[0][:, :2].T}.get(loop.type, np.eye(3))
+            errors += [shifts[0] - shifts[1], across @ (turns[0] - turns[1])]
+            gaps += [(points[0] - points[1]) / unit, across @ _turn(loop, frames)]
+        values, slopes = [], []
+        for body, middle in self.middles.items():
+            turn = moved[body][0, :3, :3]
+            point = turn @ middle + moved[body][0, :3, 3]
+            omegas, velocities = rates(body, point)
+            values += [(point - middle) / unit, (turn - np.eye(3)).ravel() * np.sqrt(0.5)]
+            turning = np.stack([_crossing(axis) @ omegas for axis in turn.T], axis=1)
+            slopes += [velocities, turning.reshape(9, -1) * np.sqrt(0.5)]
+        linear = Linear(np.concatenate(values), np.concatenate(slopes))
+        return Linear(np.concatenate(gaps), np.concatenate(errors)), linear
+
+    @cached_property
+    def columns_of_loops(self) -> Mask:
+        """Coordinates (n, c) that mirror images turn about: all, and those around each loop, or around no other."""
+        paths = tree_of(self.tree).paths
+        around = [np.not_equal(*(paths[body] for body in loop.connects)) for loop in self.loops]
+        alone = [each & (np.sum(around, axis=0) == 1) for each in around]
+        columns = np.array([np.ones(len(self.tree.joints), bool), *around, *alone])[:, column_joints(self.tree)]
+        return np.unique(columns, axis=0)
 
     @cached_property
     def bridged(self) -> tuple[Closure, dict[int, float]]:
@@ -118,6 +171,12 @@ class OpenLoops:
         return bool(len(turns) and not off.any() and turns.any(axis=1).all())
 
 
+def _crossing(point: Floats) -> Floats:
+    """The matrix (3, 3) that takes an angular velocity to its cross product with a vector (3,)."""
+    x, y, z = point
+    return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+
+
 def radius_around(points: Sequence[ArrayLike]) -> float:
     """The radius around the mean of points (3,) [length]; 1 where they have no extent."""
     every = np.array(points, float).reshape(-1, 3)
@@ -140,35 +199,3 @@ def _turn(loop: Loop, frames: Floats) -> Floats:
         one, other = frames[:, :, 2]  # of a hinge, either way along its line
         return to_rotvec(shortest_turns(np.copysign(1.0, one @ other) * other[None], one[None])[0])
     return to_rotvec(frames[0] @ frames[1].T)
-
-
-def close_home(loops: OpenLoops, free: Mask, low: Floats, high: Floats) -> ClosedHome:
-    """The coordinates nearest to home, of those found, in which the loops meet; or are least open.
-
-    Parameters
-    ----------
-    free : the coordinates that may move, (c,); the others stay at home.
-    low, high : bounds of the coordinates as deviations from home, (c,) [rad or length]; equal ones hold a coordinate.
-    """
-    home = np.where(free, np.clip(0.0, low, high), 0.0)
-    if not loops.loops:
-        return ClosedHome(home, 0.0)
-    closure, bridges = loops.bridged
-    rng, units = np.random.default_rng(0), rate_units(loops.tree)
-    strays = rng.uniform(-STRAY, STRAY, (STARTS, len(home))) * units
-    has_limits = bool(np.isfinite([low, high]).any())
-    locked = frozenset([*np.flatnonzero(~free | (low == high)).tolist(), *bridges])
-    best = ClosedHome(home, np.inf)
-    for starts in (home[None], np.where(free, np.clip(home + strays, low, high), home)):
-        coordinates = np.zeros((len(starts), len(closure.scale)))
-        coordinates[:, : len(home)], coordinates[:, list(bridges)] = starts, list(bridges.values())
-        poses = platform_poses(closure.mechanism, coordinates)
-        for limits in (False, True)[: 1 + has_limits]:
-            ends = close(closure, coordinates, poses, locked=locked, limits=limits, closeness=0.1 * CLOSED)
-            exact = close(closure, ends.coordinates, ends.poses, locked=locked, undamped=True, max_iterations=POLISH)
-            for q in np.clip(np.concatenate([exact.coordinates, ends.coordinates])[:, : len(home)], low, high):
-                trial = ClosedHome(q, loops.gap(q))
-                best = trial if trial.gap < 0.5 * best.gap else best
-            if best.gap <= TOLERANCES.file_gap:
-                return best
-    return best

@@ -15,7 +15,8 @@ from ..kinematics import columns, cycle_basis, rate_units
 from ..motion.loops import loop_slopes, right_singular
 from ..tolerances import TOLERANCES
 from .assembling import closed_structure
-from .closing import OpenLoops, close_home
+from .closed_home import close_home
+from .closing import OpenLoops
 from .notes import Note, note_names
 from .opened import OpenMechanism
 

@@ -17,6 +17,9 @@ from .mjcf_model import MjcfModel
 from .mjcf_plain import IN_BODIES, kept
 from .notes import Note, note_names
 
+BOUNDS = ("boundmass", "boundinertia")
+"""Settings by which every body weighs at least so much [kg], [kg m²]."""
+
 PRIMITIVES = (*SOLIDS, "ellipsoid")
 """Types of geoms whose mass follows from the model alone, without other files."""
 
@@ -50,7 +53,8 @@ def read_masses(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Iterat
     by_inertial = {index for index in range(1, whole.nbody) if by_geoms != "true" and model.body(index) in given}
     of_meshes = sorted({*range(1, whole.nbody)} if meshes and total > 0.0 else with_meshes - by_inertial - {0})
     note_names(notes, "masses that follow from meshes are not read, of", map(model.body, of_meshes))
-    for index in sorted((by_inertial | {*whole.geom_bodyid.tolist()}) - {0, *of_meshes}):
+    bounded = {*range(1, whole.nbody)} if any(float(said.get(key, "0")) > 0.0 for key in BOUNDS) else set()
+    for index in sorted((by_inertial | bounded | {*whole.geom_bodyid.tolist()}) - {0, *of_meshes}):
         frame = frame_on(model, index, whole.body_ipos[index], whole.body_iquat[index])
         inertia = scale * np.diag(whole.body_inertia[index])
         yield placed_mass(model.body(index), scale * float(whole.body_mass[index]), frame, inertia)

@@ -23,6 +23,15 @@ from .opened import Loop
 from .urdf_links import friction_of
 from .xml_reading import fault
 
+NEWTON_STEPS = 30
+"""Most steps to close the loops; one or two are usual, from where the joints' values put them."""
+
+SAME_ROW = 1e-4
+"""Singular value, relative to the largest, below which a row of the loops follows from others, up to rounding."""
+
+CLOSED = 1e-15
+"""Gap that is none [m or rad]."""
+
 
 class CompiledModel:
     """A model that is compiled, of a text or as a copy of another, and its state; sites are where the text puts them.
@@ -69,6 +78,15 @@ class CompiledModel:
         """Move the joints by (nv,) [rad or m]."""
         self.mujoco.mj_integratePos(self.model, self.data.qpos, motion, 1.0)
         self.update()
+
+    def close_all(self) -> float:
+        """Close all loops by Newton's method on all joints; the largest error that is left [m or rad]."""
+        for _ in range(NEWTON_STEPS):
+            errors, jacobian, _ = self.rows()
+            if np.abs(errors).max(initial=0.0) <= CLOSED:
+                break
+            self.move(-np.linalg.lstsq(jacobian, errors, rcond=SAME_ROW)[0])
+        return float(np.abs(self.rows()[0]).max(initial=0.0))
 
     def rows(self) -> tuple[Floats, Floats, Ints]:
         """Errors (r,) [m or rad] of the rows of equalities, their Jacobian (r, nv), and their equalities (r,)."""
@@ -119,11 +137,12 @@ class MjcfModel(CompiledModel):
 
     def rates(self, notes: list[Note]) -> dict[str, Rates]:
         """The armature and the friction of each joint, and the most that its actuators exert, by its name."""
-        own = (self.model.dof_armature, self.model.dof_frictionloss, self.model.dof_damping)
+        model = self.model
+        own = np.array([model.dof_armature, model.dof_frictionloss, model.dof_damping])[:, model.jnt_dofadr]
         forces, found, uneven = self._forces(), {}, []
-        for index, (low, high) in enumerate(forces):
+        of_joints = (own + self._of_actuators()).T.tolist()
+        for index, ((low, high), (armature, dry, viscous)) in enumerate(zip(forces, of_joints, strict=True)):
             name, most = self.joint(index), float(min(-low, high))
-            armature, dry, viscous = (float(each[self.model.jnt_dofadr[index]]) for each in own)
             found[name] = Rates(
                 max_torque=most if 0.0 < most < np.inf else None,
                 rotor_inertia=armature or None,
@@ -131,7 +150,19 @@ class MjcfModel(CompiledModel):
             )
             uneven += [name] * bool(-low != high)
         note_names(notes, "actuators exert more one way: the smaller limit counts, none where it is 0, of", uneven)
+        curved = [getattr(model, f"{each}_dampingpoly", np.zeros((0, 0))).any(axis=1) for each in ("dof", "actuator")]
+        names = [self.joint(int(model.dof_jntid[dof])) for dof in np.flatnonzero(curved[0])]
+        names += [self.joint(int(model.actuator_trnid[k, 0])) for k in np.flatnonzero(curved[1])]
+        note_names(notes, "damping by powers of the rate is left out, of", dict.fromkeys(names))
         return found
+
+    def _of_actuators(self) -> Floats:
+        """Armature, dry friction and damping that the actuators of each joint add to its own, (3, njnt)."""
+        model, added = self.model, np.zeros((3, self.model.njnt))
+        squares = model.actuator_gear[:, 0] ** 2
+        for row, name in ((0, "actuator_armature"), (2, "actuator_damping")):  # since MuJoCo 3.4
+            np.add.at(added[row], model.actuator_trnid[:, 0], squares * getattr(model, name, np.zeros(model.nu)))
+        return added
 
     def _forces(self) -> Floats:
         """The lowest and the highest force of the actuators on each joint, (njnt, 2) [N, N m]; infinite without."""

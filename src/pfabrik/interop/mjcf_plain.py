@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from copy import deepcopy
 from xml.etree import ElementTree as ET
 
 from ..arrays import Floats
@@ -18,9 +19,9 @@ PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 BY_GEOMS = ("inertiafromgeom", "inertiagrouprange")
 WEIGHING = ("mass", "density", "shellinertia", "group")
 OWN = ("armature", "frictionloss", "damping", "actuatorfrcrange", "actuatorfrclimited")
-DRIVING = ("class", "gear", "ctrlrange", "ctrllimited", "forcerange", "forcelimited")
+DRIVING = ("class", "gear", "ctrlrange", "ctrllimited", "forcerange", "forcelimited", "armature", "damping")
 KEPT: dict[str, tuple[str, ...]] = {
-    "compiler": ("angle", "autolimits", "balanceinertia", "eulerseq", *BY_GEOMS),
+    "compiler": ("angle", "autolimits", "balanceinertia", "boundinertia", "boundmass", "eulerseq", *BY_GEOMS),
     "default": ("class",),
     "body": ("name", "childclass", *PLACE),
     "frame": ("name", "childclass", *PLACE),
@@ -30,9 +31,10 @@ KEPT: dict[str, tuple[str, ...]] = {
     "inertial": ("mass", "diaginertia", "fullinertia", *PLACE),
     "geom": ("name", "class", "type", "size", "fromto", "contype", "conaffinity", *WEIGHING, *PLACE),
     "site": ("name", "class", "type", "size", "fromto", *PLACE),
-    "connect": ("name", "body1", "body2", "anchor", "site1", "site2", "active"),
-    "weld": ("name", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
-    "joint of equality": ("name", "joint1", "joint2", "polycoef", "active"),
+    "equality": ("active",),
+    "connect": ("name", "class", "body1", "body2", "anchor", "site1", "site2", "active"),
+    "weld": ("name", "class", "body1", "body2", "anchor", "relpose", "site1", "site2", "active", "torquescale"),
+    "joint of equality": ("name", "class", "joint1", "joint2", "polycoef", "active"),
     "general": (*DRIVING, "dyntype", "gaintype", "biastype", "gainprm"),
     "motor": DRIVING,
     "position": DRIVING,
@@ -44,7 +46,12 @@ KEPT: dict[str, tuple[str, ...]] = {
 ACTUATORS = ("general", "motor", "position", "velocity")
 """Actuators whose limits are read."""
 
-IN_DEFAULTS = ("default", "joint", "site", *ACTUATORS)
+ALL_ACTUATORS = (
+    *ACTUATORS, "intvelocity", "orientation", "pid", "damper", "cylinder", "muscle", "adhesion", "dcmotor"
+)  # fmt: skip
+"""Kinds of actuators, but for those of plugins."""
+
+IN_DEFAULTS = ("default", "joint", "site", "equality", *ACTUATORS)
 IN_BODIES = ("body", "frame", "replicate")
 REFUSED = {"attach": "a model that attaches others", "composite": "a composite body", "flexcomp": "a flexible body"}
 """Elements that make bodies in ways that are not read -> their description."""
@@ -99,6 +106,38 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     springs = (joint.get("name", "a joint") for joint in root.iter("joint") if number(joint, "stiffness"))
     note_names(notes, "springs are left out, of", springs)
     return plain
+
+
+SEEN = ("geom", "camera", "light", "plugin", "mesh", "material", "texture", "pair", "tendon")
+"""Elements that need other files, or are seen, touched or pulled."""
+
+
+def bare_model(root: ET.Element) -> ET.Element:
+    """A model with all that it says of bodies, joints and equalities, as MuJoCo itself reads it.
+
+    What is left out is listed here, and not what is kept, as `plain_model` does: so `verify` does not read with the
+    eyes of the importer.
+    """
+    bare = ET.Element("mujoco")
+    for section in root:
+        if section.tag in ("compiler", "default", "worldbody", "equality", "keyframe"):
+            bare.append(deepcopy(section))
+    for element in list(bare.iter()):
+        for child in [each for each in element if each.tag in (*SEEN, *ALL_ACTUATORS)]:
+            if element.tag != "equality":
+                element.remove(child)
+        if element.tag == "site":
+            element.attrib = {key: text for key, text in element.attrib.items() if key not in ("material", "mesh")}
+    for section in bare.iterfind("equality"):
+        for child in [each for each in section if each.tag not in ("connect", "weld", "joint")]:
+            section.remove(child)
+    for key in bare.iter("key"):
+        key.attrib = {name: text for name, text in key.attrib.items() if name in KEPT["key"]}
+    kept = ET.SubElement(bare, "actuator")
+    for joint in filter(None, (each.get("joint") for each in root.iterfind("actuator/*"))):
+        ET.SubElement(kept, "motor", joint=joint)
+    ET.SubElement(bare, "compiler", boundmass=LEAST, boundinertia=LEAST, fusestatic="false", settotalmass="-1")
+    return bare
 
 
 def kept(

@@ -19,6 +19,8 @@ from ..extras import require
 from .assembling import Imported
 from .collision import Collision
 from .driving import Rates
+from .known_elements import require_known
+from .known_mjcf import MJCF
 from .mjcf_bodies import is_half, read_struts
 from .mjcf_geoms import read_collision
 from .mjcf_masses import read_masses
@@ -104,7 +106,10 @@ def from_mjcf(
     root = read_xml(source, "mjcf")
     notes: list[Note] = []
     with noting(notes):
-        model = MjcfModel(plain_model(root, notes), configuration)
+        plain = plain_model(root, notes)
+        parts = [each.get("name", "") for each in root.iter() if each.tag in ("body", "joint", "freejoint")]
+        require_known(root, MJCF, "mujoco", notes, {*filter(None, parts), "world"})
+        model = MjcfModel(plain, configuration)
         robot = _robot(root, model, notes)
         held = [*require_names("fixed", fixed), *model.held(notes)]
         drives = None if actuated is None else require_names("actuated", actuated)

@@ -17,13 +17,21 @@ from ..errors import InvalidArgument, PfabrikError, UnknownName
 from ..fk import solve_fk
 from ..tolerances import TOLERANCES
 from .loops_file import read_loops
-from .mjcf_plain import plain_model, plain_robot
+from .mjcf_model import CompiledModel, frame_of
+from .mjcf_plain import bare_model, plain_robot
 from .mjcf_reading import from_mjcf
 from .opened import CLOSING
 from .referee import distances
 from .robot_in_mujoco import RobotInMujoco
+from .second_reading import SaidJoint, joints_said
 from .urdf_reading import from_urdf, read_description
 from .xml_reading import kind_of, read_xml
+
+SHARES = (0.0, 0.05, 0.2, 0.4)
+"""How far joints are moved off zero before the loops are closed: shares of a radian, and of the size."""
+
+OPEN = 10.0
+"""Times what loops stay open by, up to which a joint may be off: rounding."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +53,28 @@ class OriginalFile:
         elif self.loops is not None:
             raise InvalidArgument("loops", "some", "none: a MuJoCo model tells its loops itself")
         else:
-            plain = plain_model(read_xml(self.path, "mjcf"), [])
+            plain = bare_model(read_xml(self.path, "mjcf"))
         for section in plain.iterfind("equality"):
             for joint in section.findall("joint"):
                 section.remove(joint)
         _add_named_loops(plain)
         return ET.tostring(plain, encoding="unicode")
+
+    def misread(self, driven: Sequence[str]) -> tuple[float, float]:
+        """How far joints of a description are from what a second reader says of them, [m] and [rad].
+
+        The largest over configurations in which the loops of the file as a model are closed; 0 for a MuJoCo model,
+        which MuJoCo reads itself. A loop that a file of loops tells too is that file's.
+        """
+        if kind_of(self.path) == "mjcf":
+            return 0.0, 0.0
+        root, loops_file = read_xml(self.path, "urdf", "sdf"), read_loops(self.loops)
+        links, _ = read_description(root, loops_file, driven, [])
+        told = {frozenset(loop.links) for loop in loops_file.loops(links.frames, links.frame_joints)}
+        hung = {joint.name for joint in links.joints}
+        said = joints_said(root, loops_file.retyped)
+        said = [each for each in said if each.name in hung or frozenset(each.links) not in told]
+        return _misread(CompiledModel(self.model(driven)), said)
 
     def imported_as(self, mechanism: Mechanism, left_out: Sequence[str]) -> Mechanism | None:
         """The file as a machine with a mechanism's base, end effector, actuators and point; None where it makes none.
@@ -142,6 +166,26 @@ class Original:
             robot.data.eq_active[np.unique(equalities[is_doubtful])] = 0
             put()
         return gap
+
+
+def _misread(robot: CompiledModel, said: Sequence[SaidJoint]) -> tuple[float, float]:
+    """How far joints are from what is said of them, [m] and [rad], at random where a robot's loops are closed."""
+    rng, largest = np.random.default_rng(0), np.zeros(2)
+    bodies = [robot.data.body(index) for index in range(robot.model.nbody)]
+    robot.update()
+    size = max(float(np.linalg.norm([body.xpos for body in bodies], axis=1).max()), TOLERANCES.file_gap)
+    units = np.where(robot.is_slide[robot.model.dof_jntid], size, 1.0)
+    for share in SHARES:
+        robot.take(robot.model.qpos0)
+        robot.move(share * units * rng.uniform(-1.0, 1.0, robot.model.nv))
+        open_by = robot.close_all()
+        frames = {body.name: frame_of(body.xpos, body.xmat) for body in bodies}
+        values = dict(zip(robot.joint_names, robot.data.qpos[robot.model.jnt_qposadr].tolist(), strict=True))
+        for joint in said:
+            value = values.get(joint.name) if joint.kind in ("revolute", "prismatic") else None
+            error = np.array(joint.error(frames, value)) / [size, 1.0]
+            largest = np.maximum(largest, np.where(error > OPEN * open_by, error, 0.0))
+    return float(largest[0]) * size, float(largest[1])
 
 
 def _add_named_loops(plain: ET.Element) -> None:

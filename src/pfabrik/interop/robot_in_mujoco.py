@@ -19,16 +19,10 @@ from ..kinematics import columns
 from ..rotations import to_quaternion
 from ..tolerances import TOLERANCES
 from .mjcf_bodies import si_unit
-from .mjcf_model import CompiledModel
+from .mjcf_model import CLOSED, NEWTON_STEPS, SAME_ROW, CompiledModel
 
-NEWTON_STEPS = 30
-"""Most steps to close the loops; one or two are usual, from where the joints' values put them."""
-
-SAME_ROW = 1e-4
-"""Singular value, relative to the largest, below which a row of the loops follows from others, up to rounding."""
-
-CLOSED, AT_REST = 1e-15, 1e-13
-"""Gap, and step, that are none [m or rad]."""
+AT_REST = 1e-13
+"""Step that is none [m or rad]."""
 
 STILL = 1e-12
 """Slope of a row below which it does not move with a joint: rounding of the poses of bodies in between."""

@@ -18,7 +18,7 @@ from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .notes import Note, note_names
 from .told_loops import named_in
-from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, friction_of, require_few
+from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, friction_of, require_few, rotor_of
 from .xml_reading import fault, number, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal")
@@ -35,6 +35,9 @@ ENDLESS, FAR = 1e16, 20.0
 OLD = ("1.0", "1.2", "1.3", "1.4")
 """Versions in which axes are in the model's frame."""
 
+LIMITING = ("upper", "velocity", "acceleration", "effort")
+"""Limits of SDF that are endless unless it says otherwise, besides the lower one."""
+
 CUT_LAST = {"BALL": 2, "REVOLUTE": 1, "CONTINUOUS": 1}
 """Joint types -> how much rather than others they close a loop: those whose coordinates nobody asks for."""
 
@@ -42,16 +45,20 @@ CUT_LAST = {"BALL": 2, "REVOLUTE": 1, "CONTINUOUS": 1}
 def hung(joint: UrdfJoint, forward: bool, frames: Mapping[str, Floats]) -> UrdfJoint:
     """A joint that is placed in the model as one that hangs a link on another: its child on its parent, if forward."""
     parent, child = (joint.parent, joint.child) if forward else (joint.child, joint.parent)
-    frame, inward = _within(frames[parent], frames[child]), _within(frames[child], HERE)
+    ends = (joint.frame, joint.frame if joint.meets is None else joint.meets)
+    on_parent, on_child = ends if forward else ends[::-1]
+    drawn = frames[child] if joint.meets is None else on_parent @ _within(on_child, frames[child])
+    frame, inward = _within(frames[parent], drawn), _within(frames[child], on_child)
     axes = joint.axes if forward else -joint.axes[:: -1 if joint.type == "UNIVERSAL" else 1]
-    point, axes = (inward @ joint.frame)[:3, 3], axes @ inward[:3, :3].T
-    return replace(joint, parent=parent, child=child, frame=frame, point=point, axes=axes)
+    axes = axes @ joint.frame[:3, :3] @ inward[:3, :3].T
+    return replace(joint, parent=parent, child=child, frame=frame, point=inward[:3, 3], axes=axes, meets=None)
 
 
 def closing(joint: UrdfJoint, frames: Mapping[str, Floats]) -> tuple[UrdfJoint, Floats]:
     """A joint that is placed in the model as one that closes a loop, and its place (4, 4) [m] in its child's frame."""
-    frame, on_child = (_within(frames[link], joint.frame) for link in (joint.parent, joint.child))
-    return replace(joint, frame=frame, axes=joint.axes @ joint.frame[:3, :3]), on_child
+    frame = _within(frames[joint.parent], joint.frame)
+    on_child = _within(frames[joint.child], joint.frame if joint.meets is None else joint.meets)
+    return replace(joint, frame=frame, axes=joint.axes @ joint.frame[:3, :3], meets=None), on_child
 
 
 def _within(outer: Floats, frame: Floats) -> Floats:
@@ -153,7 +160,7 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     ----------
     asked : names of the joints that a caller drives or holds.
     """
-    model = _only_model(root, notes)
+    model = only_model(root, notes)
     name = model.get("name", "mechanism")
     place, poses = f"model '{name}'", Poses(model, {})
     require_few(model)
@@ -191,11 +198,13 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
         link = poses.link(each, f"frame '{each}'")
         frames[each] = poses[each]
         outward.append(UrdfJoint(f"{each}_frame", "FIXED", link, each, _within(frames[link], frames[each])))
+    loops = [closing(joint, frames) for joint in joints if joint.name not in {each.name for each, _ in hanging}]
+    if any(joint.meets is not None for joint in joints):  # links are not where they are drawn
+        for joint in outward:
+            frames[joint.child] = frames[joint.parent] @ joint.frame
     of_joints = {joint.name: poses.roundings[joint.name] for joint in joints}
     of_links = {link: poses.roundings[link] for link in frames}
     tree = UrdfLinks(name, base, outward, frames, of_links, of_joints, driven)
-    used = {joint.name for joint, _ in hanging}
-    loops = [closing(joint, frames) for joint in joints if joint.name not in used]
     return tree.closed_by(loops, asked)
 
 
@@ -209,18 +218,21 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint
     parent, child = (poses.link(_end(element, end), f"{place}.{end}") for end in ("parent", "child"))
     if parent == child:
         raise fault(place, f"'{parent}' as parent and as child", "two links")
-    is_old = (element.findtext("axis/use_parent_model_frame") or "").strip() in ("1", "true") or version in OLD
+    frame, meets = (_place_on(poses, element, end) for end in ("parent", "child"))
+    across = frame[:3, :3] @ poses[name][:3, :3].T
     axes = []
     for tag in ("axis", "axis2"):
+        by_model = (element.findtext(f"{tag}/use_parent_model_frame") or "").strip() in ("1", "true")
         xyz = element.find(f"{tag}/xyz")
         direction = numbers_in("0 0 1" if xyz is None else xyz.text or "", 3)
         if direction is None or not direction.any():
             raise fault(f"{place}.{tag}", "no direction", "three numbers, not all zero")
-        frame = xyz.get("expressed_in", "") if xyz is not None else ""
-        axes.append(poses[MODEL if is_old else frame or name][:3, :3] @ direction)
-    low, high, speed, effort = (
+        base = xyz.get("expressed_in", "") if xyz is not None else ""
+        base = MODEL if by_model or version in OLD else base or name
+        axes.append(across @ poses[base][:3, :3] @ direction)
+    low, high, speed, acceleration, effort = (
         _number(element, f"axis/limit/{key}", default, place)
-        for key, default in (("lower", -ENDLESS), ("upper", ENDLESS), ("velocity", ENDLESS), ("effort", ENDLESS))
+        for key, default in [("lower", -ENDLESS), *((key, ENDLESS) for key in LIMITING)]
     )
     dry, viscous = (_number(element, f"axis/dynamics/{key}", 0.0, place) for key in ("friction", "damping"))
     limits = None
@@ -238,15 +250,33 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint
         )
         coupling = Coupling(name, leader, (offset - ratio * reference, ratio))
     max_speed = speed if 0.0 < speed < ENDLESS else None
-    joint = UrdfJoint(name, kind.upper(), parent, child, poses[name], axes=np.array(axes))
+    is_apart = any(element.find(f"{end}_frame") is not None for end in ("parent", "child"))
+    joint = UrdfJoint(name, kind.upper(), parent, child, frame, axes=np.array(axes), meets=meets if is_apart else None)
     return replace(
         joint,
         limits=limits,
         max_speed=max_speed,
+        max_acceleration=acceleration if 0.0 < acceleration < ENDLESS else None,
         max_torque=effort if 0.0 < effort < ENDLESS else None,
+        rotor=rotor_of(element),
         friction=friction_of(dry, viscous),
         mimic=coupling,
     )
+
+
+def _place_on(poses: Poses, joint: ET.Element, end: str) -> Floats:
+    """The place of a joint's frame on its parent or child, (4, 4) [m] in the model.
+
+    Drake's `parent_frame` and `child_frame` are two frames that meet at zero; without, both are the joint's own.
+    """
+    name = joint.get("name", "")
+    given, place = _end(joint, f"{end}_frame"), f"joint '{name}'.{end}_frame"
+    if not given:
+        return poses[name]
+    link, own = poses.link(given, place), poses.link(_end(joint, end), f"joint '{name}'.{end}")
+    if link != own:
+        raise fault(place, f"'{given}', which is on '{link}'", f"a frame on '{own}'")
+    return poses[given]
 
 
 def _number(element: ET.Element, path: str, default: float, place: str) -> float:
@@ -268,7 +298,7 @@ def _driven(model: ET.Element) -> list[str]:
     return [*dict.fromkeys(named)]
 
 
-def _only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
+def only_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     """The one model of a file; refused where there are more, or where it is put together from others."""
     every = [*root.findall("model"), *root.findall("world/model")]
     models = [model for model in every if model.find("joint") is not None] or every

@@ -48,9 +48,12 @@ class UrdfJoint:
     axes : its axis there, of any length but zero, and the second one of a universal joint, (2, 3).
     limits : least and largest coordinate [rad or m]; None where the file has none.
     max_speed : [rad/s or m/s]; None where the file has none, or 0, which stands for none.
-    max_torque : [N m or N], likewise; friction : dry and viscous, in SI units.
+    max_acceleration : [rad/s² or m/s²], likewise; max_torque : [N m or N], likewise.
+    rotor : the inertia of its motor's rotor [kg m²], and the gear between; friction : dry and viscous, in SI units.
     mimic : how it follows another joint; None where it does not.
     written : `frame` as attributes of MuJoCo, in the numbers of the file; empty where it has none.
+    meets : of a joint that is placed in a model, where its frame on the child is drawn, (4, 4) [m], which is there to
+        meet `frame`; None where it is drawn where they meet.
     """
 
     name: str
@@ -62,10 +65,13 @@ class UrdfJoint:
     axes: Floats = field(default_factory=lambda: np.eye(3)[:2])
     limits: tuple[float, float] | None = None
     max_speed: float | None = None
+    max_acceleration: float | None = None
     max_torque: float | None = None
+    rotor: tuple[float | None, float | None] = (None, None)
     friction: tuple[float, float] | None = None
     mimic: Coupling | None = None
     written: Mapping[str, str] = field(default_factory=dict)
+    meets: Floats | None = None
 
     def elementary(self) -> list[tuple[str, JointType, Floats | None]]:
         """Names, types and axes (3,), in the child's frame, of the joints that it is, from its parent to its child."""
@@ -175,6 +181,11 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
         if leader and follower and ratio is not None and leader.parent == follower.parent:
             coupling = Coupling(follower.name, leader.name, (0.0, float(ratio[0])))
             first[follower.child] = replace(follower, mimic=coupling)
+    for element in root.iterfind("transmission"):
+        moved = {each.get("name", "") for each in element.iterfind("joint")}
+        rotor = rotor_of(element.find("actuator"))
+        for joint in [each for each in first.values() if rotor != (None, None) and each.name in moved]:
+            first[joint.child] = replace(joint, rotor=rotor)
     names = [link.get("name", "") for link in root.iterfind("link")]
     roots = [name for name in names if name not in first]
     if len(roots) != 1:
@@ -247,8 +258,17 @@ def friction_of(dry: float, viscous: float) -> tuple[float, float] | None:
     return (dry, viscous) if min(dry, viscous) >= 0.0 and 0.0 < max(dry, viscous) < ENDLESS else None
 
 
+def rotor_of(element: ET.Element | None) -> tuple[float | None, float | None]:
+    """The inertia of a rotor [kg m²], and its gear, as Drake's elements in one say; None where they do not."""
+    said = [None if element is None else element.find(tag) for tag in ("rotor_inertia", "gear_ratio")]
+    values = [None if each is None else numbers_in(each.get("value") or each.text or "", 1) for each in said]
+    inertia, gear = (None if value is None else float(value[0]) for value in values)
+    return (inertia, gear) if inertia else (None, None)
+
+
 def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
     name, origin, limit = element.get("name", ""), element.find("origin"), element.find("limit")
+    acceleration = number(limit, "acceleration")
     is_limited = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
     limits = (number(limit, "lower"), number(limit, "upper"))
     effort, losses = number(limit, "effort"), element.find("dynamics")
@@ -263,6 +283,7 @@ def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
         axes=HERE[:2, :3] if kind == "UNIVERSAL" else np.array([axis, axis]),
         limits=limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
         max_speed=speed if speed > 0.0 else None,
+        max_acceleration=acceleration if 0.0 < acceleration < ENDLESS else None,
         max_torque=effort if 0.0 < effort < ENDLESS else None,
         friction=friction_of(number(losses, "friction"), number(losses, "damping")),
         mimic=_coupling(name, element.find("mimic")),

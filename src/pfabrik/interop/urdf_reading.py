@@ -18,11 +18,12 @@ from ..description.joints import KINDS, Joint
 from ..errors import Fault, InvalidMechanism
 from .assembling import Imported
 from .driving import Rates
+from .known_elements import SDF, URDF, note_ranges, require_known
 from .loops_file import LinkLoop, LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, note_names, noting
 from .opened import loops_by_name
 from .robots import ImportOptions, Robot, mechanism_of
-from .sdf_links import Poses, closing, read_sdf, sdf_joint
+from .sdf_links import Poses, closing, only_model, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision, read_masses
 from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
@@ -119,11 +120,13 @@ def read_description(
     ----------
     asked : names of the joints that a caller drives or holds.
     """
-    links = read_sdf(root, asked, notes) if root.tag == "sdf" else read_links(root, loops_file.retyped, asked)
+    is_sdf = root.tag == "sdf"
+    links = read_sdf(root, asked, notes) if is_sdf else read_links(root, loops_file.retyped, asked)
     written = loops_file.loops(links.frames, links.frame_joints)
     known = {frozenset(loop.links) for loop in written}
     links = links.closed_by(list(_told_joints(root, links, known, notes)), asked)
     told = [loop for loop in links.loops if frozenset(loop.links) not in known]
+    _require_known(root, links, notes)
     for kind, plural in (("spherical", "balls"), ("revolute", "hinges"), ("fixed", "welds")):
         of_kind = (loop.name for loop in told if loop.type == kind)
         note_names(notes, f"loops that the description tells, as {plural}", of_kind)
@@ -135,6 +138,20 @@ def read_description(
         meant = 'if millimetres were meant, write length = "mm" in `units` of the mechanism file'
         notes.append(Note(f"links are up to {farthest:.4g} m away, as a description has metres; {meant}"))
     return links, [*written, *told]
+
+
+def _require_known(root: ET.Element, links: UrdfLinks, notes: list[Note]) -> None:
+    """Refuse what is not known in a description; notes name what is left out."""
+    parts = {*links.frames, *(joint.name for joint in links.joints)}
+    if root.tag == "sdf":
+        for world in root.iterfind("world"):
+            require_known(world, SDF, "world", notes, parts)
+        require_known(only_model(root, []), SDF, "model", notes, parts)
+    else:
+        require_known(root, URDF, "robot", notes, parts)
+        for joint in root.iterfind("gazebo/joint"):
+            require_known(joint, SDF, "joint", notes)
+    note_ranges(root, notes)
 
 
 def _told_joints(
@@ -202,7 +219,9 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
         places,
         order=links.driven,
         rates={
-            joint.name: Rates(joint.max_speed, max_torque=joint.max_torque, friction=joint.friction)
+            joint.name: Rates(
+                joint.max_speed, joint.max_acceleration, joint.max_torque, *joint.rotor, friction=joint.friction
+            )
             for joint in links.joints
         },
         roundings={**links.joint_roundings, **roundings_of_loops(link_loops, links.roundings)},

@@ -41,7 +41,8 @@ class AgainstOriginal:
     loop_gap : float
         How far the file's own loops stay open, by rounding [length; angles as they are].
     position_difference, rotation_difference : float
-        Difference between our pose and the file's, with the actuated joints where we have them [length], [rad].
+        Difference between our pose and the file's, with the actuated joints where we have them; or, where it is
+        larger, of joints of a description from where a second reader has them [length], [rad].
     position_tolerance, rotation_tolerance : float
         How far what import changes within the digits of the file puts poses off [length], [rad], as found by importing
         it again, up to what digits explain; and rounding.
@@ -175,6 +176,8 @@ def verify(
     The mechanism is written as a MuJoCo model. At each answer MuJoCo's constraint rows say how far the loops are open;
     then the passive joints are moved off, and Newton's method on these rows closes the loops again, with the actuated
     joints held: that must lead to the same pose. An original closes its own loops, from its joints put there by name.
+    MuJoCo reads an original that is its own itself; of a URDF, MuJoCo's reading of it says where joints are, and of an
+    SDF a reader that shares nothing with the importer's. A file of loops is read once.
 
     Parameters
     ----------
@@ -212,7 +215,9 @@ def verify(
     units, against = np.array([metres, metres, 1.0]), None
     gap, position, rotation = (on_export(mechanism, solutions, rng) / units).tolist()
     if robot is not None and file is not None:
-        open_by, apart, turned = (np.max([robot.compare(each) for each in solutions], axis=0) / units).tolist()
+        largest = np.max([robot.compare(each) for each in solutions], axis=0)
+        misread = file.misread(mechanism.actuator_names)
+        open_by, apart, turned = (np.maximum(largest, [0.0, *misread]) / units).tolist()
         explained = TOLERANCES.file_digits * np.array([size, size, 1.0])
         changed = np.minimum(robot.changes_of_import(file, solutions) / units, explained)
         nearest = float(max(changed[:2])) + tolerance

@@ -26,6 +26,9 @@ Kind = Literal["mjcf", "urdf", "sdf"]
 KINDS: dict[str, Kind] = {"mujoco": "mjcf", "robot": "urdf", "sdf": "sdf"}
 """First element of a file -> its kind."""
 
+OF_XML = ("xmlns", "xml", "xsi")
+"""Prefixes of attributes that say something of the text, and nothing of the model."""
+
 MOST_ELEMENTS, MOST_INCLUDED = 200_000, 20
 
 
@@ -131,7 +134,7 @@ class _Budget:
 
 
 def _parsed(content: bytes, place: str) -> ET.Element:
-    """The tree of a text, checked as it is read, so that nothing is expanded; prefixes of tags are left out."""
+    """The tree of a text, checked as it is read, so that nothing is expanded; prefixes of names are left out."""
     parser, builder = expat.ParserCreate(), ET.TreeBuilder()
     depth = count = 0
 
@@ -142,7 +145,8 @@ def _parsed(content: bytes, place: str) -> ET.Element:
             raise fault(place, "elements nested too deeply, or too many", f"{DEEPEST} levels, {MOST_ELEMENTS} elements")
         if tag.startswith("xacro:"):
             raise fault(place, f"<{shown(tag)[1:-1]}>, of a file for xacro", "what `xacro FILE` makes of it")
-        builder.start(tag.rpartition(":")[2], attributes)
+        own = {key.rpartition(":")[2]: text for key, text in attributes.items() if key.partition(":")[0] not in OF_XML}
+        builder.start(tag.rpartition(":")[2], own)
 
     def end(tag: str) -> None:
         nonlocal depth
