@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .arrays import Floats
 from .errors import InvalidArgument
@@ -30,10 +30,7 @@ def new_figure(
 
 def curves_over_time(times: Floats, names: Sequence[str], panels: Mapping[str, Floats]) -> Figure:
     """Columns of arrays (n, k) over times (n,) [s], a panel for each array by its label, a name for each column."""
-    require("pictures", "matplotlib", "plot")
-    from matplotlib.figure import Figure
-
-    figure: Any = Figure(figsize=(8.0, 7.0), layout="constrained")
+    figure = new_figure(8.0, 7.0)
     for axes, (label, values) in zip(figure.subplots(len(panels), 1, sharex=True), panels.items(), strict=True):
         for name, column in zip(names, values.T, strict=True):
             axes.plot(times, column, label=name)
@@ -41,8 +38,7 @@ def curves_over_time(times: Floats, names: Sequence[str], panels: Mapping[str, F
     axes.set_xlabel("time [s]")
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
-    drawn: Figure = figure
-    return drawn
+    return figure
 
 
 def require_flat(ax: Axes) -> None:

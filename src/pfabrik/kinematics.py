@@ -10,7 +10,7 @@ Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
 Masses        inertias_of, BodyInertia
 Motion        home_coordinates, displacements, joint_centres, placed, end_effector_pose; joint_path, JointPath
-              tilt_axis
+              tilt_axis, has_weak_coordinates, task_remark
 First order   around_home, generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
               actuator_units, rate_units; parallel_signs
 Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes
@@ -39,7 +39,7 @@ from .motion.displacements import (
     placed,
     rate_units,
 )
-from .motion.fitting_task import tilt_axis
+from .motion.fitting_task import has_weak_coordinates, task_remark, tilt_axis
 from .motion.joint_path import JointPath, joint_path, passive_series
 from .motion.loops import cycle_basis
 from .motion.mobility import around_home, generic_of, internal_rates
@@ -67,6 +67,7 @@ __all__ = [
     "end_effector_pose",
     "engine_of",
     "generic_of",
+    "has_weak_coordinates",
     "home_coordinates",
     "inertias_of",
     "internal_rates",
@@ -84,6 +85,7 @@ __all__ = [
     "readouts",
     "require_determined",
     "task_of",
+    "task_remark",
     "tilt_axis",
     "tree_of",
     "varied",

@@ -13,6 +13,12 @@ class Tolerances:
     ----------
     position : pose and closure tolerance [L]. Machine precision leaves three decimal orders of room below it.
     rotation : rotation tolerance [rad], the same in angle.
+    exact : error [L or rad] up to which a pose is reached to rounding: searches that converge end below 2e-12, and what
+        is reached to the tolerance alone is off by a hundredth of it and more.
+    sized : extent [L or rad] of a map from which on it is not the tolerance of poses alone: across a line that a
+        coordinate follows, this leaves a few times itself.
+    unmoved : extent [L or rad] of a map below which a coordinate that follows others may seem to vary: it is missed by
+        the square or the cube of the distance at first, of which the tolerance of poses leaves the root.
     limit : excess up to which a limit counts as kept [L or rad].
     inside : how far inside their limits answers are put [L or rad]: what is met to the last digit counts as
         kept. A range with less room than that on both sides, as of a locked joint, is kept in its middle.
@@ -55,6 +61,9 @@ class Tolerances:
         solutions meet, closing the loops to 1e-13 places each to 3e-7 only.
     """
 
+    exact: float = 5e-12
+    sized: float = 1e-8
+    unmoved: float = 2e-3
     position: float = 1e-9
     rotation: float = 1e-9
     limit: float = 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +12,16 @@ import pfabrik as pf
 
 from .arguments import MECH, load
 from .export import text_of
-from .outputs import OUTPUT, check_outputs, force_option, picture, refuse_both_on_stdout, refuse_existing, whole_file
+from .outputs import (
+    OUTPUT,
+    check_outputs,
+    force_option,
+    refuse_both_on_stdout,
+    refuse_existing,
+    require_picture,
+    whole_file,
+    write_picture,
+)
 from .printing import json_option, note, print_result
 
 
@@ -56,6 +66,7 @@ def calibrate(
     outputs = [("-o", output), ("--plot", plot), *((f"--{form}", path) for form, path in written.items())]
     check_outputs(outputs, [Path(mech), *([data] if data else [])], as_json=as_json)
     refuse_both_on_stdout(output, as_json)
+    require_picture(plot)
     for path in (output, *written.values()):
         if path is not None:
             refuse_existing(path, force)
@@ -71,8 +82,7 @@ def calibrate(
         with whole_file(path) as file:
             file.write(text)
     if plot is not None:
-        with picture(plot):
-            pf.plot_calibration(result)
+        write_picture(plot, partial(pf.plot_calibration, result))
     print_result(as_json, result)
     if held:
         note(

@@ -7,6 +7,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ import pfabrik as pf
 
 from ..extras import require
 from ..printed import aligned, error_text
-from .outputs import check_outputs, new_folder, picture, real, whole_folder
+from .outputs import check_outputs, new_folder, real, whole_folder, write_picture
 from .printing import print_text
 
 if TYPE_CHECKING:
@@ -57,8 +58,8 @@ def demo(output: Path, steps: int, quick: bool) -> int:
     count = QUICK_STEPS if quick else steps
     for key, targets in circles(count):
         runs.append(follow(key, targets))
-        with whole_folder(output) as folder, picture(folder / f"{key}.png"):
-            pf.plot_track(runs[-1].solution)
+        with whole_folder(output) as folder:
+            write_picture(folder / f"{key}.png", partial(pf.plot_track, runs[-1].solution))
         click.echo(f"wrote {output / key}.png", err=True)
     with whole_folder(output) as folder:
         for run in runs:

@@ -18,11 +18,11 @@ from .outputs import (
     OUTPUT,
     check_outputs,
     force_option,
-    picture,
     refuse_both_on_stdout,
     refuse_existing,
     require_picture,
     whole_file,
+    write_picture,
 )
 from .printing import json_option, note, print_result
 
@@ -102,8 +102,7 @@ def design(
         with whole_file(output) as file:
             file.write(dumps(best.mechanism))
     if plot is not None and best.rounds:
-        with picture(plot):
-            best.plot()
+        write_picture(plot, best.plot)
     print_result(as_json, result)
     for path, is_there in ((output, best.mechanism), (plot, best.rounds)):
         if path is not None and not is_there:

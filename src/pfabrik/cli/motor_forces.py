@@ -11,7 +11,7 @@ import click
 import pfabrik as pf
 
 from .arguments import FINITE, MECH, Triple, load
-from .outputs import OUTPUT, STANDARD, check_outputs, picture, refuse_both_on_stdout, require_picture, whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, require_picture, whole_file, write_picture
 from .printing import json_option, print_result
 from .statics import Loads, carrying, weighed
 from .track import at_lines_of, limiting
@@ -74,8 +74,7 @@ def effort(
         if handle is not None:
             found.write(handle)
     if plot is not None:
-        with picture(plot):
-            found.plot()
+        write_picture(plot, found.plot)
         click.echo(f"wrote {plot}", err=True)
     print_result(as_json, found, to_stderr=output == STANDARD)
     return int(any(found.reason))

@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import combinations
@@ -25,6 +25,9 @@ from .options import Decorator, together
 from .printing import note
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from ..view.eye import View
     from ..view.looks import Theme
 
@@ -269,9 +272,10 @@ def note_no_picture(*without: str) -> None:
             note(f"--{name} has no effect without {' or '.join(without)}")
 
 
-@contextmanager
-def picture(path: Path, drawn: PictureOptions | None = None) -> Iterator[None]:
-    """Write to a file what a block draws in one new figure; a name that cannot be is refused before it draws.
+def write_picture(
+    path: Path, draw: Callable[[], Axes | Figure | Mapping[str, Axes]], drawn: PictureOptions | None = None
+) -> None:
+    """Write to a file the figure that a function draws and returns, or of which it returns the axes.
 
     It is cropped to what is drawn, unless a size is asked for.
     """
@@ -283,8 +287,8 @@ def picture(path: Path, drawn: PictureOptions | None = None) -> Iterator[None]:
 
     matplotlib.use("Agg")  # no window, whatever the user's settings
     drawn = drawn or PictureOptions()
-    yield
-    figure = pyplot.gcf()
+    shown: Any = draw()
+    figure = (next(iter(shown.values())) if isinstance(shown, Mapping) else shown).figure.figure
     if drawn.size is not None:
         figure.set_size_inches(drawn.size)
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ from .arguments import (
     targeted,
 )
 from .options import actuators, named_values
-from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured
+from .outputs import PictureOptions, check_outputs, note_no_picture, pictured, write_picture
 from .printing import Result, complain, json_option, print_answer, print_result, printing_result
 
 if TYPE_CHECKING:
@@ -171,8 +172,7 @@ def travel(
     if path is None:
         note_no_picture("--plot")
     else:
-        with picture(path, drawn):
-            pf.plot_travel(distances, **drawn.looks)
+        write_picture(path, partial(pf.plot_travel, distances, **drawn.looks), drawn)
         click.echo(f"wrote {path}", err=True)
     print_result(as_json, distances)
     return 0

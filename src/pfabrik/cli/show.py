@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import webbrowser
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pfabrik as pf
 
 from .arguments import FINITE, MECH, TargetOptions, load, named_joints, targeted
 from .options import STANDARD_INPUT, joints_option, together
-from .outputs import PictureOptions, check_outputs, picture, pictured, require_format
+from .outputs import PictureOptions, check_outputs, pictured, require_format, write_picture
 from .printing import note
 
 
@@ -85,13 +86,11 @@ def plot(
             raise click.UsageError("--torque-map is of the whole range: it does not go with a target or --names")
         if drawn.view is not None or drawn.theme != "light":
             raise click.UsageError("--torque-map is no picture of a machine: it does not go with --view or --theme")
-        with picture(path, drawn):
-            torque_map.draw(mechanism)
+        write_picture(path, partial(torque_map.draw, mechanism), drawn)
         click.echo(f"wrote {path}")
         return 0
     shown = pf.solve_ik(mechanism, target.of(mechanism)) if target.is_given else mechanism
-    with picture(path, drawn):
-        pf.plot(shown, names=names, **drawn.in_space)
+    write_picture(path, partial(pf.plot, shown, names=names, **drawn.in_space), drawn)
     click.echo(f"wrote {path}")
     return 0 if shown else 1
 

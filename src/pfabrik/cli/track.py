@@ -23,11 +23,11 @@ from .outputs import (
     PictureOptions,
     check_outputs,
     note_no_picture,
-    picture,
     pictured,
     refuse_both_on_stdout,
     require_picture,
     whole_file,
+    write_picture,
 )
 from .printing import json_option, note, print_json, print_result, print_text
 from .questions import own_limits, speed_limits, speed_option
@@ -212,8 +212,7 @@ def follow(
 def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, drawn: PictureOptions) -> None:
     """Write the picture and the film that are wanted."""
     if picture_path is not None:
-        with picture(picture_path, drawn):
-            pf.plot_track(solution, **drawn.in_space)
+        write_picture(picture_path, partial(pf.plot_track, solution, **drawn.in_space), drawn)
         click.echo(f"wrote {picture_path}", err=True)
     if film_path is not None:
         pf.animate(solution, film_path, dpi=drawn.dpi, **drawn.in_space)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,15 @@ from ..cells import is_finite
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, TargetOptions, Triple, answered, load, numbers_of, rpy_option, targeted
 from .options import completing, named_values, together
-from .outputs import PictureOptions, check_outputs, note_no_picture, picture, pictured, require_format, require_picture
+from .outputs import (
+    PictureOptions,
+    check_outputs,
+    note_no_picture,
+    pictured,
+    require_format,
+    require_picture,
+    write_picture,
+)
 from .printing import json_option, note, print_result
 
 if TYPE_CHECKING:
@@ -146,8 +154,7 @@ def workspace(
         raise click.UsageError(f"--largest{str(error).removeprefix(error.argument)}") from error
     for path in outputs:
         if path in pictures:
-            with picture(path, drawn):
-                found.plot(shape=shape, **drawn.in_space)
+            write_picture(path, partial(found.plot, shape=shape, **drawn.in_space), drawn)
         else:
             found.save(path)
         click.echo(f"wrote {path}", err=True)
@@ -174,6 +181,7 @@ def singularities(
     it: the parts between parallel singularities, the least of each measure, and the share of points near to 0.
     """
     check_outputs([("-o", output)], [Path(mech)], as_json=as_json)
+    require_picture(output)
     if output is None:
         note_no_picture("-o")
     if not space.is_given and output is None:
@@ -184,11 +192,9 @@ def singularities(
     if target.position or target.joint:
         raise click.UsageError("--position and --joint are of one pose: over a workspace, --fix holds a coordinate")
     mechanism = load(mech)
-    with nullcontext() if output is None else picture(output, drawn):
-        found = pf.singularity_map(mechanism, space.workspace(mech, mechanism, target.rpy))
-        if output is not None:
-            found.plot(**drawn.in_space)
+    found = pf.singularity_map(mechanism, space.workspace(mech, mechanism, target.rpy))
     if output is not None:
+        write_picture(output, partial(found.plot, **drawn.in_space), drawn)
         click.echo(f"wrote {output}", err=True)
     print_result(as_json, found)
     return 0 if len(found.points) else 1

@@ -17,6 +17,7 @@ from .measuring import Measure
 from .parts import Parts
 from .refining import refined
 from .surface import BorderMesh, mesh_of
+from .unmoved import require_size
 from .verdicts import MapQuestion
 
 FINENESS, FINENESS_OF_SETS, FINENESS_ONE_BY_ONE = 1 / 100, 1 / 50, 1 / 25
@@ -30,7 +31,7 @@ FIRST_REACH = {True: 2.5, False: 1.5}
 
 
 def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[BorderMesh, Parts]:
-    """The border at cells of size `step`, (d,), and the connected parts."""
+    """The border at cells of size `step`, (d,), and the connected parts; InvalidArgument if they have no size."""
     space, exact = question.space, question.has_margins
     lattice = Lattice(space.start, step, measure)
     unit = np.where(space.is_angle, 1.0, question.mechanism.characteristic_length)
@@ -38,7 +39,9 @@ def searched(question: MapQuestion, step: Floats, measure: Measure) -> tuple[Bor
     levels = max(1, round(math.log2(FIRST_CELLS[len(step), exact] / widest)))
     reach = math.ceil(FIRST_REACH[exact] / (widest * 2**levels))
     cells = refined(lattice, levels, max(reach, 2))
-    return mesh_of(lattice, cells.border), Parts(lattice, cells)
+    mesh = mesh_of(lattice, cells.border)
+    require_size(lattice, mesh)
+    return mesh, Parts(lattice, cells)
 
 
 def step_of(question: MapQuestion, resolution: float | None) -> Floats:

@@ -177,6 +177,28 @@ class MapQuestion:
         near = answers.position_error <= TOLERANCES.position * self.mechanism.characteristic_length
         return answers, np.asarray(near & (status <= Status.PROJECTED))
 
+    def goes_on(self, points: Floats, known: Starts, *, exactly: bool) -> Mask:
+        """Mask (n,) of points (n, d) that are reached; exactly: to rounding, not to the tolerance of poses alone.
+
+        Parameters
+        ----------
+        known : configurations near them, (n,), if the map is grown.
+        """
+        if not (exactly or self.is_grown):
+            return np.asarray(self.measure(points)[0] >= 0.0)
+        if self.is_grown:
+            answers = Solution(self.mechanism, self._grown(points, known, False), (len(points),))
+            reached = np.asarray(np.asarray(answers.status) == Status.REACHED)
+        else:
+            answers, reached = self._answers(self.space.poses(points))
+        if not exactly:
+            return reached
+        length = self.mechanism.characteristic_length
+        off = np.maximum(answers.position_error, answers.residual) / length
+        if self.hold == "orientation":
+            off = np.maximum(off, answers.rotation_error)
+        return np.asarray(reached & (off <= TOLERANCES.exact))
+
     @property
     def _unknown(self) -> int:
         return len(self._known_limits) - 1

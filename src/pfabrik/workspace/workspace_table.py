@@ -12,6 +12,7 @@ import numpy as np
 from ..answers.words import bound_notes, limit_name
 from ..arrays import Floats
 from ..description.sketch import HEIGHT, MARGIN, WIDTH
+from ..kinematics import has_weak_coordinates, task_remark
 from ..printed import ResultTable
 from .border import REST, groups_of
 
@@ -30,7 +31,8 @@ MOST_LIMITS = 12
 def workspace_table(region: Region, remarks: Sequence[str]) -> ResultTable:
     """Size, ends, the limits that form the border, and remarks; over two coordinates, a drawing."""
     if not len(region.faces):
-        return ResultTable(region.mechanism.name, ["nothing within reach"])
+        weak = [task_remark(region.mechanism)] if has_weak_coordinates(region.mechanism) else []
+        return ResultTable(region.mechanism.name, ["nothing within reach", *weak])
     lines, ends = [in_words(region)], shown(region, region.bounds).T.tolist()
     for name, (low, high), unit in zip(region.names, ends, for_people(region.units)[1], strict=True):
         lines.append(f"{name} from {low:.6g} to {high:.6g} {unit}")
