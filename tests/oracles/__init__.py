@@ -8,7 +8,7 @@ for a configuration that has a pose, `annuli` areas of workspaces. `no_poses` te
 
 from .arms import ACCURACY, arms
 from .ik import Answer, NoClosedForm, WorkingModes, solve_ik, working_modes
-from .no_poses import far_poses, is_pose, no_poses
+from .no_poses import far_poses, is_pose, no_poses, rough_pose
 from .targets import (
     actuators,
     any_targets,
@@ -42,6 +42,7 @@ __all__ = [
     "no_poses",
     "poses",
     "random_targets",
+    "rough_pose",
     "solve_ik",
     "targets_about",
     "working_modes",

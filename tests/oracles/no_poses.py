@@ -49,6 +49,13 @@ def no_poses(pose: Array) -> Array:
     return np.array(spoiled)
 
 
+def rough_pose(pose: Array) -> Array:
+    """A pose whose rotation is off by nearly as much as it may, in all three of its axes, (4, 4)."""
+    matrix = pose.copy()
+    matrix[:3, :3] *= 1.0 + 0.45e-6
+    return matrix
+
+
 def far_poses(pose: Array) -> Array:
     """Poses whose position is as far away as numbers go, (n, 4, 4): the sum of its coordinates may be none."""
     most = np.finfo(float).max
