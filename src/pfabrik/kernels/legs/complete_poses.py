@@ -84,6 +84,10 @@ def is_pose(target: Floats) -> bool:
     for i in range(3):
         if not (abs(target[i, 3]) < math.inf and abs(target[3, i]) <= NOT_A_ROTATION):
             return False
+        for j in range(3):
+            if not abs(target[i, j]) < 2.0:  # so that no square overflows
+                return False
+    for i in range(3):
         for j in range(i, 3):
             if not abs(gram(target, i, j)) <= NOT_A_ROTATION:
                 return False
