@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from oracles import no_poses
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument
 from pfabrik.export.controller_tables import packed
@@ -117,6 +118,7 @@ def asked(name: str) -> tuple[Any, Any, Any]:
 def answered(name: str) -> dict[str, Any]:
     """What the page of a machine answers, in Node.js."""
     targets, path, values = asked(name)
+    spoiled = no_poses(loaded(name).home_pose)
     question = {
         "kernels": packed((FOLDER / "kernels.wasm").read_bytes()),
         "machine": machine_data(model_of(loaded(name))),
@@ -126,6 +128,7 @@ def answered(name: str) -> dict[str, Any]:
         "link": link_to(path[0]),
         "listed": targets_of(loaded(name), 1, 5).ravel().tolist(),
         "edges": edges_of(loaded(name)).reshape(-1, 16).tolist(),
+        "spoiled": np.where(np.isnan(spoiled), None, spoiled).reshape(-1, 16).tolist(),
     }
     scripts = [str(FOLDER / "web" / f"{each}.js") for each in SCRIPTS[: SCRIPTS.index("session") + 1]]
     text = re.sub(r"\bInfinity\b", "1e999", json.dumps(question))
@@ -179,6 +182,8 @@ def test_a_page_answers_as_the_library_does(name: str) -> None:
         distance = pf.travel(home, **{reach["kind"]: axis})[0].distance
         found = np.inf if reach["distance"] is None else reach["distance"]
         assert found == pytest.approx(distance, rel=1e-6, abs=1e-6 * machine.characteristic_length)
+    # what is no pose is no pose with a start and without, also in what the task leaves out
+    assert {status for statuses in told["spoiled"] for status in statuses} == {pf.Status.INVALID}
     # a link keeps the pose, and steps are undone
     steps, scale = told["steps"], max(machine.characteristic_length, 1.0)
     assert np.abs(np.subtract(steps["asked"], steps["kept"])).max() <= NEAR * scale

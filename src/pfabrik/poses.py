@@ -111,8 +111,9 @@ _ROTATIONS: dict[str, Callable[[str, Floats], Floats]] = {
 
 def is_rotation(matrix: Floats) -> bool:
     """True if a (3, 3) matrix is a rotation to the tolerance targets are held to."""
-    error = np.abs(matrix.T @ matrix - np.eye(3)).max()
-    return bool(error <= TOLERANCES.rotation_matrix and np.linalg.det(matrix) > 0.0)
+    turned = np.eye(4)
+    turned[:3, :3] = matrix
+    return bool(are_poses(turned[None])[0])
 
 
 _EXPECTED = "poses of shape (..., 4, 4) or positions of shape (..., 3)"
@@ -141,13 +142,11 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
 
 def are_poses(targets: Floats) -> Mask:
     """Which of (n, 4, 4) arrays are poses, (n,)."""
-    finite = np.asarray(np.isfinite(targets).all(axis=(1, 2)))
-    R = np.where(finite[:, None, None], targets, np.eye(4))[:, :3, :3]
-    R = np.clip(R, -2.0, 2.0)  # so that no square overflows
-    error = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    last = np.abs(targets[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0)
-    near = TOLERANCES.rotation_matrix
-    return np.asarray(finite & (error <= near) & (last <= near) & (np.linalg.det(R) > 0.0))
+    from .kernels.legs.complete_poses import are_poses as mark_poses
+
+    marks = np.empty(len(targets), np.int64)
+    mark_poses(np.ascontiguousarray(targets), marks)
+    return np.asarray(marks == 1)
 
 
 def made_exact(poses: Floats) -> Floats:

@@ -112,6 +112,8 @@ def search_log(
     if shape != ():
         raise InvalidArgument("target", f"{len(targets)} targets", "a single one")
     solution = solve_ik(mechanism, targets[0], start=start, options=options)
+    if solution.status == Status.INVALID:
+        return SearchLog(solution, (), None)
     begin = start_of(mechanism, start, ())
     free, keep_mode = mechanism.with_clearance(None), keeps_mode(options, begin)
     attempts = tuple(engine_of(free).attempts(targets, begin, options, keep_mode=keep_mode))

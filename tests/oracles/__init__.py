@@ -3,11 +3,12 @@
 `ik` has closed forms of legs: cranks, carriages, struts and guides, with all their branches; `arms` the best
 configuration of a redundant mechanism; `targets` draws targets on both sides of the border. `assembly` has closed forms
 for forward kinematics, `nearest` a general optimiser for the feasible pose nearest to a target, `search` a blind search
-for a configuration that has a pose, `annuli` areas of workspaces.
+for a configuration that has a pose, `annuli` areas of workspaces. `no_poses` tells poses from other matrices exactly.
 """
 
 from .arms import ACCURACY, arms
 from .ik import Answer, NoClosedForm, WorkingModes, solve_ik, working_modes
+from .no_poses import far_poses, is_pose, no_poses, rough_pose
 from .targets import (
     actuators,
     any_targets,
@@ -33,11 +34,15 @@ __all__ = [
     "any_values",
     "arms",
     "edge",
+    "far_poses",
     "inside_targets",
+    "is_pose",
     "leg_lengths",
     "margin",
+    "no_poses",
     "poses",
     "random_targets",
+    "rough_pose",
     "solve_ik",
     "targets_about",
     "working_modes",

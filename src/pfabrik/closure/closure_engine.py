@@ -74,9 +74,11 @@ class ClosureEngine(Engine):
         rows = new_rows(self.model, len(targets))
         answers = Configurations(rows, answer_rows(self.model, targets, begin, options, question, rows))
         if _has_side_loops(self.model):
-            closing = measure_configurations(self.model, answers.coordinates)
-            rows.measures[:, RESIDUAL], rows.measures[:, LIMIT_EXCESS] = closing.gap * self.model.length, closing.excess
-            rows.status[~closing.feasible & (rows.status < INVALID)] = FAILED
+            valid = np.flatnonzero(rows.status != INVALID)
+            closing = measure_configurations(self.model, answers.coordinates[valid])
+            measured = np.stack([closing.gap * self.model.length, closing.excess], axis=1)
+            rows.measures[valid[:, None], (RESIDUAL, LIMIT_EXCESS)] = measured
+            rows.status[valid[~closing.feasible]] = FAILED
         return answers
 
     def nearest(

@@ -51,7 +51,7 @@ int pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
 /* The meaning of a return code, in words. */
 const char *pfk_what(int code);
 #if IK
-/* Actuators for a target. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
+/* Actuators for a target, a whole pose, what the task leaves out too. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
    there, and `pose` becomes the pose reached. Nothing is written unless 0 is returned. */
 int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
 #endif
@@ -61,7 +61,7 @@ int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUAT
    where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from each of up to `starts`
    more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together. `holding`, which may be 0,
    is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where a leg is stretched, at a dead point,
-   which pfk_limits and pfk_ik then say with the code of the leg. The target is a whole pose, what the task leaves out too. */
+   which pfk_limits and pfk_ik then say with the code of the leg. */
 int pfk_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding);
 /* What a control loop calls: pfk_ik, and pfk_nearest where that has no answer. */
 int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding);

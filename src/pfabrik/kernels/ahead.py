@@ -23,6 +23,7 @@ from .home import measure_home
 from .lattice import join, number_points
 from .legs.answer import answer
 from .legs.blocks import answer_blocks
+from .legs.complete_poses import are_poses
 from .legs.feasibility import feasibility, read_targets
 from .legs.margin_blocks import margins_in_blocks
 from .noted_steps import evaluate
@@ -87,6 +88,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (rates, (*_values("i i"), _FIRST_ORDER_PLAN, *_values("F2"), _FIRST_ORDER)),
     (feasibility, tuple(_values("i F3 F3 F2 f1 i1 f2"))),
     (read_targets, tuple(_values("i F3 F3 f2"))),
+    (are_poses, tuple(_values("F3 i1"))),
     (inverse_dynamics, (*_values("i i F2 F3 F2 F2 F2"), Exerted(*_values("f2 f2 f2 f2 i1 f3 f2 f3 f3 f2 f3")))),
     (signs_of, tuple(_values("F2 f2"))),
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),

@@ -156,11 +156,11 @@ class LegsEngine(Engine):
         by_joints: Callable[[NDArray[np.intp], Configurations | None], Configurations],
         options: Options,
     ) -> Configurations:
-        """Rows of legs as answers; those that are PENDING or UNSURE by joints.
+        """Rows of legs as answers; those that are PENDING, UNSURE or INVALID by joints.
 
         An UNSURE projection stays where these neither reach its target nor come nearer.
         """
-        unsolved, start_sides = np.flatnonzero(rows.status >= PENDING), self._sides_of(start)
+        unsolved, start_sides = np.flatnonzero(rows.status > PROJECTED), self._sides_of(start)
         if not len(unsolved):
             return leg_answers(self._model, rows, sides, q, start, start_sides)
         begin = start if start is None or len(start) in (1, len(unsolved)) else start.at(unsolved)

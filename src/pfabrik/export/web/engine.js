@@ -87,6 +87,7 @@ class Engine {
   ask(target, start = null) {
     const found = this.solve(target, start);
     if (found === PENDING) return this.failed(start ?? this.home);
+    if (found === INVALID) return this.failed(start ?? this.home, INVALID);
     const answer = this.read(found === UNSURE ? PROJECTED : found);
     if (answer.status === PROJECTED && !answer.proximal.some(Number.isNaN)) answer.limits = this.holding();
     return this.complete(answer);
@@ -100,8 +101,8 @@ class Engine {
     return status === PENDING ? this.failed(start ?? this.home) : this.complete(this.read(status));
   }
 
-  failed(start) {
-    const answer = { ...start, status: FAILED, errors: [0, 0, 0, 0, 0], proximal: null, limits: [] };
+  failed(start, status = FAILED) {
+    const answer = { ...start, status, errors: [0, 0, 0, 0, 0], proximal: null, limits: [] };
     return { ...this.complete(answer), actuators: null };
   }
 

@@ -113,6 +113,7 @@ class Panel {
     const { answer, isFar } = this.session;
     const words = {
       [REACHED]: "Reached", [PROJECTED]: "Out of reach", [EXCEEDED]: "Beyond its limits", [FAILED]: "No feasible pose found",
+      [INVALID]: "Not a pose",
     };
     $("#status").className = isFar ? "far" : "reached";
     $("#status b").textContent = words[answer.status] ?? words[PROJECTED];
@@ -130,7 +131,7 @@ class Panel {
     const kept = this.machine.limits.length ? "Every limit kept, all loops closed." : "All loops closed; this machine has no limits.";
     if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : kept;
     if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";
-    if (answer.status === FAILED) return "The last feasible pose is shown.";
+    if (answer.status >= FAILED) return "The last feasible pose is shown.";
     if (wished) return "These values do not fit together; this is the nearest that does.";
     return `Nearest feasible pose, ${this.distance(answer)} short. ${has ? "Stopped by" : "Its links are stretched."}`;
   }

@@ -1,5 +1,5 @@
 // What is asked for, the answer to it, the steps that can be undone, and the link that keeps them.
-const REACHED = 0, PROJECTED = 1, EXCEEDED = 2, FAILED = 3;
+const REACHED = 0, PROJECTED = 1, EXCEEDED = 2, FAILED = 3, INVALID = 4;
 const MOST_STEPS = 200, SINGULAR = 1e-4;
 
 class Session {

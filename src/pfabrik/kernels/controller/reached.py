@@ -72,7 +72,7 @@ def reach(own: Reaching, target: Floats, pose: Floats, attempts: int) -> int:
             if task["rotations"] == 0:
                 own.wanted[i, j] = own.home.poses[0, i, j]
     is_completed = task["unset"] > 0 or task["implicit"] == 1
-    if not is_pose(own.wanted) or (is_completed and not is_pose(pose)):
+    if not is_pose(target) or (is_completed and not is_pose(pose)):
         return NO_POSE
     if own.tilt.shape[0] > 0:
         turn_along_tilt(own)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
-from .._jit import routine
+from ...arrays import Floats, Ints, Record
+from .._jit import routine, search
 from ..quaternions import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec
 from .endings import turned
@@ -81,15 +81,25 @@ def tilt_to(target: Floats, share: float, pose: Floats) -> bool:
 @routine
 def is_pose(target: Floats) -> bool:
     """True if the matrix (4, 4) is finite, with a proper rotation and last row 0 0 0 1, each to NOT_A_ROTATION."""
-    deviation, size = abs(target[3, 3] - 1.0), target[3, 3]
     for i in range(3):
-        deviation = max(deviation, abs(target[3, i]))
-        size += target[3, i] + target[i, 3]  # no number if one of them is none
+        if not (abs(target[i, 3]) < math.inf and abs(target[3, i]) <= NOT_A_ROTATION):
+            return False
+        for j in range(3):
+            if not abs(target[i, j]) < 2.0:  # so that no square overflows
+                return False
+    for i in range(3):
         for j in range(i, 3):
-            deviation = max(deviation, abs(gram(target, i, j)))
-            size += gram(target, i, j)
+            if not abs(gram(target, i, j)) <= NOT_A_ROTATION:
+                return False
     x, y, z = column(target, 0), column(target, 1), column(target, 2)
-    return deviation <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0 and abs(size) < math.inf
+    return abs(target[3, 3] - 1.0) <= NOT_A_ROTATION and dot(cross(x, y), z) > 0.0
+
+
+@search
+def are_poses(targets: Floats, marks: Ints) -> None:
+    """Mark each of (n, 4, 4) matrices: 1 if it is a pose, else 0."""
+    for row in range(targets.shape[0]):
+        marks[row] = 1 if is_pose(targets[row]) else 0
 
 
 @routine

@@ -175,9 +175,7 @@ def margins_in_blocks(
             margins[start + i], bindings[start + i] = S[LEAST, i], int(S[BINDING, i])
             is_pose = S[IS_POSE, i] == 1.0
             is_open = is_coupled == 1 if S[IS_REGULAR, i] == 0.0 else task[0]["unset"] > 0 and S[LARGEST, i] > tolerance
-            if not is_pose:
-                margins[start + i], bindings[start + i] = math.nan, -1
-            elif is_open or S[IS_KNOWN, i] == 0.0:
+            if not is_pose or is_open or S[IS_KNOWN, i] == 0.0:
                 bindings[start + i] = UNKNOWN
                 n_unknown += 1
     return n_unknown

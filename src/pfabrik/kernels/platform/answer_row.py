@@ -9,7 +9,7 @@ from .._jit import routine
 from ..clearance.link_limits import links_excess
 from ..closure.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides, place_legs
-from ..legs.complete_poses import read_target
+from ..legs.complete_poses import is_pose, read_target
 from ..legs.frames import set_frames
 from ..legs.records import Table
 from ..projecting import UNBOUNDED, begin_effort, brings_nearer, is_too_far
@@ -17,6 +17,7 @@ from ..rows import (
     CERTAIN,
     HOLD,
     HOLD_NOTHING,
+    INVALID,
     ITERATIONS,
     OPEN,
     PENDING,
@@ -496,7 +497,7 @@ def answer_row(
     from there. PENDING where no feasible pose was found, or only joint coordinates are exact enough: at a dead point,
     or on a target that the start is on already. UNSURE where these may come nearer than a projection that nearly
     reaches. OPEN if the phases asked for do not answer it, TOO_NEAR if they reach it, but with links that are too near.
-    Later phases are to be told so by the status of the answer.
+    Later phases are to be told so by the status of the answer. INVALID if the target is no pose.
 
     Parameters
     ----------
@@ -507,6 +508,9 @@ def answer_row(
     effort, most = scratch.nearest.search.effort[0], question["most_steps"]
     begin_effort(question["effort"], most if most > 0 else UNBOUNDED, effort)
     put_start(start, answer)
+    if not is_pose(target[0]):
+        answer.status[0] = INVALID
+        return INVALID
     put_start(start, scratch.other)
     status = answer_by_phases(tables, scratch, start, target, question, answer)
     if most > 0 and status == PENDING:
