@@ -32,7 +32,6 @@ from .platform.evaluate import evaluate_poses, jacobians
 from .platform.forward import assemble
 from .platform.forward_blocks import assemble_in_blocks
 from .platform.nearest import nearest_pose
-from .replay import replay
 from .rows import Rows
 from .timing import acceleration_shares, fastest, second_derivatives, speed_shares, spline_at
 from .walk_path import walk_path
@@ -95,7 +94,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
     (answer_chains, (*_values("i i i b F3 F2 f2"), Rows(*_values("i1 i2 f3 f2 f2")))),
     (measure_home, tuple(_values("f1 i f1 i1"))),
-    (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (evaluate, tuple(_values("I2 I2 I2 i F1 F2 F2 f2 f3"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),
     (join, tuple(_values("I2 i1"))),

@@ -101,6 +101,6 @@ def split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
         records = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in records.items()}
         for array in records.values():
             array["leg"] -= k
-        part = replace(table, forms=table.forms[k:end], legs=part_legs, recording=None, **records)
+        part = replace(table, forms=table.forms[k:end], legs=part_legs, fields={}, **records)
         parts.append((part, slice(k, end)))
     return tuple(parts)
