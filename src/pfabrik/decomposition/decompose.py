@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import takewhile
 from typing import TypeAlias
 
 from ..derived import derived
@@ -194,29 +193,6 @@ def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
     except NotExpressible as reason:
         return SubChain(chain.parts, str(reason))
     return SubChain(chain.parts, None, forms)
-
-
-def express_on(
-    mechanism: Mechanism, joints: frozenset[str], from_platform: bool
-) -> Iterator[tuple[tuple[Step, ...], tuple[BranchForm, ...]]]:
-    """Sub-chains that some joints begin, these as their trunks, with what stands on them in positions.
-
-    Seen from the base or, chains without branches, from the platform. Left out are those in which such a joint comes
-    later, and those that positions cannot express.
-    """
-    for chain in sub_chains(HomeNumbers(mechanism)):
-        trunk, branches = ((), ()) if from_platform else (chain.trunk, chain.branches)
-        if not trunk and _are_steps(chain.parts):
-            steps = tuple(step.back for step in reversed(chain.steps)) if from_platform else chain.steps
-            trunk = tuple(takewhile(lambda step: step.joint.name in joints, steps))
-            branches = (steps[len(trunk) :],)
-        if not all((trunk, *branches)) or {step.joint.name for step in trunk} != joints.intersection(chain.joints):
-            continue
-        try:
-            express_trunk(mechanism, trunk)
-            yield trunk, tuple(express_branch(mechanism, branch, on_base=False) for branch in branches)
-        except NotExpressible:
-            continue
 
 
 def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from .legs.margin_blocks import margins_in_blocks
 from .noted_steps import evaluate
 from .passes import plan as P
 from .passes.solve import solve_by_passes
-from .platform.answer_rows import answer_rows, mark_near, step_rows
+from .platform.answer_rows import answer_rows, mark_near
 from .platform.evaluate import evaluate_poses, jacobians
 from .platform.forward import assemble
 from .platform.forward_blocks import assemble_in_blocks
@@ -77,7 +77,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
     (note_near, tuple(_values("i i F2 i1"))),
     (solve_by_passes, _PASSES),
-    (step_rows, tuple(_values("i i F3 f2"))),
     (mark_near, tuple(_values("i i F3 F2 i1"))),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("F1 F2")), _CLOSED, *_values("f2"))),
     (evaluate_poses, tuple(_values("i i F3 F2 F2 f2 f2 f3"))),
