@@ -15,8 +15,8 @@ import pfabrik as pf
 from checks import INTERPRETED
 from machines import machine
 from oracles import any_values
-from pfabrik.decomposition.plan import compile_plan
 from pfabrik.kernels._shipped import load_module
+from pfabrik.passes.plan import compile_plan
 
 TESTS = Path(__file__).parent
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

@@ -11,8 +11,8 @@ import pfabrik as pf
 from checks import INTERPRETED
 from machines import MACHINES, closure, machine, ring, struts
 from pfabrik import Cone, Joint, Mechanism
-from pfabrik.decomposition.plan import compile_plan
 from pfabrik.errors import UnsupportedMechanism
+from pfabrik.passes.plan import compile_plan
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from machines import MACHINES
 from machines.trunks import TRUNKS
-from pfabrik.decomposition.plan import CompiledPlan, compile_plan
 from pfabrik.kernels import quaternions
 from pfabrik.kernels.legs.complete_poses import ROUNDED, orthonormalise, turn_pose
 from pfabrik.kernels.passes import half_spaces
@@ -25,6 +24,7 @@ from pfabrik.kernels.passes.passes import reach_backward
 from pfabrik.kernels.passes.plan import move_carriers, place_ends
 from pfabrik.kernels.passes.restrict import clamp_cone
 from pfabrik.kernels.vectors import angle_between, wrap
+from pfabrik.passes.plan import CompiledPlan, compile_plan
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -7,7 +7,6 @@ from functools import cached_property, lru_cache
 from .arrays import Floats
 from .decomposition.leg_forms import NoLeg
 from .decomposition.leg_table import LegTable, leg_table
-from .decomposition.rewritten import rewritten
 from .description.geometry import Geometry, geometry_of, home_numbers, numbers_with, with_numbers
 from .description.mechanism import Mechanism
 from .description.task import Task, task_of
@@ -44,8 +43,7 @@ class Model:
     ) -> Model:
         """The machine with other numbers, unchecked: no fault of theirs is found, nor a lack of freedom.
 
-        Answers are those of a machine made anew, to the last bit. Legs are read anew only where a decision by which
-        they were read comes out otherwise.
+        Answers are those of a machine made anew, to the last bit.
 
         Parameters
         ----------
@@ -55,9 +53,6 @@ class Model:
         geometry = self._geometry._replace(**{name: array for name, array in given.items() if array is not None})
         model = object.__new__(Model)
         model._like, model._numbers = self._like, numbers_with(self._like, geometry)
-        table = rewritten(self.legs, model._numbers) if self.has_legs else None
-        if table is not None:
-            model._legs = table
         return model
 
     @cached_property

@@ -207,6 +207,16 @@ def _fold(operation: int, *numbers: Any) -> Any:
     return first
 
 
+def largest(numbers: Any) -> Any:
+    """The largest of some numbers, whichever it is."""
+    return _fold(K.LARGER, *numbers)
+
+
+def smallest(numbers: Any) -> Any:
+    """The smallest of some numbers, whichever it is."""
+    return _fold(K.SMALLER, *numbers)
+
+
 def where(condition: Any, a: Any, b: Any) -> Any:
     """`kernels.vectors.where`."""
     if isinstance(condition, Number):

@@ -141,7 +141,7 @@ class ShiftedGeometry:
 
 
 def square_pairs(lines: Floats) -> Floats:
-    """The default axes of universal joints whose lines (b, 3) are: unit vectors (b, 2, 3), as of `kernels.tape`."""
+    """The default axes of universal joints whose lines (b, 3) are: unit vectors (b, 2, 3), see `noted_vectors`."""
     x, y, z = lines.T
     s = -np.copysign(np.sqrt(x * x + y * y + z * z), x)
     u, w, t = y / (x - s), z / (x - s), (s - x) / s

@@ -22,8 +22,10 @@ from functools import partial
 from itertools import pairwise, product
 
 from ..description.graph import Step
+from ..noted_vectors import Vector, area, cross, largest, norm, spread
 from ..tolerances import TOLERANCES
 from .decompose import Part, Split, SubChain
+from .home import HomeNumbers
 from .leg_forms import (
     HAS_LOOP,
     ElementaryJoint,
@@ -40,14 +42,12 @@ from .leg_forms import (
     elementary_joints,
     keeps_from_spinning,
 )
-from .recording import RecordedHome
-from .tape import Vector, area, cross, largest, norm, spread
 
 MOST_HINGES, MOST_REDUNDANT = 3, 3
 """Hinges of the largest ending, and redundant joints of a chain."""
 
 
-def legs_of_chain(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
+def legs_of_chain(home: HomeNumbers, chain: SubChain) -> tuple[LegForm, ...]:
     """The legs of a sub-chain: one, or one for each of its branches.
 
     Raises
@@ -77,7 +77,7 @@ def placed_on(redundant_joint: RedundantJoint | None, legs: Sequence[LegForm]) -
     return tuple(placed.values())
 
 
-def _branched(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
+def _branched(home: HomeNumbers, chain: SubChain) -> tuple[LegForm, ...]:
     """Rods on one proximal joint, or on redundant joints."""
     trunk = elementary_joints(home, chain.trunk)
     first_branch, *other_branches = (elementary_joints(home, branch) for branch in chain.branches)
@@ -119,7 +119,7 @@ def _on_redundant(
     return (*redundant, *placed_on(redundant[-1], rods))
 
 
-def _with_parallelogram(home: RecordedHome, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
+def _with_parallelogram(home: HomeNumbers, chain: SubChain, split: Split) -> tuple[LegForm, ...]:
     """A pinned parallelogram between two parallel hinges: its outer body turns as its inner one does."""
     place = chain.parts.index(split)
     before, after = (

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import takewhile
 from typing import TypeAlias
 
 from ..derived import derived
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
 from .graph_blocks import TIP, Block, blocks_between, graph_of, is_connected, is_tree
+from .home import HomeNumbers
 from .joint_nodes import NotExpressible
 from .positions import BranchForm, Parallelogram, express_branch, express_trunk, parallelogram_of
-from .recording import RecordedHome
 
 
 @dataclass(frozen=True)
@@ -145,11 +144,11 @@ def decompose(mechanism: Mechanism) -> tuple[SubChain, ...]:
     mechanism : Mechanism
         The machine.
     """
-    chains = sub_chains(RecordedHome(checked_mechanism(mechanism)))
+    chains = sub_chains(HomeNumbers(checked_mechanism(mechanism)))
     return tuple(_express(mechanism, chain) if chain.reason is None else chain for chain in chains)
 
 
-def sub_chains(home: RecordedHome) -> tuple[SubChain, ...]:
+def sub_chains(home: HomeNumbers) -> tuple[SubChain, ...]:
     """The sub-chains of a mechanism, not yet expressed in positions."""
     graph = graph_of(home.mechanism)
     groups = components(graph.edges, graph.base, graph.end)
@@ -157,7 +156,7 @@ def sub_chains(home: RecordedHome) -> tuple[SubChain, ...]:
     return tuple(_sub_chain(home, group, graph.base, graph.end) for group in on_base)
 
 
-def _sub_chain(home: RecordedHome, edges: Sequence[Edge], base: str, end: str) -> SubChain:
+def _sub_chain(home: HomeNumbers, edges: Sequence[Edge], base: str, end: str) -> SubChain:
     """The sub-chain of connected edges, at least one of them on the base."""
     if not is_connected(edges, base, end):
         return SubChain(tuple(Step(edge.joint) for edge in edges), "does not lead to the end effector")
@@ -165,12 +164,12 @@ def _sub_chain(home: RecordedHome, edges: Sequence[Edge], base: str, end: str) -
     return SubChain(parts, None if is_tree(edges, base, end) else "has a loop of its own")
 
 
-def parts_between(home: RecordedHome, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
+def parts_between(home: HomeNumbers, edges: Sequence[Edge], start: str, goal: str) -> tuple[Part, ...]:
     """The parts between two bodies, in series."""
     return tuple(_part(home, block) for block in blocks_between(edges, start, goal))
 
 
-def _part(home: RecordedHome, block: Block) -> Part:
+def _part(home: HomeNumbers, block: Block) -> Part:
     """A single joint; parallel paths, each decomposed again; or a mesh, if paths share joints."""
     steps = tuple(Step(edge.joint, edge.bodies[0] == block.inward, TIP in edge.bodies) for edge in block.edges)
     if len(steps) == 1:
@@ -194,29 +193,6 @@ def _express(mechanism: Mechanism, chain: SubChain) -> SubChain:
     except NotExpressible as reason:
         return SubChain(chain.parts, str(reason))
     return SubChain(chain.parts, None, forms)
-
-
-def express_on(
-    mechanism: Mechanism, joints: frozenset[str], from_platform: bool
-) -> Iterator[tuple[tuple[Step, ...], tuple[BranchForm, ...]]]:
-    """Sub-chains that some joints begin, these as their trunks, with what stands on them in positions.
-
-    Seen from the base or, chains without branches, from the platform. Left out are those in which such a joint comes
-    later, and those that positions cannot express.
-    """
-    for chain in sub_chains(RecordedHome(mechanism)):
-        trunk, branches = ((), ()) if from_platform else (chain.trunk, chain.branches)
-        if not trunk and _are_steps(chain.parts):
-            steps = tuple(step.back for step in reversed(chain.steps)) if from_platform else chain.steps
-            trunk = tuple(takewhile(lambda step: step.joint.name in joints, steps))
-            branches = (steps[len(trunk) :],)
-        if not all((trunk, *branches)) or {step.joint.name for step in trunk} != joints.intersection(chain.joints):
-            continue
-        try:
-            express_trunk(mechanism, trunk)
-            yield trunk, tuple(express_branch(mechanism, branch, on_base=False) for branch in branches)
-        except NotExpressible:
-            continue
 
 
 def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:

@@ -15,15 +15,15 @@ from ..description.graph import Edge, Step, components
 from .closed_form_legs import legs_of_chain, placed_on, rigid_rod
 from .decompose import SubChain, parts_between
 from .graph_blocks import graph_of
+from .home import HomeNumbers
 from .leg_forms import HAS_LOOP, ElementaryJoint, LegForm, NoLeg, RedundantJoint, elementary_joints
-from .recording import RecordedHome
 
 MEETING, MOST_REDUNDANT = 3, 4
 """Least joints of an intermediate platform, and most redundant joints of a sub-chain: searches fail on linkages with
 more."""
 
 
-def legs_of_sub_chain(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
+def legs_of_sub_chain(home: HomeNumbers, chain: SubChain) -> tuple[LegForm, ...]:
     """The legs of a sub-chain, and the redundant joints that they are on.
 
     Raises
@@ -38,7 +38,7 @@ def legs_of_sub_chain(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...
     return _legs_between(home, chain)
 
 
-def _legs_between(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
+def _legs_between(home: HomeNumbers, chain: SubChain) -> tuple[LegForm, ...]:
     graph, names = graph_of(home.mechanism), frozenset(chain.joints)
     edges = [edge for edge in graph.edges if edge.joint.name in names]
     below, base, edges = _redundant_in_series(home, edges, graph.base)
@@ -68,7 +68,7 @@ def _legs_between(home: RecordedHome, chain: SubChain) -> tuple[LegForm, ...]:
 
 
 def _redundant_in_series(
-    home: RecordedHome, edges: Sequence[Edge], base: str
+    home: HomeNumbers, edges: Sequence[Edge], base: str
 ) -> tuple[list[RedundantJoint], str, list[Edge]]:
     """The hinges and slides that all paths from the base pass first, the body beyond, and the remaining edges."""
     redundant: list[RedundantJoint] = []
@@ -84,7 +84,7 @@ def _redundant_in_series(
 
 
 def _intermediate_platforms(
-    home: RecordedHome, edges: Sequence[Edge], base: str, end: str, below: RedundantJoint | None
+    home: HomeNumbers, edges: Sequence[Edge], base: str, end: str, below: RedundantJoint | None
 ) -> tuple[dict[str, RedundantJoint], list[Edge]]:
     """Redundant joints from the platform to intermediate platforms, by the body that each moves; remaining edges."""
     paths: dict[str, tuple[tuple[Edge, str], ...]] = {end: ()}
@@ -115,7 +115,7 @@ def _intermediate_platforms(
     return redundant, remaining
 
 
-def _elements_of_edge(home: RecordedHome, edge: Edge, body: str) -> list[ElementaryJoint]:
+def _elements_of_edge(home: HomeNumbers, edge: Edge, body: str) -> list[ElementaryJoint]:
     """The elementary joints of an edge, passed from one of its bodies."""
     return elementary_joints(home, [Step(edge.joint, edge.bodies[0] == body)])
 

@@ -9,9 +9,9 @@ from typing import Literal
 from ..description.graph import Step
 from ..description.joints import Joint
 from ..kernels.legs import records as K
+from ..noted_vectors import Vector, area
 from ..tolerances import TOLERANCES
-from .recording import RecordedHome
-from .tape import Vector, area
+from .home import HomeNumbers
 
 Kind = Literal["R", "P", "S"]
 
@@ -48,7 +48,7 @@ class ElementaryJoint:
         return replace(self, sense=-self.sense, inward=self.outward, outward=self.inward)
 
 
-def elementary_joints(home: RecordedHome, steps: Sequence[Step]) -> list[ElementaryJoint]:
+def elementary_joints(home: HomeNumbers, steps: Sequence[Step]) -> list[ElementaryJoint]:
     """The joints of a path as hinges, slides and balls; slides before hinges that turn about their direction.
 
     A joint cut at the end effector is a point: a ball without coordinates.
@@ -62,7 +62,7 @@ def elementary_joints(home: RecordedHome, steps: Sequence[Step]) -> list[Element
     return elements
 
 
-def _of_step(home: RecordedHome, step: Step) -> list[ElementaryJoint]:
+def _of_step(home: HomeNumbers, step: Step) -> list[ElementaryJoint]:
     joint, point = step.joint, home.point(step.joint)
     bodies = joint.connects if step.forward else joint.connects[::-1]
 
@@ -70,7 +70,7 @@ def _of_step(home: RecordedHome, step: Step) -> list[ElementaryJoint]:
         return ElementaryJoint(kind, axis, point, joint, place, step.sign, *bodies)
 
     if step.ends or joint.type == "spherical":
-        return [element("S", home.vector(0.0, 0.0, 0.0))]
+        return [element("S", Vector((0.0, 0.0, 0.0)))]
     if joint.type == "universal":
         elements = [element("R", axis, place) for place, axis in enumerate(home.universal_axes(joint))]
         return elements if step.forward else elements[::-1]

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Records
 from ..kernels.legs import records as K
+from ..noted_vectors import Vector, angle_of, area, cross, largest, norm, sign, square_to
 from ..tolerances import TOLERANCES
+from .home import Fields, FilledRecords, HomeNumbers
 from .leg_forms import ElementaryJoint, Ending, KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
-from .recording import Fields, RecordedHome, RecordedRecords
-from .tape import Scalar, Vector, angle_of, area, cross, largest, norm, sign, square_to
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}
 _PROXIMAL = {"R": K.CRANK, "P": K.CARRIAGE}
 
 
-def leg_records(home: RecordedHome, forms: Sequence[LegForm]) -> RecordedRecords:
+def leg_records(home: HomeNumbers, forms: Sequence[LegForm]) -> FilledRecords:
     """A record of `LEG` for each leg."""
     fields = [_fields(home, form) | _orienting(form, after) for form, after in zip_longest(forms, forms[1:])]
-    recorded = RecordedRecords.of(fields, K.LEG)
+    recorded = FilledRecords.of(fields, K.LEG)
     legs = recorded.records
     _put_frames(legs, forms)
     legs["first_row"] = np.cumsum(legs["n_rows"]) - legs["n_rows"]
@@ -76,7 +77,7 @@ def _orienting(form: LegForm, after: LegForm | None) -> Fields:
     return {"side": -sign(across @ (after.platform_end - form.element.point))}
 
 
-def _fields(home: RecordedHome, form: LegForm) -> Fields:
+def _fields(home: HomeNumbers, form: LegForm) -> Fields:
     if isinstance(form, Rod):
         return _rod_fields(home, form)
     if isinstance(form, RedundantJoint):
@@ -84,7 +85,7 @@ def _fields(home: RecordedHome, form: LegForm) -> Fields:
     return _pivot_fields(home, form) if isinstance(form, Pivot) else _kept_axis_fields(form)
 
 
-def _platform_point(home: RecordedHome, point: Vector, is_reversed: bool) -> Vector:
+def _platform_point(home: HomeNumbers, point: Vector, is_reversed: bool) -> Vector:
     """A platform end at home, in the frame that `kernels.legs.frames` maps from [L]."""
     return point if is_reversed else point - home.reference_point
 
@@ -94,7 +95,7 @@ def _axes(ending: Ending, order: int = 1) -> list[Vector]:
     return [] if ending.kind == "ball" else [element.axis for element in ending.elements[::order]]
 
 
-def _pivot_fields(home: RecordedHome, pivot: Pivot) -> Fields:
+def _pivot_fields(home: HomeNumbers, pivot: Pivot) -> Fields:
     kind = pivot.ending.kind
     centre = home.reference_point if pivot.ending.centre is None else pivot.ending.centre
     axes = _unit_vectors(home) if kind == "weld" else _axes(pivot.ending)
@@ -122,7 +123,7 @@ def _kept_axis_fields(form: KeptAxis) -> Fields:
     return fields | _axis_rows("hinge", axes, 3)
 
 
-def _redundant_fields(home: RecordedHome, form: RedundantJoint) -> Fields:
+def _redundant_fields(home: HomeNumbers, form: RedundantJoint) -> Fields:
     element = form.element
     return {
         "kind": K.REDUNDANT,
@@ -136,8 +137,8 @@ def _redundant_fields(home: RecordedHome, form: RedundantJoint) -> Fields:
     }
 
 
-def _unit_vectors(home: RecordedHome) -> list[Vector]:
-    return [home.vector(1.0, 0.0, 0.0), home.vector(0.0, 1.0, 0.0), home.vector(0.0, 0.0, 1.0)]
+def _unit_vectors(home: HomeNumbers) -> list[Vector]:
+    return [Vector((1.0, 0.0, 0.0)), Vector((0.0, 1.0, 0.0)), Vector((0.0, 0.0, 1.0))]
 
 
 def _inverse_rows(axes: Sequence[Vector]) -> list[Vector]:
@@ -181,12 +182,12 @@ def _axis_pairs(kind: str, axes: Sequence[Vector]) -> list[tuple[Vector, Vector]
     return [(axes[0], axes[1]), (axes[1], axes[2]), (axes[2], axes[0])] if kind == "weld" else []
 
 
-def _home_side(axes: Sequence[Vector], line: Vector) -> Scalar:
+def _home_side(axes: Sequence[Vector], line: Vector) -> Any:
     """The side of two crossed hinges at home; its sign as of `kernels.legs.endings.aim`."""
     return -sign(axes[0] @ cross(axes[1], line))
 
 
-def _rod_fields(home: RecordedHome, rod: Rod) -> Fields:
+def _rod_fields(home: HomeNumbers, rod: Rod) -> Fields:
     length = norm(rod.platform_end - rod.base_end)
     line = (rod.platform_end - rod.base_end) / length
     twists, has_proximal = keeps_from_spinning(rod), rod.proximal is not None
@@ -224,7 +225,7 @@ def _points_anywhere(axes: Sequence[Vector], line: Vector) -> bool:
     return largest([abs(axes[1] @ axes[0]), abs(axes[1] @ line)]) <= TOLERANCES.alignment
 
 
-def _twist(base_axis: Vector, platform_axis: Vector, line: Vector) -> Scalar:
+def _twist(base_axis: Vector, platform_axis: Vector, line: Vector) -> Any:
     """The angle between two axes about a line."""
     cosine = base_axis @ platform_axis - (line @ base_axis) * (line @ platform_axis)
     return angle_of(line @ cross(base_axis, platform_axis), cosine)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from operator import add
 from typing import Any
@@ -18,13 +18,13 @@ from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..kernels.legs import records as K
+from ..noted_vectors import area, largest, sign
 from ..tolerances import TOLERANCES
 from .decompose import SubChain, sub_chains
+from .home import Fields, FilledRecords, HomeNumbers
 from .intermediate_platforms import legs_of_sub_chain
 from .leg_forms import ElementaryJoint, LegForm, NoLeg, RedundantJoint, Rod, closed_form_coordinates
 from .leg_records import leg_records
-from .recording import Fields, RecordedHome, RecordedRecords, Recording
-from .tape import area, largest, sign
 
 NO_PATH = "does not lead to the end effector"
 """The reason of a sub-chain that is on no path to the end effector."""
@@ -49,7 +49,7 @@ class LegTable:
     aimed : `legs`, set to compute the angles of all endings, which reading `known` takes.
     task : one record.
     limits : (joint, bound) of the limits, those of `limited` (two each), then those of `cones`.
-    recording : how the records were computed; None of a part of a table.
+    fields : what the records of each array were filled from.
     """
 
     forms: tuple[LegForm, ...]
@@ -61,7 +61,7 @@ class LegTable:
     known: Records
     task: Records
     limits: tuple[tuple[str, str], ...]
-    recording: Recording | None = None
+    fields: dict[str, tuple[Fields, ...]] = field(default_factory=dict)
 
     @cached_property
     def home_sides(self) -> Floats:
@@ -154,14 +154,18 @@ def _proximal_joint(form: LegForm) -> str:
     return items[0].joint.name if items else ""
 
 
-def leg_table(mechanism: Mechanism) -> LegTable:
+def leg_table(mechanism: Mechanism, numbers: Sequence[Any] = ()) -> LegTable:
     """A mechanism's table of legs.
+
+    Parameters
+    ----------
+    numbers : those of its home and its limits, as of `HomeNumbers`, if they note their steps.
 
     Raises
     ------
     NoLeg : some chain is no leg in closed form; the text says why.
     """
-    home = RecordedHome(mechanism)
+    home = HomeNumbers(mechanism, numbers)
     forms = _forms(home)
     recorded_legs = leg_records(home, forms)
     legs = recorded_legs.records
@@ -169,7 +173,7 @@ def leg_table(mechanism: Mechanism) -> LegTable:
         (leg, element, place) for leg, form in enumerate(forms) for element, place in closed_form_coordinates(form)
     ]
     _require_all(mechanism, {(element.joint.name, element.place) for _, element, _ in coordinates})
-    known = RecordedRecords.of([_coordinate(home, *coordinate) for coordinate in coordinates], K.COORDINATE)
+    known = FilledRecords.of([_coordinate(home, *coordinate) for coordinate in coordinates], K.COORDINATE)
     joints = [element.joint for _, element, _ in coordinates]
     limited = known.chosen([joint.range is not None for joint in joints])
     drives = {drive.column: number for number, drive in enumerate(mechanism.drives)}
@@ -177,7 +181,7 @@ def leg_table(mechanism: Mechanism) -> LegTable:
     driven.records["column"] = [drives[column] for column in driven.records["column"].tolist()]
     cone_joints = [joint for joint in mechanism.joints if joint.cone is not None]
     by_leg = sorted(((_cone(home, forms, joint), joint) for joint in cone_joints), key=lambda each: each[0]["leg"])
-    cones = RecordedRecords.of([fields for fields, _ in by_leg], K.CONE)
+    cones = FilledRecords.of([fields for fields, _ in by_leg], K.CONE)
     half_angles = cones.records["half_angle"]
     cones.records["leader"] = np.argmax(half_angles == half_angles[:, None], axis=1) if len(half_angles) else 0
     limits = [(joint.name, bound) for joint in joints if joint.range is not None for bound in ("min", "max")]
@@ -192,10 +196,11 @@ def leg_table(mechanism: Mechanism) -> LegTable:
         "task": _task(home, legs),
     }
     arrays = {name: part.records for name, part in parts.items()}
-    return LegTable(tuple(forms), **arrays, limits=tuple(limits), recording=Recording(home.tape, **parts))
+    fields = {name: part.fields for name, part in parts.items()}
+    return LegTable(tuple(forms), **arrays, limits=tuple(limits), fields=fields)
 
 
-def _forms(home: RecordedHome) -> list[LegForm]:
+def _forms(home: HomeNumbers) -> list[LegForm]:
     """The legs of all sub-chains."""
     forms: list[LegForm] = []
     for chain in sub_chains(home):
@@ -233,11 +238,11 @@ def _require_all(mechanism: Mechanism, available: set[tuple[str, int]]) -> None:
             raise NoLeg(f"joint {joint.name} has a motor or a limit that no closed form gives")
 
 
-def _coordinate(home: RecordedHome, leg: int, element: ElementaryJoint, place: int) -> Fields:
+def _coordinate(home: HomeNumbers, leg: int, element: ElementaryJoint, place: int) -> Fields:
     """Fields of a `COORDINATE`, its column that among all joint coordinates."""
     key = element.joint.name, element.place
     coordinate = next(c for c in home.mechanism.coordinates if (c.joint.name, c.place) == key)
-    unit = home.scalar(1.0) if coordinate.kind == "angle" else home.length
+    unit = 1.0 if coordinate.kind == "angle" else home.length
     lo, hi = deviations(home.bounds(coordinate), home.coordinate(coordinate), unit)
     return {
         "leg": leg,
@@ -252,7 +257,7 @@ def _coordinate(home: RecordedHome, leg: int, element: ElementaryJoint, place: i
     }
 
 
-def _cone(home: RecordedHome, forms: Sequence[LegForm], joint: Joint) -> dict[str, Any]:
+def _cone(home: HomeNumbers, forms: Sequence[LegForm], joint: Joint) -> dict[str, Any]:
     """Fields of a `CONE`: at an end of a rod, about its line, fixed to the body that the end is on."""
     reason = f"the cone of joint {joint.name} does not limit a rod's line against what its end is on"
     assert joint.cone is not None
@@ -293,14 +298,14 @@ def _cone(home: RecordedHome, forms: Sequence[LegForm], joint: Joint) -> dict[st
     raise NoLeg(reason)
 
 
-def _task(home: RecordedHome, legs: Records) -> RecordedRecords:
+def _task(home: HomeNumbers, legs: Records) -> FilledRecords:
     mechanism, description = home.mechanism, task_of(home.mechanism)
     recorded: Fields = {"length": home.length, "reference": home.reference_point}
     on_platform = [joint for joint in mechanism.joints if mechanism.end_effector in joint.connects]
     centres = [home.centre(joint) for joint in on_platform if joint.at is not None]
     if centres:
         recorded["centre"] = reduce(add, centres) / len(centres) / home.length - home.reference_point
-    recorded_task = RecordedRecords.of([recorded], K.TASK)
+    recorded_task = FilledRecords.of([recorded], K.TASK)
     task = recorded_task.records
     task["axes"], task["rotations"] = description.axes, description.rotations
     task["unset"] = 0 if mechanism.end_effector_is_joint else 6 - sum(description.axes) - description.rotations

@@ -19,10 +19,10 @@ from ..arrays import Floats, Record, Records
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
 from ..kernels.passes import plan as P
+from ..noted_vectors import Vector, area, largest, norm
 from ..tolerances import TOLERANCES
+from .home import HomeNumbers
 from .joint_nodes import JointNode, NotExpressible, joint_nodes_along
-from .recording import RecordedHome
-from .tape import Vector, area, largest, norm
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Parallelogram:
         return self.rods[0] + self.rods[1]
 
 
-def parallelogram_of(paths: Sequence[Sequence[Joint]], home: RecordedHome) -> Parallelogram | None:
+def parallelogram_of(paths: Sequence[Sequence[Joint]], home: HomeNumbers) -> Parallelogram | None:
     """The parallelogram that the paths between two bodies form at home, or None.
 
     Parameters
@@ -66,7 +66,7 @@ def parallelogram_of(paths: Sequence[Sequence[Joint]], home: RecordedHome) -> Pa
     if not (types == {"revolute"} or types <= {"universal", "spherical"}):
         return None
     pinned = types == {"revolute"}
-    axis = home.axis(paths[0][0]) if pinned else home.vector(0.0, 0.0, 0.0)
+    axis = home.axis(paths[0][0]) if pinned else Vector((0.0, 0.0, 0.0))
     if pinned and any(area(home.axis(joint), axis) > TOLERANCES.alignment for path in paths for joint in path):
         return None
     (a, b), (c, d) = ([_across(home.centre(joint), axis) for joint in path] for path in paths)
@@ -75,7 +75,7 @@ def parallelogram_of(paths: Sequence[Sequence[Joint]], home: RecordedHome) -> Pa
         return None
     (inner, outer), (inner_beside, outer_beside) = paths
     rods = ((inner.name, outer.name), (inner_beside.name, outer_beside.name))
-    return Parallelogram(rods, norm(rod).value, norm(side).value, pinned)
+    return Parallelogram(rods, float(norm(rod)), float(norm(side)), pinned)
 
 
 def _across(point: Vector, axis: Vector) -> Vector:

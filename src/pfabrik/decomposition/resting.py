@@ -56,7 +56,7 @@ def at_rest(table: LegTable, sides: Floats) -> Resting | None:
     forms = tuple(
         form for form, is_redundant_form in zip(table.forms, is_redundant, strict=True) if not is_redundant_form
     )
-    resting = replace(table, recording=None, forms=forms, legs=displaced, aimed=displaced, limits=(), **parts)
+    resting = replace(table, fields={}, forms=forms, legs=displaced, aimed=displaced, limits=(), **parts)
     if not resting.is_for_blocks:
         return None
     driven, actuators = table.driven[on_redundant["driven"]], np.full(len(table.driven), np.nan)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats
 from ..derived import derived
-from ..kernels.tape import LENGTH, SQUARE, V_SUBTRACT, result
+from ..noted_vectors import Vector, square_to
 from ..tolerances import TOLERANCES
 from .graph import next_joints, steps_from_base, tree_of
 from .joints import KINDS, Joint
@@ -161,8 +161,8 @@ def universal_axes(mechanism: Structure, joint: Joint) -> Floats:
     if joint.axes is not None:
         return np.asarray(joint.axes)
     ends, is_forward = ends_of_default_axes(mechanism, joint)
-    lines = [result(V_SUBTRACT, end.at or (), joint.at or ()) for end in ends]
-    normals = np.reshape(result(SQUARE, lines[0], result(LENGTH, lines[0])), (2, 3)) if lines else np.eye(3)[:2]
+    lines = [Vector(end.at or ()) - (joint.at or ()) for end in ends]
+    normals = np.array(square_to(lines[0])) if lines else np.eye(3)[:2]
     return np.asarray(normals if is_forward else normals[::-1])
 
 

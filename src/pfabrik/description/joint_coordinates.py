@@ -67,7 +67,7 @@ class JointCoordinate:
 def deviations(bounds: tuple[Any, Any], home: Any, unit: Any) -> tuple[Any, Any]:
     """Bounds as deviations from home, in a unit [length or rad], with room for answers that are put inside.
 
-    All are numbers, or recorded as `decomposition.tape` does, and so then are the deviations.
+    All are numbers, or numbers that note their steps (`noted_numbers`), and so then are the deviations.
     """
     low, high = ((bound - home) / unit for bound in bounds)
     lacking = max(TOLERANCES.inside - 0.5 * (high - low), 0.0)

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import UnknownName
-from ..kernels.tape import LENGTH, V_DIVIDE, V_SUBTRACT, result
+from ..noted_vectors import Vector as NotedVector
+from ..noted_vectors import length
 from .body_masses import Mass
 from .body_shapes import Shape
 from .coercion import items, numbers, text, texts
@@ -197,7 +198,7 @@ class Structure:
         """
         joint = self.joint(name)
         if joint.along is not None:
-            return result(LENGTH, self._span_along(joint))[0]
+            return float(length(self._span_along(joint)))
         return (0.0,) * len(KINDS[joint.type].coordinates) if joint.type in ("spherical", "fixed") else joint.home
 
     def home_axis(self, name: str) -> Vector:
@@ -210,12 +211,12 @@ class Structure:
         if joint.along is None:
             return cast(Vector, joint.axis)
         span = self._span_along(joint)
-        return cast(Vector, tuple(result(V_DIVIDE, span, result(LENGTH, span))))
+        return cast(Vector, tuple(span / length(span)))
 
     def _span_along(self, joint: Joint) -> list[float]:
         """From the joint of `along` on the first body to that on the second, at home [length]."""
         start, end = self.ends_along(joint)
-        return result(V_SUBTRACT, cast(Vector, end.at), cast(Vector, start.at))
+        return NotedVector(cast(Vector, end.at)) - cast(Vector, start.at)
 
     def ends_along(self, joint: Joint) -> tuple[Joint, Joint]:
         """The two joints of `along`: the one on the first body, then the one on the second."""

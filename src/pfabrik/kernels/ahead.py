@@ -29,12 +29,11 @@ from .legs.margin_blocks import margins_in_blocks
 from .noted_steps import evaluate
 from .passes import plan as P
 from .passes.solve import solve_by_passes
-from .platform.answer_rows import answer_rows, mark_near, step_rows
+from .platform.answer_rows import answer_rows, mark_near
 from .platform.evaluate import evaluate_poses, jacobians
 from .platform.forward import assemble
 from .platform.forward_blocks import assemble_in_blocks
 from .platform.nearest import nearest_pose
-from .replay import replay
 from .rows import Rows
 from .timing import acceleration_shares, fastest, second_derivatives, speed_shares, spline_at
 from .walk_path import walk_path
@@ -80,7 +79,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
     (note_near, tuple(_values("i i F2 i1"))),
     (solve_by_passes, _PASSES),
-    (step_rows, tuple(_values("i i F3 f2"))),
     (mark_near, tuple(_values("i i F3 F2 i1"))),
     (nearest_configuration, (*_values("i i"), Objective(_POSE_OBJECTIVE, *_values("F1 F2")), _CLOSED, *_values("f2"))),
     (evaluate_poses, tuple(_values("i i F3 F2 F2 f2 f2 f3"))),
@@ -99,7 +97,6 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
     (answer_chains, (*_values("i i i b F3 F2 f2"), Rows(*_values("i1 i2 f3 f2 f2")))),
     (measure_home, tuple(_values("f1 i f1 i1"))),
-    (replay, tuple(_values("I2 F1 I1 f1 I2 f1"))),
     (evaluate, tuple(_values("I2 I2 I2 i F1 F2 F2 f2 f3"))),
     (number_points, tuple(_values("I1 i1 i1 i b i1"))),
     (join, tuple(_values("I2 i1"))),

@@ -7,7 +7,6 @@ import numpy as np
 from ..arrays import Floats, Record
 from ..batch import put
 from ..closure.close import HELD, Closing, close, platform_poses
-from ..decomposition.plan import CompiledPlan, compile_plan
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..description.task import Weights
@@ -16,6 +15,7 @@ from ..motion.displacements import columns, displacements
 from ..motion.loops import Closure
 from ..rotations import from_rotvec
 from ..tolerances import TOLERANCES
+from .plan import CompiledPlan, compile_plan
 
 RESTARTS = 24
 """Random starts for rows whose joint coordinates do not fit the joint centres; every start fits most legs."""

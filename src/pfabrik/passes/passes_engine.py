@@ -19,7 +19,6 @@ from ..closure.configurations import Configurations, new_rows, steps_of
 from ..closure.descend import clip_targets
 from ..closure.engine_contract import Engine, InverseEngine
 from ..closure.projection import ProjectionMode, held_parts, projection_modes
-from ..decomposition.plan import compile_plan
 from ..derived import derived
 from ..description.mechanism import Mechanism
 from ..kernels.closure.loops import LOCKED
@@ -33,6 +32,7 @@ from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of
 from .pass_options import PassOptions
+from .plan import compile_plan
 
 NEAR = 1e-3
 """Tolerance of the passes [L] if the loops are closed exactly afterwards."""

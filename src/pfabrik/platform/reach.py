@@ -18,8 +18,7 @@ from ..model import Model
 from ..options import Options
 from ..poses import between
 from ..rotations import nearest_turn
-from .redundant_joints import split_by_redundant
-from .single import Answers, answer_phases, request_from, step_redundant_joints
+from .single import Answers, answer_phases, request_from
 from .table import TableHandle, legs_at_rest, local_table, table_handle
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -117,22 +116,17 @@ def _move_redundant(
 def rest_redundant(model: Model, start: Configurations | None, start_sides: Floats, sides: Floats, rows: Rows) -> Mask:
     """Move redundant joints of answers nearer to those of their starts, poses kept; return a mask of changed rows.
 
-    Independent sets are moved one by one, because a limit that ends a projection may block one of them.
+    The pose is asked for from the start, as a target: what reaches it moves them least.
     """
-    start_sides = np.broadcast_to(start_sides, sides.shape)
-    table, rested, is_changed = model.legs, start_sides.copy(), np.zeros(len(sides), bool)
-    step_redundant_joints(model, rows.poses, rested)
-    for _, legs in split_by_redundant(table):
-        columns = np.intersect1d(table.implicit_joints["leg"], np.arange(len(table.legs))[legs])
-        candidate, block = sides.copy(), take(rows, np.arange(len(sides)))
-        candidate[:, columns] = rested[:, columns]
-        far, before = (np.linalg.norm((array - start_sides)[:, columns], axis=1) for array in (candidate, sides))
-        reach_on_sides(local_table(table), rows.poses, rows.poses, candidate, block)
-        is_nearer = (block.status == REACHED) & (far < before)
-        sides[is_nearer], rows.actuators[is_nearer] = candidate[is_nearer], block.actuators[is_nearer]
-        for measure in (RESIDUAL, LIMIT_EXCESS):
-            rows.measures[is_nearer, measure] = block.measures[is_nearer, measure]
-        is_changed |= is_nearer
+    n, columns = len(sides), model.legs.implicit_joints["leg"]
+    found = Answers(take(rows, np.arange(n)), np.empty_like(sides), sides.copy())
+    request = request_from(model, Options(), start, start_sides.copy(), True, nearby=False)
+    answer_phases(request, rows.poses.copy(), found, np.arange(n), BY_LEGS, BY_LEGS)
+    far, before = (np.linalg.norm((array - start_sides)[:, columns], axis=1) for array in (found.sides, sides))
+    is_changed = np.asarray((found.rows.status == REACHED) & (far < before))
+    sides[is_changed], rows.actuators[is_changed] = found.sides[is_changed], found.rows.actuators[is_changed]
+    for measure in (RESIDUAL, LIMIT_EXCESS):
+        rows.measures[is_changed, measure] = found.rows.measures[is_changed, measure]
     if start is not None:
         count_turns(model, start.rows.actuators, rows)
     return is_changed

@@ -1,4 +1,4 @@
-"""Redundant joints moved, as little as possible, so that legs reach their targets: by half-spaces, or by a search."""
+"""Redundant joints moved, as little as possible, so that legs reach their targets, by a search."""
 
 from __future__ import annotations
 
@@ -6,52 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..decomposition.leg_forms import RedundantJoint
 from ..decomposition.leg_table import LegTable
-from ..decomposition.plan import compile_trunks
 from ..derived import derived
 from ..kernels.clearance.link_records import NO_LINKS
-from ..kernels.passes import plan as P
 from ..kernels.platform import redundant_sets as R
 from ..kernels.platform.nearest import NO_STARTS
 from ..kernels.platform.search_records import SETTINGS, Along, MultistartPlan
 from ..kernels.search_constants import MOST_STEPS
 from ..model import Model
-from ..tolerances import TOLERANCES
 from .nearest_pose import no_starts, search_plan
 from .table import without_legs
 
-PASSES_ALONG = 100
-"""Most passes along a branch of three parts or more, as by default."""
-
-MOST_SETS = len(R.RedundantSets._fields) - 2
-
-_RECORDS = (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT)
-NO_TRUNKS = R.MovedTrunks._make(
-    (*(np.zeros(0, each) for each in _RECORDS), np.zeros(1, R.MOVING), np.zeros(0, int), np.zeros(0))
-)
-
-
-def _trunks(model: Model) -> dict[bool, R.MovedTrunks]:
-    """The redundant joints that begin chains which positions express, from the base (False) or from the platform.
-
-    None where the task does not set the whole pose, for branches are told where to reach.
-    """
-    table, trunks = model.legs, dict[bool, R.MovedTrunks]()
-    if table.is_partial or table.has_implicit_joints or table.task["rotations"][0] != 3:
-        return trunks
-    places = {form.element.joint.name: k for k, form in enumerate(table.forms) if isinstance(form, RedundantJoint)}
-    senses = dict(zip(table.redundant["leg"].tolist(), table.redundant["sense"].tolist(), strict=True))
-    for from_platform in (False, True):
-        compiled = compile_trunks(model.mechanism, frozenset(table.redundant_joints), from_platform)
-        if compiled is not None:
-            legs = np.array([places[name] for name in compiled.trunk_joints])
-            units = np.array([senses[leg] for leg in legs.tolist()]) * compiled.plan.trunk_joints["unit"]
-            moving = np.zeros(1, R.MOVING)
-            moving[0] = from_platform, PASSES_ALONG, TOLERANCES.inside * model.length, model.length
-            records = (np.require(record, requirements=["C", "W"]) for record in compiled.plan[:6])
-            trunks[from_platform] = R.MovedTrunks._make((*records, moving, legs, units))
-    return trunks
+MOST_SETS = len(R.RedundantSets._fields)
 
 
 @derived
@@ -68,8 +34,7 @@ def redundant_sets(model: Model) -> R.RedundantSets:
         objective = model.task.held, {"steps": MOST_STEPS}
         searched = search_plan(model, part, [objective], no_starts(part), part.redundant)
         sets[place] = R.RedundantSet(*searched, np.array([legs.start or 0]))
-    trunks = _trunks(model) if len(parts) else {}
-    return R.RedundantSets._make((trunks.get(False, NO_TRUNKS), trunks.get(True, NO_TRUNKS), *sets))
+    return R.RedundantSets._make(sets)
 
 
 def _no_set(table: LegTable) -> R.RedundantSet:
@@ -101,6 +66,6 @@ def split_by_redundant(table: LegTable) -> tuple[tuple[LegTable, slice], ...]:
         records = {name: array[(array["leg"] >= k) & (array["leg"] < end)] for name, array in records.items()}
         for array in records.values():
             array["leg"] -= k
-        part = replace(table, forms=table.forms[k:end], legs=part_legs, recording=None, **records)
+        part = replace(table, forms=table.forms[k:end], legs=part_legs, fields={}, **records)
         parts.append((part, slice(k, end)))
     return tuple(parts)

@@ -123,21 +123,6 @@ def mark_near(model: Model, rows: Rows, sides: Floats) -> int:
     return sum(in_blocks(run, len(rows.status), ROWS_A_RUN))
 
 
-def step_redundant_joints(model: Model, targets: Floats, sides: Floats) -> None:
-    """Move redundant joints, (n, legs), by the least steps that keep the limits of the legs on them.
-
-    A step keeps limits to first order, and few suffice. Where they do not, or no trunk has these joints, limits stay
-    exceeded: rows are solved only if legs say so.
-    """
-    from ..kernels.platform.answer_rows import step_rows
-
-    tables = handle_of(model, Options(), with_seeds=False)
-    scratch = scratch_of_answers(tables)
-    in_blocks(
-        lambda part: step_rows(tables.address, scratch.address, targets[part], sides[part]), len(sides), ROWS_A_BLOCK
-    )
-
-
 class SingleTarget:
     """Inverse kinematics of a machine, one target at a time.
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats
 from ..closure.configurations import Configurations
+from ..decomposition.leg_table import leg_table
 from ..derived import derived
-from ..description.geometry import Geometry, home_numbers
+from ..description.geometry import Geometry, home_numbers, limit_numbers
 from ..description.mechanism import Mechanism
 from ..model import Model, model_of
 from ..noted_numbers import Formulas, Trace
@@ -42,14 +43,13 @@ class LegSlopes:
     """The legs of a machine as expressions of home's numbers, with derivatives by parameters of these."""
 
     def __init__(self, model: Model) -> None:
-        self._table, trace = model.legs, Trace()
-        recording: Any = self._table.recording
-        numbers: list[Any] = home_numbers(model.mechanism).tolist()
-        self._used = np.array([place for place in recording.used.tolist() if place < len(numbers)])
-        given = [trace.input(numbers[place]) for place in self._used]
-        for place, number in zip(self._used.tolist(), given, strict=True):
-            numbers[place] = number
-        self._legs = legs = PlacedLegs(trace, self._table, numbers, has_sides=True)
+        mechanism, trace = model.mechanism, Trace()
+        given = [trace.input(number) for number in home_numbers(mechanism).tolist()]
+        self._table = leg_table(mechanism, [*given, *limit_numbers(mechanism)])
+        self._legs = legs = PlacedLegs(trace, self._table, given[0], has_sides=True)
+        read = {id(each) for _, operands in trace.steps for each in operands}
+        self._used = np.array([place for place, number in enumerate(given) if id(number) in read])
+        given = [given[place] for place in self._used]
         decisions = list(trace.decisions.values())
         self._decided = np.array(decisions, float)
         self._decisions, self._uniform = Formulas(decisions, given, 0), Formulas(legs.uniform, given, 0)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from ..decomposition.home import Fields
 from ..decomposition.leg_table import LegTable
-from ..decomposition.recording import WORD
-from ..kernels import tape, vectors
+from ..kernels import vectors
 from ..kernels.legs import answer, feasibility, frames
 from ..kernels.legs import records as K
 from ..kernels.search_constants import NEARLY_CLOSED
@@ -31,15 +31,12 @@ class PlacedLegs:
     reach : the margins of the reach of legs among them.
     actuators : values of the actuators [length or rad].
     rows : the constraints [L or rad].
-    words : those of the table's records.
     uniform : the numbers, the same at all poses, that all these are computed from.
     """
 
-    def __init__(self, trace: Trace, table: LegTable, numbers: Sequence[Any], *, has_sides: bool = False) -> None:
-        """The legs of a table, whose tape begins with numbers: L, all else of home, and limits."""
-        recording: Any = table.recording
-        self.words, length = _replayed(table, numbers), numbers[0]
-        records = {name: _records(getattr(table, name), self.words, start) for name, _, _, start in recording.layouts}
+    def __init__(self, trace: Trace, table: LegTable, length: Number, *, has_sides: bool = False) -> None:
+        """The legs of a table of numbers that note their steps, L among them."""
+        records = {name: _records(getattr(table, name), fields) for name, fields in table.fields.items()}
         legs, task = records["legs"], records["task"][0]
         n = len(legs)
         home = [[float(i == j) for j in range(3)] + [float(task["reference"][i]) * float(length)] for i in range(3)]
@@ -122,27 +119,20 @@ def open_motions(table: LegTable, rotations: Floats, n_implicit: int) -> Floats:
     return motions
 
 
-def _replayed(table: LegTable, given: Sequence[Any]) -> list[Any]:
-    """The words of a table's records, with what the table's tape computes from given numbers."""
-    recording: Any = table.recording
-    values: list[Any] = [*given, *recording.values[len(given) :].tolist()]
-    perform = of_numbers(tape.perform)
-    for operation, a, b, out, _ in recording.steps.tolist():
-        perform(operation, values, a, b, out)
-    words: list[Any] = recording.words.tolist()
-    for word, place, size in recording.writes.tolist():
-        words[word : word + size] = values[place : place + size]
-    return words
-
-
-def _records(array: Any, words: list[Any], start: int) -> Any:
-    """An array of records as mappings whose numbers are among the words, from a place [bytes] on."""
+def _records(array: Any, fields: Sequence[Fields]) -> Any:
+    """An array of records as mappings, with what they were filled from where that notes its steps."""
     made = np.empty(len(array), object)
-    for row, record in enumerate(array):
-        made[row] = {}
-        for field, (kind, offset, *_) in array.dtype.fields.items():
-            first, size = (start + row * array.dtype.itemsize + offset) // WORD, kind.itemsize // WORD
-            parts = np.empty(size, object)
-            parts[:] = np.ravel(record[field]).tolist() if kind.base.kind == "i" else words[first : first + size]
-            made[row][field] = parts.reshape(kind.shape) if kind.shape else parts[0]
+    for row, (record, given) in enumerate(zip(array, fields, strict=True)):
+        made[row] = {name: _noted(record[name], given.get(name), array.dtype[name]) for name in array.dtype.names}
     return made
+
+
+def _noted(value: Any, given: Any, kind: Any) -> Any:
+    """A field of a record, of numbers that note their steps."""
+    if not kind.shape:
+        return given if isinstance(given, Number) else value.item()
+    noted = np.array(value, object)
+    if given is not None and kind.base.kind == "f":
+        for place, number in enumerate(given):
+            noted[place] = number
+    return noted

@@ -21,7 +21,7 @@ from ..arrays import Floats
 from ..checks import names_of
 from ..closure.parasitic import has_parasitic_motion
 from ..decomposition.leg_forms import NoLeg
-from ..decomposition.leg_table import leg_table
+from ..decomposition.leg_table import LegTable, leg_table
 from ..derived import derived
 from ..description.geometry import AT_POINTS
 from ..description.mechanism import Mechanism, checked_mechanism
@@ -33,7 +33,7 @@ from ..kernels.legs.feasibility import feasibility, read_targets
 from ..kernels.search_constants import CLOSED, NEARLY_CLOSED
 from ..model import model_of
 from ..motion.mobility import generic_of
-from ..noted_numbers import NOTHING, Formulas
+from ..noted_numbers import NOTHING, Formulas, Number
 from ..platform.table import kernel_table, table_handle
 from ..platform.tip_engine import measured
 from ..tolerances import TOLERANCES
@@ -139,25 +139,24 @@ class NotedMachine:
         self.mechanism = mechanism
         reading, p = NotedReading(mechanism, names, values), len(names)
         sketch, trace, given, numbers = reading.sketch, reading.trace, reading.given, reading.numbers
-        try:
-            self.table = leg_table(sketch)
-        except NoLeg as reason:
-            raise UnsupportedMechanism(mechanism.name, [str(reason)], "varied") from None
         centres = [x for x in numbers[AT_POINTS - 1 :][: 3 * len(sketch.joints)] if not math.isnan(float(x))]
         if not _radii(np.array([centres], float))[0]:
             centres += numbers[:3]
         self._size = 0.0 if _radii(np.array([centres], float))[0] else sketch.characteristic_length
         length = trace.input(sketch.characteristic_length)
-        self.legs = legs = PlacedLegs(trace, self.table, [length, *numbers, *reading.limits])
+        try:
+            self.table = leg_table(sketch, [length, *numbers, *reading.limits])
+        except NoLeg as reason:
+            raise UnsupportedMechanism(mechanism.name, [str(reason)], "varied") from None
+        self.legs = legs = PlacedLegs(trace, self.table, length)
         self.is_coupled = self.table.is_completed and (
             not self.table.is_for_blocks or has_parasitic_motion(model_of(mechanism).path_closure)
         )
         self._centres = Formulas(centres, given, p)
         self._decided = np.array(list(trace.decisions.values()), float).tobytes()
         parts: list[list[Any]] = [list(trace.decisions.values()), [length], numbers[:3], legs.uniform]
-        recording: Any = self.table.recording
-        self.written = [word + k for word, _, size in recording.writes.tolist() for k in range(size)]
-        parts.append([legs.words[word] for word in self.written] if self.table.is_completed else [])
+        self.written = _written(self.table) if self.table.is_completed else []
+        parts.append([number for *_, number in self.written])
         parts.append([reading.limits[2 * drive.column + end] for drive in mechanism.drives for end in (0, 1)])
         self._spans = list(pairwise(np.cumsum([0, *map(len, parts)]).tolist()))
         outputs = [number for part in parts for number in part]
@@ -202,6 +201,18 @@ class NotedMachine:
         if by_pose:
             tangents[m : m + 6, p : p + 6], tangents[m + 18 :, p + 6 :] = np.eye(6), np.eye(n_q)
         return tangents
+
+
+def _written(table: LegTable) -> list[tuple[str, int, str, int, Number]]:
+    """The numbers of a table that note their steps: array, row, field and place in this of each."""
+    return [
+        (name, row, field, place, number)
+        for name, rows in table.fields.items()
+        for row, fields in enumerate(rows)
+        for field, given in fields.items()
+        for place, number in enumerate(np.ravel(np.array(given, object)).tolist())
+        if isinstance(number, Number)
+    ]
 
 
 def _radii(centres: Floats) -> Floats:
@@ -352,10 +363,9 @@ class MachineAt:
     def _completed(self, targets: Floats, begin: Floats) -> Floats:
         """Poses and coordinates of implicit joints that targets are completed to, in rows (n, 12 + implicit)."""
         noted, table = self._noted, self._noted.table
-        recording: Any = table.recording
-        words = recording.words.copy()
-        words[noted.written] = self._written
-        arrays = recording.arrays(words)
+        arrays = {name: getattr(table, name).copy() for name in table.fields}
+        for (name, row, field, place, _), number in zip(noted.written, self._written, strict=True):
+            arrays[name][field][row : row + 1].reshape(1, -1)[0, place] = number
         handle = Handle(kernel_table(table)._replace(**{name: arrays[name] for name in arrays if name != "aimed"}))
         completed, margins = np.full((len(targets), 12 + len(table.legs)), math.nan), np.empty(len(targets))
         sides = np.array(arrays["legs"]["side"], float)[None]

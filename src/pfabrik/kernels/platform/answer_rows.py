@@ -7,12 +7,11 @@ from numpy import zeros
 from ...arrays import Floats, Ints
 from .._jit import opener, search
 from ..legs.records import SAMPLE
-from ..passes import plan as P
 from ..rows import PROJECTED, REACHED, TOO_NEAR
 from .answer_row import answer_row, are_apart
 from .assemble_row import assemble_row
 from .nearest import NO_STARTS, PLAN
-from .redundant_sets import MOVING, MovedTrunks, RedundantSet, RedundantSets, step_trunks
+from .redundant_sets import RedundantSet, RedundantSets
 from .search_records import PoseSolutions
 from .tables import MACHINE, QUESTION, Question, RestingLegs, Start, Tables, new_answer_scratch
 
@@ -21,9 +20,7 @@ def _sample() -> Tables:
     """Tables of the array types that kernels are compiled for."""
     start, count = Start(zeros((1, 4, 4)), zeros((1, 1)), zeros((1, 1))), zeros(1, int)
     resting = RestingLegs(SAMPLE, zeros((1, 1)), zeros((1, 1)))
-    records = (zeros(0, record) for record in (P.NODE, P.BRANCH, P.CHAIN, P.CONE, P.TRUNK_SPAN, P.TRUNK_JOINT))
-    trunks = MovedTrunks._make((*records, zeros(1, MOVING), zeros(0, int), zeros(0)))
-    sets = RedundantSets(trunks, trunks, *(RedundantSet(SAMPLE, PLAN, count),) * 6)
+    sets = RedundantSets(*(RedundantSet(SAMPLE, PLAN, count),) * 6)
     return Tables(zeros(1, MACHINE), SAMPLE, SAMPLE, resting, SAMPLE, SAMPLE, PLAN, NO_STARTS, sets, start)
 
 
@@ -106,11 +103,3 @@ def mark_near(tables_address: int, scratch_address: int, poses: Floats, sides: F
             status[row] = TOO_NEAR
             n_near += 1
     return n_near
-
-
-@search
-def step_rows(tables_address: int, scratch_address: int, targets: Floats, sides: Floats) -> None:
-    """Move the redundant joints of rows, (n, legs), by least steps towards targets (n, 4, 4), as `step_trunks` does."""
-    tables, scratch = open_tables(tables_address), open_scratch(scratch_address)
-    for row in range(targets.shape[0]):
-        step_trunks(tables.sets, scratch.sets, tables.home.poses[0], targets[row], sides[row])

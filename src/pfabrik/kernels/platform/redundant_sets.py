@@ -1,4 +1,4 @@
-"""Free redundant joints moved, as little as possible, so that legs reach: by half-spaces, or by searches."""
+"""Free redundant joints moved, as little as possible, so that legs reach, by searches."""
 
 from __future__ import annotations
 
@@ -7,39 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Record, Records
+from ...arrays import Floats, Ints, Record
 from .._jit import routine
 from ..legs.records import Table
-from ..passes.half_spaces import LeastStep, new_half_spaces
-from ..passes.move_trunks import move_trunk
-from ..passes.plan import Configuration, Plan, Settings, new_configuration
-from ..vectors import copy_table, sub, turn
+from ..vectors import copy_table
 from .nearest import NearestScratch, nearest_of_row, new_nearest_scratch
 from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
-
-MOVING = np.dtype(
-    [
-        ("are_on_platform", "i8"),  # 1: trunks are next to the platform
-        ("iterations", "i8"),  # most passes along a branch
-        ("enough", "f8"),  # how far inside limits steps aim, and how near branches come [length]
-        ("length", "f8"),  # L
-    ]
-)
-"""How trunks are moved."""
-
-
-class MovedTrunks(NamedTuple):
-    """Free redundant joints as the trunks of chains in joint positions, as of `passes.plan`."""
-
-    nodes: Records
-    branches: Records
-    chains: Records
-    cones: Records
-    trunks: Records
-    trunk_joints: Records
-    moving: Records  # (1,): MOVING
-    legs: Ints  # (n_trunk_joints,): their places among the legs; none if there are no trunks
-    units: Floats  # (n_trunk_joints,): of their coordinates there, in the coordinates of trunks [length or rad]
 
 
 class RedundantSet(NamedTuple):
@@ -53,23 +26,12 @@ class RedundantSet(NamedTuple):
 class RedundantSets(NamedTuple):
     """The free redundant joints of a machine."""
 
-    from_base: MovedTrunks
-    from_platform: MovedTrunks
     one: RedundantSet
     two: RedundantSet
     three: RedundantSet
     four: RedundantSet
     five: RedundantSet
     six: RedundantSet
-
-
-class TrunkScratch(NamedTuple):
-    """Scratch memory of one thread, for trunks."""
-
-    config: Configuration
-    half_spaces: LeastStep
-    pose: Floats  # (4, 4) [length]
-    values: Floats  # (n_trunk_joints,)
 
 
 class SetScratch(NamedTuple):
@@ -86,8 +48,6 @@ class SetScratch(NamedTuple):
 class SetsScratch(NamedTuple):
     """Scratch memory of one thread, for all of `RedundantSets`."""
 
-    from_base: TrunkScratch
-    from_platform: TrunkScratch
     one: SetScratch
     two: SetScratch
     three: SetScratch
@@ -98,12 +58,7 @@ class SetsScratch(NamedTuple):
 
 def new_sets_scratch(sets: RedundantSets) -> SetsScratch:
     """Allocate the scratch memory of one thread; none for sets that there are not."""
-    return SetsScratch._make([*map(_new_trunk_scratch, sets[:2]), *map(_new_set_scratch, sets[2:])])
-
-
-def _new_trunk_scratch(trunks: MovedTrunks) -> TrunkScratch:
-    plan = Plan(*trunks[:6], 1.0)
-    return TrunkScratch(new_configuration(plan), new_half_spaces(plan), np.zeros((4, 4)), np.zeros(len(trunks.legs)))
+    return SetsScratch._make(map(_new_set_scratch, sets))
 
 
 def _new_set_scratch(part: RedundantSet) -> SetScratch:
@@ -122,44 +77,6 @@ def _new_set_scratch(part: RedundantSet) -> SetScratch:
 def _emptied(scratch: Any) -> Any:
     """Scratch memory of no size."""
     return scratch._make(_emptied(item) if isinstance(item, tuple) else item[:0] for item in scratch)
-
-
-@routine
-def step_trunks(sets: RedundantSets, scratch: SetsScratch, home: Floats, target: Floats, sides: Floats) -> None:
-    """Move trunks by the least steps that keep the limits of the legs on them, to first order.
-
-    Parameters
-    ----------
-    home, target : poses of home and of the target, (4, 4) [length].
-    sides : coordinates of redundant joints, (legs,), before and after.
-    """
-    _step_some(sets.from_base, scratch.from_base, home, target, sides)
-    _step_some(sets.from_platform, scratch.from_platform, home, target, sides)
-
-
-@routine
-def _step_some(trunks: MovedTrunks, scratch: TrunkScratch, home: Floats, target: Floats, sides: Floats) -> None:
-    """Step the trunks next to the base, or those next to the platform."""
-    moving, values, pose = trunks.moving[0], scratch.values, scratch.pose
-    length, enough = moving["length"], moving["enough"]
-    if values.shape[0] == 0:
-        return
-    copy_table(target, pose)
-    if moving["are_on_platform"] == 1:  # the pose of the base as the platform sees it
-        centre = (home[0, 3], home[1, 3], home[2, 3])
-        for i in range(3):
-            for j in range(3):
-                pose[i, j] = target[j, i]
-        back = turn(pose, sub(centre, (target[0, 3], target[1, 3], target[2, 3])))
-        for i in range(3):
-            pose[i, 3] = centre[i] + back[i]
-    for i in range(values.shape[0]):
-        values[i] = sides[trunks.legs[i]] * trunks.units[i]
-    plan = Plan(trunks.nodes, trunks.branches, trunks.chains, trunks.cones, trunks.trunks, trunks.trunk_joints, length)
-    settings = Settings(enough, moving["iterations"], 0, 0, 0, length, 1)
-    move_trunk(plan, pose, values, settings, enough, scratch.config, scratch.half_spaces)
-    for i in range(values.shape[0]):
-        sides[trunks.legs[i]] = values[i] / trunks.units[i]
 
 
 @routine

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints, Records
+from ..decomposition.decompose import beyond_positions, decompose
+from ..decomposition.positions import BranchForm, express_trunk
 from ..derived import derived
 from ..description.graph import Step
 from ..description.mechanism import Mechanism
 from ..errors import UnsupportedMechanism
 from ..kernels.passes import plan as P
-from .decompose import beyond_positions, decompose, express_on
-from .positions import BranchForm, express_trunk
 
 
 @dataclass(frozen=True)
@@ -55,17 +55,6 @@ def compile_plan(mechanism: Mechanism) -> CompiledPlan:
     if reasons:
         raise UnsupportedMechanism(mechanism.name, reasons)
     return _compiled(mechanism, [(chain.trunk, chain.branch_forms) for chain in decompose(mechanism)])
-
-
-@derived
-def compile_trunks(mechanism: Mechanism, joints: frozenset[str], from_platform: bool) -> CompiledPlan | None:
-    """Compile the sub-chains that some joints begin, these as their trunks; None if positions express none of them.
-
-    Seen from the platform, base and platform change places: poses are then those of the base relative to the platform,
-    at the reference point of home.
-    """
-    chains = list(express_on(mechanism, joints, from_platform))
-    return _compiled(mechanism, chains) if chains else None
 
 
 def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Sequence[BranchForm]]]) -> CompiledPlan:
