@@ -33,6 +33,7 @@ from exported import (
     off,
     program_of,
     sanitizers_of,
+    survives,
     text_of,
     truth,
 )
@@ -176,6 +177,11 @@ def test_the_file_checks_itself(file: tuple[str, str]) -> None:
 
 
 @needs_compiler
+def test_no_argument_of_any_function_makes_the_file_write_what_is_not_finite(file: tuple[str, str]) -> None:
+    survives(program(*file))
+
+
+@needs_compiler
 @pytest.mark.campaign
 @pytest.mark.parametrize("precision", EXACT)
 @pytest.mark.parametrize("name", [name for name in (*CATALOGUE, *OTHERS) if name != AMBIGUOUS])
@@ -187,6 +193,7 @@ def test_the_file_answers_as_the_library_does_on_many_poses(name: str, precision
             built = compiled(text_of(name, precision), *options, compiler=compiler)
             check(name, precision, answers_of(built, machine(name), known), known)
             assert checks_itself(built)[0] == 0
+            survives(built)
 
 
 @needs_compiler
