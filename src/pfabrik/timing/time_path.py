@@ -22,7 +22,7 @@ from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from ..tolerances import TOLERANCES
 from .curve import Curve, curve_of, refuse_crossings
-from .limits import Limits, Pace, exceeded, motion_at, with_exact_torques
+from .exceeded import Limits, Timing, exceeded, motion_at, with_exact_torques
 from .timed import Timed
 from .torque_path import TorqueParts, TorquePath, TorqueSource
 
@@ -107,8 +107,8 @@ def time_path(
     refuse_crossings(track)
     refuse_swings(track, curve)
     limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
-    pace = _fastest(curve, limits)
-    return _sampled(track, curve, pace, with_exact_torques(curve, pace, limits), every)
+    timing = _fastest(curve, limits)
+    return _sampled(track, curve, timing, with_exact_torques(curve, timing, limits), every)
 
 
 def _torques(
@@ -155,7 +155,7 @@ def refuse_swings(track: Track, curve: Curve) -> None:
         raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
 
 
-def _fastest(curve: Curve, limits: Limits) -> Pace:
+def _fastest(curve: Curve, limits: Limits) -> Timing:
     """The largest squared speeds on a grid along s."""
     s = curve.grid()
     slopes, bends = curve.at(s, 1), curve.at(s, 2)
@@ -184,12 +184,12 @@ def _fastest(curve: Curve, limits: Limits) -> Pace:
         slower = np.where(shares > 1.0, shares, 0.0) ** 2
         slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
         caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
-    pace = Pace(s, x / max(1.0, shares.max()))
-    stuck = pace.speeds[1:] + pace.speeds[:-1] <= 0.0
+    timing = Timing(s, x / max(1.0, shares.max()))
+    stuck = timing.speeds[1:] + timing.speeds[:-1] <= 0.0
     if stuck.any():
         rows = curve.step_of(s[:-1][stuck])[:5].tolist()
         raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=rows)
-    return pace
+    return timing
 
 
 def _beside(one: Floats, other: Floats) -> Floats:
@@ -210,16 +210,16 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
 
-def _sampled(track: Track, curve: Curve, pace: Pace, limits: Limits, every: float) -> Timed:
+def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, every: float) -> Timed:
     """Samples at a rate, and at the very end."""
-    reached, names = pace.reached, track.mechanism.actuator_names
+    reached, names = timing.reached, track.mechanism.actuator_names
     if reached[-1] / every > MOST_SAMPLES:
         found = f"{1.0 / every:g} samples per second for {reached[-1]:g} s"
         raise InvalidArgument("rate", found, f"at most {MOST_SAMPLES} samples")
     times = np.arange(0.0, reached[-1], every)
     times = np.append(times[times < reached[-1] - 1e-9 * every], reached[-1])
     cells = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(reached) - 2)
-    places, *motion = pace.at(cells, times - reached[cells])
+    places, *motion = timing.at(cells, times - reached[cells])
     sampled = motion_at(curve, limits, places, *motion)
     return Timed(
         mechanism=track.mechanism,
@@ -233,6 +233,6 @@ def _sampled(track: Track, curve: Curve, pace: Pace, limits: Limits, every: floa
         used=sampled.used.max(axis=1),
         binding=sampled.used.argmax(axis=1),
         limits=limits.named(names),
-        exceeded=exceeded(curve, pace, limits, names),
+        exceeded=exceeded(curve, timing, limits, names),
         _track=track,
     )

@@ -43,7 +43,7 @@ class Limits(NamedTuple):
     path: TorquePath | None
 
     def named(self, actuators: tuple[str, ...]) -> tuple[tuple[str, What], ...]:
-        """All limits, in the order of `Motion.used`."""
+        """All limits, in the order of `CurveMotion.used`."""
         kinds: list[tuple[str, What]] = [*((name, "speed") for name in actuators)]
         kinds += [(name, "acceleration") for name in actuators]
         kinds += [(name, "torque") for name in (() if self.path is None else self.path.names)]
@@ -51,7 +51,7 @@ class Limits(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Pace:
+class Timing:
     """How fast a curve is passed: between the points s (k,) of a grid, at which s' squared is x (k,), s'' is even."""
 
     s: Floats
@@ -90,7 +90,7 @@ class Pace:
         return np.sqrt(np.maximum(self.x[cells] + 2.0 * pushes * (places - self.s[cells]), 0.0)), pushes
 
 
-class Motion(NamedTuple):
+class CurveMotion(NamedTuple):
     """A curve at n places, as it is passed.
 
     Attributes
@@ -105,7 +105,7 @@ class Motion(NamedTuple):
     used: Floats
 
 
-def motion_at(curve: Curve, limits: Limits, places: Floats, speeds: Floats, pushes: Floats) -> Motion:
+def motion_at(curve: Curve, limits: Limits, places: Floats, speeds: Floats, pushes: Floats) -> CurveMotion:
     """The motion at places s (n,) that are passed at s' and s''."""
     n, slopes, bends = curve.n_actuators, curve.at(places, 1), curve.at(places, 2)[:, : curve.n_actuators]
     rates, gains = slopes * speeds[:, None], slopes[:, :n] * pushes[:, None] + bends * speeds[:, None] ** 2
@@ -115,17 +115,17 @@ def motion_at(curve: Curve, limits: Limits, places: Floats, speeds: Floats, push
         parts = limits.path.at(places, slopes[:, :n], bends)
         shares.append(np.abs(parts.torques(speeds, pushes)) / parts.most)
     used = np.concatenate([*shares, platform[:, None] / limits.platform], axis=1)
-    return Motion(rates[:, :n], gains, platform, used)
+    return CurveMotion(rates[:, :n], gains, platform, used)
 
 
-def with_exact_torques(curve: Curve, pace: Pace, limits: Limits) -> Limits:
+def with_exact_torques(curve: Curve, timing: Timing, limits: Limits) -> Limits:
     """The limits with torques at as many places as splines between them need, to be exact in this motion."""
     path = limits.path
     if path is None:
         return limits
     places = 0.5 * (path.s[1:] + path.s[:-1])
     for _ in range(DOUBLINGS):
-        finer, motion = path.with_places(places), pace.through(places)
+        finer, motion = path.with_places(places), timing.through(places)
         slopes, bends = (curve.at(places, order)[:, : curve.n_actuators] for order in (1, 2))
         one, other = (each.at(places, slopes, bends) for each in (path, finer))
         off = np.abs(other.torques(*motion) - one.torques(*motion)) / other.most
@@ -137,46 +137,46 @@ def with_exact_torques(curve: Curve, pace: Pace, limits: Limits) -> Limits:
     return limits._replace(path=path)
 
 
-def exceeded(curve: Curve, pace: Pace, limits: Limits, actuators: tuple[str, ...]) -> tuple[Exceeded, ...]:
+def exceeded(curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str, ...]) -> tuple[Exceeded, ...]:
     """The limits that a motion exceeds, anywhere, the most first."""
     named = limits.named(actuators)
     found: dict[int, Exceeded] = {}
     durations = np.zeros(len(named))
-    signs = np.sign(curve.at(pace.s, 1)[:, : curve.n_actuators])
+    signs = np.sign(curve.at(timing.s, 1)[:, : curve.n_actuators])
     rubs = False if limits.path is None else limits.path.rubs
     turns_back = ((signs[1:] != signs[:-1]) & rubs).any(axis=1)
     for first in range(0, len(turns_back), CELLS_A_BLOCK):
         cells = np.arange(first, min(first + CELLS_A_BLOCK, len(turns_back)))
-        is_over = (_used(curve, pace, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))
+        is_over = (_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))
         cells = cells[is_over | turns_back[cells]]
         if not len(cells):
             continue
-        used = _used(curve, pace, limits, cells, CLOSER_LOOKS)
-        durations += (used > 1.0 + EXCEEDED).mean(axis=1).T @ pace.durations[cells]
+        used = _used(curve, timing, limits, cells, CLOSER_LOOKS)
+        durations += (used > 1.0 + EXCEEDED).mean(axis=1).T @ timing.durations[cells]
         for place in np.flatnonzero(used.max(axis=(0, 1)) > 1.0 + 0.5 * EXCEEDED).tolist():
             worst, look = np.unravel_index(used[..., place].argmax(), used.shape[:2])
             cell = cells[worst]
-            share, at = _peak(curve, pace, limits, cell, place, CLOSER_LOOKS[look])
+            share, at = _peak(curve, timing, limits, cell, place, CLOSER_LOOKS[look])
             if share > max(1.0 + EXCEEDED, found[place].share if place in found else 0.0):
-                late = at * pace.durations[cell]
-                step = int(curve.step_of(pace.at(cell, late)[0]))
-                found[place] = Exceeded(*named[place], share, float(pace.reached[cell] + late), step, 0.0)
+                late = at * timing.durations[cell]
+                step = int(curve.step_of(timing.at(cell, late)[0]))
+                found[place] = Exceeded(*named[place], share, float(timing.reached[cell] + late), step, 0.0)
     told = (each._replace(duration=float(durations[place])) for place, each in found.items())
     return tuple(sorted(told, key=lambda each: -each.share))
 
 
-def _peak(curve: Curve, pace: Pace, limits: Limits, cell: int, place: int, look: float) -> tuple[float, float]:
+def _peak(curve: Curve, timing: Timing, limits: Limits, cell: int, place: int, look: float) -> tuple[float, float]:
     """The largest share of a limit in a cell, and when that is, by its duration, near a look."""
     share, apart = 0.0, float(CLOSER_LOOKS[1])
     for _ in range(ZOOMS):
         looks = np.clip(look + apart * (2.0 * CLOSER_LOOKS - 1.0), 0.0, 1.0)
-        used = _used(curve, pace, limits, np.array([cell]), looks)[0, :, place]
+        used = _used(curve, timing, limits, np.array([cell]), looks)[0, :, place]
         share, look, apart = float(used.max()), float(looks[used.argmax()]), 2.0 * apart * float(CLOSER_LOOKS[1])
     return share, look
 
 
-def _used(curve: Curve, pace: Pace, limits: Limits, cells: Ints, looks: Floats) -> Floats:
+def _used(curve: Curve, timing: Timing, limits: Limits, cells: Ints, looks: Floats) -> Floats:
     """The share of each limit at some times in cells of the grid, (cells, looks, limits)."""
-    late = np.multiply.outer(pace.durations[cells], looks)
-    motion = (np.broadcast_to(each, late.shape).ravel() for each in pace.at(cells[:, None], late))
+    late = np.multiply.outer(timing.durations[cells], looks)
+    motion = (np.broadcast_to(each, late.shape).ravel() for each in timing.at(cells[:, None], late))
     return motion_at(curve, limits, *motion).used.reshape(*late.shape, -1)
