@@ -9,7 +9,7 @@ READY := .venv/.ready
 STAMP := .venv/.installed
 # The kernels, compiled in place where there is a C compiler; without one they are plain Python.
 MODULE := build/kernels/.made
-KERNELS := $(shell find src/pfabrik/kernels src/pfabrik/to_c building -name '*.py' -o -name '*.[ch]')
+KERNELS := $(shell find src/pfabrik/kernels src/pfabrik/to_c tools/kernels -name '*.py' -o -name '*.[ch]')
 # Matrices are small here: threads of the linear algebra would only wait for each other, the more so where tests run in
 # parallel.
 export OPENBLAS_NUM_THREADS := 1
@@ -34,7 +34,7 @@ reproduce: prepared
 # stops at a link that leads nowhere.
 docs: prepared
 	@$(PIP) --no-build-isolation --editable '.[docs]'
-	@$(BIN)/python docs/build_site.py
+	@$(BIN)/python tools/site/build_site.py
 	@$(BIN)/zensical build --clean --strict
 
 # In parallel.
@@ -69,11 +69,11 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict src paper tests/typing
 	$(BIN)/lint-imports
-	$(BIN)/python building/budget.py
+	$(BIN)/python tools/budget.py
 
-# The kernels of web pages, src/pfabrik/export/kernels.wasm, which is kept in the repository: needs clang and wasm-ld (lld).
+# The kernels of web pages, src/pfabrik/view/page/kernels.wasm, which is kept in the repository: needs clang and wasm-ld (lld).
 web: $(READY)
-	@$(BIN)/python building/compile_web.py
+	@$(BIN)/python tools/kernels/compile_web.py
 
 bench: prepared
 	@$(BIN)/python benchmarks/run.py
@@ -93,7 +93,7 @@ $(READY): pyproject.toml
 	@touch $@
 
 $(MODULE): $(READY) $(KERNELS)
-	@$(BIN)/python building/compile_kernels.py || [ $$? = 3 ]
+	@$(BIN)/python tools/kernels/compile_kernels.py || [ $$? = 3 ]
 	@mkdir -p $(@D) && touch $@
 
 $(STAMP): $(READY)

@@ -10,13 +10,13 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array, Struts
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.description.geometry import geometry_of
-from pfabrik.model import Model, model_of
-from pfabrik.motion.displacements import rate_units
-from pfabrik.motion.loops import actuated_columns, right_singular
-from pfabrik.motion.loops import first_order as conditions_and_twist
-from pfabrik.motion.mobility import generic_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.machine.description.geometry import geometry_of
+from pfabrik.machine.model import Model, model_of
+from pfabrik.machine.motion.displacements import rate_units
+from pfabrik.machine.motion.loops import actuated_columns, right_singular
+from pfabrik.machine.motion.loops import first_order as conditions_and_twist
+from pfabrik.machine.motion.mobility import generic_of
 from table import Row, cells, machine, table
 from timing import best_times, draw
 from yardstick import one_core

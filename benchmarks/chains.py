@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pfabrik as pf
-from pfabrik.chains.chain_engine import ChainEngine
-from pfabrik.chains.chain_tables import question_of
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.kernels.platform.tables import BY_LEGS
-from pfabrik.model import model_of
+from pfabrik.engines.chains.chain_engine import ChainEngine
+from pfabrik.engines.chains.chain_tables import question_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.kernels.pose.tables import BY_LEGS
+from pfabrik.machine.model import model_of
 from table import Row, machine
 from timing import best_times
 from yardstick import kernel, routine

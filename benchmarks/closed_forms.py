@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pfabrik as pf
-from pfabrik.description.graph import Step
+from pfabrik.machine.description.graph import Step
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -11,8 +11,8 @@ import numpy as np
 import pfabrik as pf
 from closed_forms import Array, Struts
 from newton import StrutNewton
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.model import model_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.machine.model import model_of
 from table import Row
 from timing import best_times, draw
 from yardstick import one_core

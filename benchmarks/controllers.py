@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 import pfabrik as pf
-from pfabrik.export.export_c import c_source
-from pfabrik.export.static_data import Precision
+from pfabrik.exchange.export.export_c import c_source
+from pfabrik.exchange.export.static_data import Precision
 from timing import Array, draw
 
 SIZE, TILT, BEYOND = 0.35, 0.4, 1.6

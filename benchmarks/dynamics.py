@@ -18,8 +18,8 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array
-from pfabrik.description.home_mobility import universal_axes
 from pfabrik.kinematics import inertias_of, tree_of
+from pfabrik.machine.description.home_mobility import universal_axes
 from table import Row
 from timing import best_times, draw
 

@@ -10,15 +10,15 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array
-from pfabrik.closure.projection import projection_modes
-from pfabrik.decomposition.leg_table import LegTable, leg_table
+from pfabrik.engines.joints.projection import projection_modes
+from pfabrik.engines.pose.table import table_handle
 from pfabrik.kernels.legs.answer import answer
 from pfabrik.kernels.passes.solve import solve_by_passes
-from pfabrik.model import model_of
+from pfabrik.machine.decomposition.leg_table import LegTable, leg_table
+from pfabrik.machine.model import model_of
 from pfabrik.passes.joint_positions import new_pass_results
 from pfabrik.passes.passes_engine import settings_of
 from pfabrik.passes.plan import compile_plan
-from pfabrik.platform.table import table_handle
 from table import Row
 from timing import Solve, best_times, draw
 from yardstick import one_core

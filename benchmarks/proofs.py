@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 import pfabrik as pf
-from pfabrik.certify.enclosure import COORDINATES, enclose
-from pfabrik.model import model_of
+from pfabrik.capabilities.certify.enclosure import COORDINATES, enclose
+from pfabrik.machine.model import model_of
 from table import Row
 from timing import best_times
 

@@ -34,7 +34,7 @@ def processor_time(function: Callable[[], object], calls: int) -> float:
 
 def measure(name: str) -> str:
     """A row of the table."""
-    machine = pf.load(Path(pf.__file__).parent / "catalog" / "templates" / f"{name}.toml")
+    machine = pf.load(Path(pf.__file__).parent / "machine" / "catalog" / "templates" / f"{name}.toml")
     poses, ours = draw(machine, np.random.default_rng(1), POSES, 0.1, 0.1), varied(machine)
     values = np.array([machine.dimensions[each] for each in ours.names])
     by_name = dict(zip(ours.names, values.tolist(), strict=True))

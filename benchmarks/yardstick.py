@@ -7,8 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from building.on_call import kernel, routine
 from paper import geometric
 from paper.timing import one_core
+from tools.kernels.on_call import kernel, routine
 
 __all__ = ["geometric", "kernel", "one_core", "routine"]

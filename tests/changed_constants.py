@@ -34,9 +34,9 @@ PER_ROW, LIMIT = 4, 120
 
 MACHINES = {
     "search_constants": ["stewart", "rps", "palletizer", "rrr", "panda", "straight_arm", "hexaglide", "nrpm"],
-    "platform.pose_constants": ["stewart", "rps", "prr", "reachy_mini", "canfield", "hexaglide", "nrpm"]
+    "pose.pose_constants": ["stewart", "rps", "prr", "reachy_mini", "canfield", "hexaglide", "nrpm"]
     + ["thick_hexaglide"],
-    "closure.joint_constants": ["straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"],
+    "joints.joint_constants": ["straight_arm", "arm_by_its_body", "four_bar_tripod", "walking_linkage"],
     "chains.chain_constants": ["panda", "spherical_cones", "universal_cones", "snake60"],
     "passes.pass_constants": ["nrpm", "delta", "servo_hexapod", "canfield"],
     "clearance.distance_constants": ["struts", "delta_apart"],
@@ -66,7 +66,7 @@ def symbol(record: str, name: str) -> str:
 def build(folder: Path) -> None:
     """Compile kernels whose constants are variables of the module, and which count the functions that run."""
     os.environ["PFABRIK_KERNELS"] = "python"
-    sys.path.insert(0, str(ROOT / "building"))
+    sys.path.insert(0, str(ROOT / "tools" / "kernels"))
     import compile_kernels
 
     import pfabrik.kernels.ahead  # noqa: F401

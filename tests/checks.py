@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from pfabrik import Joint, Mechanism, Solution, Status
-from pfabrik.description.home_mobility import universal_axes
 from pfabrik.kernels._shipped import IS_INTERPRETED
+from pfabrik.machine.description.home_mobility import universal_axes
 
 Array = NDArray[np.float64]
 INTERPRETED = IS_INTERPRETED

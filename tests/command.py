@@ -21,9 +21,9 @@ from click.testing import CliRunner, Result
 import pfabrik as pf
 from machines import closure
 from pfabrik import Joint, Leg, Mechanism
-from pfabrik.catalog import template
 from pfabrik.cli import main
-from pfabrik.files import dumps
+from pfabrik.machine.catalog import template
+from pfabrik.machine.files import dumps
 
 
 def pfabrik(line: str | Sequence[object], given: str | None = None) -> Result:

@@ -17,12 +17,12 @@ import machines
 import pfabrik as pf
 from checks import actuator_units
 from machines import published
-from pfabrik.description.joints import KINDS
-from pfabrik.export.export_c import c_source
-from pfabrik.export.source import targets_around_home
-from pfabrik.model import model_of
-from pfabrik.motion.displacements import columns
-from pfabrik.motion.limited_coordinates import coned
+from pfabrik.exchange.export.export_c import c_source
+from pfabrik.exchange.export.source import targets_around_home
+from pfabrik.machine.description.joints import KINDS
+from pfabrik.machine.model import model_of
+from pfabrik.machine.motion.displacements import columns
+from pfabrik.machine.motion.limited_coordinates import coned
 
 Array = np.ndarray
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

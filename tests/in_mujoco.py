@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik.interop import Imported
+from pfabrik.exchange.interop import Imported
 
 mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo, whole: pip install '.[dev]'", exc_type=ImportError)
 

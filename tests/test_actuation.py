@@ -389,8 +389,8 @@ def test_the_rate_of_the_jacobian_is_its_difference_along_the_motion(name: str, 
 
 
 def test_the_rate_of_a_rotation_vectors_matrix_is_that_of_large_and_small_ones() -> None:
-    from pfabrik.actuation.jacobian_rate import NEAR_NONE, _turning_rate
-    from pfabrik.rotations import turning
+    from pfabrik.capabilities.actuation.jacobian_rate import NEAR_NONE, _turning_rate
+    from pfabrik.common.rotations import turning
 
     random, h = np.random.default_rng(0), 1e-3
     directions, speeds = random.standard_normal((2, 6, 3))

@@ -8,16 +8,16 @@ import pytest
 import pfabrik as pf
 from oracles import targets_about
 from pfabrik import Options
+from pfabrik.engines.pose.tables import limit_names, tables_of
 from pfabrik.kernels.handle import Handle
-from pfabrik.kernels.platform import tables as T
-from pfabrik.kernels.platform.answer_row import weigh_limits
-from pfabrik.kernels.platform.answer_rows import answer_rows
-from pfabrik.kernels.platform.search_records import PoseSolutions, new_solutions
+from pfabrik.kernels.pose import tables as T
+from pfabrik.kernels.pose.answer_row import weigh_limits
+from pfabrik.kernels.pose.answer_rows import answer_rows
+from pfabrik.kernels.pose.search_records import PoseSolutions, new_solutions
 from pfabrik.kernels.projecting import UNBOUNDED
 from pfabrik.kernels.rows import PENDING, PROJECTED, REACHED, UNSURE
 from pfabrik.kernels.search_constants import MOST_STEPS
-from pfabrik.model import model_of
-from pfabrik.platform.tables import limit_names, tables_of
+from pfabrik.machine.model import model_of
 from pfabrik.tolerances import TOLERANCES
 
 MACHINES = ("stewart", "delta", "servo_hexapod", "orthoglide", "agile_eye")

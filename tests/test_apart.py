@@ -17,13 +17,13 @@ from checks import INTERPRETED
 from links import STROKE, axes_of_struts, distances_of_pairs, struts, thick_hexaglide
 from machines.redescribed import moved
 from pfabrik.cli import main
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.description.links import collisions_at_home
-from pfabrik.engine import engine_of
-from pfabrik.model import model_of
-from pfabrik.platform.legs_engine import LegsEngine
-from pfabrik.platform.links_of_legs import keeps_links
-from pfabrik.skeleton import skeleton_of
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.engines.pose.legs_engine import LegsEngine
+from pfabrik.engines.pose.links_of_legs import keeps_links
+from pfabrik.machine.description.links import collisions_at_home
+from pfabrik.machine.model import model_of
+from pfabrik.view.skeleton import skeleton_of
 
 Array = NDArray[np.float64]
 FREE = pf.Options(hold=None)

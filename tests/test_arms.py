@@ -16,12 +16,12 @@ from machines import closure, machine, ring
 from machines.trunks import arms
 from oracles.arms import redundant_margin
 from pfabrik import Mechanism, Options, Status
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.decomposition.leg_forms import RedundantJoint
-from pfabrik.engine import engine_of
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.engines.pose.legs_engine import LegsEngine
 from pfabrik.errors import UnsupportedMechanism
-from pfabrik.model import model_of
-from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.machine.decomposition.leg_forms import RedundantJoint
+from pfabrik.machine.model import model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 slow_interpreted = pytest.mark.skipif(INTERPRETED, reason="minutes")

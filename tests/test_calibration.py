@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik.calibration.printer_settings import Printer
+from pfabrik.capabilities.calibration.printer_settings import Printer
+from pfabrik.common.rotations import to_rotvec
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
-from pfabrik.files import loads
-from pfabrik.model import model_of
-from pfabrik.rotations import to_rotvec
+from pfabrik.machine.files import loads
+from pfabrik.machine.model import model_of
 
 PROGRAM = Path(__file__).parents[1] / "examples" / "tasks" / "calibrate_printer.py"
 
@@ -104,7 +104,7 @@ def test_sensitivities_are_those_of_machines_made_anew(name: str, kind: str) -> 
 
 def stewart_with_a_tool() -> pf.Mechanism:
     """A platform whose reference point goes by two dimensions."""
-    text = (Path(pf.__file__).parent / "catalog" / "stewart.toml").read_text()
+    text = (Path(pf.__file__).parent / "machine" / "catalog" / "stewart.toml").read_text()
     point = 'reference_point = [0, "side", "195 + tool"]'
     return loads(text.replace("reference_point = [0, 0, 195]", point) + "\n[dimensions]\nside = 7\ntool = 20\n")
 

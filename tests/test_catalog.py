@@ -18,7 +18,7 @@ from machines.published import PUBLISHED, moved_from_home
 from oracles import search
 from paper import geometric
 from pfabrik import Mechanism, Solution, Status
-from pfabrik.catalog import catalog_file, description
+from pfabrik.machine.catalog import catalog_file, description
 
 Array = NDArray[np.float64]
 NAMES = pf.catalog()

@@ -20,14 +20,14 @@ from checks import INTERPRETED
 from links import distances_of_pairs, struts
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
-from pfabrik.certify.subdividing import region_parameters
+from pfabrik.capabilities.certify.subdividing import region_parameters
 from pfabrik.cli import main
+from pfabrik.engines.pose.table import kernel_table
 from pfabrik.kernels.certify.affine_forms import ABOVE, BELOW, CENTRE
 from pfabrik.kernels.certify.limit_rows import put_limits
 from pfabrik.kernels.certify.pose_cells import put_cell
 from pfabrik.kernels.certify.prove import new_rows
-from pfabrik.model import model_of
-from pfabrik.platform.table import kernel_table
+from pfabrik.machine.model import model_of
 
 CENTRE_OF_STEWART = np.array([0.0, 0.0, 210.0])
 ROD_OF_ORTHOGLIDE = 310.582854123025
@@ -272,7 +272,7 @@ def test_an_orthoglide_fills_what_three_cylinders_share_and_a_five_bar_two_rings
 
 
 def enclosure_of(machine: pf.Mechanism, names: tuple[str, ...], accuracy: float) -> pf.Enclosure:
-    from pfabrik.certify.enclosure import COORDINATES, enclose
+    from pfabrik.capabilities.certify.enclosure import COORDINATES, enclose
 
     held = dict(zip(COORDINATES, [*machine.home_pose[:3, 3], 0.0, 0.0, 0.0], strict=True))
     ends = np.full(len(names), np.inf)

@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from checks import INTERPRETED, assert_feasible, assert_honest
 from pfabrik import Cone, Joint, Mechanism, Options, Status
-from pfabrik.chains.chain_engine import ChainEngine
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.engine import engine_of
-from pfabrik.model import model_of
+from pfabrik.engines.chains.chain_engine import ChainEngine
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.machine.model import model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 compiled_only = pytest.mark.skipif(INTERPRETED, reason="minutes in plain Python")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik.arguments import array, is_positive
-from pfabrik.checks import put_limits, require_finite, require_names, require_path, require_positive
+from pfabrik.common.arguments import array, is_positive
+from pfabrik.common.checks import put_limits, require_finite, require_names, require_path, require_positive
 from pfabrik.errors import InvalidArgument, PfabrikError, UnknownName
 
 NAMES = ("A1", "A2")

@@ -23,22 +23,22 @@ from oracles import targets_about
 from pfabrik.answers.active_limits import ActiveLimit, binding_limits
 from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnsupportedMechanism
-from pfabrik.files import loads
-from pfabrik.files.units import metres_of
-from pfabrik.files.writing import dumps
-from pfabrik.interop import qpos as mjcf_qpos
-from pfabrik.interop import to_mjcf
+from pfabrik.exchange.interop import qpos as mjcf_qpos
+from pfabrik.exchange.interop import to_mjcf
 from pfabrik.kernels.clearance.capsules import capsule_clearance
 from pfabrik.kernels.clearance.least_clearance import least_clearance
 from pfabrik.kernels.clearance.solids import BOX, CAPSULE, DISC
-from pfabrik.skeleton import skeleton_of
+from pfabrik.machine.files import loads
+from pfabrik.machine.files.units import metres_of
+from pfabrik.machine.files.writing import dumps
+from pfabrik.view.skeleton import skeleton_of
 from slopes import beside, slopes
 
 Array = NDArray[np.float64]
 ROWS = 500 if INTERPRETED else 20_000
 SLOW = pytest.mark.slow if INTERPRETED else ()
 KINDS = ("capsule", "box", "disc")
-DELTA = (Path(pf.__file__).parent / "catalog" / "delta.toml").read_text()
+DELTA = (Path(pf.__file__).parent / "machine" / "catalog" / "delta.toml").read_text()
 
 
 def around(machine: pf.Mechanism, count: int, shift: float, turn: float) -> pf.Solution:

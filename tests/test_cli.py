@@ -24,13 +24,13 @@ import pfabrik as pf
 from command import files, in_process, listed, pfabrik, write_files
 from machines import closure
 from pfabrik.answers.words import as_sentence
-from pfabrik.catalog import description, template, templates
 from pfabrik.cli import main
 from pfabrik.cli.examples import EXAMPLES
 from pfabrik.cli.printing import fitted
-from pfabrik.export.rod_lengths import uneven_rods
-from pfabrik.files import loads
-from pfabrik.rotations import to_rpy
+from pfabrik.common.rotations import to_rpy
+from pfabrik.exchange.export.rod_lengths import uneven_rods
+from pfabrik.machine.catalog import description, template, templates
+from pfabrik.machine.files import loads
 from pfabrik.view.live.viewer import Viewer
 from test_calibration import klipper_settings
 
@@ -247,8 +247,8 @@ def test_what_is_printed_asks_for_no_joints_that_it_does_not_show(line: str, mon
     def unasked(*_: object) -> None:
         raise AssertionError("joint coordinates are worked out")
 
-    monkeypatch.setattr("pfabrik.platform.coordinates.read_coordinates", unasked)
-    monkeypatch.setattr("pfabrik.platform.coordinates._closed", unasked)
+    monkeypatch.setattr("pfabrik.engines.pose.coordinates.read_coordinates", unasked)
+    monkeypatch.setattr("pfabrik.engines.pose.coordinates._closed", unasked)
     assert pfabrik(line).exit_code in (0, 1)
 
 
@@ -284,7 +284,7 @@ def test_a_workspace_tells_its_size_its_border_and_angles_in_degrees() -> None:
 
 
 def test_a_machine_without_closed_forms_is_told_of_at_once_and_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pfabrik.telling.PATIENCE", 0.0)
+    monkeypatch.setattr("pfabrik.common.telling.PATIENCE", 0.0)
     pf.save(closure.with_hinges_apart(pf.load("delta").without_limits()), "apart.toml")
     result = pfabrik("workspace apart.toml --fix z=-200 --within x=-60:60 --within y=-60:60 --resolution 30 --json")
     assert result.exit_code == 0 and json.loads(result.stdout)["size"] == pytest.approx(120.0**2)

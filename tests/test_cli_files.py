@@ -15,9 +15,9 @@ import pytest
 
 import pfabrik as pf
 from command import in_process, listed, pfabrik, rows_of, told, write_files
-from pfabrik.catalog import template
 from pfabrik.cli import outputs
 from pfabrik.cli.outputs import ignores_case
+from pfabrik.machine.catalog import template
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -121,7 +121,7 @@ def test_what_stood_in_the_output_stays_when_the_work_fails(monkeypatch: pytest.
 
     write_files("path.csv")
     Path("answers.csv").write_text("precious")
-    monkeypatch.setattr("pfabrik.paths.track_rows.TrackRows.write", interrupted)
+    monkeypatch.setattr("pfabrik.capabilities.paths.track_rows.TrackRows.write", interrupted)
     assert pfabrik("track five_bar path.csv -o answers.csv").exit_code == 130
     assert Path("answers.csv").read_text() == "precious"
     assert listed() == ["answers.csv", "path.csv"]
@@ -316,7 +316,7 @@ def test_demo_refuses_a_file_where_its_folder_should_be() -> None:
 
 def test_a_missing_library_is_named_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     write_files("path.csv")
-    monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("pfabrik.common.extras.find_spec", lambda _: None)
     for line in ("demo", "plot five_bar", "track five_bar path.csv --animate a.gif"):
         result = pfabrik(line)
         assert result.exit_code == 2

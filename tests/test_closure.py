@@ -7,11 +7,11 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, machine
-from pfabrik.closure.close import HELD, close, platform_poses
-from pfabrik.closure.multistart import random_feasible
-from pfabrik.closure.reaches import reaches_of
-from pfabrik.model import model_of
-from pfabrik.motion.displacements import columns, stepped
+from pfabrik.engines.joints.close import HELD, close, platform_poses
+from pfabrik.engines.joints.multistart import random_feasible
+from pfabrik.engines.joints.reaches import reaches_of
+from pfabrik.machine.model import model_of
+from pfabrik.machine.motion.displacements import columns, stepped
 from pfabrik.tolerances import TOLERANCES
 
 NAMES = ["five_bar", "nrpm", "stewart", *MACHINES]

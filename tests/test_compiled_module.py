@@ -140,8 +140,8 @@ def test_kernels_edited_after_they_were_compiled_are_plain_python(
     assert LIBRARY is not None
     monkeypatch.delenv("PFABRIK_KERNELS", raising=False)
     folder = tmp_path / "src" / "pfabrik" / "kernels"
-    (tmp_path / "building").mkdir()
-    (tmp_path / "building" / "compile_kernels.py").touch()  # a checkout
+    (tmp_path / "tools" / "kernels").mkdir(parents=True)
+    (tmp_path / "tools" / "kernels" / "compile_kernels.py").touch()  # a checkout
     copy_kernels(folder)
     module = Path(LIBRARY.module.__file__)
     (folder / module.name).write_bytes(module.read_bytes())

@@ -12,7 +12,7 @@ import pfabrik as pf
 from machines import machine
 from oracles import targets_about
 from pfabrik import Mechanism, Solution, Status
-from pfabrik.description.joints import KINDS
+from pfabrik.machine.description.joints import KINDS
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

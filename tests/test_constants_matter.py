@@ -18,8 +18,8 @@ from checks import INTERPRETED
 SCRIPT = Path(__file__).with_name("changed_constants.py")
 GUARDS = {
     "search_constants": "LAST SOLVABLE",
-    "platform.pose_constants": "NEAR_INCUMBENT STRETCHED HOLDABLE EASING BENT",
-    "closure.joint_constants": "MOST_DAMPING FEW",
+    "pose.pose_constants": "NEAR_INCUMBENT STRETCHED HOLDABLE EASING BENT",
+    "joints.joint_constants": "MOST_DAMPING FEW",
     "chains.chain_constants": "ALONG PULLED_TURN ON_BOUND MOST_DAMPING LEAST_PIVOT NOTHING RESTORED PULLED_FROM PULLS "
     "BENT DESCENTS_NEARBY",
     "passes.pass_constants": "CONTENT OBLIQUE LARGEST_TURN TURN_DAMPING NO_LENGTH NO_SIDE WELL_INSIDE LEAST_SHARE "

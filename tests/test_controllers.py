@@ -16,9 +16,9 @@ import pfabrik as pf
 from exported import COMPILERS, needs_compiler
 from machines.redescribed import moved
 from pfabrik.errors import UnsupportedMechanism
-from pfabrik.export.export_c import c_source
-from pfabrik.export.firmware_settings import klipper
-from pfabrik.export.linuxcnc import linuxcnc
+from pfabrik.exchange.export.export_c import c_source
+from pfabrik.exchange.export.firmware_settings import klipper
+from pfabrik.exchange.export.linuxcnc import linuxcnc
 
 STUBS = {
     "rtapi_app.h": "#define EXPORT_SYMBOL(name) struct unused_##name { int i; }\n"
@@ -101,7 +101,9 @@ UNIT = "mm */ setp x\nsetp y"
 def test_machines_that_stand_elsewhere_are_modules_of_their_own(
     name: str, up: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pfabrik.export.linuxcnc.c_source", partial(c_source, parts=("ik",)))  # the shortest code
+    monkeypatch.setattr(
+        "pfabrik.exchange.export.linuxcnc.c_source", partial(c_source, parts=("ik",))
+    )  # the shortest code
     text = linuxcnc(dataclasses.replace(turned(name, 0.0, up), length_unit=UNIT))
     assert "kinematicsInverse" in text
     assert not re.search("^setp", text, re.MULTILINE) and "*/ setp" not in text

@@ -15,7 +15,7 @@ from checks import INTERPRETED
 from pfabrik import PoseRegion, Status, keep
 
 pytestmark = pytest.mark.skipif(INTERPRETED, reason="thousands of machines")
-TEMPLATES = Path(pf.__file__).parent / "catalog" / "templates"
+TEMPLATES = Path(pf.__file__).parent / "machine" / "catalog" / "templates"
 ABOUT_HOME = PoseRegion.box([-30, -30, -30], [30, 30, 30], rotation=math.radians(8))
 TURNED = PoseRegion.box([-5, -5, 0], [5, 5, 0], rotation=[0.1, 0, 0])
 SLIGHT = PoseRegion.box([-10, -10, -10], [10, 10, 10])

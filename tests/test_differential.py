@@ -17,13 +17,13 @@ from machines import planar, redescribed, ring, struts
 from oracles import targets_about
 from pfabrik import Joint, Mechanism, Solution
 from pfabrik.answers.differential import Mobility, forward_jacobian, inverse_jacobian, mobility, singularity
-from pfabrik.closure.first_order import forward_map, inverse_map, units_of
+from pfabrik.engines.joints.first_order import forward_map, inverse_map, units_of
 from pfabrik.errors import InvalidArgument
-from pfabrik.model import model_of
-from pfabrik.motion.displacements import columns
-from pfabrik.motion.loops import actuated_columns, first_order
-from pfabrik.motion.mobility import generic_of
-from pfabrik.motion.singularities import KINDS
+from pfabrik.machine.model import model_of
+from pfabrik.machine.motion.displacements import columns
+from pfabrik.machine.motion.loops import actuated_columns, first_order
+from pfabrik.machine.motion.mobility import generic_of
+from pfabrik.machine.motion.singularities import KINDS
 from pfabrik.tolerances import TOLERANCES
 from slopes import beside, slope_of_pose, slopes, somewhere
 

@@ -12,7 +12,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.errors import InvalidMechanism, UnknownName
-from pfabrik.files import dumps, loads
+from pfabrik.machine.files import dumps, loads
 
 PENDULUM = """
 schema = 1

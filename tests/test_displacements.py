@@ -12,7 +12,7 @@ import pfabrik as pf
 from checks import placed_bodies, with_axes
 from machines import machine
 from pfabrik import Joint, Mechanism
-from pfabrik.motion.displacements import (
+from pfabrik.machine.motion.displacements import (
     centres,
     columns,
     displacements,
@@ -23,8 +23,8 @@ from pfabrik.motion.displacements import (
     screws,
     stepped,
 )
-from pfabrik.motion.mobility import around_home
-from pfabrik.motion.outward import centres_at
+from pfabrik.machine.motion.mobility import around_home
+from pfabrik.machine.motion.outward import centres_at
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -128,7 +128,7 @@ def compiler_that_does_not_optimize(folder: Path) -> Path:
 def test_the_page_of_a_task_is_what_its_program_prints(
     program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each is run in an empty folder; `python docs/pages.py` writes the pages and their pictures."""
+    """Each is run in an empty folder; `python tools/site/pages.py` writes the pages and their pictures."""
     if '"cc"' in program.read_text(encoding="utf-8"):
         if shutil.which("cc") is None:
             pytest.skip("the page shows what compiled C prints, and there is no compiler")

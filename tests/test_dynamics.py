@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik.files.units import metres_of
 from pfabrik.kinematics import displacements, home_coordinates
+from pfabrik.machine.files.units import metres_of
 
 WITHOUT_IDLE = (
     *("agile_eye", "ankle_ups", "canfield", "delta", "five_bar", "g1_ankle", "hexaglide", "nrpm", "orthoglide"),

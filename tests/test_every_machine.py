@@ -14,10 +14,10 @@ from checks import INTERPRETED, home_values, pose_errors
 from machines import EVERY, machine
 from oracles import any_targets, any_values, targets_about
 from pfabrik import Options, Status
-from pfabrik.description.task import task_of
-from pfabrik.engine import engine_of
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.pose.legs_engine import LegsEngine
 from pfabrik.errors import InvalidArgument
-from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.machine.description.task import task_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

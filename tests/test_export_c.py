@@ -39,12 +39,12 @@ from exported import (
 )
 from machines import closure
 from pfabrik.cli import main
-from pfabrik.description.task import task_of
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
-from pfabrik.export import source
-from pfabrik.export.export_c import PARTS, c_source
-from pfabrik.export.static_data import in_words
-from pfabrik.files import dumps, loads
+from pfabrik.exchange.export import source
+from pfabrik.exchange.export.export_c import PARTS, c_source
+from pfabrik.exchange.export.static_data import in_words
+from pfabrik.machine.description.task import task_of
+from pfabrik.machine.files import dumps, loads
 
 ROUNDED = 1e-6
 """How far a pose is off in single precision after some ten roundings [L or rad]."""

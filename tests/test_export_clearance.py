@@ -31,13 +31,13 @@ from exported import (
     slack_of,
     survives,
 )
-from pfabrik.description.links import links_of
 from pfabrik.errors import UnsupportedMechanism
-from pfabrik.export.export_c import c_source
-from pfabrik.export.firmware_settings import klipper
-from pfabrik.export.linuxcnc import linuxcnc
-from pfabrik.export.source import targets_around_home
-from pfabrik.export.tensors import tensor_source
+from pfabrik.exchange.export.export_c import c_source
+from pfabrik.exchange.export.firmware_settings import klipper
+from pfabrik.exchange.export.linuxcnc import linuxcnc
+from pfabrik.exchange.export.source import targets_around_home
+from pfabrik.exchange.export.tensors import tensor_source
+from pfabrik.machine.description.links import links_of
 
 Array = np.ndarray
 PAIR = 10_000
@@ -357,7 +357,9 @@ def test_links_that_turn_as_no_leg_says_are_refused_by_name() -> None:
 def test_a_hexapod_with_a_clearance_is_a_module_of_its_own_for_linuxcnc_which_keeps_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("pfabrik.export.linuxcnc.c_source", partial(c_source, parts=("ik", "limits")))  # what it calls
+    monkeypatch.setattr(
+        "pfabrik.exchange.export.linuxcnc.c_source", partial(c_source, parts=("ik", "limits"))
+    )  # what it calls
     text = linuxcnc(hexapod())
     assert "kinematicsInverse" in text and "PAIR" in text
     assert "genhexkins" in linuxcnc(hexapod(clearance=None))

@@ -13,8 +13,8 @@ import pytest
 import pfabrik as pf
 from exported import STRICT, compiled, needs_compiler, survives
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
-from pfabrik.export.export_c import c_source
-from pfabrik.export.source import targets_around_home
+from pfabrik.exchange.export.export_c import c_source
+from pfabrik.exchange.export.source import targets_around_home
 
 DRIVER = Path(__file__).parent / "data" / "run_effort.c"
 EXACT = {"double": 1e-9, "float": 1e-4}

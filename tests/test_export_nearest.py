@@ -26,11 +26,11 @@ from exported import (
     survives,
 )
 from oracles import far_poses, is_pose, no_poses
-from pfabrik.export import source
-from pfabrik.export.export_c import c_source
-from pfabrik.export.source import targets_around_home
-from pfabrik.export.static_data import Precision
-from pfabrik.model import model_of
+from pfabrik.exchange.export import source
+from pfabrik.exchange.export.export_c import c_source
+from pfabrik.exchange.export.source import targets_around_home
+from pfabrik.exchange.export.static_data import Precision
+from pfabrik.machine.model import model_of
 
 Array = np.ndarray
 PROJECTED, BUDGET, NO_POSE = -4, -5, -1

@@ -21,11 +21,11 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from oracles import no_poses
 from pfabrik.cli import main
+from pfabrik.common.rotations import from_rotvec
 from pfabrik.errors import InvalidArgument
-from pfabrik.export.controller_tables import packed
-from pfabrik.export.export_web import FOLDER, SCRIPTS, machine_data, web_page
-from pfabrik.model import model_of
-from pfabrik.rotations import from_rotvec
+from pfabrik.exchange.export.controller_tables import packed
+from pfabrik.machine.model import model_of
+from pfabrik.view.page.export_web import FOLDER, SCRIPTS, machine_data, web_page
 
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js, which is not installed")
@@ -256,6 +256,6 @@ def test_a_name_cannot_end_the_script() -> None:
 
 @pytest.mark.skipif(not (shutil.which("clang") and shutil.which("wasm-ld")), reason="needs clang and wasm-ld")
 def test_the_kernels_of_pages_are_those_of_today() -> None:
-    command = [sys.executable, "building/compile_web.py", "--check"]
+    command = [sys.executable, "tools/kernels/compile_web.py", "--check"]
     ran = subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout + ran.stderr  # run: make web

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pfabrik.catalog import catalog, catalog_file
-from pfabrik.description.copies import MOST_COPIES, cos_sin
-from pfabrik.description.form_faults import MOST_FAULTS
-from pfabrik.description.mechanism import Cone, Joint, Mechanism
+from pfabrik.common.whole_files import whole_path
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
-from pfabrik.files import LARGEST_FILE, MOST_DOTS, dumps, load, loads, save
-from pfabrik.files.reading import MOST_JOINTS
-from pfabrik.files.units import exact_degrees
-from pfabrik.whole_files import whole_path
+from pfabrik.machine.catalog import catalog, catalog_file
+from pfabrik.machine.description.copies import MOST_COPIES, cos_sin
+from pfabrik.machine.description.form_faults import MOST_FAULTS
+from pfabrik.machine.description.mechanism import Cone, Joint, Mechanism
+from pfabrik.machine.files import LARGEST_FILE, MOST_DOTS, dumps, load, loads, save
+from pfabrik.machine.files.reading import MOST_JOINTS
+from pfabrik.machine.files.units import exact_degrees
 
 HEAD = 'schema = 1\nname = "m"\nend_effector = "platform"\nreference_point = [0, 0, 3]\n'
 TRIPOD = (

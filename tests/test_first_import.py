@@ -14,7 +14,7 @@ import pfabrik as pf
 from command import pfabrik
 from in_mujoco import Model
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
-from pfabrik.interop import NoEndEffector, from_mjcf, from_urdf
+from pfabrik.exchange.interop import NoEndEffector, from_mjcf, from_urdf
 from rounded_files import LINKAGES, model_text, planar_four_bar
 from test_interop_reading import ANKLE, FIVE_BAR, MIMIC, URDF, delta
 

@@ -13,13 +13,13 @@ from click.testing import CliRunner
 import pfabrik as pf
 from in_mujoco import Model
 from machines.redescribed import moved
-from pfabrik.catalog import template
 from pfabrik.cli import main
-from pfabrik.files import loads
-from pfabrik.interop import from_mjcf, to_mjcf
-from pfabrik.motion.fitting_task import fitting_tasks, has_dependent_coordinates
-from pfabrik.remarks import remarks_on
-from pfabrik.rotations import from_rotvec
+from pfabrik.cli.remarks import remarks_on
+from pfabrik.common.rotations import from_rotvec
+from pfabrik.exchange.interop import from_mjcf, to_mjcf
+from pfabrik.machine.catalog import template
+from pfabrik.machine.files import loads
+from pfabrik.machine.motion.fitting_task import fitting_tasks, has_dependent_coordinates
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

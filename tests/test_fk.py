@@ -150,7 +150,7 @@ def test_blocks_of_rows_answer_as_newton_row_by_row_and_as_single_rows(
         alone = pf.solve_fk(mechanism, values[row], start=None if start is None else start[row])
         assert (alone.status, alone.residual) == (answer.status[row], answer.residual[row])
         np.testing.assert_array_equal(alone.pose, answer.pose[row])
-    monkeypatch.setattr("pfabrik.platform.single.places_of_rods", lambda model: None)
+    monkeypatch.setattr("pfabrik.engines.pose.single.places_of_rods", lambda model: None)
     _, one_by_one = answers(dataclasses.replace(mechanism, name="row by row"))
     np.testing.assert_array_equal(answer.status, one_by_one.status)
     assert pose_errors(mechanism, answer.pose, one_by_one.pose).max() <= 1e-8

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from in_mujoco import Model, agrees
-from pfabrik.interop import (
+from pfabrik.exchange.interop import (
     Imported,
     from_mjcf,
     from_sdf,

@@ -10,7 +10,7 @@ import pytest
 
 import pfabrik as pf
 from machines.redescribed import scaled
-from pfabrik.arrays import Floats
+from pfabrik.common.arrays import Floats
 from pfabrik.kinematics import actuator_units
 
 DRY = 0.5

@@ -32,14 +32,14 @@ def is_live(name: str, folder: Path) -> bool:
 
 
 def test_the_gallery_is_what_its_generator_writes(gallery: ModuleType) -> None:
-    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == gallery.page(), "run: python docs/gallery.py"
+    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == gallery.page(), "run: python tools/site/gallery.py"
 
 
 @pytest.mark.slow
 def test_every_machine_with_a_live_page_has_a_picture_of_it_for_light_and_for_dark_pages(tmp_path: Path) -> None:
     live = {name for name in pf.catalog() if is_live(name, tmp_path)}
     expected = {f"{name}{end}" for name in (*live, "film") for end in ("", "-dark")}
-    assert {path.stem for path in LIVE.glob("*.webp")} == expected, "run: python docs/portraits.py NAME"
+    assert {path.stem for path in LIVE.glob("*.webp")} == expected, "run: python tools/site/portraits.py NAME"
 
 
 @pytest.mark.parametrize("name", ["delta", "g1_ankle", "serial_arm", "snake60"])

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import EVERY, TRUNKS, machine
-from pfabrik.decomposition.leg_forms import NoLeg
-from pfabrik.decomposition.leg_table import LegTable, leg_table
-from pfabrik.description.geometry import (
+from pfabrik.machine.decomposition.leg_forms import NoLeg
+from pfabrik.machine.decomposition.leg_table import LegTable, leg_table
+from pfabrik.machine.description.geometry import (
     Geometry,
     geometry_of,
     home_numbers,
@@ -22,10 +22,10 @@ from pfabrik.description.geometry import (
     with_geometry,
     with_numbers,
 )
-from pfabrik.description.joints import JOINT_TYPES
-from pfabrik.description.structure import Structure
-from pfabrik.files import dumps, loads
-from pfabrik.model import Model, model_of
+from pfabrik.machine.description.joints import JOINT_TYPES
+from pfabrik.machine.description.structure import Structure
+from pfabrik.machine.files import dumps, loads
+from pfabrik.machine.model import Model, model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

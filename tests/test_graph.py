@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from pfabrik import Joint
-from pfabrik.decomposition.graph_blocks import blocks_between, is_tree
-from pfabrik.description.graph import Edge, components
+from pfabrik.machine.decomposition.graph_blocks import blocks_between, is_tree
+from pfabrik.machine.description.graph import Edge, components
 
 START, GOAL = "start", "goal"
 BODIES = (START, "a", "b", "c", "d", GOAL)

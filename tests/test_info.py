@@ -10,13 +10,13 @@ import pytest
 import pfabrik as pf
 from command import pfabrik
 from machines import MACHINES
-from pfabrik.chains.chain_engine import ChainEngine
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.decomposition.decompose import beyond_positions
-from pfabrik.description.home_mobility import universal_axes
-from pfabrik.engine import engine_of as answering_engine
-from pfabrik.overview import chain_table, clean, vector
-from pfabrik.platform.legs_engine import LegsEngine
+from pfabrik.engines.chains.chain_engine import ChainEngine
+from pfabrik.engines.engine import engine_of as answering_engine
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.engines.pose.legs_engine import LegsEngine
+from pfabrik.machine.decomposition.decompose import beyond_positions
+from pfabrik.machine.description.home_mobility import universal_axes
+from pfabrik.view.overview import chain_table, clean, vector
 
 
 def test_directions_are_cleaned_of_rounding_and_nothing_else() -> None:

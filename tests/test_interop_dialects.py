@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from in_mujoco import Model, agrees, notes_of
 from pfabrik.errors import InvalidArgument, InvalidMechanism
-from pfabrik.files import dumps, loads
-from pfabrik.interop import from_sdf, from_urdf, verify
+from pfabrik.exchange.interop import from_sdf, from_urdf, verify
+from pfabrik.machine.files import dumps, loads
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -16,7 +16,16 @@ import pfabrik as pf
 from command import pfabrik
 from in_mujoco import Model, agrees, mujoco, notes_of
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
-from pfabrik.interop import Imported, Loop, NoEndEffector, OpenMechanism, assemble, from_mjcf, from_urdf, verify
+from pfabrik.exchange.interop import (
+    Imported,
+    Loop,
+    NoEndEffector,
+    OpenMechanism,
+    assemble,
+    from_mjcf,
+    from_urdf,
+    verify,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -579,7 +588,7 @@ def test_the_command_says_what_is_wrong_in_one_line(
 
 
 def test_a_missing_library_is_told_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pfabrik.extras.find_spec", lambda name: None)
+    monkeypatch.setattr("pfabrik.common.extras.find_spec", lambda name: None)
     code, _, err = run("verify", "stewart")
     assert code == 2 and "pip install '.[mujoco]'" in err
 

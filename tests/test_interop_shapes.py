@@ -11,7 +11,7 @@ import pytest
 import pfabrik as pf
 from in_mujoco import mujoco, notes_of
 from pfabrik.errors import InvalidMechanism
-from pfabrik.interop import Imported, from_mjcf, from_urdf
+from pfabrik.exchange.interop import Imported, from_mjcf, from_urdf
 from test_interop_reading import FIVE_BAR, FORE
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

@@ -15,11 +15,11 @@ import pfabrik as pf
 from checks import INTERPRETED, home_values
 from in_mujoco import Model, mujoco
 from machines import closure
-from pfabrik.description.links import links_of
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
-from pfabrik.files.units import metres_of
-from pfabrik.interop import from_mjcf, to_mjcf, verify
-from pfabrik.interop.referee import reached_at_random
+from pfabrik.exchange.interop import from_mjcf, to_mjcf, verify
+from pfabrik.exchange.interop.referee import reached_at_random
+from pfabrik.machine.description.links import links_of
+from pfabrik.machine.files.units import metres_of
 
 LIKE_OTHERS = ("ankle_ups", "hexaglide", "linear_delta", "nrpm", "panda", "prr", "psu", "reachy_mini", "rps", "rrr")
 """Machines whose joints and loops others of the catalogue have too."""
@@ -60,7 +60,7 @@ def test_mujoco_finds_our_answers_closed_and_closes_to_the_same_poses(name: str,
 
 def test_the_referee_sees_a_machine_that_is_not_the_one_that_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A millionth of the size off, in one joint of the model: it must not agree."""
-    from pfabrik.interop import referee
+    from pfabrik.exchange.interop import referee
 
     bent = to_mjcf(pf.load("stewart")).replace('pos="0.1 0.02 0.0"', 'pos="0.1001 0.02 0.0"')
     monkeypatch.setattr(referee, "to_mjcf", lambda mechanism: bent)

@@ -15,8 +15,8 @@ from machines import MACHINES, closure, machine
 from machines.redescribed import moved, relabelled, reversed_joints, scaled
 from oracles import any_targets, any_values
 from pfabrik import Mechanism, Solution, Status
-from pfabrik.model import model_of
-from pfabrik.platform.seeds import seeds_of
+from pfabrik.engines.pose.seeds import seeds_of
+from pfabrik.machine.model import model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

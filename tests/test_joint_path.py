@@ -12,8 +12,8 @@ import pfabrik as pf
 from machines import machine
 from pfabrik import Joint, Mechanism
 from pfabrik.errors import InvalidArgument, MobilityWarning, UnknownName
-from pfabrik.motion.displacements import end_effector_pose, home_coordinates
-from pfabrik.motion.joint_path import JointPath, joint_path, passive_series
+from pfabrik.machine.motion.displacements import end_effector_pose, home_coordinates
+from pfabrik.machine.motion.joint_path import JointPath, joint_path, passive_series
 
 
 @cache

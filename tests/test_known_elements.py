@@ -10,8 +10,8 @@ import pytest
 
 from in_mujoco import Model, mujoco, notes_of
 from pfabrik.errors import InvalidMechanism
-from pfabrik.interop import from_mjcf, from_sdf, from_urdf, known_elements
-from pfabrik.interop.known_mjcf import MJCF
+from pfabrik.exchange.interop import from_mjcf, from_sdf, from_urdf, known_elements
+from pfabrik.exchange.interop.known_mjcf import MJCF
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

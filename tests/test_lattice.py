@@ -7,8 +7,8 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pfabrik.workspace.lattice_points import Numbering, codes, offsets, places_of
-from pfabrik.workspace.parts import connected
+from pfabrik.capabilities.workspace.lattice_points import Numbering, codes, offsets, places_of
+from pfabrik.capabilities.workspace.parts import connected
 
 
 @pytest.mark.parametrize("d", [2, 3])

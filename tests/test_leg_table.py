@@ -12,16 +12,16 @@ import oracles
 import pfabrik as pf
 from checks import actuator_units
 from machines import closure, machine
-from pfabrik.closure.configurations import Configurations, new_rows
-from pfabrik.engine import engine_of
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.joints.configurations import Configurations, new_rows
+from pfabrik.engines.pose.answers import sides_at
+from pfabrik.engines.pose.legs_engine import LegsEngine
+from pfabrik.engines.pose.reach import reach
 from pfabrik.feasibility import _margins
 from pfabrik.kernels.rows import Rows
-from pfabrik.model import Model, model_of
-from pfabrik.motion.mobility import generic_of
+from pfabrik.machine.model import Model, model_of
+from pfabrik.machine.motion.mobility import generic_of
 from pfabrik.options import Options
-from pfabrik.platform.answers import sides_at
-from pfabrik.platform.legs_engine import LegsEngine
-from pfabrik.platform.reach import reach
 
 SERVED = [name for name in pf.catalog() if not model_of(pf.load(name)).why_poses_do_not_suffice]
 IN_FRONT = [name for name in SERVED if isinstance(engine_of(pf.load(name)), LegsEngine)]

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 import pfabrik as pf
 from pfabrik import Cone, Joint, Leg, Mechanism
-from pfabrik.description.form_faults import MOST_FAULTS
-from pfabrik.description.legs import read_chain
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning
-from pfabrik.files import dumps, loads
-from pfabrik.files.reading import MOST_JOINTS
+from pfabrik.machine.description.form_faults import MOST_FAULTS
+from pfabrik.machine.description.legs import read_chain
+from pfabrik.machine.files import dumps, loads
+from pfabrik.machine.files.reading import MOST_JOINTS
 from test_files import TRIPOD as JOINTS
 from test_files import edited
 

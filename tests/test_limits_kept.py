@@ -11,7 +11,7 @@ from machines import EVERY, machine
 from machines.closure import Z, chain, joint, out, pairs
 from oracles import any_values, targets_about
 from pfabrik import Mechanism
-from pfabrik.motion.displacements import home_coordinates
+from pfabrik.machine.motion.displacements import home_coordinates
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -14,9 +14,9 @@ from click.testing import CliRunner
 
 import pfabrik as pf
 from pfabrik.cli import main
-from pfabrik.description.body_inertias import inertias_of
 from pfabrik.errors import InvalidArgument
-from pfabrik.files import dumps, loads
+from pfabrik.machine.description.body_inertias import inertias_of
+from pfabrik.machine.files import dumps, loads
 from test_dynamics import weighed
 
 DESCRIBED = """

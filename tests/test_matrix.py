@@ -15,10 +15,10 @@ from machines import EVERY, FILES, machine
 from oracles import any_targets, any_values, targets_about
 from oracles.nearest import conditions
 from pfabrik import Mechanism, Options, Solution, Status
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.description.task import task_of
-from pfabrik.engine import engine_of
-from pfabrik.model import model_of
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.machine.description.task import task_of
+from pfabrik.machine.model import model_of
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning"),

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from pfabrik.description.enclosing import enclosing_radius
-from pfabrik.description.graph import cone_line
-from pfabrik.description.home_mobility import universal_axes
-from pfabrik.description.mechanism import Cone, Joint, Mechanism
 from pfabrik.errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName
-from pfabrik.files import loads
+from pfabrik.machine.description.enclosing import enclosing_radius
+from pfabrik.machine.description.graph import cone_line
+from pfabrik.machine.description.home_mobility import universal_axes
+from pfabrik.machine.description.mechanism import Cone, Joint, Mechanism
+from pfabrik.machine.files import loads
 from pfabrik.tolerances import TOLERANCES
 
 Z = (0.0, 0.0, 1.0)

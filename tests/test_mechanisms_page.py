@@ -17,7 +17,7 @@ LARGEST_PICTURE = 25_000  # bytes
 
 
 def generator() -> ModuleType:
-    """The script docs/mechanisms.py as a module."""
+    """The script tools/site/mechanisms.py as a module."""
     spec = importlib.util.spec_from_file_location("mechanisms_page", DOCS / "mechanisms.py")
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -27,13 +27,13 @@ def generator() -> ModuleType:
 
 def test_the_page_is_what_its_generator_writes() -> None:
     written = (DOCS / "mechanisms.md").read_text(encoding="utf-8")
-    assert written == generator().page(), "run: python docs/mechanisms.py"
+    assert written == generator().page(), "run: python tools/site/mechanisms.py"
 
 
 def test_every_machine_has_small_pictures_for_light_and_dark_pages_and_no_other_has_one() -> None:
     pictures = {path.stem: path.stat().st_size for path in (DOCS / "pictures").glob("*.png")}
     assert set(pictures) == {f"{name}{ending}" for name in pf.catalog() for ending in ("", "-dark")}, (
-        "run: python docs/mechanisms.py"
+        "run: python tools/site/mechanisms.py"
     )
     assert max(pictures.values()) < LARGEST_PICTURE
 

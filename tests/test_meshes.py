@@ -14,13 +14,13 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from pfabrik import extras
+from pfabrik.common import extras
 from pfabrik.errors import InvalidMechanism, MissingLibrary
-from pfabrik.files.writing import dumps
 from pfabrik.kernels.clearance.least_clearance import least_clearance
 from pfabrik.kernels.clearance.solids import BOX, CAPSULE, DISC
-from pfabrik.meshes import MOST_VERTICES, hull_of, middle_of, sizes_of
-from pfabrik.skeleton import skeleton_of
+from pfabrik.machine.files.writing import dumps
+from pfabrik.machine.meshes import MOST_VERTICES, hull_of, middle_of, sizes_of
+from pfabrik.view.skeleton import skeleton_of
 from test_compiled_and_interpreted import INTERPRETED
 
 Array = NDArray[np.float64]
@@ -217,7 +217,7 @@ def test_a_mesh_in_a_file_is_measured_as_the_box_that_it_is_and_kept_on_saving(t
 
 def test_copies_of_a_body_have_its_mesh_turned_with_them(tmp_path: Path) -> None:
     written(tmp_path, CUBE)
-    delta = (Path(pf.__file__).parent / "catalog" / "delta.toml").read_text()
+    delta = (Path(pf.__file__).parent / "machine" / "catalog" / "delta.toml").read_text()
     table = '\n[[body]]\nname = "arm"\nshape = "mesh"\nfile = "mesh.obj"\nscale = 10\nat = [0, -200, 0]\n'
     (tmp_path / "delta.toml").write_text(delta + table)
     machine = pf.load(tmp_path / "delta.toml")

@@ -14,9 +14,9 @@ from checks import INTERPRETED, actuator_units, assert_feasible, home_values
 from machines import closure, machine
 from oracles import any_values
 from pfabrik import Joint, Mechanism, Options, Solution, Status
-from pfabrik.model import model_of
-from pfabrik.platform.answers import sides_at
-from pfabrik.platform.branch import branch_of, same_branch
+from pfabrik.engines.pose.answers import sides_at
+from pfabrik.engines.pose.branch import branch_of, same_branch
+from pfabrik.machine.model import model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 KEEP, ANY = Options(working_mode="keep"), Options(working_mode="any")

@@ -15,13 +15,13 @@ from machines import closure, five_bar
 from oracles import targets_about
 from oracles.nearest import conditions
 from pfabrik import Joint, Leg, Mechanism, Options, Status
-from pfabrik.closure.close import close
-from pfabrik.closure.closure_engine import ClosureEngine
-from pfabrik.description.task import task_of
-from pfabrik.engine import engine_of
-from pfabrik.model import model_of
-from pfabrik.platform.legs_engine import LegsEngine
-from pfabrik.rotations import angles_between
+from pfabrik.common.rotations import angles_between
+from pfabrik.engines.engine import engine_of
+from pfabrik.engines.joints.close import close
+from pfabrik.engines.joints.closure_engine import ClosureEngine
+from pfabrik.engines.pose.legs_engine import LegsEngine
+from pfabrik.machine.description.task import task_of
+from pfabrik.machine.model import model_of
 
 SAME = 1e-6
 """Share of the distance, or of L, by which answers may differ."""

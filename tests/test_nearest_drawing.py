@@ -11,7 +11,7 @@ from scipy.optimize import root
 
 import pfabrik as pf
 from in_mujoco import notes_of
-from pfabrik.interop import Imported, Loop, OpenMechanism, assemble, from_urdf
+from pfabrik.exchange.interop import Imported, Loop, OpenMechanism, assemble, from_urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -15,7 +15,7 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
-from pfabrik.description.sketch import HEIGHT, HELD, WIDTH, sketch
+from pfabrik.machine.description.sketch import HEIGHT, HELD, WIDTH, sketch
 
 MARKED = pf.Options(on_invalid="mark")
 FIVE_BAR = pf.load("five_bar")

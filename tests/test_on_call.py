@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from building import on_call
 from pfabrik.kernels._shipped import IS_INTERPRETED
+from tools.kernels import on_call
 
 pytestmark = pytest.mark.skipif(IS_INTERPRETED, reason="nothing is compiled")
 

@@ -18,11 +18,11 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
-from pfabrik.common_centre import common_centre
-from pfabrik.description.sketch import joint_places, joints_on, slider_place
-from pfabrik.drawn_parts import home_rail, order_around
 from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName
-from pfabrik.skeleton import skeleton_of
+from pfabrik.machine.common_centre import common_centre
+from pfabrik.machine.description.sketch import joint_places, joints_on, slider_place
+from pfabrik.view.drawn_parts import home_rail, order_around
+from pfabrik.view.skeleton import skeleton_of
 
 pytest.importorskip("matplotlib")
 from matplotlib.colors import to_hex
@@ -30,7 +30,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from pfabrik.description.plane import plane_of
+from pfabrik.machine.description.plane import plane_of
 from pfabrik.view.canvas import round_length
 from pfabrik.view.crossings import far_to_near
 from pfabrik.view.eye import Eye, eye_for, eye_of, eye_on
@@ -406,7 +406,7 @@ def test_what_is_missing_is_named_with_what_installs_it(monkeypatch: pytest.Monk
     monkeypatch.setattr(animation, "_own_ffmpeg", lambda: None)
     with pytest.raises(MissingLibrary, match=r"need the program ffmpeg; install it with: .*apt"):
         pf.animate(SHORT, "film.mp4")
-    monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("pfabrik.common.extras.find_spec", lambda _: None)
     with pytest.raises(MissingLibrary, match=r"pictures need matplotlib; .* pip install '\.\[plot\]'"):
         pf.plot(TRIPOD)
 

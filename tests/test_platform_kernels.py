@@ -8,25 +8,25 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines import machine, published
-from pfabrik.closure.placed_links import links_on_paths
-from pfabrik.decomposition.leg_table import LegTable
+from pfabrik.engines.joints.placed_links import links_on_paths
+from pfabrik.engines.pose.carriages import stays_there
+from pfabrik.engines.pose.links_of_legs import links_of_legs
+from pfabrik.engines.pose.table import kernel_table
 from pfabrik.kernels.clearance.link_limits import new_link_limits, pair_excess
 from pfabrik.kernels.clearance.link_records import NO_LINKS, LinkLimits
-from pfabrik.kernels.closure import path_kinematics
-from pfabrik.kernels.closure.descend import move
-from pfabrik.kernels.closure.loops import BALL, BASE_AXES, PoseObjective
-from pfabrik.kernels.closure.path_kinematics import LAYOUT, new_equations, new_state
 from pfabrik.kernels.holding import limit_multipliers
-from pfabrik.kernels.platform import equations as E
-from pfabrik.kernels.platform import limits
-from pfabrik.kernels.platform.linearise import lagrangian_gradient, note_involved
-from pfabrik.kernels.platform.nearest import NO_STARTS, new_nearest_scratch
-from pfabrik.kernels.platform.search import new_search_scratch
-from pfabrik.kernels.platform.search_records import SETTINGS, MultistartPlan, PlatformObjective
-from pfabrik.model import model_of
-from pfabrik.platform.carriages import stays_there
-from pfabrik.platform.links_of_legs import links_of_legs
-from pfabrik.platform.table import kernel_table
+from pfabrik.kernels.joints import path_kinematics
+from pfabrik.kernels.joints.descend import move
+from pfabrik.kernels.joints.loops import BALL, BASE_AXES, PoseObjective
+from pfabrik.kernels.joints.path_kinematics import LAYOUT, new_equations, new_state
+from pfabrik.kernels.pose import equations as E
+from pfabrik.kernels.pose import limits
+from pfabrik.kernels.pose.linearise import lagrangian_gradient, note_involved
+from pfabrik.kernels.pose.nearest import NO_STARTS, new_nearest_scratch
+from pfabrik.kernels.pose.search import new_search_scratch
+from pfabrik.kernels.pose.search_records import SETTINGS, MultistartPlan, PlatformObjective
+from pfabrik.machine.decomposition.leg_table import LegTable
+from pfabrik.machine.model import model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

@@ -14,8 +14,8 @@ import pytest
 
 import pfabrik as pf
 from command import pfabrik
-from pfabrik.overview import Overview
-from pfabrik.printed import ResultTable
+from pfabrik.common.printed import ResultTable
+from pfabrik.view.overview import Overview
 
 
 def test_a_track_says_what_the_command_says(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from machines.redescribed import moved
 from pfabrik.cli import main
 from pfabrik.cli.export import text_of
 from pfabrik.errors import InvalidMechanism, UnsupportedMechanism
-from pfabrik.files import print_region_of
+from pfabrik.machine.files import print_region_of
 
 FILES = Path(__file__).parent / "data" / "printers"
 

@@ -10,9 +10,9 @@ import pytest
 
 import pfabrik as pf
 from machines import machine as made
-from pfabrik.cells import marked
+from pfabrik.capabilities.paths import path as path_module
+from pfabrik.common.cells import marked
 from pfabrik.errors import InvalidArgument
-from pfabrik.paths import path as path_module
 
 
 def read(tmp_path: Path, text: str, name: str = "path.nc", machine: str = "stewart", **options: float) -> Any:
@@ -309,7 +309,7 @@ def test_binary_and_endless_paths_end(tmp_path: Path, monkeypatch: pytest.Monkey
     (tmp_path / "binary.nc").write_bytes(bytes(range(256)) * 1000)
     with pytest.raises(InvalidArgument, match="no text"):
         pf.read_path(tmp_path / "binary.nc", made("stewart"))
-    for module in ("pfabrik.paths.sampling", "pfabrik.paths.read_path"):
+    for module in ("pfabrik.capabilities.paths.sampling", "pfabrik.capabilities.paths.read_path"):
         monkeypatch.setattr(f"{module}.MOST_STEPS", 1000)
     assert path_module.MOST_STEPS == 1_000_000
     with pytest.raises(InvalidArgument, match="line 1002: more than 1000 targets"):

@@ -33,7 +33,7 @@ ALTERNATIVE = rf"(?:{CHOICES}|{SHAPE}|{KIND}(?: {SHAPE})?)"
 
 @cache
 def generator() -> ModuleType:
-    """The script docs/reference.py as a module."""
+    """The script tools/site/reference.py as a module."""
     spec = importlib.util.spec_from_file_location("reference_pages", ROOT / "docs" / "reference.py")
     assert spec and spec.loader
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
@@ -132,7 +132,7 @@ def agree(told: str, hint: Any) -> bool:
 
 def test_the_pages_are_what_their_generator_writes() -> None:
     written = {path.name: path.read_text("utf-8") for path in (ROOT / "docs" / "reference").glob("*.md")}
-    assert written == generator().pages(), "run: python docs/reference.py"
+    assert written == generator().pages(), "run: python tools/site/reference.py"
 
 
 def test_every_public_name_is_on_one_page_and_every_page_on_the_site() -> None:

@@ -13,7 +13,7 @@ import pytest
 import pfabrik as pf
 from machines import ring
 from pfabrik.errors import InvalidArgument, UnknownName
-from pfabrik.interop import from_mjcf, qpos, verify
+from pfabrik.exchange.interop import from_mjcf, qpos, verify
 
 ROBOT = """
 <mujoco model="walker">

@@ -14,7 +14,7 @@ import pfabrik as pf
 from command import pfabrik
 from machines import machine
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
-from pfabrik.motion.joint_path import joint_path
+from pfabrik.machine.motion.joint_path import joint_path
 
 DATA = Path(__file__).parent / "data"
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")

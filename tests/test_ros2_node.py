@@ -24,8 +24,8 @@ from checks import actuator_units
 from command import pfabrik
 from exported import KEEP, STRICT, home_of
 from pfabrik.errors import InvalidArgument, UnsupportedMechanism
-from pfabrik.export.source import targets_around_home
-from pfabrik.files.units import metres_of
+from pfabrik.exchange.export.source import targets_around_home
+from pfabrik.machine.files.units import metres_of
 from test_export_clearance import hexapod
 
 Array = np.ndarray

@@ -15,8 +15,8 @@ from command import pfabrik
 from in_mujoco import Model, notes_of
 from oracles import any_values
 from pfabrik.errors import UnknownName
-from pfabrik.interop import Imported, from_mjcf, to_mjcf, verify
-from pfabrik.interop.digits import digits_of
+from pfabrik.exchange.interop import Imported, from_mjcf, to_mjcf, verify
+from pfabrik.exchange.interop.digits import digits_of
 from rounded_files import LINKAGES, Linkage, model_text, planar_four_bar, spherical_three_legs
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")

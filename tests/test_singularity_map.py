@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 import pfabrik as pf
 from oracles.annuli import within
+from pfabrik.capabilities.workspace.locus import locus
 from pfabrik.errors import InvalidArgument
 from pfabrik.view.singular_picture import on_grid, without_specks
 from pfabrik.view.slices import cut_mesh, loops_of, plane_across
-from pfabrik.workspace.locus import locus
 from test_pictures import faults
 
 Array = NDArray[np.float64]

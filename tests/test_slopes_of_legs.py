@@ -16,13 +16,13 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from duals import dual, duals, on_duals
 from machines import EVERY, FILES, machine
-from pfabrik.decomposition.leg_forms import NoLeg
+from pfabrik.engines.pose.table import kernel_table, with_pointing_cones
 from pfabrik.kernels import vectors
 from pfabrik.kernels.legs import answer, endings, frames, kinds, pivots, rods
 from pfabrik.kernels.legs import records as K
-from pfabrik.kernels.platform import equations, limits
-from pfabrik.model import model_of
-from pfabrik.platform.table import kernel_table, with_pointing_cones
+from pfabrik.kernels.pose import equations, limits
+from pfabrik.machine.decomposition.leg_forms import NoLeg
+from pfabrik.machine.model import model_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 MODULES = (vectors, endings, frames, pivots, rods, kinds, answer, equations, limits)

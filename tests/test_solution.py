@@ -218,7 +218,7 @@ def test_a_status_is_written_and_compares_by_its_name_and_its_number() -> None:
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many rows joint coordinates are computed of, call by call."""
-    from pfabrik.platform import answers
+    from pfabrik.engines.pose import answers
 
     rows: list[int] = []
     compute = answers.joint_coordinates

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from oracles import targets_about
 from pfabrik import Options, Solver, Status
-from pfabrik.engine import engine_of
+from pfabrik.engines.engine import engine_of
 from pfabrik.errors import InvalidArgument
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]

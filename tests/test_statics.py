@@ -17,9 +17,9 @@ import pfabrik as pf
 from in_mujoco import Model, mujoco
 from machines import closure, ring
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
-from pfabrik.files.units import metres_of
-from pfabrik.interop import to_mjcf
-from pfabrik.interop.referee import reached_at_random
+from pfabrik.exchange.interop import to_mjcf
+from pfabrik.exchange.interop.referee import reached_at_random
+from pfabrik.machine.files.units import metres_of
 
 Array = NDArray[np.float64]
 QUICK = ("stewart", "five_bar", "orthoglide", "tricept", "rps")

@@ -11,10 +11,10 @@ import pytest
 from click.testing import CliRunner
 
 import pfabrik as pf
-from pfabrik.catalog import template, templates
 from pfabrik.cli import main
-from pfabrik.description.symmetry import crossed_rounds, near_copies
-from pfabrik.files import dumps, loads
+from pfabrik.machine.catalog import template, templates
+from pfabrik.machine.description.symmetry import crossed_rounds, near_copies
+from pfabrik.machine.files import dumps, loads
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 

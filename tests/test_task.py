@@ -13,9 +13,9 @@ from checks import INTERPRETED
 from machines import closure, published
 from machines.published import PUBLISHED
 from pfabrik import Joint, Mechanism, Status
-from pfabrik.description.task import Task, task_of
 from pfabrik.errors import InvalidMechanism
-from pfabrik.files import dumps, loads
+from pfabrik.machine.description.task import Task, task_of
+from pfabrik.machine.files import dumps, loads
 
 N = 4 if INTERPRETED else 30
 

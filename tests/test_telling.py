@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pfabrik as pf
-from pfabrik.telling import in_words, lines_on_pipes, telling
-from pfabrik.workspace.measuring import MapProgress
+from pfabrik.capabilities.workspace.measuring import MapProgress
+from pfabrik.common.telling import in_words, lines_on_pipes, telling
 
 
 class Terminal(io.StringIO):
@@ -36,8 +36,8 @@ def test_a_share_never_falls_whatever_estimates_do(estimates: list[tuple[int, in
 
 def said(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, total: int) -> str:
     """What is written of a hundred steps."""
-    monkeypatch.setattr("pfabrik.telling.PATIENCE", 0.0)
-    monkeypatch.setattr("pfabrik.telling.SECONDS_A_LINE", 0.0)
+    monkeypatch.setattr("pfabrik.common.telling.PATIENCE", 0.0)
+    monkeypatch.setattr("pfabrik.common.telling.SECONDS_A_LINE", 0.0)
     monkeypatch.setattr(sys, "stderr", stream)
     with telling("count") as tell:
         for done in range(101) if tell else ():

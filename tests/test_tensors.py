@@ -18,9 +18,9 @@ import pfabrik as pf
 from checks import actuator_units
 from exported import KEEP, limit_units, machine, off, truth
 from pfabrik.errors import InvalidArgument, UnknownName, UnsupportedMechanism
-from pfabrik.export.source import targets_around_home
-from pfabrik.export.tensors import tensor_source
-from pfabrik.motion.joint_path import joint_path, passive_series
+from pfabrik.exchange.export.source import targets_around_home
+from pfabrik.exchange.export.tensors import tensor_source
+from pfabrik.machine.motion.joint_path import joint_path, passive_series
 
 REFUSED = {
     "nrpm": "poses leave joints A1, B1",

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from machines.redescribed import moved
-from pfabrik.interop import from_mjcf
+from pfabrik.exchange.interop import from_mjcf
 from rounded_files import Hinge, Linkage, model_text
 
 UPRIGHT = Rotation.from_rotvec([np.pi / 2, 0.0, 0.0]).as_matrix()

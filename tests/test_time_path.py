@@ -16,14 +16,14 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from command import pfabrik
 from machines import closure, planar
-from pfabrik.arrays import Floats
-from pfabrik.description.task import task_of
+from pfabrik.capabilities.timing.curve import curve_of
+from pfabrik.capabilities.timing.time_path import limits_of
+from pfabrik.common.arrays import Floats
 from pfabrik.errors import InvalidArgument, UnknownName
-from pfabrik.motion.displacements import actuator_units
-from pfabrik.motion.loops import first_order
-from pfabrik.motion.mobility import generic_of
-from pfabrik.timing.curve import curve_of
-from pfabrik.timing.time_path import limits_of
+from pfabrik.machine.description.task import task_of
+from pfabrik.machine.motion.displacements import actuator_units
+from pfabrik.machine.motion.loops import first_order
+from pfabrik.machine.motion.mobility import generic_of
 
 KEPT = 1.0 + 2e-6
 """Share of a limit that counts as kept."""

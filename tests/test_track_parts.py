@@ -21,8 +21,8 @@ from click.testing import Result
 
 import pfabrik as pf
 from command import pfabrik
-from pfabrik.paths.follow import follow_parts
-from pfabrik.paths.path import Path as Targets
+from pfabrik.capabilities.paths.follow import follow_parts
+from pfabrik.capabilities.paths.path import Path as Targets
 from test_track import CIRCLES, arm, circle, turned_by
 
 Run = Callable[..., Result]
@@ -112,9 +112,9 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Run a command line in a folder of its own, with parts of 16 steps and paths of at most 200."""
     monkeypatch.chdir(tmp_path)
     for module in ("csv_table", "read_path", "sampling"):
-        monkeypatch.setattr(f"pfabrik.paths.{module}.BLOCK", 16)
+        monkeypatch.setattr(f"pfabrik.capabilities.paths.{module}.BLOCK", 16)
     for module in ("read_path", "sampling"):
-        monkeypatch.setattr(f"pfabrik.paths.{module}.MOST_STEPS", 200)
+        monkeypatch.setattr(f"pfabrik.capabilities.paths.{module}.MOST_STEPS", 200)
     monkeypatch.setattr(importlib.import_module("pfabrik.cli.track"), "MOST_TARGETS", 200)
 
     return lambda *line, given=None: pfabrik(line, given)

@@ -10,7 +10,7 @@ import pytest
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument
-from pfabrik.interop import from_urdf, to_urdf, verify
+from pfabrik.exchange.interop import from_urdf, to_urdf, verify
 from test_interop_writing import NAMES
 
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-import pfabrik.calibration.sensitivity as sensitivities
-from pfabrik.arrays import Floats
+import pfabrik.capabilities.calibration.sensitivity as sensitivities
+from pfabrik.common.arrays import Floats
+from pfabrik.common.rotations import from_rotvec
 from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName, UnsupportedMechanism
-from pfabrik.files.reading import read_mechanism
 from pfabrik.kinematics import VariedMachine, varied
-from pfabrik.rotations import from_rotvec
+from pfabrik.machine.files.reading import read_mechanism
 
-TEMPLATES = sorted((Path(pf.__file__).parent / "catalog" / "templates").glob("*.toml"))
+TEMPLATES = sorted((Path(pf.__file__).parent / "machine" / "catalog" / "templates").glob("*.toml"))
 
 
 @cache

@@ -447,7 +447,7 @@ def test_what_cannot_be_shown_is_refused(shown: Callable[..., pf.Viewer], monkey
         pf.view(machine, port=0)
     with pytest.raises(InvalidArgument, match="one Solution of"):
         shown(machine).show(pf.solve_ik(tripod_rps(), (0, 0, 210)))
-    monkeypatch.setattr("pfabrik.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("pfabrik.common.extras.find_spec", lambda _: None)
     with pytest.raises(MissingLibrary, match=r"the viewer needs viser; install it with: pip install '\.\[view\]'"):
         pf.view(machine)
 

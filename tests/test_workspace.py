@@ -23,12 +23,7 @@ import pfabrik as pf
 from links import distances_of_struts, struts
 from machines import closure
 from oracles.annuli import Ring, area, within
-from pfabrik.errors import InvalidArgument
-from pfabrik.view.border_parts import patches_of
-from pfabrik.view.eye import Eye
-from pfabrik.view.looks import look_of
-from pfabrik.view.solid import in_the_light
-from pfabrik.workspace.border import (
+from pfabrik.capabilities.workspace.border import (
     JOINT_COLOURS,
     LINK_COLOURS,
     MOTOR_COLOURS,
@@ -36,7 +31,12 @@ from pfabrik.workspace.border import (
     groups_of,
     stems_of,
 )
-from pfabrik.workspace.verdicts import MapQuestion
+from pfabrik.capabilities.workspace.verdicts import MapQuestion
+from pfabrik.errors import InvalidArgument
+from pfabrik.view.border_parts import patches_of
+from pfabrik.view.eye import Eye
+from pfabrik.view.looks import look_of
+from pfabrik.view.solid import in_the_light
 
 Array = NDArray[np.float64]
 
@@ -488,7 +488,7 @@ def test_a_picture_has_every_limit_of_the_border_and_the_machine() -> None:
 
 def test_groups_beyond_the_colours_are_one_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {group.name for group in groups_of(space("delta"))} >= {"A1…3 min", "A1…3 max", "BL1…3 cone"}
-    monkeypatch.setattr(sys.modules["pfabrik.workspace.border"], "MOTOR_COLOURS", ("#0072b2",))
+    monkeypatch.setattr(sys.modules["pfabrik.capabilities.workspace.border"], "MOTOR_COLOURS", ("#0072b2",))
     names = [group.name for group in groups_of(space("five_bar"))]
     assert names[-1] == "2 other limits" and len(names) == 4
 

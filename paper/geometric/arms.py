@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from building.on_call import kernel, routine
 from pfabrik import Mechanism, SubChain
+from tools.kernels.on_call import kernel, routine
 
 from ..arrays import Floats, Records
 from ..step import Step

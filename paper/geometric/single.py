@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from building.on_call import for_each
 from pfabrik import Mechanism
+from tools.kernels.on_call import for_each
 
 from ..arrays import Floats
 from .ik import Geometric

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from building.on_call import routine
+from tools.kernels.on_call import routine
 
 from ..arrays import Floats
 from ..tolerances import ROTATION_MATRIX

@@ -39,7 +39,7 @@ __version__ = "0.1.0"
 
 # The public names of each module. Modules are imported when a name is first used, so that `import pfabrik` is quick.
 _NAMES = {
-    "actuation.actuation": ("Actuation", "actuation"),
+    "capabilities.actuation.actuation": ("Actuation", "actuation"),
     "answers.differential": (
         "Mobility",
         "NearlyFree",
@@ -54,55 +54,55 @@ _NAMES = {
     "answers.solution": ("Solution",),
     "answers.status": ("Status",),
     "answers.tracked": ("Track",),
-    "calibration.least_squares": ("calibrate",),
-    "calibration.calibration": ("Calibration",),
-    "calibration.csv_measurements": ("read_measurements",),
-    "calibration.printer_settings": ("read_printer",),
-    "calibration.measurements": ("Measurements",),
-    "calibration.parameters": ("Parameters", "parameters"),
-    "calibration.plot_calibration": ("plot_calibration",),
-    "calibration.sensitivity": ("Sensitivity", "sensitivity"),
-    "catalog": ("catalog",),
-    "certify.certificates": ("Certificate",),
-    "certify.question": ("certify",),
-    "certify.enclosure": ("Enclosure",),
-    "certify.pose_region": ("PoseRegion",),
-    "clearance.clearance": ("Clearance", "clearance"),
+    "capabilities.calibration.least_squares": ("calibrate",),
+    "capabilities.calibration.calibration": ("Calibration",),
+    "capabilities.calibration.csv_measurements": ("read_measurements",),
+    "capabilities.calibration.printer_settings": ("read_printer",),
+    "capabilities.calibration.measurements": ("Measurements",),
+    "capabilities.calibration.parameters": ("Parameters", "parameters"),
+    "capabilities.calibration.plot_calibration": ("plot_calibration",),
+    "capabilities.calibration.sensitivity": ("Sensitivity", "sensitivity"),
+    "machine.catalog": ("catalog",),
+    "capabilities.certify.certificates": ("Certificate",),
+    "capabilities.certify.question": ("certify",),
+    "capabilities.certify.enclosure": ("Enclosure",),
+    "capabilities.certify.pose_region": ("PoseRegion",),
+    "capabilities.clearance.clearance": ("Clearance", "clearance"),
     "configuration": ("configuration",),
-    "decomposition.decompose": ("SubChain", "decompose"),
-    "description.legs": ("Leg",),
-    "description.mechanism": ("Cone", "Joint", "Mass", "Mechanism", "Shape"),
-    "design.by_counterexample": ("design",),
-    "design.found_design": ("Design", "Designs"),
-    "dynamics.efforts": ("Efforts",),
-    "dynamics.identification": ("BaseParameter", "Identification"),
-    "dynamics.identify": ("identify",),
-    "dynamics.inverse_dynamics": ("inverse_dynamics",),
-    "dynamics.mass_matrix": ("mass_matrix",),
-    "export.export_c": ("export_c",),
-    "export.export_web": ("export_web",),
-    "export.ros2_control": ("export_ros2_control",),
-    "export.ros2_node": ("export_ros2_node",),
-    "export.tensors": ("export_jax", "export_numpy", "export_tensors", "export_torch"),
+    "machine.decomposition.decompose": ("SubChain", "decompose"),
+    "machine.description.legs": ("Leg",),
+    "machine.description.mechanism": ("Cone", "Joint", "Mass", "Mechanism", "Shape"),
+    "capabilities.design.by_counterexample": ("design",),
+    "capabilities.design.found_design": ("Design", "Designs"),
+    "capabilities.dynamics.efforts": ("Efforts",),
+    "capabilities.dynamics.identification": ("BaseParameter", "Identification"),
+    "capabilities.dynamics.identify": ("identify",),
+    "capabilities.dynamics.inverse_dynamics": ("inverse_dynamics",),
+    "capabilities.dynamics.mass_matrix": ("mass_matrix",),
+    "exchange.export.export_c": ("export_c",),
+    "view.page.export_web": ("export_web",),
+    "exchange.export.ros2_control": ("export_ros2_control",),
+    "exchange.export.ros2_node": ("export_ros2_node",),
+    "exchange.export.tensors": ("export_jax", "export_numpy", "export_tensors", "export_torch"),
     "feasibility": ("Feasibility", "feasibility"),
-    "files": ("load", "save"),
+    "machine.files": ("load", "save"),
     "fk": ("solve_fk",),
     "ik": ("solve_ik",),
-    "modes.assembly": ("AssemblyModes", "assembly_modes"),
-    "modes.working": ("WorkingModes", "working_modes"),
+    "capabilities.modes.assembly": ("AssemblyModes", "assembly_modes"),
+    "capabilities.modes.working": ("WorkingModes", "working_modes"),
     "options": ("Options",),
-    "paths.read_path": ("read_path",),
-    "poses": ("pose",),
+    "capabilities.paths.read_path": ("read_path",),
+    "common.poses": ("pose",),
     "search_log": ("SearchLog", "search_log"),
     "solver": ("Solver",),
-    "statics.accuracy": ("PoseAccuracy", "accuracy"),
-    "statics.capacity": ("WrenchCapacity", "wrench_capacity"),
-    "statics.forces": ("Forces", "forces"),
-    "statics.stiffness": ("Stiffness", "stiffness"),
-    "statics.transmission": ("Factors", "Transmission", "transmission"),
-    "timing.platform_speed": ("PlatformSpeed", "platform_speed"),
-    "timing.time_path": ("time_path",),
-    "timing.timed": ("Timed",),
+    "capabilities.statics.accuracy": ("PoseAccuracy", "accuracy"),
+    "capabilities.statics.capacity": ("WrenchCapacity", "wrench_capacity"),
+    "capabilities.statics.forces": ("Forces", "forces"),
+    "capabilities.statics.stiffness": ("Stiffness", "stiffness"),
+    "capabilities.statics.transmission": ("Factors", "Transmission", "transmission"),
+    "capabilities.timing.platform_speed": ("PlatformSpeed", "platform_speed"),
+    "capabilities.timing.time_path": ("time_path",),
+    "capabilities.timing.timed": ("Timed",),
     "track": ("track",),
     "travel": ("Travel", "travel"),
     "view.animation": ("animate",),
@@ -110,21 +110,22 @@ _NAMES = {
     "view.machine": ("plot",),
     "view.plot_track": ("plot_track",),
     "view.plot_travel": ("plot_travel",),
-    "workspace.ask": ("workspace",),
-    "workspace.inscribed": ("Inscribed",),
-    "workspace.largest": ("Largest", "largest"),
-    "workspace.result": ("Workspace",),
-    "workspace.singular": ("SingularityMap", "SingularityTrack", "singularity_map"),
+    "capabilities.workspace.ask": ("workspace",),
+    "capabilities.workspace.inscribed": ("Inscribed",),
+    "capabilities.workspace.largest": ("Largest", "largest"),
+    "capabilities.workspace.result": ("Workspace",),
+    "capabilities.workspace.singular": ("SingularityMap", "SingularityTrack", "singularity_map"),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 # Modules that are themselves public.
-_MODULES = {"errors": "errors", "interop": "interop", "keep": "design.keep", "passes": "passes"}
+_MODULES = {"errors": "errors", "interop": "exchange.interop", "keep": "capabilities.design.keep", "passes": "passes"}
 
 __all__ = [*sorted([*_HOMES, *_MODULES]), "__version__"]
 
 if TYPE_CHECKING:
-    from . import errors as errors, interop as interop, passes as passes
-    from .actuation.actuation import Actuation as Actuation, actuation as actuation
+    from . import errors as errors, passes as passes
+    from .exchange import interop as interop
+    from .capabilities.actuation.actuation import Actuation as Actuation, actuation as actuation
     from .answers.differential import (
         Mobility as Mobility,
         NearlyFree as NearlyFree,
@@ -140,72 +141,72 @@ if TYPE_CHECKING:
     from .answers.solution import Solution as Solution
     from .answers.status import Status as Status
     from .answers.tracked import Track as Track
-    from .calibration.least_squares import calibrate as calibrate
-    from .calibration.calibration import Calibration as Calibration
-    from .calibration.csv_measurements import read_measurements as read_measurements
-    from .calibration.printer_settings import read_printer as read_printer
-    from .calibration.measurements import Measurements as Measurements
-    from .calibration.parameters import Parameters as Parameters, parameters as parameters
-    from .calibration.plot_calibration import plot_calibration as plot_calibration
-    from .calibration.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
-    from .catalog import catalog as catalog
-    from .certify.certificates import Certificate as Certificate
-    from .certify.question import certify as certify
-    from .certify.enclosure import Enclosure as Enclosure
-    from .certify.pose_region import PoseRegion as PoseRegion
-    from .clearance.clearance import Clearance as Clearance, clearance as clearance
+    from .capabilities.calibration.least_squares import calibrate as calibrate
+    from .capabilities.calibration.calibration import Calibration as Calibration
+    from .capabilities.calibration.csv_measurements import read_measurements as read_measurements
+    from .capabilities.calibration.printer_settings import read_printer as read_printer
+    from .capabilities.calibration.measurements import Measurements as Measurements
+    from .capabilities.calibration.parameters import Parameters as Parameters, parameters as parameters
+    from .capabilities.calibration.plot_calibration import plot_calibration as plot_calibration
+    from .capabilities.calibration.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
+    from .machine.catalog import catalog as catalog
+    from .capabilities.certify.certificates import Certificate as Certificate
+    from .capabilities.certify.question import certify as certify
+    from .capabilities.certify.enclosure import Enclosure as Enclosure
+    from .capabilities.certify.pose_region import PoseRegion as PoseRegion
+    from .capabilities.clearance.clearance import Clearance as Clearance, clearance as clearance
     from .configuration import configuration as configuration
-    from .decomposition.decompose import SubChain as SubChain, decompose as decompose
-    from .description.legs import Leg as Leg
-    from .description.mechanism import (
+    from .machine.decomposition.decompose import SubChain as SubChain, decompose as decompose
+    from .machine.description.legs import Leg as Leg
+    from .machine.description.mechanism import (
         Cone as Cone,
         Joint as Joint,
         Mass as Mass,
         Mechanism as Mechanism,
         Shape as Shape,
     )
-    from .design import keep as keep
-    from .design.by_counterexample import design as design
-    from .design.found_design import Design as Design, Designs as Designs
-    from .dynamics.efforts import Efforts as Efforts
-    from .dynamics.identification import BaseParameter as BaseParameter
-    from .dynamics.identification import Identification as Identification
-    from .dynamics.identify import identify as identify
-    from .dynamics.inverse_dynamics import inverse_dynamics as inverse_dynamics
-    from .dynamics.mass_matrix import mass_matrix as mass_matrix
-    from .export.export_c import export_c as export_c
-    from .export.export_web import export_web as export_web
-    from .export.ros2_control import export_ros2_control as export_ros2_control
-    from .export.ros2_node import export_ros2_node as export_ros2_node
-    from .export.tensors import (
+    from .capabilities.design import keep as keep
+    from .capabilities.design.by_counterexample import design as design
+    from .capabilities.design.found_design import Design as Design, Designs as Designs
+    from .capabilities.dynamics.efforts import Efforts as Efforts
+    from .capabilities.dynamics.identification import BaseParameter as BaseParameter
+    from .capabilities.dynamics.identification import Identification as Identification
+    from .capabilities.dynamics.identify import identify as identify
+    from .capabilities.dynamics.inverse_dynamics import inverse_dynamics as inverse_dynamics
+    from .capabilities.dynamics.mass_matrix import mass_matrix as mass_matrix
+    from .exchange.export.export_c import export_c as export_c
+    from .view.page.export_web import export_web as export_web
+    from .exchange.export.ros2_control import export_ros2_control as export_ros2_control
+    from .exchange.export.ros2_node import export_ros2_node as export_ros2_node
+    from .exchange.export.tensors import (
         export_jax as export_jax,
         export_numpy as export_numpy,
         export_tensors as export_tensors,
         export_torch as export_torch,
     )
     from .feasibility import Feasibility as Feasibility, feasibility as feasibility
-    from .files import load as load, save as save
+    from .machine.files import load as load, save as save
     from .fk import solve_fk as solve_fk
     from .ik import solve_ik as solve_ik
-    from .modes.assembly import AssemblyModes as AssemblyModes, assembly_modes as assembly_modes
-    from .modes.working import WorkingModes as WorkingModes, working_modes as working_modes
+    from .capabilities.modes.assembly import AssemblyModes as AssemblyModes, assembly_modes as assembly_modes
+    from .capabilities.modes.working import WorkingModes as WorkingModes, working_modes as working_modes
     from .options import Options as Options
-    from .paths.read_path import read_path as read_path
-    from .poses import pose as pose
+    from .capabilities.paths.read_path import read_path as read_path
+    from .common.poses import pose as pose
     from .search_log import SearchLog as SearchLog, search_log as search_log
     from .solver import Solver as Solver
-    from .statics.accuracy import PoseAccuracy as PoseAccuracy, accuracy as accuracy
-    from .statics.capacity import WrenchCapacity as WrenchCapacity, wrench_capacity as wrench_capacity
-    from .statics.forces import Forces as Forces, forces as forces
-    from .statics.stiffness import Stiffness as Stiffness, stiffness as stiffness
-    from .statics.transmission import (
+    from .capabilities.statics.accuracy import PoseAccuracy as PoseAccuracy, accuracy as accuracy
+    from .capabilities.statics.capacity import WrenchCapacity as WrenchCapacity, wrench_capacity as wrench_capacity
+    from .capabilities.statics.forces import Forces as Forces, forces as forces
+    from .capabilities.statics.stiffness import Stiffness as Stiffness, stiffness as stiffness
+    from .capabilities.statics.transmission import (
         Factors as Factors,
         Transmission as Transmission,
         transmission as transmission,
     )
-    from .timing.platform_speed import PlatformSpeed as PlatformSpeed, platform_speed as platform_speed
-    from .timing.time_path import time_path as time_path
-    from .timing.timed import Timed as Timed
+    from .capabilities.timing.platform_speed import PlatformSpeed as PlatformSpeed, platform_speed as platform_speed
+    from .capabilities.timing.time_path import time_path as time_path
+    from .capabilities.timing.timed import Timed as Timed
     from .track import track as track
     from .travel import Travel as Travel, travel as travel
     from .view.animation import animate as animate
@@ -213,11 +214,11 @@ if TYPE_CHECKING:
     from .view.machine import plot as plot
     from .view.plot_track import plot_track as plot_track
     from .view.plot_travel import plot_travel as plot_travel
-    from .workspace.ask import workspace as workspace
-    from .workspace.inscribed import Inscribed as Inscribed
-    from .workspace.largest import Largest as Largest, largest as largest
-    from .workspace.result import Workspace as Workspace
-    from .workspace.singular import (
+    from .capabilities.workspace.ask import workspace as workspace
+    from .capabilities.workspace.inscribed import Inscribed as Inscribed
+    from .capabilities.workspace.largest import Largest as Largest, largest as largest
+    from .capabilities.workspace.result import Workspace as Workspace
+    from .capabilities.workspace.singular import (
         SingularityMap as SingularityMap,
         SingularityTrack as SingularityTrack,
         singularity_map as singularity_map,

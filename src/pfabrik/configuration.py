@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 from .answers.solution import Solution
 from .answers.start_configuration import joint_vectors
 from .answers.status import Status
-from .closure.close import CLOSED, measure_configurations
-from .description.mechanism import Mechanism
-from .engine import engine_of
-from .model import model_of
+from .engines.engine import engine_of
+from .engines.joints.close import CLOSED, measure_configurations
+from .machine.description.mechanism import Mechanism
+from .machine.model import model_of
 
 
 def configuration(mechanism: Mechanism, q: ArrayLike) -> Solution:

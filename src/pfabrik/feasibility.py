@@ -10,22 +10,22 @@ import numpy as np
 
 from .answers.start_configuration import Start, start_of
 from .answers.words import bound_notes
-from .arrays import Floats, Ints, shaped
-from .closure.configurations import Configurations
-from .closure.link_distances import least_distances, pair_names
-from .closure.parasitic import has_parasitic_motion
-from .description.mechanism import Mechanism, checked_mechanism
+from .common.arrays import Floats, Ints, shaped
+from .common.executors import Workers, slices
+from .common.printed import ResultTable, plain
+from .engines.joints.configurations import Configurations
+from .engines.joints.link_distances import least_distances, pair_names
+from .engines.joints.parasitic import has_parasitic_motion
+from .engines.pose.answers import sides_at
+from .engines.pose.branch import starts_beside
+from .engines.pose.links_at_poses import links_at_poses
+from .engines.pose.table import table_handle
+from .engines.pose.tip_engine import measured, start_at_tip
+from .engines.targets import Target, as_targets
 from .errors import UnsupportedMechanism, counted
-from .executors import Workers, slices
 from .kernels.threads import in_blocks
-from .model import Model, model_of
-from .platform.answers import sides_at
-from .platform.branch import starts_beside
-from .platform.links_at_poses import links_at_poses
-from .platform.table import table_handle
-from .platform.tip_engine import measured, start_at_tip
-from .printed import ResultTable, plain
-from .targets import Target, as_targets
+from .machine.description.mechanism import Mechanism, checked_mechanism
+from .machine.model import Model, model_of
 from .tolerances import TOLERANCES
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096

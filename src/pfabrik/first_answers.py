@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .answers.differential import forward_jacobian, singularity
-from .description.mechanism import Mechanism
+from .common.poses import pose
 from .fk import solve_fk
 from .ik import solve_ik
-from .poses import pose
+from .machine.description.mechanism import Mechanism
 from .track import track
 
 FAR = 3.0

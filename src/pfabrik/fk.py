@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike
 
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
-from .arguments import as_floats
-from .arrays import Floats
-from .checks import require_each
-from .closure.assemble import forward_answers
-from .closure.close import measure_configurations
-from .description.mechanism import Mechanism, checked_mechanism
-from .engine import engine_of
+from .common.arguments import as_floats
+from .common.arrays import Floats
+from .common.checks import require_each
+from .engines.engine import engine_of
+from .engines.joints.assemble import forward_answers
+from .engines.joints.close import measure_configurations
 from .errors import InvalidArgument
 from .kernels.rows import ACTUATOR_ERROR, PROJECTED, REACHED
-from .model import model_of
+from .machine.description.mechanism import Mechanism, checked_mechanism
+from .machine.model import model_of
 from .options import Options, checked_options
 from .tolerances import TOLERANCES
 

@@ -12,20 +12,20 @@ import numpy as np
 from .answers.answer_fields import PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
-from .arrays import Floats
-from .closure.close import measure_configurations
-from .closure.closure_engine import ClosureEngine
-from .closure.configurations import Configurations
-from .closure.engine_contract import InverseEngine
-from .closure.parasitic import has_parasitic_motion
-from .description.mechanism import Mechanism
-from .engine import engine_of, knows_all_modes
+from .common.arrays import Floats
+from .common.executors import SLOWER, Workers, slices
+from .engines.engine import engine_of, knows_all_modes
+from .engines.joints.close import measure_configurations
+from .engines.joints.closure_engine import ClosureEngine
+from .engines.joints.configurations import Configurations
+from .engines.joints.engine_contract import InverseEngine
+from .engines.joints.parasitic import has_parasitic_motion
+from .engines.targets import Target, as_targets, refuse_invalid
 from .errors import InvalidArgument
-from .executors import SLOWER, Workers, slices
 from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, ITERATIONS, PROJECTED, REACHED, RESIDUAL, Rows
-from .model import model_of
+from .machine.description.mechanism import Mechanism
+from .machine.model import model_of
 from .options import Options, checked_options
-from .targets import Target, as_targets, refuse_invalid
 from .tolerances import TOLERANCES
 
 

@@ -16,20 +16,21 @@ First order   around_home, generic_of, internal_rates, require_determined; Joint
 Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes
 """
 
-from .closure.configurations import Configurations
-from .closure.first_order import JointRates
-from .description.body_inertias import BodyInertia, inertias_of
-from .description.graph import tree_of
-from .description.home_mobility import column_joints
-from .description.links import links_of
-from .description.plane import plane_of
-from .description.readouts import Readout, readout, readouts
-from .description.task import Task, task_of
-from .engine import engine_of
-from .model import Model, model_of
-from .motion.cut_loops import cut_loops
-from .motion.determined import require_determined
-from .motion.displacements import (
+from .engines.engine import engine_of
+from .engines.joints.configurations import Configurations
+from .engines.joints.first_order import JointRates
+from .engines.varied import MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
+from .machine.description.body_inertias import BodyInertia, inertias_of
+from .machine.description.graph import tree_of
+from .machine.description.home_mobility import column_joints
+from .machine.description.links import links_of
+from .machine.description.plane import plane_of
+from .machine.description.readouts import Readout, readout, readouts
+from .machine.description.task import Task, task_of
+from .machine.model import Model, model_of
+from .machine.motion.cut_loops import cut_loops
+from .machine.motion.determined import require_determined
+from .machine.motion.displacements import (
     actuator_units,
     columns,
     displacements,
@@ -39,12 +40,11 @@ from .motion.displacements import (
     placed,
     rate_units,
 )
-from .motion.fitting_task import has_weak_coordinates, task_remark, tilt_axis
-from .motion.joint_path import JointPath, joint_path, passive_series
-from .motion.loops import cycle_basis
-from .motion.mobility import around_home, generic_of, internal_rates
-from .motion.singularities import parallel_signs
-from .varied import MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
+from .machine.motion.fitting_task import has_weak_coordinates, task_remark, tilt_axis
+from .machine.motion.joint_path import JointPath, joint_path, passive_series
+from .machine.motion.loops import cycle_basis
+from .machine.motion.mobility import around_home, generic_of, internal_rates
+from .machine.motion.singularities import parallel_signs
 
 __all__ = [
     "BodyInertia",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
-from .checks import require_choice, require_count, require_positive
+from .common.checks import require_choice, require_count, require_positive
 from .errors import InvalidArgument
 from .tolerances import TOLERANCES
 

@@ -9,19 +9,19 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .answers.words import limit_name
-from .closure.attempts import Attempt
-from .closure.configurations import Configurations
-from .closure.link_distances import too_near
-from .description.mechanism import Mechanism
-from .engine import engine_of
+from .common.printed import Printed, ResultTable, plain
+from .engines.engine import engine_of
+from .engines.joints.attempts import Attempt
+from .engines.joints.configurations import Configurations
+from .engines.joints.link_distances import too_near
+from .engines.pose.tip_engine import measured
+from .engines.targets import Target, as_targets
 from .errors import InvalidArgument
 from .feasibility import feasibility
 from .ik import keeps_mode, solve_ik
-from .model import model_of
+from .machine.description.mechanism import Mechanism
+from .machine.model import model_of
 from .options import Options, checked_options
-from .platform.tip_engine import measured
-from .printed import Printed, ResultTable, plain
-from .targets import Target, as_targets
 from .tolerances import TOLERANCES
 
 KEPT_APART = "links kept apart"

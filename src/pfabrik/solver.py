@@ -12,19 +12,19 @@ from .answers.differential import forward_jacobian
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
-from .arguments import DOUBLE
-from .arrays import Floats
-from .closure.configurations import new_rows
-from .description.mechanism import Mechanism, checked_mechanism
-from .engine import engine_of
+from .common.arguments import DOUBLE
+from .common.arrays import Floats
+from .engines.engine import engine_of
+from .engines.joints.configurations import new_rows
+from .engines.targets import Target
 from .errors import InvalidArgument
 from .first_answers import prepare
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
-from .model import model_of
-from .motion.fitting_task import along_tilt, tilt_axis
+from .machine.description.mechanism import Mechanism, checked_mechanism
+from .machine.model import model_of
+from .machine.motion.fitting_task import along_tilt, tilt_axis
 from .options import Options, checked_options
-from .targets import Target
 
 
 class Solver:

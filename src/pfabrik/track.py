@@ -13,24 +13,24 @@ from .answers.pace import pace_of
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track
-from .arrays import Floats, Mask
-from .batch import put
-from .closure.close import measure_configurations
-from .closure.configurations import Configurations
-from .closure.effort import continued
-from .closure.engine_contract import InverseEngine, OnProgress
-from .description.mechanism import Mechanism
-from .description.task import task_of
-from .engine import engine_of
+from .common.arrays import Floats, Mask
+from .common.batch import put
+from .common.poses import between
+from .common.rotations import whole_turns
+from .common.telling import telling
+from .engines.engine import engine_of
+from .engines.joints.close import measure_configurations
+from .engines.joints.configurations import Configurations
+from .engines.joints.effort import continued
+from .engines.joints.engine_contract import InverseEngine, OnProgress
+from .engines.targets import Target, as_targets, refuse_invalid
 from .errors import InvalidArgument, counted
 from .kernels.rows import POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
-from .model import model_of
-from .motion.singularities import assembly_signs
+from .machine.description.mechanism import Mechanism
+from .machine.description.task import task_of
+from .machine.model import model_of
+from .machine.motion.singularities import assembly_signs
 from .options import Options, checked_options
-from .poses import between
-from .rotations import whole_turns
-from .targets import Target, as_targets, refuse_invalid
-from .telling import telling
 from .tolerances import TOLERANCES
 
 LEAST_STEP = 1e-13

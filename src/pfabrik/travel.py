@@ -13,19 +13,19 @@ from .answers.active_limits import ActiveLimit, active_limits
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.words import DEAD_POINT, NO_FREEDOM, STRETCHED, has_freedom, short_names
-from .arguments import array
-from .arrays import Floats, Mask
-from .closure.first_order import are_stretched, is_at_dead_point
-from .description.mechanism import Mechanism
-from .description.task import task_of
-from .engine import engine_of
+from .common.arguments import array
+from .common.arrays import Floats, Mask
+from .common.printed import Printed, ResultTable, plain
+from .common.rotations import from_rotvec
+from .engines.engine import engine_of
+from .engines.joints.first_order import are_stretched, is_at_dead_point
 from .errors import InvalidArgument, counted
 from .kernels.rows import REACHED
-from .model import model_of
-from .motion.fitting_task import has_dependent_coordinates, task_remark, tilt_axis
-from .motion.singularities import assembly_signs
-from .printed import Printed, ResultTable, plain
-from .rotations import from_rotvec
+from .machine.description.mechanism import Mechanism
+from .machine.description.task import task_of
+from .machine.model import model_of
+from .machine.motion.fitting_task import has_dependent_coordinates, task_remark, tilt_axis
+from .machine.motion.singularities import assembly_signs
 from .tolerances import TOLERANCES
 
 STEP = 1.0 / 32.0

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pfabrik import Cone, Joint, Mechanism
-from pfabrik.description.home_mobility import universal_axes
+from pfabrik.machine.description.home_mobility import universal_axes
 
 from .positions import five_bar, ring
 

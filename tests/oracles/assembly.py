@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pfabrik.description.mechanism import Mechanism
+from pfabrik.machine.description.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 

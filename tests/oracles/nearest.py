@@ -12,7 +12,7 @@ import numpy as np
 
 from checks import cone_angle, deviations, placed_bodies, task_offsets, with_axes
 from pfabrik import Mechanism, Solution
-from pfabrik.description.joints import KINDS
+from pfabrik.machine.description.joints import KINDS
 
 from .search import units
 from .turns import Array

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from checks import cone_angle, placed_bodies
 from pfabrik import Mechanism
-from pfabrik.description.joints import KINDS
+from pfabrik.machine.description.joints import KINDS
 
 Array = NDArray[np.float64]
 INSIDE = (

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from checks import actuator_units, home_values
 from pfabrik import Mechanism
-from pfabrik.description.task import task_of
+from pfabrik.machine.description.task import task_of
 
 from .arms import redundant_actuators, redundant_margin
 from .ik import solve_ik

@@ -9,15 +9,15 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
-from ..closure.first_order import are_stretched
-from ..closure.link_distances import pair_distances_at, pair_names
-from ..description.mechanism import Mechanism
-from ..model import Model
-from ..motion.displacements import rate_units
-from ..motion.limited_coordinates import coned, ranges_of
-from ..motion.loops import cycle_basis, first_order, right_singular
-from ..motion.mobility import generic_of
+from ..common.arrays import Floats
+from ..engines.joints.first_order import are_stretched
+from ..engines.joints.link_distances import pair_distances_at, pair_names
+from ..machine.description.mechanism import Mechanism
+from ..machine.model import Model
+from ..machine.motion.displacements import rate_units
+from ..machine.motion.limited_coordinates import coned, ranges_of
+from ..machine.motion.loops import cycle_basis, first_order, right_singular
+from ..machine.motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 
 Bound: TypeAlias = Literal["min", "max", "cone", "clearance", "stretched"]

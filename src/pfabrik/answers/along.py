@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
-from ..decomposition.leg_forms import ElementaryJoint, Rod
-from ..description.mechanism import Mechanism
-from ..model import model_of
-from ..motion.displacements import displacements, home_coordinates
+from ..common.arrays import Floats
+from ..machine.decomposition.leg_forms import ElementaryJoint, Rod
+from ..machine.description.mechanism import Mechanism
+from ..machine.model import model_of
+from ..machine.motion.displacements import displacements, home_coordinates
 from .margins import margins
 from .solution import Solution
 

@@ -9,13 +9,12 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints, shaped
-from ..batch import aligned
-from ..closure.configurations import Configurations
-from ..closure.projection import projection_modes
-from ..description.mechanism import Mechanism
-from ..engine import engine_of
-from ..frozen import FrozenMapping
+from ..common.arrays import Floats, Ints, shaped
+from ..common.batch import aligned
+from ..common.frozen import FrozenMapping
+from ..engines.engine import engine_of
+from ..engines.joints.configurations import Configurations
+from ..engines.joints.projection import projection_modes
 from ..kernels.rows import (
     ACTUATOR_ERROR,
     HOLD_NOTHING,
@@ -27,8 +26,9 @@ from ..kernels.rows import (
     ROUNDS,
     Rows,
 )
-from ..model import model_of
-from ..motion.displacements import columns, home_coordinates
+from ..machine.description.mechanism import Mechanism
+from ..machine.model import model_of
+from ..machine.motion.displacements import columns, home_coordinates
 from ..options import Options
 from .active_limits import (
     ActiveLimit,

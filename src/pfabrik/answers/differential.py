@@ -8,16 +8,16 @@ from typing import cast
 
 import numpy as np
 
-from ..arrays import Floats, shaped
-from ..chains.chain_jacobians import forward_of_chain, inverse_of_chain, is_driven_chain
-from ..closure.configurations import Configurations
-from ..closure.first_order import JointRates, singularities
-from ..description.mechanism import Mechanism, checked_mechanism
-from ..model import Model, model_of
-from ..motion.mobility import Mobility, NearlyFree, generic_of
-from ..motion.singularities import NUMBERS, Singularity
-from ..platform.jacobians import forward_map, inverse_map
-from ..printed import triple
+from ..common.arrays import Floats, shaped
+from ..common.printed import triple
+from ..engines.chains.chain_jacobians import forward_of_chain, inverse_of_chain, is_driven_chain
+from ..engines.joints.configurations import Configurations
+from ..engines.joints.first_order import JointRates, singularities
+from ..engines.pose.jacobians import forward_map, inverse_map
+from ..machine.description.mechanism import Mechanism, checked_mechanism
+from ..machine.model import Model, model_of
+from ..machine.motion.mobility import Mobility, NearlyFree, generic_of
+from ..machine.motion.singularities import NUMBERS, Singularity
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 

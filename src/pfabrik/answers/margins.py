@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, as_plain, shaped
-from ..closure.link_distances import pair_distances, pair_names
-from ..closure.placed_links import placed_at
-from ..description.task import Task
-from ..frozen import FrozenMapping
-from ..motion.displacements import actuator_units, end_effector_pose, gaps
-from ..motion.limited_coordinates import coned, ranges_of
-from ..printed import Printed, ResultTable, plain
+from ..common.arrays import Floats, as_plain, shaped
+from ..common.frozen import FrozenMapping
+from ..common.printed import Printed, ResultTable, plain
+from ..engines.joints.link_distances import pair_distances, pair_names
+from ..engines.joints.placed_links import placed_at
+from ..machine.description.task import Task
+from ..machine.motion.displacements import actuator_units, end_effector_pose, gaps
+from ..machine.motion.limited_coordinates import coned, ranges_of
 from ..tolerances import TOLERANCES
 from .solution import Solution, checked_solution
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import array, is_not_infinite
-from ..arrays import Floats
-from ..checks import put_limits, require_positive
-from ..description.mechanism import Mechanism
+from ..common.arguments import array, is_not_infinite
+from ..common.arrays import Floats
+from ..common.checks import put_limits, require_positive
 from ..errors import InvalidArgument
+from ..machine.description.mechanism import Mechanism
 
 EVEN = 1e-6
 """Relative difference up to which time steps count as equal: times in files have so many digits."""

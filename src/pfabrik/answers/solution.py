@@ -9,10 +9,10 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import as_plain
-from ..checks import require_type
+from ..common.arrays import as_plain
+from ..common.checks import require_type
+from ..common.printed import ResultTable
 from ..kernels.rows import REACHED
-from ..printed import ResultTable
 from .answer_fields import Answer
 from .status import Status
 from .words import answer_table, as_sentence, what_blocks

@@ -7,16 +7,16 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import array
-from ..arrays import Floats
-from ..closure.close import measure_configurations
-from ..closure.configurations import Configurations
-from ..description.mechanism import Mechanism, checked_mechanism, told_apart
-from ..engine import engine_of
+from ..common.arguments import array
+from ..common.arrays import Floats
+from ..engines.engine import engine_of
+from ..engines.joints.close import measure_configurations
+from ..engines.joints.configurations import Configurations
 from ..errors import InvalidArgument
 from ..kernels.rows import FAILED
-from ..model import model_of
-from ..motion.displacements import home_coordinates
+from ..machine.description.mechanism import Mechanism, checked_mechanism, told_apart
+from ..machine.model import model_of
+from ..machine.motion.displacements import home_coordinates
 from .solution import Solution
 
 Start: TypeAlias = Solution | ArrayLike

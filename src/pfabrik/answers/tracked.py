@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints, Mask, as_plain
-from ..closure.configurations import Configurations
-from ..closure.link_distances import least_on_the_way
-from ..description.mechanism import Mechanism
-from ..description.readouts import readouts
-from ..description.task import task_of
-from ..engine import engine_of
+from ..common.arrays import Floats, Ints, Mask, as_plain
+from ..common.poses import between
+from ..common.printed import ResultTable, plain
+from ..engines.engine import engine_of
+from ..engines.joints.configurations import Configurations
+from ..engines.joints.link_distances import least_on_the_way
 from ..errors import InvalidArgument, counted
-from ..motion.displacements import actuator_units
-from ..poses import between
-from ..printed import ResultTable, plain
+from ..machine.description.mechanism import Mechanism
+from ..machine.description.readouts import readouts
+from ..machine.description.task import task_of
+from ..machine.motion.displacements import actuator_units
 from ..tolerances import TOLERANCES
 from .active_limits import ActiveLimit
 from .along import Extremes, largest_tilts, least_margins

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Floats
-from ..closure.assemble import is_over_determined
-from ..closure.first_order import is_at_dead_point
-from ..description.joints import KINDS
-from ..description.mechanism_table import bound_text
-from ..description.readouts import Readout, readouts
-from ..description.sketch import sketch
-from ..description.task import task_of
-from ..model import model_of
-from ..motion.fitting_task import has_dependent_coordinates, motions_at, task_remark, tilt_axis
-from ..printed import ResultTable, error_text, plain
-from ..rotations import to_rotvec, to_rpy
+from ..common.arrays import Floats
+from ..common.printed import ResultTable, error_text, plain
+from ..common.rotations import to_rotvec, to_rpy
+from ..engines.joints.assemble import is_over_determined
+from ..engines.joints.first_order import is_at_dead_point
+from ..machine.description.joints import KINDS
+from ..machine.description.mechanism_table import bound_text
+from ..machine.description.readouts import Readout, readouts
+from ..machine.description.sketch import sketch
+from ..machine.description.task import task_of
+from ..machine.model import model_of
+from ..machine.motion.fitting_task import has_dependent_coordinates, motions_at, task_remark, tilt_axis
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
-    from ..description.mechanism import Joint, Mechanism
+    from ..machine.description.mechanism import Joint, Mechanism
     from .active_limits import ActiveLimit
     from .answer_fields import Answer
 
@@ -75,7 +75,7 @@ def causes(answer: Answer) -> list[str]:
 
 def given_up(answer: Answer) -> list[str]:
     """A phrase for the part of the target that a projected answer should hold and does not; empty if there is none."""
-    from ..closure.projection import projection_modes
+    from ..engines.joints.projection import projection_modes
     from ..kernels.rows import HOLD_NOTHING
 
     request = answer._request

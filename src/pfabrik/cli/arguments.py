@@ -15,14 +15,14 @@ from click.shell_completion import CompletionItem
 
 import pfabrik as pf
 
-from ..cells import is_finite
+from ..common.cells import is_finite
 from ..errors import counted, near_miss
 from ..tolerances import TOLERANCES
 from .options import STANDARD_INPUT, named_values, series, together
 from .printing import note
 
 if TYPE_CHECKING:
-    from ..targets import Target
+    from ..engines.targets import Target
 
 Triple: TypeAlias = tuple[float, float, float]
 Value = TypeVar("Value")
@@ -46,7 +46,7 @@ def load(mech: str) -> pf.Mechanism:
     """The mechanism of an argument MECH: a catalogue name, a file, or ``-`` for standard input."""
     if mech != STANDARD_INPUT:
         return pf.load(mech)
-    from ..files import loads
+    from ..machine.files import loads
 
     return loads(sys.stdin.read(), "standard input")
 
@@ -138,10 +138,10 @@ def answered(mechanism: pf.Mechanism, options: TargetOptions) -> pf.Solution | N
 
 def noted(mechanism: pf.Mechanism, options: TargetOptions) -> Target:
     """The target that options give; notes say what of it the task, or an end effector that only tilts, leaves out."""
+    from ..common.poses import as_poses
+    from ..engines.targets import as_targets
     from ..kinematics import tilt_axis
-    from ..overview import vector
-    from ..poses import as_poses
-    from ..targets import as_targets
+    from ..view.overview import vector
 
     target = options.of(mechanism)
     note_left_out(ignored(mechanism, options), mechanism)
@@ -183,7 +183,7 @@ def joint_target(mechanism: pf.Mechanism, options: tuple[str, ...]) -> dict[str,
 
 def joint_coordinates(mechanism: pf.Mechanism, words: str) -> tuple[str, float | list[float]]:
     """A joint's name and coordinates [rad or length], from words such as ``pivot=5,10``."""
-    from ..description.joints import KINDS
+    from ..machine.description.joints import KINDS
 
     name, equals, listed = words.partition("=")
     values = listed.split(",")

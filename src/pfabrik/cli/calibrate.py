@@ -73,7 +73,7 @@ def calibrate(
     result, machine = _calibrated(mech, data, free or None, "copies" if tied else None, sigma)
     held = [each.name for each in result.parameters if not each.determined]
     if output is not None:
-        from ..files import dumps
+        from ..machine.files import dumps
 
         with whole_file(output) as file:
             file.write(_said_of(held, "#") + dumps(machine))
@@ -95,7 +95,7 @@ def _calibrated(
     mech: str, data: Path | None, free: tuple[str, ...] | None, ties: Literal["copies"] | None, sigma: float | None
 ) -> tuple[pf.Calibration, pf.Mechanism]:
     """The calibration, and the machine to write."""
-    from ..files import printer_settings_of
+    from ..machine.files import printer_settings_of
 
     if printer_settings_of(mech) is not None:
         printer = pf.read_printer(mech, sigma=sigma)

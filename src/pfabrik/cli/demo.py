@@ -16,13 +16,13 @@ import click
 
 import pfabrik as pf
 
-from ..extras import require
-from ..printed import aligned, error_text
+from ..common.extras import require
+from ..common.printed import aligned, error_text
 from .outputs import check_outputs, new_folder, real, whole_folder, write_picture
 from .printing import print_text
 
 if TYPE_CHECKING:
-    from ..arrays import Floats
+    from ..common.arrays import Floats
 
 QUICK_STEPS = 36
 
@@ -96,9 +96,9 @@ def follow(key: str, targets: Floats) -> Run:
 
 def write(run: Run, folder: Path) -> None:
     """Write the CSV file of one run, with the active limits: these take joint coordinates, and more kernels."""
-    from ..paths.follow import TrackPart
-    from ..paths.path import Path as Targets
-    from ..paths.track_rows import TrackRows
+    from ..capabilities.paths.follow import TrackPart
+    from ..capabilities.paths.path import Path as Targets
+    from ..capabilities.paths.track_rows import TrackRows
 
     with (folder / f"{run.key}.csv").open("w", newline="", encoding="utf-8") as handle:
         TrackRows(handle).write(TrackPart(Targets.of(run.targets), run.solution, first=0))

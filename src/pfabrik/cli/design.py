@@ -97,7 +97,7 @@ def design(
     )
     best: pf.Design = result[0] if isinstance(result, pf.Designs) else result
     if output is not None and best.mechanism is not None:
-        from ..files import dumps
+        from ..machine.files import dumps
 
         with whole_file(output) as file:
             file.write(dumps(best.mechanism))

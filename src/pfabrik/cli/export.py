@@ -41,22 +41,22 @@ def text_of(
     if form == "mjcf":
         return pf.interop.to_mjcf(mechanism)
     if form == "linuxcnc":
-        from ..export.linuxcnc import linuxcnc
+        from ..exchange.export.linuxcnc import linuxcnc
 
         return linuxcnc(mechanism)
     if form in FIRMWARES:
-        from ..export import firmware_settings
+        from ..exchange.export import firmware_settings
 
         return str(getattr(firmware_settings, form)(mechanism))
     if form == "web":
-        from ..export.export_web import web_page
+        from ..view.page.export_web import web_page
 
         return web_page(mechanism)
     if form in BACKENDS:
-        from ..export.tensors import TASK, tensor_source
+        from ..exchange.export.tensors import TASK, tensor_source
 
         return tensor_source(mechanism, backend=cast(Any, form), joints=joints or TASK)
-    from ..export.export_c import c_source
+    from ..exchange.export.export_c import c_source
 
     chosen, precision = cast(Any, parts or None), cast(Any, "float" if form == "c-float" else "double")
     return c_source(mechanism, precision=precision, parts=chosen, name=name, joints=joints, file=file)
@@ -149,11 +149,11 @@ def export(
         file = "FILE" if path == STANDARD else path.name
         _write(path, form, text_of(mechanism, form, "pfk" if name is None else name, joints or None, file, parts))
     if folder is not None:
-        from ..export.ros2_control import ros2_control_texts
+        from ..exchange.export.ros2_control import ros2_control_texts
 
         _write_package(folder, ros2_control_texts(mechanism, folder, joints=joints, name=name), force)
     if node is not None:
-        from ..export.ros2_node import commands, ros2_node_texts
+        from ..exchange.export.ros2_node import commands, ros2_node_texts
 
         _write_package(node, ros2_node_texts(mechanism, node, name=name), force)
         for line in ("build it in a workspace, and try it:", *commands(mechanism, node, name)):
@@ -183,7 +183,7 @@ def _write(path: Path, form: str, text: str) -> None:
 
 
 def _write_package(folder: Path, texts: dict[str, str], force: bool) -> None:
-    from ..export.ros2_texts import write_package
+    from ..exchange.export.ros2_texts import write_package
 
     for place in texts:
         refuse_existing(folder / place, force)

@@ -14,9 +14,9 @@ from typing import Any, NoReturn
 
 import click
 
+from ..common.telling import lines_on_pipes
 from ..errors import InvalidArgument, PfabrikError, near_miss
 from ..kernels import NoKernels
-from ..telling import lines_on_pipes
 from .examples import EXAMPLES
 from .printing import complain
 from .stops import Stops

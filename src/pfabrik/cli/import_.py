@@ -17,7 +17,7 @@ from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_exist
 from .printing import complain, json_option, note, print_json, printing_result
 
 if TYPE_CHECKING:
-    from ..interop import Choice, Imported
+    from ..exchange.interop import Choice, Imported
 
 DEFAULTS: tuple[object, ...] = ("qpos0", "m", (), [])
 """Values of options that need not be said."""
@@ -71,8 +71,8 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
         for remark in getattr(error, "__notes__", []):
             complain(remark)
         raise
-    from ..files import dumps
-    from ..remarks import remarks_on
+    from ..machine.files import dumps
+    from .remarks import remarks_on
 
     said = [*map(str, model.notes)]
     remarks = [pf.interop.Note(remark) for remark in remarks_on(model.mechanism) if not remark.startswith(tuple(said))]

@@ -15,15 +15,15 @@ from click.shell_completion import CompletionItem
 
 import pfabrik as pf
 
-from ..catalog import catalog_file, description, template, templates, title
+from ..common.printed import aligned
 from ..errors import counted
-from ..printed import aligned
+from ..machine.catalog import catalog_file, description, template, templates, title
 from .arguments import MECH, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import json_option, note, print_answer, print_json, print_text, printing_result
 
 if TYPE_CHECKING:
-    from ..overview import Overview
+    from ..view.overview import Overview
 
 ALIASES = {"hexapod": "6-UPS", "five-bar": "5-bar", "servo-hexapod": "6-RUS", "hexaglide": "6-PUS", "tripod": "3-RPS"}
 """Other names of kinds."""
@@ -116,7 +116,7 @@ def file_of(machine: str) -> str:
     """The text of a mechanism file: one of the catalogue as it is there, or what a file describes."""
     if machine in pf.catalog() or not os.path.exists(machine):
         return catalog_file(machine).read_text(encoding="utf-8")
-    from ..files import dumps
+    from ..machine.files import dumps
 
     return dumps(load(machine))
 
@@ -147,7 +147,7 @@ def with_dimensions(text: str, options: Sequence[str]) -> str:
         require_sign(name, dimension, value, text)
         line = re.compile(rf"^({dimension} *= *)(\"[^\"]*\"|[^ #\n]+)( *)", re.MULTILINE)
         text = line.sub(rf"\g<1>{value:.15g}\g<3>", text, count=1)
-    from ..files import loads
+    from ..machine.files import loads
 
     loads(text)
     return text
@@ -172,7 +172,7 @@ def info(mech: str) -> Overview:
 
     Its joints, limits, actuators, mobility and task, and its sub-chains with the engine that answers, and why.
     """
-    from ..overview import Overview
+    from ..view.overview import Overview
 
     return Overview(load(mech))
 
@@ -185,8 +185,8 @@ def check(mech: str, as_json: bool) -> int:
 
     Says "ok", or names every fault, one a line. What is sound but may not be what was meant is noted on stderr.
     """
-    from ..files import print_region_of
-    from ..remarks import remarks_on
+    from ..machine.files import print_region_of
+    from .remarks import remarks_on
 
     try:
         mechanism = load(mech)

@@ -17,7 +17,7 @@ from .statics import Loads, carrying, weighed
 from .track import at_lines_of, limiting
 
 if TYPE_CHECKING:
-    from ..paths import path as paths
+    from ..capabilities.paths import path as paths
     from .track import LimitsOf
 
 

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from ..checks import require_ending
+from ..common.checks import require_ending
+from ..common.extras import require
+from ..common.whole_files import whole_path
 from ..errors import InvalidArgument
-from ..extras import require
 from ..view.save_picture import PICTURES
-from ..whole_files import whole_path
 from .options import Decorator, together
 from .printing import note
 

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import click
 
-from ..printed import ResultTable
+from ..common.printed import ResultTable
 from .options import Decorator
 
 LEAST = 20

@@ -12,7 +12,7 @@ import click
 
 import pfabrik as pf
 
-from ..cells import is_finite
+from ..common.cells import is_finite
 from ..errors import counted
 from .arguments import (
     FINITE,
@@ -33,7 +33,7 @@ from .outputs import PictureOptions, check_outputs, note_no_picture, pictured, w
 from .printing import Result, complain, json_option, print_answer, print_result, printing_result
 
 if TYPE_CHECKING:
-    from ..arrays import Floats
+    from ..common.arrays import Floats
 
 
 @click.command()
@@ -58,7 +58,7 @@ def ik(mech: str, target: TargetOptions, options: pf.Options, with_margins: bool
         raise click.UsageError("--margins is of one answer: it does not go with --all")
     if not target.is_given:
         raise click.UsageError("no target: give --position, --rpy or both, or --joint")
-    from ..description.links import has_pairs
+    from ..machine.description.links import has_pairs
 
     mechanism = load(mech)
     pose = noted(mechanism, target)
@@ -209,7 +209,7 @@ def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "-
 
 def own_limits(mechanism: pf.Mechanism) -> dict[str, float]:
     """The speeds that the mechanism's file gives, by name [rad/s or length/s]."""
-    from ..timing.time_path import limits_of
+    from ..capabilities.timing.time_path import limits_of
 
     speeds = zip(mechanism.actuator_names, limits_of(mechanism, "speed", None).tolist(), strict=True)
     return {name: speed for name, speed in speeds if math.isfinite(speed)}

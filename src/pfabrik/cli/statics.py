@@ -9,7 +9,7 @@ import click
 
 import pfabrik as pf
 
-from ..cells import is_finite
+from ..common.cells import is_finite
 from .arguments import FINITE, Triple, at_a_pose, by_name, numbers_of, positive
 from .options import actuators, joints, named_values, together
 from .printing import Result, json_option, note, print_result, printing_result
@@ -48,7 +48,7 @@ def weighed(mechanism: pf.Mechanism, loads: Loads) -> pf.Mechanism:
     """The machine with a mass of every body; a note names those that count as none, and none at all is an error."""
     if not (loads or mechanism.masses or any(shape.density for shape in mechanism.shapes)):
         raise click.UsageError("nothing has a mass: give --load, or `mass` in tables [[body]] of the file")
-    from ..dynamics.weights import lacking_masses
+    from ..capabilities.dynamics.weights import lacking_masses
 
     weightless = lacking_masses(mechanism)
     if left := [body for body in weightless if body not in loads]:
@@ -116,7 +116,7 @@ def bounds_of(words: str) -> float | tuple[float, float]:
 
 def rods(mechanism: pf.Mechanism) -> tuple[str, ...]:
     """Names of the rods."""
-    from ..statics.forces import rods_of
+    from ..capabilities.statics.forces import rods_of
 
     return rods_of(mechanism).names
 

@@ -12,8 +12,8 @@ import click
 
 import pfabrik as pf
 
+from ..common.telling import telling
 from ..errors import counted, near_miss
-from ..telling import telling
 from ..view.save_picture import FILMS
 from .arguments import FINITE, MECH, Triple, by_name, load, note_left_out, positive, projecting
 from .options import actuators, named_values, together
@@ -35,8 +35,8 @@ from .statics import Loads, carrying, weighed
 
 if TYPE_CHECKING:
     from ..answers.tracked import TrackSummary
-    from ..arrays import Mask
-    from ..paths import path as paths
+    from ..capabilities.paths import path as paths
+    from ..common.arrays import Mask
 
     LimitsOf: TypeAlias = Callable[[pf.Mechanism], dict[str, Any]]
 
@@ -101,7 +101,7 @@ def track(
     mechanism = load(mech)
     limits = speed_limits(mechanism, speeds)
     from ..answers.tracked import TrackSummary
-    from ..paths.read_path import path_blocks
+    from ..capabilities.paths.read_path import path_blocks
 
     is_whole = as_json or is_drawn
     read = partial(path_blocks, path, mechanism, most=None if is_whole else MOST_TARGETS, **sampling)
@@ -130,7 +130,7 @@ def blocks_of(
 
     A path that can be read twice is checked to its end before the first answer is written; others part by part.
     """
-    from ..paths.path import joined
+    from ..capabilities.paths.path import joined
 
     if whole:
         block = joined(check(read()))
@@ -144,7 +144,7 @@ def checked(blocks: Iterable[paths.Path], mechanism: pf.Mechanism, is_timed: boo
     """Blocks of a path, with notes of what it sets to no effect, and an error if it sets nothing of the task."""
     import numpy as np
 
-    from ..paths.csv_table import NUMERIC
+    from ..capabilities.paths.csv_table import NUMERIC
 
     is_set, passed = np.zeros((4, 4), bool), ""
     for number, block in enumerate(blocks):
@@ -195,8 +195,8 @@ def follow(
     n_targets: int | None,
 ) -> pf.Track:
     """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
-    from ..paths.follow import follow_parts
-    from ..paths.track_rows import TrackRows
+    from ..capabilities.paths.follow import follow_parts
+    from ..capabilities.paths.track_rows import TrackRows
 
     rows = None if handle is None else TrackRows(handle)
     with telling(f"tracking {counted(n_targets, 'target') if n_targets else 'targets'}") as tell:
@@ -300,7 +300,7 @@ def time(
     """
     refuse_both_on_stdout(output, as_json)
     check_outputs([("-o", output)], [path, Path(mech)], as_json=as_json)
-    from ..dynamics.weights import lacking_masses
+    from ..capabilities.dynamics.weights import lacking_masses
 
     mechanism = load(mech)
     limits = limits_of(mechanism)

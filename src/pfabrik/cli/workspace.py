@@ -13,7 +13,7 @@ import click
 
 import pfabrik as pf
 
-from ..cells import is_finite
+from ..common.cells import is_finite
 from ..view.save_picture import PICTURES
 from .arguments import FINITE, MECH, TargetOptions, Triple, answered, load, numbers_of, rpy_option, targeted
 from .options import completing, named_values, together
@@ -29,7 +29,7 @@ from .outputs import (
 from .printing import json_option, note, print_result
 
 if TYPE_CHECKING:
-    from ..workspace.inscribed import Kind
+    from ..capabilities.workspace.inscribed import Kind
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class SpaceOptions:
 
 def coordinates(mechanism: pf.Mechanism) -> dict[str, None]:
     """Names of the coordinates that a workspace of a machine may have."""
-    from ..workspace.space import free_coordinates, space_of
+    from ..capabilities.workspace.space import free_coordinates, space_of
 
     usual = space_of(mechanism, None, None, None, mechanism.home_pose).names
     return dict.fromkeys((*usual, *free_coordinates(mechanism)))
@@ -131,7 +131,7 @@ def workspace(
         raise click.UsageError("--centre says nothing without --largest")
     if tilt is not None and not 0.0 <= tilt <= 180.0:
         raise click.UsageError(f"--tilt {tilt:g}: expected an angle from 0 to 180 degrees")
-    from ..workspace.saving import ENDINGS
+    from ..capabilities.workspace.saving import ENDINGS
 
     check_outputs([("-o", path) for path in outputs], [Path(mech)], as_json=as_json)
     pictures = [path for path in outputs if path.suffix.lower() in PICTURES]
@@ -202,7 +202,7 @@ def singularities(
 
 def note_slow(mechanism: pf.Mechanism) -> None:
     """Note before the work begins that it takes longer where no closed forms answer, and why."""
-    from ..engine import why_not_measured
+    from ..engines.engine import why_not_measured
 
     reason = why_not_measured(mechanism)
     if reason:
@@ -211,7 +211,7 @@ def note_slow(mechanism: pf.Mechanism) -> None:
 
 def above_bed(mech: str, is_over_z: bool) -> dict[str, tuple[float, float]]:
     """The ends of z to which a printer's firmware keeps; notes say what else it keeps to, which a machine does not."""
-    from ..files import print_region_of
+    from ..machine.files import print_region_of
 
     printer = print_region_of(mech)
     if printer is None:
@@ -242,7 +242,7 @@ def in_its_unit(
     mechanism: pf.Mechanism, names: Sequence[str] | None, held: Mapping[str, float], resolution: float
 ) -> float:
     """A resolution as `workspace` takes it: from degrees to rad where all coordinates are angles."""
-    from ..workspace.space import space_of
+    from ..capabilities.workspace.space import space_of
 
     units = space_of(mechanism, names, held, None, mechanism.home_pose).units
     return math.radians(resolution) if set(units) == {"rad"} else resolution

@@ -25,7 +25,7 @@ def name_of(function: Callable[..., Any]) -> str:
 
 def is_stale(file: str | None) -> bool:
     """True if kernels of a checkout were edited after the module was compiled; installed ones never are."""
-    if file is None or not (HERE.parents[2] / "building" / "compile_kernels.py").exists():
+    if file is None or not (HERE.parents[2] / "tools" / "kernels" / "compile_kernels.py").exists():
         return False
     made = os.stat(file).st_mtime
     return any(path.stat().st_mtime > made for path in HERE.rglob("*.py"))
@@ -77,7 +77,7 @@ def choose() -> Library | None:
         raise NoKernels(f"{CHOICE}={choice}: {reason}")
     warnings.warn(
         f"{reason}: answers are the same, and take 15 to 100 times as long; install a wheel, or compile them with a C "
-        "compiler (python building/compile_kernels.py)",
+        "compiler (python tools/kernels/compile_kernels.py)",
         RuntimeWarning,
         stacklevel=2,
     )

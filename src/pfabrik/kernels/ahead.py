@@ -10,16 +10,16 @@ from .certify.prove import prove
 from .chains.answer_chains import answer_chains, walk_chains
 from .clearance.capsules import capsule_clearance, place_ends
 from .clearance.least_clearance import least_clearance
-from .closure.answer_joints import answer_joints, note_near
-from .closure.close import close
-from .closure.descend import nearest_configuration
-from .closure.first_order import rates
-from .closure.joint_tables import Answered
-from .closure.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Objective, PoseObjective
 from .dynamics.inverse_dynamics import inverse_dynamics
 from .dynamics.moving import Exerted
 from .dynamics.signs import signs_of
 from .home import measure_home
+from .joints.answer_joints import answer_joints, note_near
+from .joints.close import close
+from .joints.descend import nearest_configuration
+from .joints.first_order import rates
+from .joints.joint_tables import Answered
+from .joints.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Objective, PoseObjective
 from .lattice import join, number_points
 from .legs.answer import answer
 from .legs.blocks import answer_blocks
@@ -29,11 +29,11 @@ from .legs.margin_blocks import margins_in_blocks
 from .noted_steps import evaluate
 from .passes import plan as P
 from .passes.solve import solve_by_passes
-from .platform.answer_rows import answer_rows, mark_near
-from .platform.evaluate import evaluate_poses, jacobians
-from .platform.forward import assemble
-from .platform.forward_blocks import assemble_in_blocks
-from .platform.nearest import nearest_pose
+from .pose.answer_rows import answer_rows, mark_near
+from .pose.evaluate import evaluate_poses, jacobians
+from .pose.forward import assemble
+from .pose.forward_blocks import assemble_in_blocks
+from .pose.nearest import nearest_pose
 from .rows import Rows
 from .timing import acceleration_shares, fastest, second_derivatives, speed_shares, spline_at
 from .walk_path import walk_path

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..common.arrays import Floats, Ints
 from ._jit import routine
 from .qp import QP, factorise, solve_qp
 from .search_constants import EASE, IMPLIED, LOOSE, SHARED

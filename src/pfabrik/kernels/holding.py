@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from ._jit import routine
 from .qp import QP, apply_inverse, factorise, solve_qp
 from .search_constants import REGULARISATION

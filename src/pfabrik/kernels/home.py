@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..common.arrays import Floats, Ints
 from . import enclosing
 from ._jit import routine, search
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..arrays import Ints
+from ..common.arrays import Ints
 from ._jit import kernel, routine
 
 # A code holds the coordinates on two or three axes, in this many bits each.

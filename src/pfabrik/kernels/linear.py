@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from ._jit import routine
 
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..common.arrays import Floats, Ints
 from ._jit import kernel, routine
 from .legs.columns import arctangent
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Record, Records
+from ..common.arrays import Floats, Record, Records
 from ._jit import routine
-from .closure.loops import LOCKED
+from .joints.loops import LOCKED
 from .rows import HOLD_ORIENTATION
 from .search_constants import HOLD_COST, SAME_DISTANCE
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..common.arrays import Floats, Ints
 from ._jit import allocator, routine
 from .search_constants import DEPENDENT, KEPT, ROUNDED
 

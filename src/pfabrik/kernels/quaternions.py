@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from ._jit import inlined, routine
 
 # Squares of a half angle [rad] and of its sine below which power series replace trigonometry: the first omitted terms

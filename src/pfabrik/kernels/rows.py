@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Mask
+from ..common.arrays import Floats, Ints, Mask
 
 # Status of a row, numbered as the public Status.
 REACHED, PROJECTED, EXCEEDED, FAILED, INVALID, PENDING = 0, 1, 2, 3, 4, 9

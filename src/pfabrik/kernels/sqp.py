@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Record, Records
+from ..common.arrays import Floats, Ints, Record, Records
 from ._jit import routine
 from .qp import QP, factorise, solve_qp
 from .search_constants import (

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from ._jit import inlined, kernel, routine
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from ._jit import inlined, routine
 
 Vec: TypeAlias = tuple[float, float, float]

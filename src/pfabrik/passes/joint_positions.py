@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Record
-from ..batch import put
-from ..closure.close import HELD, Closing, close, platform_poses
-from ..derived import derived
-from ..description.mechanism import Mechanism
-from ..description.task import Weights
+from ..common.arrays import Floats, Record
+from ..common.batch import put
+from ..common.derived import derived
+from ..common.rotations import from_rotvec
+from ..engines.joints.close import HELD, Closing, close, platform_poses
 from ..kernels.passes import plan as P
-from ..motion.displacements import columns, displacements
-from ..motion.loops import Closure
-from ..rotations import from_rotvec
+from ..machine.description.mechanism import Mechanism
+from ..machine.description.task import Weights
+from ..machine.motion.displacements import columns, displacements
+from ..machine.motion.loops import Closure
 from ..tolerances import TOLERANCES
 from .plan import CompiledPlan, compile_plan
 

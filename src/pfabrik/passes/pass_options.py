@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ..checks import require_choice, require_count
+from ..common.checks import require_choice, require_count
 from ..errors import InvalidArgument
 from ..options import Options
 

@@ -11,24 +11,24 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
-from ..batch import put, take
-from ..closure.close import Closing, close
-from ..closure.closure_engine import start_coordinates, to_answers
-from ..closure.configurations import Configurations, new_rows, steps_of
-from ..closure.descend import clip_targets
-from ..closure.engine_contract import Engine, InverseEngine
-from ..closure.projection import ProjectionMode, held_parts, projection_modes
-from ..derived import derived
-from ..description.mechanism import Mechanism
-from ..kernels.closure.loops import LOCKED
+from ..common.arrays import Floats
+from ..common.batch import put, take
+from ..common.derived import derived
+from ..common.poses import are_poses, made_exact
+from ..engines.joints.close import Closing, close
+from ..engines.joints.closure_engine import start_coordinates, to_answers
+from ..engines.joints.configurations import Configurations, new_rows, steps_of
+from ..engines.joints.descend import clip_targets
+from ..engines.joints.engine_contract import Engine, InverseEngine
+from ..engines.joints.projection import ProjectionMode, held_parts, projection_modes
+from ..engines.pose.answers import sides_at
+from ..kernels.joints.loops import LOCKED
 from ..kernels.passes import plan as P
 from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
-from ..model import Model, model_of
+from ..machine.description.mechanism import Mechanism
+from ..machine.model import Model, model_of
 from ..options import Options
-from ..platform.answers import sides_at
-from ..poses import are_poses, made_exact
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of
 from .pass_options import PassOptions

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Records
-from ..decomposition.decompose import beyond_positions, decompose
-from ..decomposition.positions import BranchForm, express_trunk
-from ..derived import derived
-from ..description.graph import Step
-from ..description.mechanism import Mechanism
+from ..common.arrays import Floats, Ints, Records
+from ..common.derived import derived
 from ..errors import UnsupportedMechanism
 from ..kernels.passes import plan as P
+from ..machine.decomposition.decompose import beyond_positions, decompose
+from ..machine.decomposition.positions import BranchForm, express_trunk
+from ..machine.description.graph import Step
+from ..machine.description.mechanism import Mechanism
 
 
 @dataclass(frozen=True)

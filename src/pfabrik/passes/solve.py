@@ -8,15 +8,15 @@ from ..answers.pace import pace_of
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start
 from ..answers.tracked import Track
-from ..closure.engine_contract import InverseEngine
-from ..decomposition.decompose import positions_express
-from ..derived import derived
-from ..description.mechanism import Mechanism
-from ..engine import engine_of
+from ..common.derived import derived
+from ..engines.engine import engine_of
+from ..engines.joints.engine_contract import InverseEngine
+from ..engines.targets import Target
 from ..ik import solve_by
-from ..model import Model, model_of
+from ..machine.decomposition.decompose import positions_express
+from ..machine.description.mechanism import Mechanism
+from ..machine.model import Model, model_of
 from ..options import options_or
-from ..targets import Target
 from ..track import as_path, follow_by
 from .pass_options import PassOptions
 from .passes_engine import PassesEngine

@@ -14,13 +14,12 @@ from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
-from ..checks import require_count, require_ending, require_positive
-from ..drawing import SMALL
+from ..common.checks import require_count, require_ending, require_positive
+from ..common.drawing import SMALL
+from ..common.extras import require
+from ..common.telling import OnProgress, telling
+from ..common.whole_files import whole_path
 from ..errors import MissingLibrary
-from ..extras import require
-from ..skeleton import Skeleton, skeleton_of
-from ..telling import OnProgress, telling
-from ..whole_files import whole_path
 from .canvas import Size, canvas_on, checked_size, letters_in, usual_size
 from .eye import View
 from .looks import HELD, Look, Theme, look_of
@@ -28,6 +27,7 @@ from .machine import key_of, machine_eye
 from .painter import draw_machine
 from .plot_track import checked_track, places_along
 from .save_picture import FILMS
+from .skeleton import Skeleton, skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

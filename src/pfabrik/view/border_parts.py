@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..common.arrays import Floats, Ints
 
 if TYPE_CHECKING:
-    from ..workspace.region import Region
+    from ..capabilities.workspace.region import Region
 
 HALVINGS = 6
 """How often a segment is halved towards the point where one limit takes over from another."""

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from ..arrays import Floats
-from ..checks import require_method, require_positive
-from ..drawing import SMALL, new_figure, require_flat
+from ..common.arrays import Floats
+from ..common.checks import require_method, require_positive
+from ..common.drawing import SMALL, new_figure, require_flat
 from ..errors import InvalidArgument
 from .eye import Eye
 from .looks import Look, dress

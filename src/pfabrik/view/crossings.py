@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 
 ENDS = 0.01
 """Share of a line at both ends in which it crosses no other: there they are joined."""

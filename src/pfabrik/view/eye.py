@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from ..errors import InvalidArgument
 
 View: TypeAlias = Literal["top", "front", "side", "iso"] | tuple[float, float]

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..checks import require_method
-from ..drawing import SMALL, new_figure, require_flat
-from ..skeleton import Skeleton, skeleton_of
-from ..workspace.space import POSITIONS
-from ..workspace.workspace_table import for_people, in_words, labels
+from ..capabilities.workspace.space import POSITIONS
+from ..capabilities.workspace.workspace_table import for_people, in_words, labels
+from ..common.arrays import Floats, Ints
+from ..common.checks import require_method
+from ..common.drawing import SMALL, new_figure, require_flat
 from .canvas import LETTER, Size, checked_size, fit
 from .eye import Eye
 from .looks import Look, dress
 from .raster import Raster
+from .skeleton import Skeleton, skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..workspace.region import Region
+    from ..capabilities.workspace.region import Region
 
 TICKS, ROOM = 5, 26.0
 """Numbers of an axis at most, and the room of each along an edge in space [points]."""

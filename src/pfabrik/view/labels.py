@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
+from ..common.arrays import Floats
 from .canvas import Canvas
 
 DIRECTIONS = np.stack([np.cos(np.radians(range(0, 360, 30))), np.sin(np.radians(range(0, 360, 30)))], axis=1)

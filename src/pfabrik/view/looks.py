@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from ..checks import require_choice
-from ..description.joints import JointType
+from ..common.checks import require_choice
+from ..machine.description.joints import JointType
 
 EDGE = "#1a1a1a"
 HELD = "#d55e00"

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..answers.solution import Solution
-from ..checks import require_names
-from ..description.mechanism import Mechanism
-from ..drawing import SMALL
+from ..common.checks import require_names
+from ..common.drawing import SMALL
 from ..kinematics import plane_of
-from ..skeleton import Mark, Skeleton, checked_shown, skeleton_of
+from ..machine.description.mechanism import Mechanism
 from .canvas import LETTER, ON_TOP, Canvas, canvas_on, new_canvas
 from .eye import Eye, View, eye_for, eye_of, eye_on
 from .labels import place_names
 from .looks import HELD, Look, Theme, look_of
 from .painter import INK, draw_machine, marker_style
+from .skeleton import Mark, Skeleton, checked_shown, skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

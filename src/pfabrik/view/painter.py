@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..description.joints import JointType
-from ..skeleton import Line, Skeleton
+from ..common.arrays import Floats
+from ..machine.description.joints import JointType
 from ..tolerances import TOLERANCES
 from .canvas import Canvas
 from .crossings import cross, far_to_near
 from .eye import SAME
 from .looks import HELD, MARKERS, Look
+from .skeleton import Line, Skeleton
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

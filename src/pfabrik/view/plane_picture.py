@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..answers.words import limit_name
-from ..arrays import Floats
-from ..drawing import SMALL
-from ..skeleton import Skeleton
-from ..workspace.border import Group, group_of_limits, groups_of
-from ..workspace.space import POSITIONS
-from ..workspace.workspace_table import labels, shown
+from ..capabilities.workspace.border import Group, group_of_limits, groups_of
+from ..capabilities.workspace.space import POSITIONS
+from ..capabilities.workspace.workspace_table import labels, shown
+from ..common.arrays import Floats
+from ..common.drawing import SMALL
 from .border_parts import patches_of
 from .canvas import draw_title, number_axes
 from .frame import machine_of, title_of
 from .looks import Look
+from .skeleton import Skeleton
 from .slices import DASHED, area_of, loops_of, outline_of, stretches_of
 
 if TYPE_CHECKING:
-    from ..workspace.inscribed import Inscribed
-    from ..workspace.region import Region
+    from ..capabilities.workspace.inscribed import Inscribed
+    from ..capabilities.workspace.region import Region
 
 SHORTEST_NAMED = 0.08
 """Shortest stretch of a border that its limit is written beside, as a share of the picture's diagonal."""

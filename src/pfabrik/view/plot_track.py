@@ -11,17 +11,17 @@ from ..answers.margins import margins
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
-from ..arrays import Floats, Mask
-from ..checks import require_method, require_type
-from ..drawing import SMALL, new_figure
+from ..common.arrays import Floats, Mask
+from ..common.checks import require_method, require_type
+from ..common.drawing import SMALL, new_figure
 from ..errors import InvalidArgument, counted
 from ..kinematics import Readout, readouts
-from ..skeleton import skeleton_of
 from .canvas import Canvas, canvas_on, checked_size, wrapped
 from .eye import View
 from .looks import HELD, Look, Theme, dress, look_of
 from .machine import key_of, machine_eye
 from .painter import draw_machine
+from .skeleton import skeleton_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..answers.words import short_names
-from ..checks import require_method
-from ..drawing import SMALL, new_figure
+from ..common.checks import require_method
+from ..common.drawing import SMALL, new_figure
 from ..errors import InvalidArgument
 from ..travel import Reach, Travel
 from .canvas import LEAST_SIZE, TITLE, checked_size, round_length, wrapped

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints, Mask
+from ..common.arrays import Floats, Ints, Mask
 from .crossings import cross
 
 AT_ONCE = 2_000_000

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from ..checks import require_ending
-from ..whole_files import whole_path
+from ..common.checks import require_ending
+from ..common.whole_files import whole_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..drawing import SMALL, new_figure
-from ..workspace.parts import connected
-from ..workspace.singular import signed_at
-from ..workspace.surface import face_normals, sizes_of
-from ..workspace.workspace_table import for_people, labels
+from ..capabilities.workspace.parts import connected
+from ..capabilities.workspace.singular import signed_at
+from ..capabilities.workspace.surface import face_normals, sizes_of
+from ..capabilities.workspace.workspace_table import for_people, labels
+from ..common.arrays import Floats, Ints
+from ..common.drawing import SMALL, new_figure
 from .canvas import Size, checked_size, draw_title, wrapped
 from .eye import View, eye_of, upright
 from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit_bare
@@ -24,7 +24,7 @@ from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_o
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..workspace.singular import SingularityMap, SingularityTrack
+    from ..capabilities.workspace.singular import SingularityMap, SingularityTrack
 
 LINES = {
     "serial": ("#0072b2", "-"),

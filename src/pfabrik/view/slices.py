@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..drawing import SMALL
-from ..workspace.workspace_table import for_people, labels
+from ..capabilities.workspace.workspace_table import for_people, labels
+from ..common.arrays import Floats, Ints
+from ..common.drawing import SMALL
 from .frame import round_ticks
 from .looks import Look, dress
 
 if TYPE_CHECKING:
-    from ..workspace.inscribed import Inscribed
-    from ..workspace.region import Region
+    from ..capabilities.workspace.inscribed import Inscribed
+    from ..capabilities.workspace.region import Region
 
 BORDER, ROUND = 1.8, 96
 """Width of a border [points], and straight pieces of a circle."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats, Ints, Mask
-from ..workspace.surface import face_normals
+from ..capabilities.workspace.surface import face_normals
+from ..common.arrays import Floats, Ints, Mask
 from .eye import USUAL, Eye, best_of
 from .raster import (
     Raster,
@@ -22,7 +22,7 @@ from .raster import (
 )
 
 if TYPE_CHECKING:
-    from ..workspace.region import Region
+    from ..capabilities.workspace.region import Region
 
 ELEVATIONS = (20.0, 30.0, 40.0)
 """Elevations that are tried for a solid [deg]."""

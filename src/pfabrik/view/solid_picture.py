@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..answers.words import limit_name
-from ..arrays import Floats, Ints, Mask
-from ..drawing import SMALL, new_figure
-from ..workspace.border import Group, group_of_limits, groups_of
-from ..workspace.workspace_table import for_people
+from ..capabilities.workspace.border import Group, group_of_limits, groups_of
+from ..capabilities.workspace.workspace_table import for_people
+from ..common.arrays import Floats, Ints, Mask
+from ..common.drawing import SMALL, new_figure
 from .canvas import Size, checked_size, draw_key, draw_title, draw_triad
 from .eye import Eye, View, eye_of, upright
 from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit_bare, machine_lines, title_of
@@ -22,8 +22,8 @@ from .solid import PickedFaces, SeenSolid, best_eye, in_the_light, is_told_apart
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..workspace.inscribed import Inscribed
-    from ..workspace.region import Region
+    from ..capabilities.workspace.inscribed import Inscribed
+    from ..capabilities.workspace.region import Region
 
 ACROSS, ACROSS_BELOW = 760, 560
 """Pixels across a solid, and across the one from below: as many as 300 an inch on paper."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..drawing import SMALL
-from ..workspace.space import TURNS
-from ..workspace.workspace_table import for_people
+from ..capabilities.workspace.space import TURNS
+from ..capabilities.workspace.workspace_table import for_people
+from ..common.drawing import SMALL
 from .canvas import Size, draw_title
 from .eye import View
 from .frame import PLANE_SIZE, axes_for
@@ -17,8 +17,8 @@ from .solid_picture import plot_solid
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..workspace.inscribed import Inscribed
-    from ..workspace.region import Region
+    from ..capabilities.workspace.inscribed import Inscribed
+    from ..capabilities.workspace.region import Region
 
 
 def plot_workspace(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..legs.endings import turned
 from ..vectors import Vec, along, cross, dot, norm, put, scale, sub, vec

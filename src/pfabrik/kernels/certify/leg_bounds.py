@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import routine
 from ..legs.endings import turned, turned_back
 from ..legs.records import CARRIAGE, COSINE, CRANK, FROM_BASE, N_VALUES, Q_PROXIMAL, SINE

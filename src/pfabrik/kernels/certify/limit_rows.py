@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints, Record
+from ...common.arrays import Floats, Ints, Record
 from .._jit import routine
 from ..legs.records import (
     BASE_END,

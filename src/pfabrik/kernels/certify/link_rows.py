@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..clearance.capsules import between_segments
 from ..clearance.link_records import BASE, PLATFORM, LinkLimits

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, norm, put, scale, vec
 

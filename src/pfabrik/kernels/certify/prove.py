@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import opener, routine, search
 from ..clearance.link_records import NO_LINKS
 from ..legs.records import SAMPLE, SHARED, Table, open_table

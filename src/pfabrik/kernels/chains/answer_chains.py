@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import routine, search
 from ..legs.complete_poses import is_pose, orthonormalise
-from ..platform.answer_row import errors
-from ..platform.tables import BY_LEGS
+from ..pose.answer_row import errors
+from ..pose.tables import BY_LEGS
 from ..rows import (
     FAILED,
     HOLD,

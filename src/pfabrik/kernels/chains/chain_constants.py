@@ -59,7 +59,7 @@ HELD_WEIGHT = 100.0
 """Weight of the squares of held components in the Hessian, relative to the largest force: it changes nothing but the
 definiteness of the Hessian, which counts along held components alone."""
 
-# Multistart (`search_chain`, `pfabrik.chains`)
+# Multistart (`search_chain`, `pfabrik.engines.chains`)
 
 CLOSENESS = 1e-12
 """Error of held components that ends a search [L or rad]."""

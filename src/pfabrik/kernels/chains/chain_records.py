@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Records
+from ...common.arrays import Floats, Ints, Records
 from .._jit import opener
-from ..closure.linearise_loops import PoseGradient
-from ..closure.loops import BALL
-from ..platform.tables import QUESTION, Question
+from ..joints.linearise_loops import PoseGradient
+from ..joints.loops import BALL
+from ..pose.tables import QUESTION, Question
 from ..projecting import ATTEMPT, EFFORT, TALLY
 
 SEEDS = 512

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
-from ..closure.linearise_loops import turn_of_tilt, yaw_gradient
-from ..closure.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
+from ..joints.linearise_loops import turn_of_tilt, yaw_gradient
+from ..joints.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..linear import solve_spd
 from .chain_constants import HELD_WEIGHT
 from .chain_records import ChainScratch, SerialChain

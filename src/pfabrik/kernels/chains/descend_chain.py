@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
-from ..closure.loops import BASE_AXES, LOCKED, PoseObjective
+from ..joints.loops import BASE_AXES, LOCKED, PoseObjective
 from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
 from ..quaternions import difference

@@ -8,10 +8,10 @@ set to the bounds, and the others make up for it.
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
-from ..closure.linearise_loops import pose_gradient
-from ..closure.loops import PoseObjective
+from ..joints.linearise_loops import pose_gradient
+from ..joints.loops import PoseObjective
 from ..linear import solve_spd
 from .chain_constants import LONGEST_STEP, PATIENCE, PROGRESS, REACH_DAMPING, REACH_SWEEPS
 from .chain_records import ChainScratch, ChainState, SerialChain

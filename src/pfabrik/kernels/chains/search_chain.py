@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import routine
-from ..closure.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
+from ..joints.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..legs.complete_poses import turn_pose
-from ..platform.answer_row import errors
+from ..pose.answer_row import errors
 from ..projecting import brings_nearer, clear_tally, count_ending, is_agreed, is_spent, is_too_far, note_attempt
 from ..quaternions import difference
 from ..rows import HOLD_NOTHING

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import inlined, routine
-from ..closure.loops import BALL, SLIDE
+from ..joints.loops import BALL, SLIDE
 from ..quaternions import logarithm, rotate_by, turn_ball
 from .chain_constants import ALONG, CORRECTIONS, NEAR_CONE
 from .chain_records import ChainScratch, ChainState, SerialChain

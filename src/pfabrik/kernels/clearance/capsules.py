@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import inlined, kernel, routine
 from ..vectors import Vec, along, cross, dot, norm, put, scale, sub, vec
 from .distance_constants import PARALLEL

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import allocator, routine
 from ..vectors import Vec, along, cross, dot, flatten, norm, put, scale, sub, vec
 from .distance_constants import CLOSE, FLAT, MOST_SIMPLICES, MOST_STALLED, ROUNDING

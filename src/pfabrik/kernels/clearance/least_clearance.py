@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import routine, search
 from ..vectors import Vec, along, norm, put, scale, sub, vec
 from .capsules import between_axes, capsule_points, square_to_axes

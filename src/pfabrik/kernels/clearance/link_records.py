@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .convex import Polytope, new_polytope
 
 # The numbers of bodies that every engine knows; others are not negative.

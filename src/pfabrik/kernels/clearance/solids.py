@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, flatten, norm, scale, sub, vec
 from .distance_constants import ALONG_AXIS

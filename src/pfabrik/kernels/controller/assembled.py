@@ -5,23 +5,16 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import routine
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose
 from ..legs.records import Table
-from ..platform.equations import evaluate_legs
-from ..platform.forward import (
-    NewtonScratch,
-    assemble_from_others,
-    assemble_from_own,
-    load_start,
-    newton,
-    put_deviations,
-)
-from ..platform.nearest import is_other_mode
-from ..platform.pose_constants import ASSEMBLED, NEARLY_ASSEMBLED
-from ..platform.search_records import Starts
-from ..platform.starts import put_sides
+from ..pose.equations import evaluate_legs
+from ..pose.forward import NewtonScratch, assemble_from_others, assemble_from_own, load_start, newton, put_deviations
+from ..pose.nearest import is_other_mode
+from ..pose.pose_constants import ASSEMBLED, NEARLY_ASSEMBLED
+from ..pose.search_records import Starts
+from ..pose.starts import put_sides
 from ..rows import PENDING
 from ..vectors import copy_row
 from .reached import LEG, NO_ACTUATORS, NO_POSE, OTHER_MODE, Reaching, farthest_leg, rest_from, too_near

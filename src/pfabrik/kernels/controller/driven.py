@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import routine
 from ..dynamics.inverse_dynamics import put_efforts
 from ..dynamics.moving import FREE_PART, NOT_MADE, SINGULAR, Exerted, MovingMachine, MovingScratch

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..linear import solve_spd
 from ..quaternions import difference

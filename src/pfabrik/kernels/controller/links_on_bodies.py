@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import routine
 from ..clearance.convex import Polytope
 from ..clearance.least_clearance import clearance_within

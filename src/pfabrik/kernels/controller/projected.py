@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..legs.complete_poses import is_pose
-from ..platform.answer_row import answer_row
-from ..platform.search_records import PoseSolutions
-from ..platform.tables import AnswerScratch, Question, Start, Tables
+from ..pose.answer_row import answer_row
+from ..pose.search_records import PoseSolutions
+from ..pose.tables import AnswerScratch, Question, Start, Tables
 from ..rows import PROJECTED as IS_PROJECTED
 from ..rows import REACHED, UNSURE
 from ..vectors import copy_row, copy_table

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import routine
-from ..closure.first_order import subtract_projections
+from ..joints.first_order import subtract_projections
 from ..legs.answer import put_slopes
 from ..legs.frames import redundant_slope
 from ..legs.leg_constants import LEAST_MARGIN
 from ..legs.records import Table
 from ..legs.rods import put_proximal_slope
-from ..platform.equations import LegEvaluation, direction, has_proximal
-from ..platform.limits import coordinate_slope
+from ..pose.equations import LegEvaluation, direction, has_proximal
+from ..pose.limits import coordinate_slope
 from ..vectors import copy_row
 from .reached import LEG, Reaching, rest
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..legs.answer import Completion, complete_pose, deviation, place_legs, put_rows
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose, read_target, tilt_to, turn_pose
 from ..legs.frames import set_frames
 from ..legs.leg_constants import KEPT, LEAST_MARGIN
 from ..legs.records import Table
-from ..platform.equations import has_proximal, length_row
-from ..platform.limits import is_multiturn
-from ..platform.search_records import Starts
+from ..pose.equations import has_proximal, length_row
+from ..pose.limits import is_multiturn
+from ..pose.search_records import Starts
 from ..quaternions import difference
 from ..search_constants import NEARLY_CLOSED
 from ..vectors import along, angle_between, copy_row, copy_table, dot, norm, scale, vec, wrap

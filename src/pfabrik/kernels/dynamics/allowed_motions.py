@@ -8,7 +8,7 @@ What remains is a basis of all motions. The factors stay in place of what they e
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import inlined, routine
 from ..vectors import add, cross, vec
 from .moving import FROM, LEAST, MOTIONS, OF_END, ROWS, VISITS, MovingMachine, MovingScratch

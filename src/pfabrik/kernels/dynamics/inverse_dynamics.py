@@ -9,9 +9,9 @@ N_s' (A' (t + f) + h) = 0, with the loads f of rotors and friction and the work 
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine, search
-from ..closure.first_order import fill_map, orthogonalise_rows, orthonormalise_rows
+from ..joints.first_order import fill_map, orthogonalise_rows, orthonormalise_rows
 from ..vectors import Vec, copy_row, cross, dot, vec
 from .allowed_motions import add_share, close_gains, close_rates
 from .masses import (

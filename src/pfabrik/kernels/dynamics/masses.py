@@ -7,9 +7,9 @@ its centre at r, and inertia I about it, resists with the force f = m (g - a_r),
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import inlined, routine
-from ..closure.loops import BALL
+from ..joints.loops import BALL
 from ..vectors import Vec, add, along, cross, put, scale, sub, turn, vec
 from .moving import BASE, COLUMN, END, FIRST, FROM, KIND, PARENT, ROWS, TO, MovingMachine, MovingScratch
 from .placing import point_of

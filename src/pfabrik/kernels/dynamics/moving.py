@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import opener
 
 BASE, END = 0, 1

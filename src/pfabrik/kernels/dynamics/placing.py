@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints
+from ...common.arrays import Floats, Ints
 from .._jit import inlined, routine
-from ..closure.loops import BALL, SLIDE
-from ..closure.path_kinematics import turn_about
+from ..joints.loops import BALL, SLIDE
+from ..joints.path_kinematics import turn_about
 from ..quaternions import exponential
 from ..vectors import Vec, cross, dot, move, put, scale, sub, turn, vec
 from .moving import BASE, COLUMN, COORDINATE, END, FIRST, KIND, PARENT, SENSE, MovingMachine, MovingScratch

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine, search
 
 STILL = 1e-8

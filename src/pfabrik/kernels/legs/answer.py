@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Record, Records
+from ...common.arrays import Floats, Ints, Record, Records
 from .._jit import allocator, flattened, routine
 from ..linear import solve_spd
 from ..quaternions import yaw_of

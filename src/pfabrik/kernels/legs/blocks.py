@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Record
+from ...common.arrays import Floats, Ints, Record
 from .._jit import inlined, kernel, routine
 from ..rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL
 from ..search_constants import CLOSED, NEARLY_CLOSED

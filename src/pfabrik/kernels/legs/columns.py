@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import inlined, routine
 from ..vectors import Vec, cross, dot, scale, sub, vec
 from .complete_poses import orthonormalise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Ints, Record
+from ...common.arrays import Floats, Ints, Record
 from .._jit import routine, search
 from ..quaternions import UPSIDE_DOWN, turn_about_z, yaw_of
 from ..vectors import Vec, cross, dot, norm, scale, turn, vec

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..vectors import Vec, along, angle_between, cross, dot, scale, where
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Record, Records
+from ...common.arrays import Floats, Ints, Record, Records
 from .._jit import routine, search
 from ..quaternions import difference, turn_about_z, yaw_difference
 from ..search_constants import NEARLY_CLOSED

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Floats, Record, Records
+from ...common.arrays import Floats, Record, Records
 from .._jit import allocator, routine
 from ..vectors import Vec, add, cross, dot, move, put, scale, sub, turn, vec
 from .endings import solve_angle, turned

@@ -5,7 +5,7 @@ A rod, a pivot and a redundant joint are a file each (`rods`, `pivots`, `frames`
 
 from __future__ import annotations
 
-from ...arrays import Floats, Records
+from ...common.arrays import Floats, Records
 from .._jit import routine
 from .frames import place_redundant, q_redundant_of
 from .pivots import pivot_rows, pivot_slopes, place_pivot

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Record, Records
+from ...common.arrays import Floats, Ints, Record, Records
 from .._jit import kernel, routine
 from ..search_constants import CLOSED, NEARLY_CLOSED
 from .blocks import counting_range, fill_rod, fill_sides, project_on_cone_axis, wrap_between

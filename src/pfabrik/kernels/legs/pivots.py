@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, cross, dot, move, put, sub, turn, vec, where
 from .endings import angle_to, spin_angle, turned, universal_angles

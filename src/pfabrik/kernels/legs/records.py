@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Ints, Records
+from ...common.arrays import Ints, Records
 from .._jit import opener
 
 # Kinds of legs. An idle leg does not constrain a platform that cannot turn.

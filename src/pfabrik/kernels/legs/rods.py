@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec, where, wrap
 from .endings import aimed_axis, angle_to, parts_about, solve_angle, turned, turned_back, universal_angles

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..quaternions import difference

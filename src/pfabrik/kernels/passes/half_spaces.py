@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Records
+from ...common.arrays import Floats, Records
 from .._jit import allocator, routine
 from ..qp import QP, new_qp, solve_with_equations
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, put, scale, sub, turn, vec

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record
+from ...common.arrays import Floats, Record
 from .._jit import routine
 from ..vectors import Vec, add, along, cross, dot, move, norm, put, scale, sub, turn, vec
 from .pass_constants import BRACKETS, GOLDEN, NO_LENGTH, SECTIONS

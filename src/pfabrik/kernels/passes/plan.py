@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats, Ints, Records
+from ...common.arrays import Floats, Ints, Records
 from .._jit import allocator, routine
 from ..legs.complete_poses import turn_pose
 from ..vectors import Vec, add, along, copy_row, copy_table, move, put, rotate, scale, sub, turn, vec

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Floats, Record, Records
+from ...common.arrays import Floats, Record, Records
 from .._jit import inlined, routine
 from ..legs.complete_poses import orthonormalise, turn_pose
 from ..linear import solve_spd

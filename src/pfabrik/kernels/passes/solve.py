@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...arrays import Floats
+from ...common.arrays import Floats
 from .._jit import routine, search
 from ..vectors import copy_row, copy_table
 from .accelerated import project_by_half_spaces

@@ -10,14 +10,14 @@ import numpy as np
 from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.tracked import Track
-from ...arrays import Floats
-from ...description.mechanism import Mechanism
-from ...drawn_parts import free_axes
+from ...common.arrays import Floats
+from ...common.rotations import from_quaternion
 from ...kinematics import plane_of
-from ...rotations import from_quaternion
-from ...skeleton import checked_shown, skeleton_of
+from ...machine.description.mechanism import Mechanism
+from ..drawn_parts import free_axes
 from ..eye import VIEWS, Eye, eye_on
 from ..plot_track import checked_track
+from ..skeleton import checked_shown, skeleton_of
 from .panel import Actions, Panel
 from .scene import MACHINE, Patch, Scene, quaternion
 from .session import Session

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...answers.solution import Solution
-from ...arrays import Floats
-from ...description.mechanism import Mechanism
-from ...drawn_parts import free_axes
+from ...common.arrays import Floats
 from ...errors import counted
 from ...kinematics import Readout, readout, readouts
+from ...machine.description.mechanism import Mechanism
+from ..drawn_parts import free_axes
 from ..eye import VIEWS
 from .panel_html import legend_html, margins_html, note_html, page_html, pose_html, singular_html, status_html
 from .scene import Patch

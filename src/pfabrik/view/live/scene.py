@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from ...answers.solution import Solution
 from ...answers.tracked import Track
-from ...arrays import Floats
-from ...clearance.clearance import clearance
-from ...clearance.solid_meshes import SolidMesh
-from ...description.mechanism import Mechanism
-from ...drawn_parts import Part, role_of
+from ...capabilities.clearance.clearance import clearance
+from ...capabilities.clearance.solid_meshes import SolidMesh
+from ...common.arrays import Floats
+from ...common.rotations import shortest_turns, to_quaternion, to_rotvec
 from ...kinematics import links_of
-from ...rotations import shortest_turns, to_quaternion, to_rotvec
-from ...skeleton import Mark, Skeleton, skeleton_of
+from ...machine.description.mechanism import Mechanism
+from ..drawn_parts import Part, role_of
 from ..looks import ACHIEVED, ASKED, EDGE, HELD, rgb
+from ..skeleton import Mark, Skeleton, skeleton_of
 
 if TYPE_CHECKING:
     import viser

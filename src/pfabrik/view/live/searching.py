@@ -10,14 +10,14 @@ import numpy as np
 
 from ...answers.solution import Solution
 from ...answers.words import by_bound, exceeded
-from ...arrays import Floats, Ints
-from ...description.mechanism import Mechanism
-from ...drawn_parts import free_axes
+from ...capabilities.modes.assembly import assembly_modes
+from ...capabilities.modes.working import working_modes
+from ...capabilities.workspace.space import POSITIONS
+from ...common.arrays import Floats, Ints
+from ...common.telling import OnProgress
 from ...kinematics import plane_of
-from ...modes.assembly import assembly_modes
-from ...modes.working import working_modes
-from ...telling import OnProgress
-from ...workspace.space import POSITIONS
+from ...machine.description.mechanism import Mechanism
+from ..drawn_parts import free_axes
 from ..looks import SINGULAR
 from .live_machine import LiveMachine
 from .panel import FAR, LOCUS, WORKSPACE
@@ -25,7 +25,7 @@ from .scene import Patch
 from .workers import Newest
 
 if TYPE_CHECKING:
-    from ...workspace.result import Workspace
+    from ...capabilities.workspace.result import Workspace
 
 
 class _Unwanted(Exception):
@@ -86,8 +86,8 @@ class Searches:
 
     def _find_borders(self, machine: LiveMachine, start: Solution) -> None:
         """Find the borders that are wanted, one after the other: singularities are looked for in a workspace."""
-        from ...workspace.ask import workspace
-        from ...workspace.workspace_table import in_words
+        from ...capabilities.workspace.ask import workspace
+        from ...capabilities.workspace.workspace_table import in_words
 
         both = WORKSPACE, LOCUS
         if not self._is_wanted(machine, both):
@@ -149,7 +149,7 @@ def border_of(space: Workspace, start: Solution, _: object) -> tuple[list[Patch]
 
     Coordinates that it does not span are as at the start. One over angles has no place in the scene.
     """
-    from ...workspace.border import groups_of
+    from ...capabilities.workspace.border import groups_of
 
     corners, limits = _in_the_scene(space, start, space.vertices, space.faces), np.asarray(space.face_limit)
     if corners is None:
@@ -162,7 +162,7 @@ def border_of(space: Workspace, start: Solution, _: object) -> tuple[list[Patch]
 
 def locus_of(space: Workspace, start: Solution, on_progress: OnProgress) -> tuple[list[Patch], str]:
     """Where the parallel measure changes its sign in a workspace, and a remark."""
-    from ...workspace.singular import singularity_map
+    from ...capabilities.workspace.singular import singularity_map
 
     if not set(space.names) <= set(POSITIONS):
         return [], f"singularities over {', '.join(space.names)} have no place in the scene"

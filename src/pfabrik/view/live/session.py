@@ -10,14 +10,14 @@ import numpy as np
 from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.words import as_sentence
-from ...arrays import Floats
+from ...common.arrays import Floats
+from ...common.poses import pose
+from ...common.rotations import to_rpy
 from ...configuration import configuration
-from ...description.mechanism import Mechanism
 from ...fk import solve_fk
 from ...ik import solve_ik
 from ...kinematics import JointPath, home_coordinates, joint_path, passive_series
-from ...poses import pose
-from ...rotations import to_rpy
+from ...machine.description.mechanism import Mechanism
 from .distances import Nearness, nearness, side_of
 
 DIGITS = 9

@@ -17,15 +17,15 @@ import numpy as np
 import rich
 
 from ...answers.solution import Solution, checked_solution
-from ...arrays import Floats
-from ...checks import require_count, require_ending
+from ...common.arrays import Floats
+from ...common.checks import require_count, require_ending
+from ...common.extras import require
+from ...common.whole_files import whole_path
 from ...configuration import configuration
-from ...description.mechanism import Mechanism
 from ...errors import InvalidArgument, PfabrikError
-from ...extras import require
-from ...files import load
 from ...first_answers import prepare
-from ...whole_files import whole_path
+from ...machine.description.mechanism import Mechanism
+from ...machine.files import load
 from .live_machine import LiveMachine, Shown, checked, keep_in_view
 from .panel import Actions
 from .searching import Searches

@@ -1,0 +1,1 @@
+"""What is asked of a machine beyond its kinematics, on the verbs and `pfabrik.kinematics` alone."""

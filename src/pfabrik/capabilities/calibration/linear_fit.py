@@ -1,0 +1,158 @@
+"""A least-squares problem at its solution: determined directions, deviations, and measurements that do not fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...common.arrays import Floats, Ints, Mask
+
+RANK = 1e-8
+"""Singular value, as a share of the largest, up to which a direction of parameters leaves measurements unchanged:
+derivatives are exact to 1e-10, and what decides, at 1e-5 and above, is far from it."""
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """A least-squares problem at its solution.
+
+    Attributes
+    ----------
+    jacobian : of the residuals in standard deviations by parameters in their scales, (m, p).
+    residual : (m,), in standard deviations, or as lengths where none are given.
+    groups : the measurement of every residual, (m,).
+    has_sigma : True if standard deviations are given.
+    """
+
+    jacobian: Floats
+    residual: Floats
+    groups: Ints
+    has_sigma: bool
+
+    @cached_property
+    def _decomposed(self) -> tuple[Floats, Floats, Floats]:
+        return decomposed(self.jacobian)
+
+    @cached_property
+    def rank(self) -> int:
+        _, values, _ = self._decomposed
+        return int((values > RANK * values.max(initial=0.0)).sum())
+
+    @cached_property
+    def open_directions(self) -> Floats:
+        """Orthonormal directions (k, p) of scaled parameters that change no measurement."""
+        return self._decomposed[2][self.rank :]
+
+    @cached_property
+    def variance(self) -> float:
+        """Variance of a residual: what is left over, and no less than 1 if deviations are given.
+
+        Where nothing is left over it is not known: infinite, but for deviations that are given.
+        """
+        left_over = float(self.residual @ self.residual) / self.spare if self.spare else np.inf
+        if self.has_sigma:
+            return max(1.0, left_over) if self.spare else 1.0
+        return left_over
+
+    @cached_property
+    def spare(self) -> int:
+        """Number of residuals beyond what is determined by them; what has no weight does not count."""
+        return int((self.jacobian.any(axis=1) | (self.residual != 0.0)).sum()) - self.rank
+
+    @cached_property
+    def cofactors(self) -> Floats:
+        """Covariance of the scaled parameters, (p, p), within the directions that are determined, by the variance."""
+        _, values, right = self._decomposed
+        kept = right[: self.rank] / values[: self.rank, None]
+        return np.asarray(kept.T @ kept)
+
+    def spreads(self, kept: Mask) -> Floats:
+        """Deviations (k,) of some of the scaled parameters beside which the others are held, by the variance.
+
+        Infinite where some direction of them changes no measurement.
+        """
+        _, values, right = self._decomposed
+        _, sizes, turned = decomposed((values[:, None] * right[: len(values)])[:, kept])
+        if len(sizes) < kept.sum() or sizes.min(initial=np.inf) <= RANK * values.max(initial=0.0):
+            return np.full(int(kept.sum()), np.inf)
+        return np.asarray(np.sqrt(((turned / sizes[:, None]) ** 2).sum(axis=0)))
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Of the scaled parameters, (p, p), within the directions that are determined."""
+        if np.isinf(self.variance):
+            return np.where(self.cofactors == 0.0, 0.0, np.copysign(np.inf, self.cofactors))
+        return np.asarray(self.cofactors * self.variance)
+
+    def by_held(self, jacobian: Floats, expected: float) -> Floats:
+        """Covariance (p, p) of scaled parameters by what those that are held may be off.
+
+        If they are off by h, the others are off by S h, with S = -J⁺ J_h. Of h two things are known: it is about 0,
+        within e, and what it leaves of the residual r, of variance v. So the mean of h h^T is V + d d^T, with
+        R = J_h + J S, V = (R^T R / v + 1 / e²)^-1 and d = -V R^T r / v.
+
+        Parameters
+        ----------
+        jacobian : (m, p), with the parameters that are held, whose columns are 0 in that of this fit.
+        expected : e, deviation of scaled parameters that are held from what they are held at.
+        """
+        held = jacobian.any(axis=0) & ~self.jacobian.any(axis=0)
+        left, values, right = self._decomposed
+        across = left[:, : self.rank].T @ jacobian[:, held]
+        moved = -(right[: self.rank] / values[: self.rank, None]).T @ across
+        rest = jacobian[:, held] - left[:, : self.rank] @ across
+        information = rest.T @ rest / self.variance + np.eye(int(held.sum())) / expected**2
+        spread = np.linalg.inv(information)
+        shift = spread @ (rest.T @ self.residual) / self.variance
+        return np.asarray(moved @ (spread + np.outer(shift, shift)) @ moved.T)
+
+    def left_out(self) -> tuple[Ints, Floats, Floats]:
+        """Measurements, and the root mean square residual of each from what the others predict, also studentised."""
+        left = self._decomposed[0][:, : self.rank]
+        numbers = np.unique(self.groups)
+        raw, student = np.full(len(numbers), np.nan), np.full(len(numbers), np.nan)
+        total = float(self.residual @ self.residual)
+        for k, number in enumerate(numbers):
+            rows = np.flatnonzero(self.groups == number)
+            room = np.eye(len(rows)) - left[rows] @ left[rows].T
+            values, vectors = np.linalg.eigh(room)
+            seen = values > 1e-9
+            if not seen.any():
+                continue
+            parts = vectors[:, seen].T @ self.residual[rows]
+            predicted = vectors[:, seen] @ (parts / values[seen])
+            raw[k] = float(np.sqrt(np.mean(predicted**2)))
+            explained = float(parts @ (parts / values[seen]))
+            others = self.spare - int(seen.sum())
+            scale = 1.0 if self.has_sigma else (total - explained) / others if others > 0 else float("nan")
+            if scale > 0.0:
+                student[k] = float(np.sqrt(explained / seen.sum() / scale))
+        return numbers, raw, student
+
+
+def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
+    """The singular value decomposition of a matrix (m, p): (m, k), (k,), and all (p, p) on the right.
+
+    By routines that leave matrices of this size to one thread: those of a BLAS wait for each other longer than they
+    compute.
+    """
+    from scipy.linalg import svd
+
+    turned, triangle = _by_triangles(matrix)
+    left, values, right = svd(triangle, lapack_driver="gesvd")
+    return np.einsum("mk,kr->mr", turned, left), values, right
+
+
+def _by_triangles(matrix: Floats) -> tuple[Floats, Floats]:
+    """Q (m, k) and R (k, p) of a matrix (m, p), by pieces twice as high as wide."""
+    m, p = matrix.shape
+    if m <= 2 * p:
+        turned, triangle = np.linalg.qr(matrix)
+        return turned, triangle
+    pieces = np.zeros((-(-m // (2 * p)), 2 * p, p))
+    pieces.reshape(-1, p)[:m] = matrix
+    turned, triangles = np.linalg.qr(pieces)
+    before, triangle = _by_triangles(triangles.reshape(-1, p))
+    return (turned @ before.reshape(-1, p, before.shape[1])).reshape(-1, before.shape[1])[:m], triangle

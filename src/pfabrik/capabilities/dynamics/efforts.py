@@ -1,0 +1,199 @@
+"""What actuators exert, and joints transmit, in motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TextIO
+
+import numpy as np
+
+from ...common.arrays import Floats, Mask, as_plain, shaped
+from ...common.cells import CsvWriter
+from ...common.drawing import curves_over_time
+from ...common.frozen import FrozenMapping
+from ...common.printed import Printed, ResultTable, plain
+from ...common.whole_files import whole_path
+from ...errors import InvalidArgument, counted
+from ...kinematics import readouts
+from ...machine.description.mechanism import Mechanism
+from ..statics.joint_balance import open_in_words
+from ..statics.loads import Reasons, reasons_in_words
+from .drives import Drives, drives_of
+from .moving_rows import MovingRows
+from .transmitted import transmitted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Efforts(Printed):
+    """What actuators exert in motion, as `inverse_dynamics` returns it.
+
+    Attributes
+    ----------
+    actuators : array (..., n_a)
+        Force or torque that each actuator exerts on its coordinate, rotor and friction included [N, N m]: positive
+        drives it up. NaN where `reason` says why.
+    rates, accelerations : array (..., n_a)
+        Those of the actuators [length or rad, per s and per s²].
+    at_rest : array of bool (..., n_a)
+        True for actuators that stand still, to rounding: dry friction counts as 0 there, and may be anything up to its
+        size.
+    power : array (..., n_a)
+        What each actuator gives to the machine, negative where it brakes [W].
+    times : array (n,) or None
+        Times of the rows of a path [s]; None for others.
+    energy : array (n,) or None
+        What all actuators have given since the first row [J]; None without times.
+    is_least_norm : bool
+        True if there are more actuators than motions that they control: of all forces that make the motion, those with
+        the least sum of squares are given, torques compared with forces times L: within `max_torque` where any are.
+    reason : str or array of str (...)
+        Why there are no such forces; empty where there are. A text for a single answer.
+    """
+
+    actuators: Floats
+    rates: Floats
+    accelerations: Floats
+    at_rest: Mask
+    times: Floats | None
+    is_least_norm: bool
+    reason: str | Reasons
+    _rows: MovingRows = field(repr=False)
+
+    @property
+    def _mechanism(self) -> Mechanism:
+        return self._rows.solution.mechanism
+
+    @property
+    def _drives(self) -> Drives:
+        return drives_of(self._mechanism)
+
+    @cached_property
+    def _transmitted(self) -> tuple[Floats, Mask]:
+        return transmitted(self._rows, np.reshape(self.actuators, (-1, len(self._mechanism.actuator_names))))
+
+    @cached_property
+    def power(self) -> Floats:
+        """See the attributes."""
+        return np.asarray(self.actuators * self.rates * self._drives.si)
+
+    @cached_property
+    def energy(self) -> Floats | None:
+        """See the attributes."""
+        if self.times is None:
+            return None
+        power = self.power.sum(axis=-1)
+        return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(self.times))])
+
+    @cached_property
+    def reactions(self) -> FrozenMapping[str, Floats]:
+        """Joint -> force and moment that its first body exerts on its second, (..., 6) [N, N m], in the base frame.
+
+        Moments are about the points that `Forces.reactions` has. NaN where `reason` says why, and where `undetermined`
+        does.
+        """
+        joints, shape = enumerate(self._mechanism.joints), self._rows.solution.shape
+        return FrozenMapping({joint.name: shaped(self._transmitted[0][:, place], shape) for place, joint in joints})
+
+    @property
+    def undetermined(self) -> str:
+        """Which of the reactions the motion does not determine, in words; empty if it determines all."""
+        return open_in_words(self._mechanism, self._transmitted[1])
+
+    def table(self) -> ResultTable:
+        """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""
+        lines, units = reasons_in_words(self.reason, "no forces"), self._drives.forces
+        exerted, power, rates = (np.reshape(x, (-1, len(units))) for x in (self.actuators, self.power, self.rates))
+        known = np.flatnonzero(~np.isnan(exerted).any(axis=1))
+        if not len(known):
+            return ResultTable(self._mechanism.name, lines or ["no row"])
+        single, limits, rows = np.ndim(self.actuators) == 1, self._drives.limits, []
+        header = ["actuator", *(["exerts"] if single else ["largest", "rms"]), "unit", "power [W]", "rate"]
+        weights = np.ones(len(known)) if self.times is None or len(known) < 2 else np.gradient(self.times[known])
+        for place, each in enumerate(readouts(self._mechanism)):
+            own, gives = exerted[known, place], power[known, place]
+            moves, most = each.display(rates[known, place]), float(np.abs(own).max())
+            cells = [each.name, plain(_largest(own), 1e-9 * np.abs(exerted[known]).max())]
+            cells += [] if single else [f"{np.sqrt(weights @ own**2 / weights.sum()):.6g}"]
+            cells += [units[place], f"{_largest(gives):.6g}", f"{_largest(moves):.6g} {each.unit}/s"]
+            if np.isfinite(limits).any():
+                cells.append(f"{most / limits[place]:.0%}" if np.isfinite(limits[place]) else "-")
+            rows.append(cells)
+        if np.isfinite(limits).any():
+            header.append("of its limit")
+        remarks = self._resting
+        if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
+            remarks.append(f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s")
+        return ResultTable(self._mechanism.name, lines, header, rows, remarks)
+
+    @property
+    def _resting(self) -> list[str]:
+        """What dry friction at rest may be, a sentence if there is any."""
+        names, units, dry = self._mechanism.actuator_names, self._drives.forces, self._drives.friction[:, 0]
+        counts = np.reshape(self.at_rest, (-1, len(names))).sum(axis=0)
+        where: dict[str, list[str]] = {}
+        for place in np.flatnonzero((counts > 0) & (dry > 0.0)):
+            rows = "" if np.ndim(self.actuators) == 1 else f", in {counted(int(counts[place]), 'row')}"
+            where.setdefault(f"{dry[place]:.6g} {units[place]}{rows}", []).append(names[place])
+        most = "; ".join(f"{', '.join(actuators)} ({size})" for size, actuators in where.items())
+        return [f"at rest dry friction counts as 0, and may be up to its size either way: {most}"] * bool(where)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its fields, with power and energy, as plain numbers, lists and texts, ready for JSON."""
+        return {**super().to_dict(), "power": as_plain(self.power), "energy": as_plain(self.energy)}
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write a row for each time: what actuators exert [N m, N], their rates [deg/s, length/s] and power [W], the
+        energy given so far [J], and why there are no forces, where there are none.
+
+        The file appears whole or not at all.
+
+        Raises
+        ------
+        InvalidArgument
+            Configurations that are no path with times.
+        """
+        self._require_times()
+        with whole_path(path) as part, part.open("w", newline="", encoding="utf-8") as handle:
+            self.write(handle)
+
+    def write(self, handle: TextIO) -> None:
+        """Write the columns of `to_csv` to an open file."""
+        times, shown = self._require_times(), readouts(self._mechanism)
+        rates = [each.display(column) for each, column in zip(shown, self.rates.T, strict=True)]
+        numbers = np.column_stack([times, self.actuators, *rates, self.power, np.asarray(self.energy)])
+        writer = CsvWriter(handle)
+        header = [f"effort_{each.name}" for each in shown]
+        header += [f"rate_{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
+        writer.writerow(["t", *header, *(f"power_{each.name}" for each in shown), "energy", "reason"])
+        for row, reason in zip((numbers + 0.0).tolist(), self.reason, strict=True):
+            writer.writerow([*row, reason])
+
+    def _require_times(self) -> Floats:
+        if self.times is None:
+            raise InvalidArgument("efforts", "no path with times", "those of a `track` with times, or of `time_path`")
+        return self.times
+
+    def plot(self) -> Figure:
+        """Forces, speeds and power of the actuators over time, one curve each; a Matplotlib figure.
+
+        Raises
+        ------
+        InvalidArgument
+            Configurations that are no path with times.
+        """
+        times, shown = self._require_times(), readouts(self._mechanism)
+        rates = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
+        forces, units = sorted(set(self._drives.forces)), sorted({f"{each.unit}/s" for each in shown})
+        labels = f"exerts [{', '.join(forces)}]", f"rate [{', '.join(units)}]", "power [W]"
+        panels = dict(zip(labels, (self.actuators, rates, self.power), strict=True))
+        return curves_over_time(times, [each.name for each in shown], panels)
+
+
+def _largest(values: Floats) -> float:
+    """The value of the largest magnitude."""
+    return float(values[np.abs(values).argmax()]) + 0.0

@@ -1,0 +1,238 @@
+"""`time_path`: the fastest timing of a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...answers.solution import Solution
+from ...answers.tracked import Track, refuse_leaps
+from ...common.arrays import Floats
+from ...common.checks import put_limits, require_positive, require_type
+from ...errors import InvalidArgument
+from ...fk import solve_fk
+from ...kernels.timing import acceleration_shares, fastest, speed_shares
+from ...kinematics import actuator_units, readouts
+from ...machine.description.mechanism import Mechanism
+from ...tolerances import TOLERANCES
+from ..dynamics.moving_rows import MovingRows
+from ..dynamics.weights import lacking_masses, weights_of
+from ..statics.forces import GRAVITY
+from ..statics.loads import BodyLoads, checked_gravity
+from .curve import Curve, curve_of, refuse_crossings
+from .exceeded import Limits, Timing, exceeded, motion_at, with_exact_torques
+from .timed import Timed
+from .torque_path import TorqueParts, TorquePath, TorqueSource
+
+MOST_SAMPLES = 10_000_000
+
+TORQUE_PLACES = 400
+"""Places of a path, at least, between which torques are a spline."""
+
+ROUNDS = 8
+"""Largest number of passes that slow down cells of the grid in which an acceleration exceeds its limit; usually three
+suffice."""
+
+
+def time_path(
+    track: Track,
+    *,
+    speed: float | Mapping[str, float] | None = None,
+    acceleration: float | Mapping[str, float] | None = None,
+    platform_speed: float | None = None,
+    torque: float | Mapping[str, float] | None = None,
+    loads: BodyLoads | None = None,
+    gravity: ArrayLike = GRAVITY,
+    rate: float = 1000.0,
+) -> Timed:
+    """The fastest timing of a path that was followed, from rest to rest, within the limits of every actuator.
+
+    Between its steps the path is the cubic spline of the actuators through them, so that corners of a path are rounded
+    off within a step: follow it in steps as short as it is to be exact. On that path no other timing is faster, but for
+    the grid it is computed on. Where no acceleration is limited, it starts and ends at full speed.
+
+    Parameters
+    ----------
+    track : Track
+        A path, all of its steps reached, without jumps.
+    speed, acceleration : float or mapping of str to float, optional
+        Highest values of the actuators, by name or the same for all [length or rad, per s and per s^2]; those not named
+        have the limits of their joints, `max_speed` and `max_acceleration`.
+    platform_speed : float, optional
+        Highest speed of the reference point [length/s].
+    torque : float or mapping of str to float, optional
+        The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
+        `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
+        are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline. Redundant
+        actuators share what they do in any way that keeps their limits: at these are several at once. What the timing
+        exceeds is in `exceeded`.
+    loads : mapping of str to tuple, optional
+        For torques, as in `inverse_dynamics`.
+    gravity : array (3,), optional
+        For torques, likewise [m/s²].
+    rate : float, optional
+        Rate of the samples that are returned [1/s].
+
+    Raises
+    ------
+    InvalidArgument
+        A track with steps that were not reached, leap, cross a parallel singularity, or between which the spline leaves
+        a range, by the number of the step; one that does not move; no limit at all; more than ten million samples. With
+        limits of torque, bodies without a mass, and limits that are exceeded at rest.
+    UnsupportedMechanism
+        Limits of torque of a machine with so many redundant actuators that what they do together has over 500 limits.
+    """
+    require_type("track", track, Track, "a Track, as `track` returns")
+    mechanism = track.mechanism
+    speeds = limits_of(mechanism, "speed", speed)
+    accelerations = limits_of(mechanism, "acceleration", acceleration)
+    torques = limits_of(mechanism, "torque", torque)
+    if torque is None and lacking_masses(mechanism):
+        torques[:] = np.inf
+    most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
+    every = 1.0 / require_positive("rate", rate)
+    if not np.isfinite([*speeds, *accelerations, *torques, most_platform]).any():
+        found = f"'{mechanism.name}' without max_speed and max_acceleration"
+        raise InvalidArgument(
+            "speed", found, "a limit of speed, acceleration, torque or platform speed, given or in the mechanism"
+        )
+    if not len(track):
+        raise InvalidArgument("track", "an empty path", "two steps or more that differ")
+    refuse_leaps(track)
+    curve = curve_of(track)
+    if len(curve.s) < 2:
+        raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
+    refuse_crossings(track)
+    refuse_swings(track, curve)
+    limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
+    timing = _fastest(curve, limits)
+    return _sampled(track, curve, timing, with_exact_torques(curve, timing, limits), every)
+
+
+def _torques(
+    track: Track, curve: Curve, limits: Floats, loads: BodyLoads | None, gravity: ArrayLike
+) -> TorquePath | None:
+    """The torques along a path; None where none is limited."""
+    if not np.isfinite(limits).any():
+        return None
+    mechanism, n = track.mechanism, curve.n_actuators
+    weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
+
+    def rows_at(s: Floats) -> MovingRows:
+        values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
+        if np.array_equal(s, curve.s):
+            solution: Solution = track[curve.steps]
+        else:
+            solution = solve_fk(mechanism, values, start=track[curve.step_of(s)])
+        return MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
+
+    source = TorqueSource(mechanism, rows_at, curve.step_of)
+    return TorquePath(limits, source, curve.grid(TORQUE_PLACES, 1))
+
+
+def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
+    """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
+    limits = np.array([drive.said(f"max_{what}") or np.inf for drive in mechanism.drives])
+    put_limits(limits, what, given, mechanism.actuator_names)
+    return limits
+
+
+def refuse_swings(track: Track, curve: Curve) -> None:
+    """Refuse a track whose spline, which swings out where steps bend, leaves the range of an actuator between steps."""
+    s, mechanism = curve.grid(), track.mechanism
+    low, high = np.array([drive.limits for drive in mechanism.drives]).T
+    values = curve.at(s)[:, : curve.n_actuators]
+    beyond, units = np.maximum(low - values, values - high), actuator_units(mechanism)
+    over = beyond > TOLERANCES.active * units
+    if over.any():
+        place = int(np.argmax((beyond / units).max(axis=0)))
+        shown = readouts(mechanism)[place]
+        far = float(shown.display(beyond[:, place].max(keepdims=True))[0])
+        found = f"a path that swings {far:.3g} {shown.unit} beyond the range of '{shown.name}' between its steps"
+        steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
+        raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
+
+
+def _fastest(curve: Curve, limits: Limits) -> Timing:
+    """The largest squared speeds on a grid along s."""
+    s = curve.grid()
+    slopes, bends = curve.at(s, 1), curve.at(s, 2)
+    n, shares = curve.n_actuators, np.empty(len(s) - 1)
+    speed_shares(s, slopes, bends, limits.speeds, limits.platform, shares)
+    with np.errstate(divide="ignore"):
+        caps = 1.0 / shares**2
+    caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
+    caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
+    by_push, by_speed, most = slopes, bends, np.tile(limits.accelerations, (len(s), 1))
+    rest = viscous = np.zeros(most.shape)
+    if limits.path is not None:
+        parts, limited = limits.path.at(s, slopes[:, :n], bends[:, :n]), np.isfinite(limits.accelerations).nonzero()[0]
+        by_push, by_speed = _beside(slopes[:, limited], parts.by_push), _beside(bends[:, limited], parts.by_speed)
+        rest, viscous = _beside(rest[:, limited], parts.rest), _beside(viscous[:, limited], parts.viscous)
+        most = _beside(most[:, limited], parts.most)
+        _refuse_heavy(curve, s, parts, limits.path)
+    x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
+    for _ in range(ROUNDS):
+        fastest(s, by_push, by_speed, most, held, caps, at_rest, x)
+        acceleration_shares(s, x, slopes, bends, limits.accelerations, shares)
+        before, held = held, rest + viscous * np.sqrt(x)[:, None]
+        drag = np.abs(held - before) > TOLERANCES.speed * most
+        if shares.max() <= 1.0 + TOLERANCES.speed and not drag.any():
+            break
+        slower = np.where(shares > 1.0, shares, 0.0) ** 2
+        slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
+        caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
+    timing = Timing(s, x / max(1.0, shares.max()))
+    stuck = timing.speeds[1:] + timing.speeds[:-1] <= 0.0
+    if stuck.any():
+        rows = curve.step_of(s[:-1][stuck])[:5].tolist()
+        raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=rows)
+    return timing
+
+
+def _beside(one: Floats, other: Floats) -> Floats:
+    """Columns of two arrays, (n, m) and (n, k), as kernels take them."""
+    return np.ascontiguousarray(np.hstack([one, other]))
+
+
+def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath) -> None:
+    """Refuse limits of torque that a machine exceeds while it rests on the path, or begins to move."""
+    over = np.abs(parts.rest) >= parts.most
+    if over.any():
+        share = np.abs(parts.rest) / parts.most
+        place = int(np.argmax(share.max(axis=0)))
+        limit = path.limits[place]
+        most = limit * share[:, place].max()
+        found = f"{limit:.6g}, where '{path.names[place]}' must exert up to {most:.6g} at rest"
+        steps = np.unique(curve.step_of(s[over[:, place]]))[:5].tolist()
+        raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
+
+
+def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, every: float) -> Timed:
+    """Samples at a rate, and at the very end."""
+    reached, names = timing.reached, track.mechanism.actuator_names
+    if reached[-1] / every > MOST_SAMPLES:
+        found = f"{1.0 / every:g} samples per second for {reached[-1]:g} s"
+        raise InvalidArgument("rate", found, f"at most {MOST_SAMPLES} samples")
+    times = np.arange(0.0, reached[-1], every)
+    times = np.append(times[times < reached[-1] - 1e-9 * every], reached[-1])
+    cells = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(reached) - 2)
+    places, *motion = timing.at(cells, times - reached[cells])
+    sampled = motion_at(curve, limits, places, *motion)
+    return Timed(
+        mechanism=track.mechanism,
+        times=times,
+        steps=curve.step_of(places),
+        poses=curve.poses_at(places),
+        actuators=curve.at(places)[:, : curve.n_actuators],
+        rates=sampled.rates,
+        accelerations=sampled.accelerations,
+        platform_speeds=sampled.platform_speeds,
+        used=sampled.used.max(axis=1),
+        binding=sampled.used.argmax(axis=1),
+        limits=limits.named(names),
+        exceeded=exceeded(curve, timing, limits, names),
+        _track=track,
+    )

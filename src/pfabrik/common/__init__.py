@@ -1,0 +1,1 @@
+"""What knows no machine: arrays, poses, checks, printed results."""

@@ -1,0 +1,47 @@
+"""Figures, and the size of their letters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import InvalidArgument
+from .arrays import Floats
+from .extras import require
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+SMALL = 8.0
+"""Size of letters [points]."""
+
+
+def new_figure(
+    width: float, height: float, paper: str | None = None, *, dpi: int = 150, layout: str | None = "constrained"
+) -> Figure:
+    """A new figure [inches] on a ground of a colour; MissingLibrary where matplotlib is not installed."""
+    require("pictures", "matplotlib", "plot")
+    from matplotlib import pyplot
+
+    return pyplot.figure(figsize=(width, height), dpi=dpi, layout=layout, facecolor=paper)
+
+
+def curves_over_time(times: Floats, names: Sequence[str], panels: Mapping[str, Floats]) -> Figure:
+    """Columns of arrays (n, k) over times (n,) [s], a panel for each array by its label, a name for each column."""
+    figure = new_figure(8.0, 7.0)
+    for axes, (label, values) in zip(figure.subplots(len(panels), 1, sharex=True), panels.items(), strict=True):
+        for name, column in zip(names, values.T, strict=True):
+            axes.plot(times, column, label=name)
+        axes.set_ylabel(label)
+    axes.set_xlabel("time [s]")
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=6, fontsize="small", frameon=False)
+    return figure
+
+
+def require_flat(ax: Axes) -> None:
+    """Refuse three-dimensional axes: what is in space is drawn as an eye sees it."""
+    if hasattr(ax, "get_zlim"):
+        raise InvalidArgument("ax", "three-dimensional axes", "two-dimensional ones, as of figure.add_subplot()")

@@ -1,0 +1,1 @@
+"""What answers targets: legs at a pose, joint coordinates, chains."""

@@ -1,0 +1,136 @@
+"""The contract of engines."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from typing import Literal
+
+from ...common.arrays import Floats
+from ...kernels.pose.search_records import Starts
+from ...kernels.rows import Rows
+from ...options import Options
+from .attempts import Attempt
+from .close import Closing
+from .configurations import Configurations
+from .projection import ProjectionMode
+
+OnProgress = Callable[[int, int], None]
+"""Called with the number of targets solved, and of all."""
+
+Counted = Literal["orientation", "position"]
+"""What counts of targets: their orientation too, or the position alone."""
+
+Prepared = tuple[Callable[[], int], object]
+"""A call prepared for one row, which returns 0 if it solves that row, and what must be kept alive for it."""
+
+
+class InverseEngine(ABC):
+    """Solves for the poses of targets.
+
+    Every answer is a feasible configuration: REACHED within the tolerances of the options, or PROJECTED to the nearest
+    one found. Rows are INVALID where the target is no pose, and FAILED where no feasible configuration is found.
+
+    Attributes
+    ----------
+    bounds_steps : True if `Options.most_steps` bounds its searches.
+    """
+
+    bounds_steps = False
+
+    @abstractmethod
+    def answer(
+        self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Configurations:
+        """Solve for targets (n, 4, 4) independently of each other.
+
+        Parameters
+        ----------
+        start : one start for all targets, or one for each; None for home.
+        keep_mode : answers are in the working mode of the start.
+        """
+
+    @abstractmethod
+    def follow(
+        self, targets: Floats, start: Configurations | None, options: Options, on_progress: OnProgress | None
+    ) -> Configurations:
+        """Solve for a path (n, 4, 4), each target from the answer before it, in its working mode."""
+
+    def attempts(
+        self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
+    ) -> Iterator[Attempt]:
+        """Every attempt to answer one target (1, 4, 4), repeated one by one, in the order in which they are made."""
+        return iter(())
+
+    def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
+        """A call that solves for the pose in `target`, (1, 4, 4), into `rows`; None if the engine has none.
+
+        It answers as `answer` does where it succeeds. Where it does not, it has overwritten `rows`.
+        """
+        return None
+
+
+class Engine(InverseEngine):
+    """Solves a mechanism: inverse and forward kinematics, and what results say about configurations."""
+
+    @abstractmethod
+    def advance(self, targets: Floats, start: Configurations) -> Configurations:
+        """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
+
+    def grower(self, counted: Counted) -> Engine | None:
+        """The engine that grows known configurations, where this takes far less time than to answer targets anew."""
+        return None
+
+    def known(self, start: Configurations | None) -> Starts:
+        """Configurations as what others grow from; None for home."""
+        raise NotImplementedError
+
+    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
+        """Move known configurations, one or as many, to nearby targets (n, 4, 4); PROJECTED where the nearest is found.
+
+        Parameters
+        ----------
+        anew : targets may be far, and are searched for from the machine's seeds too, where it has any.
+        keep_mode : stay in the working modes of the known configurations.
+        """
+        raise NotImplementedError
+
+    def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
+        """Answers whose projections have their redundant joints as near to those of the start as their poses let them.
+
+        Parameters
+        ----------
+        start : one start for all answers, or one for each; None for home.
+        """
+        return answers
+
+    @abstractmethod
+    def forward(
+        self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
+    ) -> Configurations:
+        """Solve for configurations with actuated values (n, n_a), from one start or one for each.
+
+        With `keep_mode` in the assembly mode of the start, or home's.
+
+        REACHED where the values differ by at most `tolerance` [L or rad]; PROJECTED at the nearest values found.
+        """
+
+    def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared | None:
+        """A call that solves for the configuration with the values in `rows.actuators`; as `prepared`."""
+        return None
+
+    @abstractmethod
+    def as_configurations(self, closing: Closing) -> Configurations:
+        """Configurations that were closed in joint coordinates, with their status still PENDING."""
+
+    @abstractmethod
+    def points(self, configurations: Configurations) -> Mapping[str, Floats]:
+        """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
+
+    @abstractmethod
+    def limit_multipliers(self, configurations: Configurations, targets: Floats, projection: ProjectionMode) -> Floats:
+        """Multipliers (n, 2 columns + cones) of all limits at projections of targets (n, 4, 4).
+
+        In the order low and high bound of each coordinate, then the cones: the decrease of the distance [L] per unit
+        [L or rad] by which the limit is relaxed; 0 for limits that are not active.
+        """

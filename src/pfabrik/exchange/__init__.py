@@ -1,0 +1,1 @@
+"""Machines from and for others: robot files in and out, code for controllers."""

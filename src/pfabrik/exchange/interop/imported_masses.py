@@ -1,0 +1,68 @@
+"""The masses of an imported mechanism, from the inertial elements of its file."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable
+
+import numpy as np
+
+from ...common.arrays import Floats
+from ...machine.description.body_inertias import BodyInertia, joined
+from ...machine.description.body_masses import as_matrix, as_moments
+from ...machine.description.mechanism import Mass, Mechanism
+from ...machine.description.whole_rules import is_impossible
+from .notes import Note, note_names
+
+
+def placed_mass(body: str, mass: float, frame: Floats, inertia: Floats) -> Mass:
+    """The mass of a body whose centre, and the axes of whose inertia (3, 3), are a frame (4, 4)."""
+    turn = frame[:3, :3]
+    return Mass(body, mass, frame[:3, 3], as_moments(turn @ inertia @ turn.T))
+
+
+def moved_mass(mass: Mass, motion: Floats) -> Mass:
+    """A mass moved by a transform (4, 4)."""
+    turn, centre, moments = motion[:3, :3], mass.centre, mass.inertia
+    if centre is None or moments is None:
+        return mass
+    return Mass(mass.body, mass.mass, turn @ centre + motion[:3, 3], as_moments(turn @ as_matrix(moments) @ turn.T))
+
+
+def mass_in_unit(mass: Mass, metres: float) -> Mass:
+    """A mass with lengths in a unit, from metres."""
+    if mass.centre is None or mass.inertia is None:
+        return mass
+    return Mass(mass.body, mass.mass, np.divide(mass.centre, metres), np.divide(mass.inertia, metres**2))
+
+
+def with_masses(mechanism: Mechanism, masses: Iterable[Mass], known: Collection[str], notes: list[Note]) -> Mechanism:
+    """With the masses of bodies that were merged as one; 0 for bodies that the file does not know.
+
+    Parameters
+    ----------
+    known : the bodies of the file: others are between the joints that one of its joints has become.
+    """
+    parts: dict[str, list[Mass]] = defaultdict(list)
+    for mass in masses:
+        parts[mass.body].append(mass)
+    if not parts:
+        return mechanism
+    lost = [body for body, own in parts.items() if body not in mechanism.bodies and any(each.mass for each in own)]
+    note_names(notes, "masses of bodies within a joint are left out, of", lost)
+    strange, found = [], []
+    for body in mechanism.bodies:
+        own = [each for each in parts.get(body, []) if each.centre is not None and each.mass > 0.0]
+        strange += [body for each in own if is_impossible(each.inertia)]
+        solids = [BodyInertia(each.mass, np.array(each.centre), _inertia(each)) for each in own]
+        if solids:
+            whole = joined(solids)
+            found.append(Mass(body, whole.mass, whole.centre, as_moments(whole.inertia)))
+        elif body != mechanism.base and (body in parts or body not in known):
+            found.append(Mass(body, 0.0))
+    note_names(notes, "moments of inertia that no body has are left out: its mass is a point, of", strange)
+    return mechanism.with_masses(found)
+
+
+def _inertia(mass: Mass) -> Floats:
+    return np.zeros((3, 3)) if mass.inertia is None or is_impossible(mass.inertia) else as_matrix(mass.inertia)

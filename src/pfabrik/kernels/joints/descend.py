@@ -1,0 +1,221 @@
+"""The nearest feasible configuration by a descent in joint coordinates along closed loops, within every limit.
+
+The unknowns are the motions that the loops leave free, computed anew at each configuration. Each step is restored onto
+the loops before it is accepted, so that every accepted configuration is feasible.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...common.arrays import Floats
+from .._jit import routine, search
+from ..clearance.link_limits import pair_excess
+from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
+from ..holding import limit_multipliers
+from ..quaternions import turn_ball
+from ..search_constants import CLOSED, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
+from ..sqp import (
+    allowed_violation,
+    begin_descent,
+    is_closed,
+    is_stuck_infeasible,
+    judge_step,
+    longest,
+    plan_step,
+    resume,
+    scale_objective,
+    symmetrise,
+)
+from .linearise_loops import (
+    DescentScratch,
+    add_anchors,
+    add_cone,
+    add_force,
+    cone_excess,
+    linearise,
+    open_scratch,
+    pose_gradient,
+    walk_all,
+)
+from .loops import BALL, Closed, Loops, Objective
+from .path_kinematics import State, add_pair_slope, copy_state, load_row, open_loops, place_links, store_row
+
+
+@routine
+def lagrangian_gradient(
+    loops: Loops, row: int, objective: Objective, state: State, scratch: DescentScratch, out: Floats
+) -> None:
+    """Gradient of the Lagrangian at a configuration, with multipliers of limits and, in `balance`, of the loops."""
+    n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, scratch.hessian.multipliers
+    walk_all(loops, state, scratch)
+    _, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, scratch.gradient, True)
+    for j in range(n):
+        out[j] = multipliers[2 * j + 1] - multipliers[2 * j]
+    add_anchors(row, objective, state, scratch.gradient.unit[0], out)
+    for i in range(6):
+        scratch.force[0, i] = scratch.gradient.force[i]
+        for path in range(1, paths):
+            scratch.force[path, i] = scratch.balance[6 * (path - 1) + i]
+            scratch.force[0, i] -= scratch.force[path, i]
+        for k in range(held):
+            scratch.force[0, i] += scratch.balance[6 * (paths - 1) + k] * scratch.gradient.holds[k, i]
+    for path in range(paths):
+        add_force(loops, path, scratch.force[path], scratch, out)
+    for cone in range(len(loops.cone_angles)):
+        if multipliers[2 * n + cone] != 0.0:
+            cone_excess(loops, cone, objective.pose.margin, state, scratch)
+            add_cone(loops, cone, multipliers[2 * n + cone], scratch, out)
+    offset, links, is_placed = 2 * n + len(loops.cone_angles), scratch.links, False
+    for pair in range(links.kept[0]):
+        if multipliers[offset + pair] != 0.0:
+            if not is_placed:
+                place_links(scratch.ways, state, scratch.way_eq, scratch.links)
+            is_placed = True
+            over, multiplier = pair_excess(scratch.links, pair, math.inf), multipliers[offset + pair]
+            add_pair_slope(scratch.ways, scratch.links, pair, over, multiplier, scratch.way_eq, out)
+
+
+@routine
+def lagrangian_hessian(
+    loops: Loops, row: int, objective: Objective, scratch: DescentScratch, reduced: FreeMotions
+) -> float:
+    """Reduced Hessian of the Lagrangian at `scratch.best`; its largest diagonal entry.
+
+    By differences of the gradient of the Lagrangian. The multipliers of the loops make this zero at pivot coordinates.
+    """
+    n, linear, H, trial = len(loops.lo), reduced.linear, scratch.hessian.H, scratch.trial
+    motions = linear.totals[0]["motions"]
+    basis, here, there, along = reduced.basis, scratch.here, scratch.there, scratch.row
+    for i in range(scratch.balance.shape[0]):
+        scratch.balance[i] = 0.0
+    lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
+    scratch.control[0]["equation_multipliers"] = put_multipliers(scratch.here, reduced, scratch.balance)
+    lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
+    for a in range(motions):
+        probe = PROBE / math.sqrt(linear.metric[a, a])
+        for j in range(n):
+            along[j] = basis[j, a]
+        copy_state(scratch.best, trial)
+        move(loops, scratch.row, probe, trial)
+        lagrangian_gradient(loops, row, objective, trial, scratch, scratch.there)
+        for j in range(n):
+            there[j] = (there[j] - here[j]) / probe
+        project(there, reduced, H[a])
+    return symmetrise(H, motions)
+
+
+@routine
+def move(loops: Loops, step: Floats, share: float, state: State) -> None:
+    """Add a share of a step to a configuration."""
+    for k in range(len(loops.kinds)):
+        j = loops.columns[k]
+        if loops.kinds[k] == BALL:
+            turn_ball(state.balls[k], share * step[j], share * step[j + 1], share * step[j + 2])
+        else:
+            state.q[j] += share * step[j]
+
+
+@routine
+def take_step(loops: Loops, reduced: FreeMotions, x: Floats, state: State, scratch: DescentScratch) -> float:
+    """Take a step of the free motions, with the one that closes the loops to first order; the share that was taken."""
+    put_step(x, reduced, scratch.row)
+    share = LONGEST_STEP / max(longest(scratch.row, len(loops.lo)), LONGEST_STEP)
+    move(loops, scratch.row, share, state)
+    return share
+
+
+@routine
+def restore_feasibility(
+    loops: Loops,
+    row: int,
+    objective: Objective,
+    state: State,
+    tolerance: float,
+    scratch: DescentScratch,
+    reduced: FreeMotions,
+) -> bool:
+    """Restore a configuration, linearised in `reduced`, onto its loops and within its limits by shortest steps.
+
+    True if both hold to the tolerance, or after all steps, if rounding prevents that, to `NEARLY_CLOSED`.
+    """
+    for _step in range(RESTORING):
+        if is_closed(reduced.linear, tolerance):
+            return True
+        if not restoring_step(reduced, False, scratch.p):  # using all motions, steps jump over wrist singularities
+            return False
+        take_step(loops, reduced, scratch.p.x, state, scratch)
+        linearise(loops, row, objective, state, scratch, reduced)
+    return is_closed(reduced.linear, max(tolerance, NEARLY_CLOSED))
+
+
+@routine
+def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratch) -> int:
+    """Descend from a feasible `scratch.best`, linearised in `scratch.first`, to a local minimum; the steps."""
+    reduced, trial_reduced, best, trial, p = scratch.first, scratch.second, scratch.best, scratch.trial, scratch.p
+    hessian, control, most = scratch.hessian, scratch.control[0], objective.pose.max_iterations
+    scratch.gradient.unit[0] = scale_objective(reduced.linear)
+    begin_descent(reduced.linear, hessian, control)
+    while control["is_done"] == 0:
+        control["largest"] = lagrangian_hessian(loops, row, objective, scratch, reduced)
+        is_accepted = False
+        while not is_accepted and control["is_done"] == 0:
+            if plan_step(reduced.linear, hessian, control, most, p):
+                copy_state(best, trial)
+                share = take_step(loops, reduced, p.x, trial, scratch)
+                linearise(loops, row, objective, trial, scratch, trial_reduced)
+                tolerance = allowed_violation(control, share)
+                feasible = restore_feasibility(loops, row, objective, trial, tolerance, scratch, trial_reduced)
+                is_accepted = judge_step(reduced.linear, trial_reduced.linear, feasible, share, control)
+                if is_accepted:
+                    copy_state(trial, best)
+                    reduced, trial_reduced = trial_reduced, reduced
+            if is_stuck_infeasible(reduced.linear, is_accepted, most, control):
+                if restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced):
+                    resume(control)
+                is_accepted = True
+    restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced)
+    return int(control["steps"])
+
+
+@routine
+def nearest_of(
+    loops: Loops, row: int, objective: Objective, scratch: DescentScratch, closed: Closed, weights: Floats
+) -> None:
+    """Minimise the objective of a row; see `nearest_configuration`."""
+    best, first = scratch.best, scratch.first
+    load_row(loops, row, closed, best)
+    closed.iterations[row] = 0
+    scratch.gradient.unit[0] = 1.0
+    linearise(loops, row, objective, best, scratch, first)
+    if objective.pose.max_iterations == 0:
+        scale_objective(first.linear)
+        for c in range(limit_multipliers(first.linear, objective.pose.near, scratch.p, scratch.pulls)):
+            weights[row, first.linear.which[c]] = scratch.p.x[c]
+        return
+    if restore_feasibility(loops, row, objective, best, CLOSED, scratch, first):
+        closed.iterations[row] = descend(loops, row, objective, scratch)
+    linearise(loops, row, objective, best, scratch, first)
+    store_row(loops, row, best, closed)
+    for group in range(closed.gaps.shape[1]):  # the measures of the whole mechanism, for every group
+        closed.gaps[row, group] = first.linear.totals[0]["gap"]
+        closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.pose.margin, 0.0)
+        closed.misses[row, group] = 0.0
+
+
+@search
+def nearest_configuration(
+    machine: int, scratch_address: int, objective: Objective, closed: Closed, weights: Floats
+) -> None:
+    """Minimise the objective of every row, from a configuration that is closed within its limits or nearly so.
+
+    With `max_iterations` 0, write instead the multipliers of the limits of each row, (n, 2 columns + cones + pairs of
+    links): the decrease of the distance per unit by which the limit is relaxed; 0 for limits that are not active.
+
+    Parameters
+    ----------
+    machine, scratch_address : addresses of `Loops` and `DescentScratch`.
+    """
+    loops, scratch = open_loops(machine), open_scratch(scratch_address)
+    for row in range(len(closed.coordinates)):
+        nearest_of(loops, row, objective, scratch, closed, weights)

@@ -1,0 +1,1 @@
+"""What a machine is: its description, files, decomposition and motions."""
