@@ -17,7 +17,7 @@ export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 # Tests start many processes, and pytest rewrites every assertion: compiled files are kept, whatever the user's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: prepared demo reproduce docs test test-processors test-tensors test-fast test-interpreted campaign check bench web clean
+.PHONY: prepared demo reproduce docs test test-processors test-tensors test-all test-interpreted campaign check bench web clean
 
 demo: $(READY) $(MODULE)
 	@$(BIN)/pfabrik demo
@@ -41,14 +41,15 @@ docs: prepared
 test: prepared
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
+# What `make test` leaves out: tests that cost much, and two thirds of the matrix of machines and questions.
+test-all: prepared
+	@$(BIN)/python -m pytest -n auto --dist worksteal -m "slow and not campaign and not pages"
+
 # The programs of pages, examples and notebooks, with the linear algebra of several processors.
 test-processors: prepared
 	@for core in Haswell Zen Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
 		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal -m "not campaign" tests/test_docs.py \
 		tests/test_notebooks.py tests/test_transcripts.py || exit 1; done
-
-test-fast: prepared
-	@$(BIN)/python -m pytest -m "not slow and not campaign and not pages"
 
 # Files of tensors in PyTorch and JAX, which are large: in an environment of their own.
 test-tensors: $(STAMP)
@@ -58,7 +59,7 @@ test-tensors: $(STAMP)
 
 # The same tests with the kernels as plain Python: this run sees every line, so it measures coverage.
 test-interpreted: $(STAMP)
-	@PFABRIK_KERNELS=python $(BIN)/python -m pytest -m "not slow and not campaign and not pages" --cov --cov-report=term
+	@PFABRIK_KERNELS=python $(BIN)/python -m pytest -m "not compiled and not slow and not campaign and not pages" --cov --cov-report=term
 
 # Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
 campaign: prepared
@@ -69,7 +70,7 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict src paper tests/typing
 	$(BIN)/lint-imports
-	$(BIN)/python tools/budget.py
+	$(BIN)/python tools/counts.py --check
 
 # The kernels of web pages, src/pfabrik/view/page/kernels.wasm, which is kept in the repository: needs clang and wasm-ld (lld).
 web: $(READY)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from costs import Costs, slow_items
 from pfabrik.kernels._shipped import IS_INTERPRETED as INTERPRETED
 
 os.environ.setdefault("MPLBACKEND", "Agg")  # pictures open no window, whatever the user's settings
@@ -22,6 +23,24 @@ if INTERPRETED:
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None, max_examples=2 if INTERPRETED else 8)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile(os.environ.get("PFABRIK_HYPOTHESIS", "fixed"))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--costs", action="store_true", help="measure what items cost, and write tests/costs.toml")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--costs"):
+        config.pluginmanager.register(Costs(hasattr(config, "workerinput")))
+
+
+@pytest.hookimpl(tryfirst=True)  # before marks are asked for
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is left to `make test-all`; `-m ''` asks for all."""
+    slow = slow_items([item.nodeid for item in items])
+    for item in items:
+        if item.nodeid in slow:
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish() -> None:

@@ -15,7 +15,7 @@ CHROMIUM = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
 )
 MARKS = [
-    pytest.mark.slow,
+    pytest.mark.compiled,
     pytest.mark.skipif(not CHROMIUM, reason="needs Chromium, which is not installed (apt install chromium)"),
 ]
 SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]

@@ -202,7 +202,7 @@ def test_coordinates_out_of_reach_are_projected_and_the_limit_is_named() -> None
     np.testing.assert_allclose(a.to_joints(x.values[1]).values, [0.0, a.high[1]], atol=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_nothing_is_nan_at_and_beyond_dead_points() -> None:
     """From home into the corner where a crank and its rod are in line, and on."""
     a = ankle()
@@ -288,7 +288,7 @@ def test_torques_of_redundant_actuators_have_the_least_norm() -> None:
 # What is feasible.
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_the_hull_is_feasible_and_says_what_is_lost() -> None:
     a = ankle()
     hull = a.hull()

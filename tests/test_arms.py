@@ -308,7 +308,7 @@ def test_maps_lead_arms_that_turn_far_near_home() -> None:
     assert (feasible & reached).sum() > 0.97 * reached.sum()
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_rods_of_one_arm_that_are_not_parallel_have_no_dead_point_alone() -> None:
     """Three rods, two and one on three cranks: where one of three stands square to its crank, the others place it."""
     joints = []

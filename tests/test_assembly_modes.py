@@ -112,7 +112,7 @@ def assert_modes(case: Case, modes: Sequence[Solution], atol: float = 1e-6) -> N
         left.pop(int(np.argmin(off)))
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", CASES)
 def test_all_modes_of_a_closed_form_or_a_publication_are_found(name: str) -> None:
     case = CASES[name]()

@@ -192,7 +192,7 @@ def test_struts_of_the_ucu_hexapod_are_as_long_as_printed(
     np.testing.assert_allclose(found.actuators, [*lengths[::2], *lengths[1::2]], atol=6e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_the_planar_3rpr_has_the_two_poses_of_the_book() -> None:
     mechanism = machine("rpr")
     modes = pf.assembly_modes(mechanism, [np.sqrt(5)] * 3)

@@ -245,7 +245,7 @@ def test_the_forward_jacobian_is_the_slope_of_the_pose() -> None:
 
 # --- hundreds of joints ----------------------------------------------------------------------------------------------
 
-LENGTHS = [300, pytest.param(999, marks=pytest.mark.slow)]
+LENGTHS = [300, pytest.param(999, marks=pytest.mark.compiled)]
 
 
 @compiled_only

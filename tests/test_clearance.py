@@ -36,7 +36,7 @@ from slopes import beside, slopes
 
 Array = NDArray[np.float64]
 ROWS = 500 if INTERPRETED else 20_000
-SLOW = pytest.mark.slow if INTERPRETED else ()
+SLOW = pytest.mark.compiled if INTERPRETED else ()
 KINDS = ("capsule", "box", "disc")
 DELTA = (Path(pf.__file__).parent / "machine" / "catalog" / "delta.toml").read_text()
 
@@ -558,7 +558,7 @@ def test_an_answer_held_back_by_links_says_so_in_words() -> None:
     assert log.answered_by == "links kept apart" and "come too near at the target" in str(log)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_sizes_of_workspaces_are_not_proved_of_a_machine_with_a_clearance() -> None:
     machine = struts(clearance=2.0)
     place = machine.home_pose[:3, 3]

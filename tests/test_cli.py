@@ -220,7 +220,7 @@ def test_any_finite_target_gets_an_answer(name: str, position: str) -> None:
     assert found["status"] in ("PROJECTED", "FAILED")
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("value", ["1e150", "0", pytest.param("-1e12", marks=pytest.mark.campaign), "5e-324"])
 @pytest.mark.parametrize("name", pf.catalog())
 def test_any_finite_actuator_values_get_an_answer(name: str, value: str) -> None:
@@ -252,7 +252,7 @@ def test_what_is_printed_asks_for_no_joints_that_it_does_not_show(line: str, mon
     assert pfabrik(line).exit_code in (0, 1)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_mode_beyond_limits_says_which() -> None:
     _, below = pf.assembly_modes(FIVE_BAR, np.radians([-20, 20]))
     assert as_sentence(below) == "exceeded: assembled, but beyond limits: p2 min; p4 max"
@@ -590,7 +590,7 @@ def test_tables_fit_the_terminal(line: str, monkeypatch: pytest.MonkeyPatch) -> 
 LINES = [line for name, lines in EXAMPLES.items() if name != "demo" for line in lines]  # whose tests run it just so
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_examples_of_the_help_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the order of the help, one after the other: what one writes another may read."""
     for needed in ("matplotlib", "mujoco"):

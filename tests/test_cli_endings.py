@@ -48,7 +48,7 @@ def test_a_reader_who_has_gone_is_no_error_worth_words() -> None:
     assert process.returncode == 141
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("line", "closed", "code", "said"),
     [
@@ -104,7 +104,7 @@ def test_a_track_that_is_told_to_end_leaves_no_parts_of_files(folder: Path) -> N
     assert os.listdir(folder) == ["path.csv"]
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("after", [1.5, 3.0])
 def test_a_view_is_interrupted_at_any_moment(after: float) -> None:
     pytest.importorskip("viser")

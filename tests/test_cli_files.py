@@ -61,7 +61,7 @@ def test_actuators_that_are_too_fast_are_named_in_their_rows() -> None:
         assert result.exit_code == (1 if named else 0)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_track_tells_where_answers_leap() -> None:
     write_files("two_links.toml", "hole.csv")
     result = pfabrik("track two_links.toml hole.csv -o answers.csv")
@@ -298,7 +298,7 @@ def test_a_workspace_is_written_in_every_format() -> None:
     assert np.load("a.npz")["size"] == pf.workspace(pf.load("stewart"), resolution=16.0).size
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_demo_writes_a_picture_and_a_table_for_each_machine() -> None:
     pytest.importorskip("matplotlib")
     assert pfabrik("demo --quick -o pictures").exit_code == 0

@@ -52,7 +52,7 @@ def test_a_projection_is_never_further_away_than_where_it_started() -> None:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(36, marks=pytest.mark.slow), pytest.param(120, marks=pytest.mark.campaign)]
+    "count", [pytest.param(36, marks=pytest.mark.compiled), pytest.param(120, marks=pytest.mark.campaign)]
 )
 def test_a_start_far_away_keeps_its_working_mode_as_a_path_does(count: int) -> None:
     """A single step of Newton's method leaps over a wrist's singularity."""

@@ -56,7 +56,7 @@ def answers(name: str) -> dict[str, np.ndarray]:
     return values | {f"point {joint}": points for joint, points in answer.points.items()}
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.skipif(not load_module()[0], reason="kernels are not compiled in this folder: see `make`")
 @pytest.mark.parametrize("names", [FEW, pytest.param(MANY, marks=pytest.mark.campaign)])
 def test_compiled_and_interpreted_answers_are_the_same(tmp_path: Path, names: tuple[str, ...]) -> None:

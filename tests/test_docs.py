@@ -23,6 +23,7 @@ PAGES = sorted(
 EXAMPLES = sorted(ROOT.glob("examples/*.py"))
 FORMAT = ROOT / "docs" / "describing-a-mechanism.md"
 MAP = ROOT / "docs" / "map.md"
+CONTRIBUTING = ROOT / "CONTRIBUTING.md"
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 ROUNDING = re.compile(r"(?<!< )\b\d(\.\d+)?e-1[2-9]")
 """A number that is rounding, whose digits differ between processors; ``< 1e-12`` is none."""
@@ -74,12 +75,10 @@ def test_files_of_the_package_that_a_page_names_are_there(page: str) -> None:
     assert missing == []
 
 
-@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=page_id)
-def test_every_page_is_on_the_map(page: Path) -> None:
-    """Linked from the map, or from the list of its own folder."""
-    indices = [MAP, *ROOT.glob("docs/*/index.md")]
-    linked = set().union(*map(linked_from, indices))
-    assert page == MAP or page.resolve() in linked
+def test_every_page_is_on_the_map() -> None:
+    """Linked from the map, from the list of its own folder, or for developers from CONTRIBUTING.md."""
+    linked = set().union(*map(linked_from, [MAP, CONTRIBUTING, *ROOT.glob("docs/*/index.md")]))
+    assert {page.resolve() for page in ROOT.glob("docs/**/*.md")} <= linked | {MAP}
 
 
 ELSEWHERE_TOO = ("docs/your-controller.md-3", "docs/start.md-2", "docs/ros2-node.md-1", "docs/cluster.md-1")
@@ -110,7 +109,7 @@ def test_examples_run(example: Path, capsys: pytest.CaptureFixture[str], monkeyp
     runpy.run_path(str(example), run_name="__main__")
     printed = capsys.readouterr().out
     assert printed
-    if example.name == "11_on_a_cluster.py":
+    if example.name == "08_on_a_cluster.py":
         assert blocks(ROOT / "docs" / "cluster.md", "text") == [printed]
 
 
@@ -133,7 +132,7 @@ def test_the_page_of_a_task_is_what_its_program_prints(
         if shutil.which("cc") is None:
             pytest.skip("the page shows what compiled C prints, and there is no compiler")
         monkeypatch.setenv("PATH", str(compiler_that_does_not_optimize(tmp_path)), prepend=os.pathsep)
-    page = runpy.run_path(str(ROOT / "docs" / "pages.py"))["page_of"](program)
+    page = runpy.run_path(str(ROOT / "tools" / "site" / "pages.py"))["page_of"](program)
     written = ROOT / "docs" / "tasks" / f"{program.stem}.md"
     assert page.text == written.read_text(encoding="utf-8")
     assert all((written.parent / name).exists() for name in page.pictures)
@@ -176,7 +175,7 @@ def misspelt(text: str) -> str:
     return text.replace('name = "TopR"', 'name = "TopL"').replace('["rodR", "platform"]', '["rodR", "platfrom"]')
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("page", SHOWING, ids=page_id)
 def test_commands_print_what_their_page_shows(page: Path, folder: Path) -> None:
     """All in one folder, one after the other; what stands for dots is not compared."""
@@ -216,7 +215,7 @@ def test_the_readme_leads_to_every_page() -> None:
     """By a link of its own, or by the map that it has a link to."""
     linked = linked_from(ROOT / "README.md")
     assert MAP in linked
-    linked |= linked_from(MAP)
+    linked |= linked_from(MAP) | linked_from(CONTRIBUTING)
     assert [page.name for page in ROOT.glob("docs/*.md") if page.resolve() not in linked] == []
 
 
@@ -244,7 +243,7 @@ def test_lines_for_those_who_come_from_elsewhere_run(section: str) -> None:
         eval(line, namespace)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.usefixtures("folder")
 def test_the_first_program_of_the_readme_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
     (code, *_), (shown,) = blocks(ROOT / "README.md", "python"), blocks(ROOT / "README.md", "text")
@@ -277,7 +276,7 @@ ELSEWHERE = ("pfabrik demo --quick",)
 """Commands that take long, and that tests of their own run just so."""
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("line", [line for line in LINES if not line.startswith(ELSEWHERE)])
 def test_commands_of_the_readme_answer(line: str, folder: Path) -> None:
     pf.save(pf.load("five_bar"), folder / "my_machine.toml")
@@ -292,7 +291,7 @@ DRAWN = re.compile(r"pfabrik .*figures/[\w.]+\.(?:png|gif)")
 DRAWING = [line for block in blocks(SEEING, "") for line in block.splitlines() if DRAWN.fullmatch(line)]
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     "line", [pytest.param(line, marks=[pytest.mark.campaign] * line.endswith(".gif")) for line in DRAWING]
 )

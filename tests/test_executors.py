@@ -72,7 +72,7 @@ def assert_same(there: Any, here: Any) -> None:
         assert np.array_equal(getattr(there, name), getattr(here, name), equal_nan=name != "status"), name
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.filterwarnings("default")
 def test_answers_are_the_same_wherever_they_are_worked_out(executor: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors, "POSES_A_BLOCK", 900)  # large enough for clusters to send arrays by themselves
@@ -97,7 +97,7 @@ def test_answers_are_the_same_wherever_they_are_worked_out(executor: Executor, m
     assert error.value.rows == (750,)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.filterwarnings("default")
 def test_maps_are_the_same_wherever_they_are_worked_out(executor: Executor) -> None:
     for name, asked in (("five_bar", {"resolution": 4.0}), ("rpr", {"resolution": 0.2, "orientation": "any"})):
@@ -107,7 +107,7 @@ def test_maps_are_the_same_wherever_they_are_worked_out(executor: Executor) -> N
             assert np.array_equal(getattr(there, field), getattr(here, field))
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.filterwarnings("default")
 def test_verdicts_are_the_same_wherever(executor: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["pfabrik.capabilities.certify.question"], "CELLS_A_BLOCK", 20)

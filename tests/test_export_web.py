@@ -21,9 +21,9 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from oracles import no_poses
 from pfabrik.cli import main
+from pfabrik.common.memory_image import packed
 from pfabrik.common.rotations import from_rotvec
 from pfabrik.errors import InvalidArgument
-from pfabrik.exchange.export.controller_tables import packed
 from pfabrik.machine.model import model_of
 from pfabrik.view.page.export_web import FOLDER, SCRIPTS, machine_data, web_page
 

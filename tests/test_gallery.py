@@ -19,7 +19,7 @@ LIVE = DOCS / "pictures" / "live"
 
 @pytest.fixture
 def gallery(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(DOCS)
+    monkeypatch.syspath_prepend(DOCS.parent / "tools" / "site")
     return importlib.import_module("gallery")
 
 
@@ -35,7 +35,7 @@ def test_the_gallery_is_what_its_generator_writes(gallery: ModuleType) -> None:
     assert (DOCS / "gallery.md").read_text(encoding="utf-8") == gallery.page(), "run: python tools/site/gallery.py"
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_every_machine_with_a_live_page_has_a_picture_of_it_for_light_and_for_dark_pages(tmp_path: Path) -> None:
     live = {name for name in pf.catalog() if is_live(name, tmp_path)}
     expected = {f"{name}{end}" for name in (*live, "film") for end in ("", "-dark")}

@@ -18,7 +18,7 @@ LARGEST_PICTURE = 25_000  # bytes
 
 def generator() -> ModuleType:
     """The script tools/site/mechanisms.py as a module."""
-    spec = importlib.util.spec_from_file_location("mechanisms_page", DOCS / "mechanisms.py")
+    spec = importlib.util.spec_from_file_location("mechanisms_page", DOCS.parent / "tools" / "site" / "mechanisms.py")
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -110,7 +110,7 @@ def modes_of(name: str) -> tuple[Mechanism, Sequence[Solution]]:
     return mechanism, pf.working_modes(mechanism, target)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", MACHINES)
 def test_a_near_target_is_reached_in_the_mode_of_the_start_or_else_of_home(name: str) -> None:
     mechanism, modes = modes_of(name)
@@ -136,7 +136,7 @@ def barred(name: str) -> Mechanism:
     raise AssertionError(f"no limit of {name} bars the mode of home alone")
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", MACHINES)
 def test_a_mode_that_cannot_reach_is_left_where_that_is_allowed_and_kept_where_it_is_not(name: str) -> None:
     mechanism, target = barred(name), MACHINES[name][1]

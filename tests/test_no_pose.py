@@ -16,9 +16,9 @@ from links import thick_hexaglide
 from machines import EVERY, FILES, machine
 from oracles import Array, far_poses, is_pose, no_poses, rough_pose, targets_about
 from pfabrik import Mechanism, Options, Solution, Solver, Status
-from pfabrik.common.poses import are_poses
 from pfabrik.engines.engine import engine_of
 from pfabrik.errors import InvalidArgument
+from pfabrik.machine.poses import are_poses
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 compiled = pytest.mark.skipif(INTERPRETED, reason="many searches; Python warns of numbers that are not finite")

@@ -184,7 +184,7 @@ def test_a_far_target_is_found_where_the_machine_never_yaws_or_tilts_upside_down
     assert not wrong_of(random_case(seed, 8))
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.campaign
 def test_of_thousands_of_machines_none_misses_a_target_or_moves_what_is_aside() -> None:
     assert not wrong_among(range(1000, 4000), 8)

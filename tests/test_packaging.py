@@ -16,7 +16,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 def test_the_conda_recipe_has_the_version_and_the_requirements_of_the_project() -> None:
     yaml = pytest.importorskip("yaml")
-    recipe = yaml.safe_load((ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((ROOT / "tools" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
     assert recipe["context"]["version"] == pf.__version__
     assert f">={recipe['context']['python_min']}" == PROJECT["project"]["requires-python"]
 

@@ -11,9 +11,9 @@ from scipy.spatial import transform
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
-from pfabrik.common.poses import as_poses, is_rotation
 from pfabrik.common.rotations import angles_between, from_rotvec, square_to
 from pfabrik.errors import InvalidArgument
+from pfabrik.machine.poses import as_poses, is_rotation
 
 ANGLES = [0.0, 1e-300, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 3.0, np.pi, 4.0, 100.0]
 LAST = (0, 0, 0, 1)

@@ -72,7 +72,7 @@ def row_of(question: str, stdout: str) -> list[str]:
     return line[len(question) :].split()
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_the_same_answers_are_the_same_to_the_last_bit(recording: Path) -> None:
     found = np.load(recording)
     assert {key.split("/")[0] for key in found.files} == {"catalogue stewart", "scaled five_bar"}
@@ -84,7 +84,7 @@ def test_the_same_answers_are_the_same_to_the_last_bit(recording: Path) -> None:
     assert "all answers are the same to the last bit" in done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_number_that_differs_is_counted_unless_it_is_within_the_tolerance(recording: Path, tmp_path: Path) -> None:
     path = changed(recording, tmp_path, "scaled five_bar/given/ik", off_by(1e-9, 4))
     code, printed = compared(path)
@@ -96,7 +96,7 @@ def test_a_number_that_differs_is_counted_unless_it_is_within_the_tolerance(reco
     assert compared(path, "--tolerance", "1e-8")[0] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_status_and_the_name_of_a_limit_differ_whatever_the_tolerance(recording: Path, tmp_path: Path) -> None:
     path = changed(recording, tmp_path, "scaled five_bar/given/track", off_by(1.0, 0))
     code, printed = compared(path, "--tolerance", "1e-3")

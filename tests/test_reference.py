@@ -34,7 +34,7 @@ ALTERNATIVE = rf"(?:{CHOICES}|{SHAPE}|{KIND}(?: {SHAPE})?)"
 @cache
 def generator() -> ModuleType:
     """The script tools/site/reference.py as a module."""
-    spec = importlib.util.spec_from_file_location("reference_pages", ROOT / "docs" / "reference.py")
+    spec = importlib.util.spec_from_file_location("reference_pages", ROOT / "tools" / "site" / "reference.py")
     assert spec and spec.loader
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -28,7 +28,7 @@ WRENCH = np.array([10.0, -20.0, 30.0, 400.0, 500.0, -600.0])
 
 def named(*names: str) -> list[object]:
     """Names of machines as parameters: those that take their time as plain Python are marked as slow."""
-    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in names]
+    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.compiled) for name in names]
 
 
 @cache
@@ -205,7 +205,7 @@ def test_at_a_parallel_singularity_only_what_does_no_work_is_held() -> None:
     np.testing.assert_allclose(stiff.matrix[1], pf.stiffness(both[1], 5.0).matrix, rtol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 def test_at_a_constraint_singularity_nothing_is_said() -> None:
     machine = closure.h4()
@@ -507,7 +507,7 @@ def with_slides(machine: pf.Mechanism, name: str, side: int, axes: Array) -> pf.
     [
         ("stewart", "AR2", 0),
         ("stewart", "CL3", 1),
-        pytest.param("delta", "BL1", 0, marks=pytest.mark.slow),
+        pytest.param("delta", "BL1", 0, marks=pytest.mark.compiled),
         ("five_bar", "p2", 0),
     ],
 )
@@ -554,7 +554,7 @@ OF_A_DELTA = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("of", OF_A_DELTA)
 def test_answers_of_batches_are_those_of_their_rows(of: str) -> None:
     machine, ask = pf.load("delta"), OF_A_DELTA[of]

@@ -37,7 +37,7 @@ def transcript(text: str) -> str:
     "name",
     [
         *("check", "design", "fk", "ik", "info", "speed", "statics", "track", "travel"),
-        pytest.param("modes", marks=pytest.mark.slow),
+        pytest.param("modes", marks=pytest.mark.compiled),
     ],
 )
 def test_the_command_prints_this(name: str) -> None:

@@ -48,7 +48,7 @@ def assert_same_angles(modes: Sequence[Solution], expected: Sequence[Sequence[fl
 # --- closed forms ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "count"), [("3-RRR", 8), ("6-RSS", 64), ("delta", 8)])
 def test_cranks_have_the_modes_of_their_closed_form(name: str, count: int) -> None:
     mechanism, modes = modes_of(name)
@@ -67,7 +67,7 @@ def test_a_5_bar_has_the_four_modes_of_its_closed_form_some_beyond_limits() -> N
     assert (len(few), few.total) == (0, 4)
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_what_a_task_leaves_open_is_found_too() -> None:
     """Only the position asked for: the eight modes with a level platform, and others with a turned one."""
     whole, target = closure.delta(), pf.pose([20.0, -30.0, -230.0])
@@ -87,7 +87,7 @@ def tool_poses(*q: Sequence[float]) -> np.ndarray:
     return pf.configuration(ARM, np.array(q)).pose
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_six_axis_arm_with_a_spherical_wrist_has_eight_modes_four_and_these_with_the_wrist_flipped() -> None:
     """Within the shoulder's reach: before it or behind, elbow up or down; one of them is the one that was asked for."""
     for q in ([0.4, 0.3, -0.2, 0.6, 0.8, 0.2], [-1.2, -0.4, 0.5, -1.0, 1.1, 0.7]):
@@ -100,7 +100,7 @@ def test_a_six_axis_arm_with_a_spherical_wrist_has_eight_modes_four_and_these_wi
         assert min(np.abs(np.exp(1j * mode.actuators) - np.exp(1j * np.array(q))).max() for mode in modes) <= 1e-7
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_angles_are_counted_into_their_ranges() -> None:
     q = [2.9, 0.3, -0.2, 4.0, 0.8, 5.2]  # the last is beyond its range a turn less
     modes = pf.working_modes(closure.wrist_arm(range=(-1.0, 6.0)), tool_poses(q)[0])
@@ -112,7 +112,7 @@ def test_angles_are_counted_into_their_ranges() -> None:
 # --- counts ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("name", "count"),
     [
@@ -142,7 +142,7 @@ CONTINUA = ("nrpm", "panda", "snake60")
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        *(pytest.param(name, 1, marks=pytest.mark.slow) for name in OF_EACH_KIND),
+        *(pytest.param(name, 1, marks=pytest.mark.compiled) for name in OF_EACH_KIND),
         *(pytest.param(name, 5, marks=pytest.mark.campaign) for name in pf.catalog() if name not in CONTINUA),
     ],
 )
@@ -161,7 +161,7 @@ def test_what_solve_ik_reaches_is_one_of_the_modes(name: str, count: int) -> Non
 # --- continua, and what is none --------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_redundant_machine_is_told_what_still_moves() -> None:
     mechanism = pf.load("nrpm")
     with pytest.raises(ContinuumOfSolutions, match="6 freedoms of the actuators") as caught:
@@ -178,7 +178,7 @@ def test_a_task_that_asks_for_less_leaves_a_continuum() -> None:
         pf.working_modes(mechanism, tool_poses([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])[0, :3, 3])
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_stretched_wrist_leaves_a_continuum_and_a_nearly_stretched_one_two_modes_close_together() -> None:
     stretched, nearly = tool_poses([0.3, 0.4, -0.2, 0.5, 0.0, 0.1], [0.3, 0.4, -0.2, 0.5, 1e-3, 0.1])
     with pytest.raises(ContinuumOfSolutions, match=r"1 freedom of the actuators R1.4, R1.6\)"):
@@ -187,7 +187,7 @@ def test_a_stretched_wrist_leaves_a_continuum_and_a_nearly_stretched_one_two_mod
     assert (np.abs(np.abs(bends) - 1e-3) <= 1e-6).sum() == 2 and len(bends) == 8
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_what_spins_with_a_rod_makes_no_modes() -> None:
     """A servo hexapod one of whose rods carries a triangle of bars: it turns with the rod, however that is spun."""
     plain = machines.hexapod_rus()
@@ -210,7 +210,7 @@ def test_a_platform_that_is_upside_down_is_at_no_yaw() -> None:
 # --- singularities and reach -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize(("beyond", "count"), [(-1e-3, 4), (0.0, 2), (1e-3, 0)])
 def test_modes_merge_and_vanish_where_an_arm_is_stretched(beyond: float, count: int) -> None:
     """The left arm of the 5-bar, of 110 and 145 from (-50, 0)."""
@@ -218,7 +218,7 @@ def test_modes_merge_and_vanish_where_an_arm_is_stretched(beyond: float, count: 
     assert len(pf.working_modes(pf.load("five_bar").without_limits(), tip)) == count
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize("position", [(0, 0, 9000), (0, 1e200, -1e200)])
 @pytest.mark.parametrize("name", ["five_bar", "serial_arm"])
 def test_what_no_arm_is_long_enough_for_has_no_modes(name: str, position: tuple[float, ...]) -> None:
@@ -227,7 +227,7 @@ def test_what_no_arm_is_long_enough_for_has_no_modes(name: str, position: tuple[
     assert 0.0 < modes.unseen < 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "away"), [("stewart", 9e3), ("stewart", 1e7), ("rps", 1e5)])
 def test_a_strut_has_a_mode_however_far_and_exceeds_its_stroke(name: str, away: float) -> None:
     modes = pf.working_modes(pf.load(name), (0, 0, away))
@@ -238,7 +238,7 @@ def test_a_strut_has_a_mode_however_far_and_exceeds_its_stroke(name: str, away: 
 # --- what the list says ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_list_says_how_it_was_found_is_the_same_in_every_call_and_begins_nearest_to_home() -> None:
     mechanism, modes = modes_of("6-RSS")
     target = MACHINES["6-RSS"][1]

@@ -208,7 +208,7 @@ def apart() -> pf.Workspace:
 
 
 KEEP, ANYHOW = pf.Options(working_mode="keep"), pf.Options(hold="position", working_mode="any")
-SLOW = pytest.mark.slow
+SLOW = pytest.mark.compiled
 CONTAINED = [
     *(pytest.param(partial(space, name), None, pf.Options(), id=name) for name in (*RESOLUTIONS, "five_bar", "rrr")),
     *(pytest.param(partial(in_mode, k), k, KEEP, id=f"mode {k}") for k in (0, 1)),
@@ -237,7 +237,7 @@ def test_what_is_contained_is_what_is_reached(
     assert options.hold == "position" or not contained[~reached].any()
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_any_orientation_ends_at_a_window() -> None:
     machine = pf.load("rpr")
     low, high = anyhow(machine, resolution=0.2).bounds
@@ -346,7 +346,7 @@ def reached_at_some_yaw(mechanism: pf.Mechanism, points: Array) -> Array:
     return rows
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_any_orientation_is_that_of_some_yaw_of_a_platform_on_three_struts(monkeypatch: pytest.MonkeyPatch) -> None:
     machine = struts_only(pf.load("rpr"))
     with monkeypatch.context() as patched:
@@ -617,7 +617,7 @@ def test_what_no_closed_form_answers_is_explored_to_the_workspace_of_what_it_nea
 # Links kept apart
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_border_is_where_links_are_as_near_as_they_may_be() -> None:
     machine = struts(clearance=10.0)
     found = pf.workspace(machine, over=["tilt_x", "yaw"], resolution=0.05)
@@ -640,7 +640,7 @@ def test_a_border_is_where_links_are_as_near_as_they_may_be() -> None:
     assert "clearance" in found._repr_html_()
 
 
-@pytest.mark.slow
+@pytest.mark.compiled
 def test_a_map_that_explores_without_closed_forms_goes_round_an_obstacle() -> None:
     machine = pf.load("panda")
     length, at = machine.characteristic_length, np.array([406.9, 100.0, 697.0])

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 os.environ["PFABRIK_KERNELS"] = "python"
-os.environ["PFABRIK_KERNELS"] = "python"
 sys.path.insert(0, str(Path(__file__).parents[1] / "src"))
 
 import pfabrik as pf
@@ -24,16 +23,27 @@ ROOT = Path(pf.__file__).parent
 class Walk(NamedTuple):
     files: set[Path]
     functions: set[tuple[Path, str]]
+    depths: list[int]
+
+    @property
+    def depth(self) -> int:
+        """The most functions of the package that are in one another."""
+        return max(self.depths)
 
 
 def walk(ask: Callable[[], object]) -> Walk:
     """Files of the package that a question enters, and the named functions in them."""
-    entered = Walk(set(), set())
+    entered, within = Walk(set(), set(), [0]), 0
 
     def enter(frame: object, event: str, _: object) -> None:
+        nonlocal within
         code = frame.f_code  # type: ignore[attr-defined]
         path = Path(code.co_filename)
-        if event == "call" and path.is_relative_to(ROOT):
+        if event not in ("call", "return") or not path.is_relative_to(ROOT):
+            return
+        within += 1 if event == "call" else -1
+        if event == "call":
+            entered.depths.append(within)
             entered.files.add(path)
             if not code.co_name.startswith("<"):
                 entered.functions.add((path, getattr(code, "co_qualname", code.co_name)))
@@ -60,19 +70,24 @@ def questions() -> dict[str, Callable[[], object]]:
     }
 
 
-def walks() -> dict[str, Walk]:
-    asked = questions()
+def walks(*names: str) -> dict[str, Walk]:
+    asked = {name: ask for name, ask in questions().items() if not names or name in names}
     for ask in asked.values():
         ask()
     return {name: walk(ask) for name, ask in asked.items()}
 
 
 def main() -> None:
-    print(f"{'question':32} files  of them kernels  functions  lines of these files")
-    for name, (files, functions) in walks().items():
+    if "--far" in sys.argv:  # what `tools/counts.py` reads
+        far = walks("target out of reach")["target out of reach"]
+        print(len(far.functions), far.depth)
+        return
+    print(f"{'question':32} files  of them kernels  functions  depth  lines of these files")
+    for name, walked in walks().items():
+        files, functions = walked.files, walked.functions
         lines = sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files)
         n_kernels = sum("kernels" in path.relative_to(ROOT).parts for path in files)
-        print(f"{name:32} {len(files):5} {n_kernels:16} {len(functions):10} {lines:21}")
+        print(f"{name:32} {len(files):5} {n_kernels:16} {len(functions):10} {walked.depth:6} {lines:21}")
 
 
 if __name__ == "__main__":

@@ -2,10 +2,12 @@
 
 A capability (statics, say, or timing) is a thin room over the verbs, `solve_ik`, `track` or `margins`, each imported
 from its public module. What it asks of the machine itself it imports from here, and reaches no deeper: the import
-contracts in `pyproject.toml` name the rooms that have kernels of their own, and what few imports are owed. Each name
-is documented where it is defined.
+contracts in `pyproject.toml` name the few that search or prove by the engines' own parts. Each name is documented where
+it is defined.
 
-Machine       model_of, Model; engine_of, Configurations; task_of, Task
+Machine       model_of, Model; task_of, Task
+Engine        engine_of, kind_of_engine, Engine, Starts, Configurations, why_not_measured
+Targets       Target, as_targets, carrying_joint; POSITION_ERROR
 Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
 Masses        inertias_of, BodyInertia
@@ -13,13 +15,14 @@ Motion        home_coordinates, displacements, joint_centres, placed, end_effect
               tilt_axis, has_weak_coordinates, task_remark
 First order   around_home, generic_of, internal_rates, require_determined; JointRates, cycle_basis; cut_loops
               actuator_units, rate_units; parallel_signs
-Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes
+Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes, LegSlopes
 """
 
-from .engines.engine import engine_of
+from .engines.engine import POSITION_ERROR, Engine, Starts, engine_of, kind_of_engine, why_not_measured
 from .engines.joints.configurations import Configurations
 from .engines.joints.first_order import JointRates
-from .engines.varied import MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
+from .engines.targets import Target, as_targets, carrying_joint
+from .engines.varied import LegSlopes, MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
 from .machine.description.body_inertias import BodyInertia, inertias_of
 from .machine.description.graph import tree_of
 from .machine.description.home_mobility import column_joints
@@ -47,18 +50,25 @@ from .machine.motion.mobility import around_home, generic_of, internal_rates
 from .machine.motion.singularities import parallel_signs
 
 __all__ = [
+    "POSITION_ERROR",
     "BodyInertia",
     "Configurations",
+    "Engine",
     "JointPath",
     "JointRates",
+    "LegSlopes",
     "MachineAt",
     "Model",
     "Readout",
+    "Starts",
+    "Target",
     "Task",
     "VariedGeometry",
     "VariedMachine",
     "actuator_units",
     "around_home",
+    "as_targets",
+    "carrying_joint",
     "column_joints",
     "columns",
     "cut_loops",
@@ -73,6 +83,7 @@ __all__ = [
     "internal_rates",
     "joint_centres",
     "joint_path",
+    "kind_of_engine",
     "leg_slopes",
     "links_of",
     "model_of",
@@ -89,4 +100,5 @@ __all__ = [
     "tilt_axis",
     "tree_of",
     "varied",
+    "why_not_measured",
 ]

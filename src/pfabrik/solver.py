@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .answers.differential import forward_jacobian
+from .answers.differential import forward_jacobian, singularity
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
@@ -18,13 +18,17 @@ from .engines.engine import engine_of
 from .engines.joints.configurations import new_rows
 from .engines.targets import Target
 from .errors import InvalidArgument
-from .first_answers import prepare
 from .fk import Actuators, solve_fk
 from .ik import keeps_mode, solve_ik
 from .machine.description.mechanism import Mechanism, checked_mechanism
 from .machine.model import model_of
 from .machine.motion.fitting_task import along_tilt, tilt_axis
+from .machine.poses import pose
 from .options import Options, checked_options
+from .track import track
+
+FAR = 3.0
+"""How far away from home a target is out of reach of any machine [L or rad]."""
 
 
 class Solver:
@@ -187,3 +191,16 @@ def _read_only(array: Floats) -> Floats:
     view = array.view()
     view.setflags(write=False)
     return view
+
+
+def prepare(mechanism: Mechanism) -> None:
+    """Let first answers, within reach and out of it, prepare what later ones use: 0.1 s, once a machine."""
+    home, shift = mechanism.home_pose, FAR * mechanism.characteristic_length
+    far = pose(home[:3, 3] + shift, rotvec=(FAR, 0.0, 0.0))
+    at_home = solve_ik(mechanism, home)
+    solve_ik(mechanism, far)
+    assert len(track(mechanism, np.stack([home, far])).q) == 2
+    for change in (0.0, shift):
+        solve_fk(mechanism, at_home.actuators + change)
+    forward_jacobian(at_home)
+    singularity(at_home)

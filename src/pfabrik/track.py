@@ -15,7 +15,6 @@ from .answers.status import Status
 from .answers.tracked import Track
 from .common.arrays import Floats, Mask
 from .common.batch import put
-from .common.poses import between
 from .common.rotations import whole_turns
 from .common.telling import telling
 from .engines.engine import engine_of
@@ -30,6 +29,7 @@ from .machine.description.mechanism import Mechanism
 from .machine.description.task import task_of
 from .machine.model import model_of
 from .machine.motion.singularities import assembly_signs
+from .machine.poses import between
 from .options import Options, checked_options
 from .tolerances import TOLERANCES
 

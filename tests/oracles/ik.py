@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pfabrik import Joint, Mechanism
-from pfabrik.common.poses import as_poses
+from pfabrik.machine.poses import as_poses
 from pfabrik.tolerances import TOLERANCES
 
 from .turns import Array, angle_about, angle_of, either_angle, turns_about, unit

@@ -1,8 +1,8 @@
 """Write docs/gallery.md, all machines and tasks as pictures: `python tools/site/gallery.py`, when there are new ones.
 
-`python tools/site/portraits.py NAME` takes the picture of a new machine before. On the site each machine of the gallery has a
-page that this module writes too: the machine live, as `pf.export_web` makes it, its file, and six lines of Python with
-what they print.
+`python tools/site/portraits.py NAME` takes the picture of a new machine before. On the site each machine of the gallery
+has a page that this module writes too: the machine live, as `pf.export_web` makes it, its file, and six lines of Python
+with what they print.
 """
 
 from __future__ import annotations

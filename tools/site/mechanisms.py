@@ -1,4 +1,4 @@
-"""Write docs/mechanisms.md and docs/pictures/: what is in the catalogue. Run it as `python tools/site/mechanisms.py`."""
+"""Write docs/mechanisms.md and docs/pictures/, the catalogue: `python tools/site/mechanisms.py`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from matplotlib import pyplot
 from PIL import Image
 
 import pfabrik as pf
+from pfabrik.common.drawing import Theme
 from pfabrik.engines.chains.serial_chain import is_chain
 from pfabrik.machine.catalog import catalog_file, description
 from pfabrik.machine.model import model_of
-from pfabrik.view.looks import LOOKS, Theme
+from pfabrik.view.looks import LOOKS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "mechanisms.md"
 PICTURES = PAGE.parent / "pictures"

@@ -1,4 +1,4 @@
-"""Write docs/pictures/live: machines as their pages show them, and a film of one: `python tools/site/portraits.py [NAME]...`.
+"""Write docs/pictures/live, machines as their pages show them: `python tools/site/portraits.py [NAME]...`; a film too.
 
 Pages are opened in headless Chromium, light and dark, with nothing but the machine on them. The pictures have no
 ground, so that cards of any colour carry them.

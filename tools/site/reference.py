@@ -41,8 +41,8 @@ PAGES = {
         "A machine is a `Mechanism`: joints between bodies, read from a file by `load`, or made of joints or legs "
         "in Python. It never changes; methods with `with_` in their names return another one.",
         "Mechanism Joint Cone Leg Shape Mass load save catalog decompose SubChain",
-        "description.joint_coordinates.JointCoordinate decomposition.decompose.Split "
-        "decomposition.positions.Parallelogram",
+        "machine.description.joint_coordinates.JointCoordinate machine.decomposition.decompose.Split "
+        "machine.decomposition.positions.Parallelogram",
     ),
     "solving": Page(
         "Solving",
@@ -57,7 +57,7 @@ PAGES = {
         "An answer is a `Solution`, of one target or of a batch, with a `Status` for each. What stops it is an "
         "`ActiveLimit`, and `margins` says how far every limit is.",
         "Solution Status ActiveLimit Track margins closure_residual",
-        "answers.along.Extremes printed.ResultTable",
+        "answers.along.Extremes common.printed.ResultTable",
     ),
     "reach": Page(
         "Reach",
@@ -71,14 +71,14 @@ PAGES = {
         "`certify` proves for every pose of a region that it is reached; `largest` finds the largest region of a "
         "shape for which it can. Both are for machines whose legs have closed forms.",
         "certify Certificate PoseRegion Enclosure largest Largest",
-        "certify.certificates.Refutation",
+        "capabilities.certify.certificates.Refutation",
     ),
     "design": Page(
         "Design",
         "`design` finds dimensions for what a machine must do, with a proof of its margins. Requirements are in "
         "`pf.keep`.",
         "design Design Designs " + " ".join(f"keep.{name}" for name in pf.keep.__all__),
-        "design.found_design.Binding design.found_design.DesignRound",
+        "capabilities.design.found_design.Binding capabilities.design.found_design.DesignRound",
     ),
     "first-order": Page(
         "First order",
@@ -106,14 +106,16 @@ PAGES = {
         "result says which of them the measurements determine, and how well.",
         "parameters Parameters sensitivity Sensitivity Measurements read_measurements read_printer calibrate "
         "Calibration plot_calibration",
-        "calibration.calibration.ParameterValue calibration.calibration.Suspect calibration.printer_settings.Printer",
+        "capabilities.calibration.calibration.ParameterValue capabilities.calibration.calibration.Suspect "
+        "capabilities.calibration.printer_settings.Printer",
     ),
     "paths": Page(
         "Paths and time",
         "`read_path` makes targets of a table or of G-code, which `track` follows; `time_path` is how fast that "
         "may be. `platform_speed` is the highest speed at one configuration.",
         "read_path time_path Timed platform_speed PlatformSpeed",
-        "paths.path.Path timing.platform_speed.PlatformSpeeds timing.timed.Exceeded",
+        "capabilities.paths.path.Path capabilities.timing.platform_speed.PlatformSpeeds "
+        "capabilities.timing.timed.Exceeded",
     ),
     "controllers": Page(
         "Controllers and learning",
@@ -121,8 +123,9 @@ PAGES = {
         "this library no more: C for a controller, tensors for learning, a page for a browser.",
         "actuation Actuation export_c export_ros2_control export_ros2_node export_web export_tensors export_numpy "
         "export_torch export_jax",
-        "actuation.named_values.Mapped actuation.actuation.Gains actuation.actuation.LimitMargin "
-        "actuation.drive_limits.HalfSpaces actuation.hull.Hull actuation.sample.Sample",
+        "capabilities.actuation.named_values.Mapped capabilities.actuation.actuation.Gains "
+        "capabilities.actuation.actuation.LimitMargin capabilities.actuation.drive_limits.HalfSpaces "
+        "capabilities.actuation.hull.Hull capabilities.actuation.sample.Sample",
     ),
     "pictures": Page(
         "Pictures",
@@ -147,7 +150,7 @@ PAGES = {
         "MuJoCo and URDF",
         "Mechanisms from MuJoCo models, URDF and SDF, and back. `from_sdf` is `from_urdf` under another name.",
         " ".join(f"interop.{name}" for name in pf.interop.__all__ if name != "from_sdf"),
-        "interop.referee.Travelled",
+        "exchange.interop.referee.Travelled",
     ),
 }
 

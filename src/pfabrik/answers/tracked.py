@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import Floats, Ints, Mask, as_plain
-from ..common.poses import between
 from ..common.printed import ResultTable, plain
 from ..engines.engine import engine_of
 from ..engines.joints.configurations import Configurations
@@ -23,6 +22,7 @@ from ..machine.description.mechanism import Mechanism
 from ..machine.description.readouts import readouts
 from ..machine.description.task import task_of
 from ..machine.motion.displacements import actuator_units
+from ..machine.poses import between
 from ..tolerances import TOLERANCES
 from .active_limits import ActiveLimit
 from .along import Extremes, largest_tilts, least_margins

@@ -22,7 +22,7 @@ from .options import STANDARD_INPUT, named_values, series, together
 from .printing import note
 
 if TYPE_CHECKING:
-    from ..engines.targets import Target
+    from ..kinematics import Target
 
 Triple: TypeAlias = tuple[float, float, float]
 Value = TypeVar("Value")
@@ -138,9 +138,8 @@ def answered(mechanism: pf.Mechanism, options: TargetOptions) -> pf.Solution | N
 
 def noted(mechanism: pf.Mechanism, options: TargetOptions) -> Target:
     """The target that options give; notes say what of it the task, or an end effector that only tilts, leaves out."""
-    from ..common.poses import as_poses
-    from ..engines.targets import as_targets
-    from ..kinematics import tilt_axis
+    from ..kinematics import as_targets, tilt_axis
+    from ..machine.poses import as_poses
     from ..view.overview import vector
 
     target = options.of(mechanism)

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..view.eye import View
-    from ..view.looks import Theme
+    from ..common.drawing import Theme, View
 
 STANDARD = Path("-")
 """Standard input or output, in place of a file."""

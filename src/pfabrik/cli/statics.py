@@ -170,7 +170,7 @@ def error_names(mechanism: pf.Mechanism) -> dict[str, None]:
 )
 @click.option("--rms", is_flag=True, help="Errors are standard deviations, not bounds.")
 @printing_result
-def accuracy(solution: pf.Solution, errors: tuple[str, ...], rms: bool) -> pf.Accuracy:
+def accuracy(solution: pf.Solution, errors: tuple[str, ...], rms: bool) -> pf.PoseAccuracy:
     """Tell how far off a pose is if actuators are off and joints have play.
 
     At a pose, home by default. The error of an actuator is half its resolution and half its backlash together; play of

@@ -202,7 +202,7 @@ def singularities(
 
 def note_slow(mechanism: pf.Mechanism) -> None:
     """Note before the work begins that it takes longer where no closed forms answer, and why."""
-    from ..engines.engine import why_not_measured
+    from ..kinematics import why_not_measured
 
     reason = why_not_measured(mechanism)
     if reason:

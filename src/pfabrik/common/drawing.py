@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 from ..errors import InvalidArgument
+from .above import above
 from .arrays import Floats
 from .extras import require
 
@@ -13,9 +14,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Size: TypeAlias = tuple[float, float]
+Theme: TypeAlias = Literal["light", "dark"]
+View: TypeAlias = Literal["top", "front", "side", "iso"] | tuple[float, float]
+
+ACHIEVED, SHADE = "#00204d", "#ececec"
+"""Colours of what is achieved, and of the ground where nothing is."""
 
 SMALL = 8.0
 """Size of letters [points]."""
+
+
+@runtime_checkable
+class Plotted(Protocol):
+    """A result that draws itself."""
+
+    def plot(self, *args: Any, **options: Any) -> Any: ...
+
+
+def drawn(result: object, *args: Any) -> Any:
+    """Draw a result by the function that `pfabrik.view`, above it, has for its class."""
+    return above("view.picture_of")(type(result).__name__)(result, *args)
 
 
 def new_figure(

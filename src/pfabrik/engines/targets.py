@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ..common.arguments import DOUBLE, any_values, array
 from ..common.arrays import Floats, Ints
-from ..common.poses import SupportsMatrix, as_poses, what_is_wrong
 from ..errors import InvalidArgument
 from ..kernels.rows import INVALID
 from ..machine.description.mechanism import Mechanism, checked_mechanism
@@ -18,6 +17,7 @@ from ..machine.description.task import task_of
 from ..machine.motion.displacements import columns
 from ..machine.motion.fitting_task import along_tilt
 from ..machine.motion.joint_path import path_of
+from ..machine.poses import SupportsMatrix, as_poses, what_is_wrong
 from ..options import Options
 
 Target: TypeAlias = ArrayLike | SupportsMatrix | Mapping[str, ArrayLike]

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ..common.arrays import Floats
 from ..common.batch import put, take
 from ..common.derived import derived
-from ..common.poses import are_poses, made_exact
 from ..engines.joints.close import Closing, close
 from ..engines.joints.closure_engine import start_coordinates, to_answers
 from ..engines.joints.configurations import Configurations, new_rows, steps_of
@@ -28,6 +27,7 @@ from ..kernels.rows import FAILED, ITERATIONS, REACHED, ROUNDS
 from ..kernels.threads import in_blocks
 from ..machine.description.mechanism import Mechanism
 from ..machine.model import Model, model_of
+from ..machine.poses import are_poses, made_exact
 from ..options import Options
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of

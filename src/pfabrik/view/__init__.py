@@ -1,1 +1,19 @@
 """Pictures, which need the extra ``plot``, and the viewer in the browser, which needs the extra ``view``."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+PICTURES = {
+    "SingularityMap": "singular_picture.plot_singular_map",
+    "SingularityTrack": "singular_picture.plot_singular_track",
+    "Workspace": "workspace_picture.plot_workspace",
+}
+"""What draws results that lie below this package, by their classes."""
+
+
+def picture_of(name: str) -> Callable[..., Any]:
+    """What draws the results of a class; its module is imported when it is first asked for."""
+    module, _, function = PICTURES[name].rpartition(".")
+    drawing: Callable[..., Any] = getattr(import_module(f".{module}", __name__), function)
+    return drawing

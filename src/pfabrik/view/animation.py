@@ -15,14 +15,13 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..answers.words import as_sentence, short_names
 from ..common.checks import require_count, require_ending, require_positive
-from ..common.drawing import SMALL
+from ..common.drawing import SMALL, Size, Theme, View
 from ..common.extras import require
 from ..common.telling import OnProgress, telling
 from ..common.whole_files import whole_path
 from ..errors import MissingLibrary
-from .canvas import Size, canvas_on, checked_size, letters_in, usual_size
-from .eye import View
-from .looks import HELD, Look, Theme, look_of
+from .canvas import canvas_on, checked_size, letters_in, usual_size
+from .looks import HELD, Look, look_of
 from .machine import key_of, machine_eye
 from .painter import draw_machine
 from .plot_track import checked_track, places_along

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..common.arrays import Floats
 from ..common.checks import require_method, require_positive
-from ..common.drawing import SMALL, new_figure, require_flat
+from ..common.drawing import SMALL, Size, new_figure, require_flat
 from ..errors import InvalidArgument
 from .eye import Eye
 from .looks import Look, dress
@@ -34,7 +34,6 @@ EDGE_FREE, STRIP_FREE = 9.0, 3.0
 TITLE, TITLE_LINE = SMALL + 2.0, 15.0
 """Size of the letters of a title, and the height of one of its lines [points]."""
 
-Size: TypeAlias = tuple[float, float]
 """Width and height of a figure [inches]."""
 
 LEAST_SIZE = (3.0, 2.5)

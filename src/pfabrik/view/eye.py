@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import Literal, TypeAlias
 
 import numpy as np
 
 from ..common.arrays import Floats
+from ..common.drawing import View
 from ..errors import InvalidArgument
 
-View: TypeAlias = Literal["top", "front", "side", "iso"] | tuple[float, float]
 """A direction by name, or as elevation above the level and azimuth about the upright axis [deg]."""
 
 VIEWS: dict[str, tuple[float, float]] = {

@@ -12,8 +12,8 @@ from ..capabilities.workspace.space import POSITIONS
 from ..capabilities.workspace.workspace_table import for_people, in_words, labels
 from ..common.arrays import Floats, Ints
 from ..common.checks import require_method
-from ..common.drawing import SMALL, new_figure, require_flat
-from .canvas import LETTER, Size, checked_size, fit
+from ..common.drawing import SMALL, Size, new_figure, require_flat
+from .canvas import LETTER, checked_size, fit
 from .eye import Eye
 from .looks import Look, dress
 from .raster import Raster

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 from ..common.checks import require_choice
+from ..common.drawing import ACHIEVED, SHADE, Theme
 from ..machine.description.joints import JointType
 
 EDGE = "#1a1a1a"
@@ -15,7 +16,7 @@ HELD = "#d55e00"
 SINGULAR = "#aa3377"
 """Colour of singularities, and of nothing else."""
 
-ASKED, ACHIEVED, SHADE = "#8c8c8c", "#00204d", "#ececec"
+ASKED = "#8c8c8c"
 
 MARKERS: dict[JointType, str] = {
     "revolute": "o",
@@ -25,8 +26,6 @@ MARKERS: dict[JointType, str] = {
     "cylindrical": "h",
     "fixed": "X",
 }
-
-Theme: TypeAlias = Literal["light", "dark"]
 
 
 @dataclass(frozen=True)

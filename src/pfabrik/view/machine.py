@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..answers.solution import Solution
 from ..common.checks import require_names
-from ..common.drawing import SMALL
+from ..common.drawing import SMALL, Plotted, Theme, View
 from ..kinematics import plane_of
 from ..machine.description.mechanism import Mechanism
 from .canvas import LETTER, ON_TOP, Canvas, canvas_on, new_canvas
-from .eye import Eye, View, eye_for, eye_of, eye_on
+from .eye import Eye, eye_for, eye_of, eye_on
 from .labels import place_names
-from .looks import HELD, Look, Theme, look_of
+from .looks import HELD, Look, look_of
 from .painter import INK, draw_machine, marker_style
 from .skeleton import Mark, Skeleton, checked_shown, skeleton_of
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def plot(
-    shown: Mechanism | Solution,
+    shown: Mechanism | Solution | Plotted,
     ax: Axes | None = None,
     *,
     names: Sequence[str] | bool = (),
@@ -42,7 +43,7 @@ def plot(
     Parameters
     ----------
     shown : Mechanism or Solution
-        A Mechanism, or one Solution.
+        A Mechanism, or one Solution; a result that has a `plot` of its own is drawn by that.
     ax : Axes, optional
         Two-dimensional Matplotlib axes to draw on. Default: those of a new figure, which is `ax.figure`; its `savefig`
         writes PNG, SVG and PDF.
@@ -70,6 +71,8 @@ def plot(
     MissingLibrary
         Matplotlib is not installed.
     """
+    if isinstance(shown, Plotted):
+        return plot_result(shown, ax=ax, names=names, view=view, size=size, theme=theme)
     mechanism, _ = checked_shown(shown)
     if isinstance(names, bool):
         names = [joint.name for joint in mechanism.joints] if names else ()
@@ -88,6 +91,13 @@ def plot(
     draw_machine(canvas, skeleton)
     write_names(canvas, skeleton, named)
     axes: Axes = canvas.axes
+    return axes
+
+
+def plot_result(result: Plotted, **options: Any) -> Axes:
+    """Draw a result by its own `plot`, with what was asked for beside what `plot` does by itself."""
+    usual = {name: each.default for name, each in inspect.signature(plot).parameters.items()}
+    axes: Axes = result.plot(**{name: value for name, value in options.items() if value is not usual[name]})
     return axes
 
 

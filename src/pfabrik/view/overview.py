@@ -13,8 +13,8 @@ from typing import Any
 from ..answers.differential import Mobility, NearlyFree, mobility
 from ..capabilities.clearance.clearance import clearance
 from ..common.printed import Printed, ResultTable, error_text
-from ..engines.engine import kind_of_engine
 from ..ik import solve_ik
+from ..kinematics import kind_of_engine
 from ..machine.decomposition.decompose import decompose
 from ..machine.description.home_mobility import universal_axes
 from ..machine.description.joints import DRIVE_FIELDS, KINDS

@@ -13,12 +13,11 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..common.arrays import Floats, Mask
 from ..common.checks import require_method, require_type
-from ..common.drawing import SMALL, new_figure
+from ..common.drawing import SMALL, Theme, View, new_figure
 from ..errors import InvalidArgument, counted
 from ..kinematics import Readout, readouts
 from .canvas import Canvas, canvas_on, checked_size, wrapped
-from .eye import View
-from .looks import HELD, Look, Theme, dress, look_of
+from .looks import HELD, Look, dress, look_of
 from .machine import key_of, machine_eye
 from .painter import draw_machine
 from .skeleton import skeleton_of

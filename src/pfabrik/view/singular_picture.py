@@ -12,11 +12,11 @@ from ..capabilities.workspace.singular import signed_at
 from ..capabilities.workspace.surface import face_normals, sizes_of
 from ..capabilities.workspace.workspace_table import for_people, labels
 from ..common.arrays import Floats, Ints
-from ..common.drawing import SMALL, new_figure
-from .canvas import Size, checked_size, draw_title, wrapped
-from .eye import View, eye_of, upright
+from ..common.drawing import SMALL, Size, Theme, View, new_figure
+from .canvas import checked_size, draw_title, wrapped
+from .eye import eye_of, upright
 from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit_bare
-from .looks import SINGULAR, Look, Theme, look_of
+from .looks import SINGULAR, Look, look_of
 from .raster import lines_between, rasterised
 from .slices import area_of, cut_mesh, draw_slice, loops_of, plane_across
 from .solid import best_eye, corner_normals, in_the_light, picked_faces, scale_of, seen_solid

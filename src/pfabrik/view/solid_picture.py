@@ -10,9 +10,9 @@ from ..answers.words import limit_name
 from ..capabilities.workspace.border import Group, group_of_limits, groups_of
 from ..capabilities.workspace.workspace_table import for_people
 from ..common.arrays import Floats, Ints, Mask
-from ..common.drawing import SMALL, new_figure
-from .canvas import Size, checked_size, draw_key, draw_title, draw_triad
-from .eye import Eye, View, eye_of, upright
+from ..common.drawing import SMALL, Size, View, new_figure
+from .canvas import checked_size, draw_key, draw_title, draw_triad
+from .eye import Eye, eye_of, upright
 from .frame import PADS, axes_for, box_of, dense, draw_box, draw_image, draw_lines, fit_bare, machine_lines, title_of
 from .looks import Look
 from .raster import counted_around

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..capabilities.workspace.space import TURNS
 from ..capabilities.workspace.workspace_table import for_people
-from ..common.drawing import SMALL
-from .canvas import Size, draw_title
-from .eye import View
+from ..common.drawing import SMALL, Size, Theme, View
+from .canvas import draw_title
 from .frame import PLANE_SIZE, axes_for
-from .looks import Look, Theme, look_of
+from .looks import Look, look_of
 from .plane_picture import plot_plane
 from .solid_picture import plot_solid
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...answers.solution import Solution
 from ...answers.status import Status
+from ...common.above import above
 from ...common.arrays import Floats
 from ...common.checks import require_count
 from ...errors import InvalidArgument, counted
-from ...exchange.interop.mjcf_qpos import qpos
 from .named_values import box_of
 from .placed import Placer
 
@@ -42,7 +42,8 @@ class Sample(NamedTuple):
     @property
     def qpos(self) -> Floats:
         """MuJoCo's joint positions of the model, (n, nq) [rad, m]; see `interop.qpos`."""
-        return qpos(self.solution, self.model)
+        joints: Floats = above("interop.qpos")(self.solution, self.model)
+        return joints
 
 
 def sample_feasible(placer: Placer, n: int, seed: int, box: Any, model: object) -> Sample:

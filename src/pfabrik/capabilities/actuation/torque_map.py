@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...common.arrays import Floats, Mask
-from ...common.drawing import SMALL, new_figure
+from ...common.drawing import ACHIEVED, SHADE, SMALL, new_figure
 from ...errors import InvalidArgument
 from ...tolerances import TOLERANCES
-from ...view.looks import ACHIEVED, SHADE
 from .drive_limits import HalfSpaces, clipped, image_of_box
 from .named_values import box_of, per_actuator
 from .placed import Placer

@@ -10,10 +10,10 @@ import numpy as np
 from ...common.arrays import Floats
 from ...common.checks import require_path
 from ...common.csv_columns import CsvColumns
-from ...common.poses import pose
 from ...common.text_lines import WrongText, as_text, lines_of, refusing
 from ...errors import InvalidArgument, near_miss
 from ...machine.description.mechanism import Mechanism, checked_mechanism
+from ...machine.poses import pose
 from .measurements import Measurements, Sigma
 
 POSITION, QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")

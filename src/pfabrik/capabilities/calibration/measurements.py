@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from ...common.arguments import any_values, array, is_not_infinite
 from ...common.arrays import Floats, Ints, Mask
 from ...common.checks import require_known
-from ...common.poses import is_rotation
 from ...common.rotations import from_rotvec, to_rotvec, turning
 from ...errors import InvalidArgument
+from ...machine.poses import is_rotation
 
 INSTRUMENT = ("frame", "tool")
 """The frame and target of an instrument, which sees T_instrument_base T_base_platform T_platform_target."""

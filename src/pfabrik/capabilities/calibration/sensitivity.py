@@ -9,10 +9,10 @@ import numpy as np
 from ...answers.solution import Solution, checked_solution
 from ...common.arrays import Floats, shaped
 from ...common.derived import derived
-from ...engines.varied import LegSlopes
 from ...errors import InvalidArgument, UnsupportedMechanism
 from ...kinematics import (
     JointRates,
+    LegSlopes,
     cycle_basis,
     displacements,
     end_effector_pose,

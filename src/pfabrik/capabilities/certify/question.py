@@ -15,10 +15,8 @@ from ...answers.status import Status
 from ...common.arrays import Floats
 from ...common.checks import require_count, require_finite, require_names, require_positive
 from ...common.executors import Workers
-from ...common.poses import are_poses
 from ...common.rotations import to_rotvec
 from ...common.telling import OnProgress, telling
-from ...engines.targets import Target, as_targets
 from ...errors import InvalidArgument, UnsupportedMechanism
 from ...feasibility import feasibility
 from ...ik import solve_ik
@@ -39,7 +37,7 @@ from ...kernels.certify.prove import (
     SPENT,
     TOO_SMALL,
 )
-from ...kinematics import Model, model_of, task_of
+from ...kinematics import Model, Target, are_poses, as_targets, model_of, task_of
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg

@@ -13,8 +13,8 @@ from ...common.arrays import Floats
 from ...common.checks import require_choice, require_finite, require_mapping
 from ...common.extras import require
 from ...common.telling import OnProgress, telling
-from ...engines.targets import Target
 from ...errors import InvalidArgument, UnknownName
+from ...kinematics import Target
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ..certify.pose_region import PoseRegion
 from .candidate import Candidate

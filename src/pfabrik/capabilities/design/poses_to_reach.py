@@ -10,10 +10,8 @@ import numpy as np
 
 from ...answers.tracked import Track
 from ...common.arrays import Floats
-from ...common.poses import are_poses
-from ...engines.targets import as_targets
 from ...errors import InvalidArgument
-from ...kinematics import plane_of, task_of
+from ...kinematics import are_poses, as_targets, plane_of, task_of
 from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
 from ...track import track

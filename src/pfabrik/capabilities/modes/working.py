@@ -12,13 +12,12 @@ from ...answers.status import Status
 from ...answers.words import actuator_columns, in_units, pose_cells, pose_columns
 from ...common.arrays import Floats
 from ...common.checks import require_count
-from ...common.poses import are_poses, made_exact, what_is_wrong
 from ...engines.joints.close import CLOSED, close
-from ...engines.targets import Target, as_targets
 from ...errors import InvalidArgument
 from ...kernels.rows import POSITION_ERROR, ROTATION_ERROR
-from ...kinematics import engine_of, model_of, readouts
+from ...kinematics import Target, are_poses, as_targets, engine_of, model_of, readouts
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import made_exact, what_is_wrong
 from .branches import BranchSearch, Listed
 from .lists import BATCH, Modes
 

@@ -11,11 +11,11 @@ import numpy as np
 from ...common.arrays import Floats
 from ...common.cells import unmarked
 from ...common.csv_columns import CsvColumns, CsvRows
-from ...common.poses import pose
 from ...common.text_lines import WrongText
 from ...errors import InvalidArgument, near_miss
 from ...kinematics import JointPath, generic_of, joint_path, passive_series, task_of
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import pose
 from ...tolerances import TOLERANCES
 from .path import BLOCK, AngleUnit, Path
 

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ...common.arrays import Floats, Ints
-from ...common.poses import between
+from ...machine.poses import between
 
 MOST_STEPS = 1_000_000
 """Steps of a path that is held whole, at most."""

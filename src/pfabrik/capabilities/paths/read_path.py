@@ -17,10 +17,10 @@ import numpy as np
 from ...common.arrays import Floats
 from ...common.checks import require_path, require_positive
 from ...common.csv_columns import SAID
-from ...common.poses import pose
 from ...common.rotations import to_rpy
 from ...common.text_lines import WrongText, as_text, lines_of, refusing
 from ...machine.description.mechanism import Mechanism, checked_mechanism
+from ...machine.poses import pose
 from .csv_table import CsvTable
 from .gcode import COMMENT, Move, steps_of
 from .path import BLOCK, MOST_STEPS, Path, joined

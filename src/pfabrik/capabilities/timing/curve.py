@@ -9,10 +9,10 @@ import numpy as np
 from ...answers.differential import inverse_jacobian
 from ...answers.tracked import Track
 from ...common.arrays import Floats, Ints, Mask
-from ...common.poses import between
 from ...errors import InvalidArgument
 from ...kernels.timing import second_derivatives, spline_at
 from ...kinematics import actuator_units
+from ...machine.poses import between
 from ...tolerances import TOLERANCES
 
 FINEST, FEWEST = 20_000, 2

@@ -14,12 +14,12 @@ from ...answers.start_configuration import Start, joint_vectors, start_of
 from ...common.arguments import any_values, array
 from ...common.arrays import Floats
 from ...common.checks import require_angle, require_known, require_mapping, require_positive
-from ...common.poses import SupportsMatrix
 from ...common.telling import OnProgress, telling
 from ...configuration import configuration
 from ...errors import InvalidArgument, UnsupportedMechanism
 from ...kinematics import model_of, task_of
 from ...machine.description.mechanism import Mechanism, checked_mechanism
+from ...machine.poses import SupportsMatrix
 from ..certify.enclosure import Enclosure, enclose
 from ..certify.question import require_no_clearance
 from .border_search import searched, step_of

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Floats, Ints
 from ...common.batch import joined, take
-from ...engines.engine import Starts
+from ...kinematics import Starts
 from .lines import Lines, lines_between, narrow
 from .measuring import Measure
 from .verdicts import OUTSIDE

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...common.arrays import Floats, Ints, Mask
 from ...common.batch import put, take
-from ...engines.engine import Starts
+from ...kinematics import Starts
 from ...tolerances import TOLERANCES
 from .measuring import Measure
 

@@ -15,7 +15,7 @@ from ...common.arrays import Floats, Ints
 from ...common.batch import joined, take, take_each
 from ...common.executors import SLOWER, Result, Workers, slices
 from ...common.telling import OnProgress
-from ...engines.engine import Starts
+from ...kinematics import Starts
 from .verdicts import MapQuestion
 
 LOOKS, LOOKS_GROWN, LOOKS_ONE_BY_ONE = 0.25, 0.75, 3.0

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from ...common.drawing import Theme, View, drawn
 from ...common.printed import Printed, ResultTable
 from ...errors import counted
 from ..certify.enclosure import Enclosure
@@ -20,9 +21,6 @@ from .workspace_table import LEAST_SHARE, in_words, workspace_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from ...view.eye import View
-    from ...view.looks import Theme
 
 
 class Workspace(Printed, Region):
@@ -143,9 +141,8 @@ class Workspace(Printed, Region):
         MissingLibrary
             Matplotlib is not installed.
         """
-        from ...view.workspace_picture import plot_workspace
-
-        return plot_workspace(self, ax, shape, view, size, theme)
+        axes: Axes = drawn(self, ax, shape, view, size, theme)
+        return axes
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write .npz (all arrays), .stl or .ply (the mesh; .ply with limits), or .csv (points of the border)."""

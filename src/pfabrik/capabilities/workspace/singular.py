@@ -15,6 +15,7 @@ from ...answers.status import Status
 from ...answers.tracked import Track
 from ...common.arrays import Floats, Ints, as_plain
 from ...common.checks import require_positive
+from ...common.drawing import Theme, View, drawn
 from ...common.printed import Printed, ResultTable, plain
 from ...common.telling import OnProgress, telling
 from ...errors import InvalidArgument, counted
@@ -30,8 +31,6 @@ from .result import Workspace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ...view.eye import View
-    from ...view.looks import Theme
 
 POINTS = 20_000
 """Approximate number of points of a map by default."""
@@ -110,9 +109,8 @@ class SingularityMap(Printed):
         theme : {"light", "dark"}, optional
             Colours for a light or a dark ground.
         """
-        from ...view.singular_picture import plot_singular_map
-
-        return plot_singular_map(self, ax, view, size, theme)
+        axes: Axes = drawn(self, ax, view, size, theme)
+        return axes
 
     @property
     def _signed(self) -> Floats:
@@ -191,9 +189,8 @@ class SingularityTrack(Printed):
         theme : {"light", "dark"}, optional
             Colours for a light or a dark ground.
         """
-        from ...view.singular_picture import plot_singular_track
-
-        return plot_singular_track(self, ax, size, theme)
+        axes: Axes = drawn(self, ax, size, theme)
+        return axes
 
 
 def least_and_share(measure: float | Floats) -> tuple[float, float]:

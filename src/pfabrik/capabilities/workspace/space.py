@@ -12,12 +12,11 @@ import numpy as np
 from ...common.arguments import array
 from ...common.arrays import Floats
 from ...common.checks import require_finite, require_known, require_mapping, require_names
-from ...common.poses import SupportsMatrix, is_rotation
 from ...common.rotations import from_rotvec
-from ...engines.targets import as_targets, carrying_joint
 from ...errors import InvalidArgument, UnknownName
-from ...kinematics import columns, generic_of, home_coordinates, task_of, tilt_axis
+from ...kinematics import as_targets, carrying_joint, columns, generic_of, home_coordinates, task_of, tilt_axis
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import SupportsMatrix, is_rotation
 from ...tolerances import TOLERANCES
 
 POSITIONS = ("x", "y", "z")

@@ -18,10 +18,9 @@ from ...common.arrays import Floats, Ints, Mask
 from ...common.batch import put, take_each
 from ...common.rotations import from_rotvec
 from ...configuration import configuration
-from ...engines.engine import POSITION_ERROR, Configurations, Engine, Starts, engine_of, why_not_measured
 from ...feasibility import feasibility
 from ...ik import solve_ik
-from ...kinematics import home_coordinates
+from ...kinematics import POSITION_ERROR, Configurations, Engine, Starts, engine_of, home_coordinates, why_not_measured
 from ...machine.description.mechanism import Mechanism
 from ...options import Options
 from ...tolerances import TOLERANCES

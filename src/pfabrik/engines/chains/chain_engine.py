@@ -11,13 +11,13 @@ import numpy as np
 
 from ...common.arrays import Floats, Records
 from ...common.batch import take
-from ...common.poses import are_poses
 from ...kernels.chains.chain_constants import MET, MOST_BENT
 from ...kernels.handle import Handle
 from ...kernels.pose.tables import BY_LEGS, Question
 from ...kernels.rows import PROJECTED, REACHED, TOO_NEAR, Rows
 from ...kernels.threads import in_blocks
 from ...machine.model import Model
+from ...machine.poses import are_poses
 from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
 from ..joints.assemble import forward_answers

@@ -10,7 +10,6 @@ import numpy as np
 from ...common.arrays import Floats, Ints
 from ...common.batch import put
 from ...common.derived import derived
-from ...common.poses import are_poses
 from ...kernels.handle import Handle
 from ...kernels.joints.joint_tables import ANSWER, EXPECTED, NEAREST, REACH, STEP, JointQuestion
 from ...kernels.pose.search_records import Starts
@@ -30,6 +29,7 @@ from ...kernels.rows import (
 from ...machine.model import Model
 from ...machine.motion.displacements import centres
 from ...machine.motion.limited_coordinates import within_turns
+from ...machine.poses import are_poses
 from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
 from .assemble import assemble, forward_answers, nearest_values

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...common.arrays import Floats, Ints, Mask
 from ...common.derived import derived
-from ...common.poses import between
 from ...kernels.clearance.link_records import PLATFORM
 from ...kernels.threads import in_blocks
 from ...machine.description.links import Links, links_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.model import model_of
 from ...machine.motion.displacements import end_effector_pose
+from ...machine.poses import between
 from ...options import USUAL
 from ...tolerances import TOLERANCES
 from .configurations import Configurations, new_rows

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...common.derived import derived
-from ...common.poses import pose
 from ...common.rotations import from_quaternion, random_quaternions, rotvec_from_quaternion
 from ...kernels.joints.joint_constants import RANDOM_STARTS, RANDOM_STEPS, SEED_DISTANCE, SEED_TURN, SEEDS, SPREAD
 from ...kernels.joints.loops import BASE_AXES
 from ...kernels.search_constants import MOST_STEPS
 from ...machine.motion.displacements import columns
 from ...machine.motion.loops import Closure
+from ...machine.poses import pose
 from ...tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, close
 from .descend import nearest_configurations

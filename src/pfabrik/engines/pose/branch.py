@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...common.arrays import Floats, Mask
 from ...common.derived import derived
-from ...common.poses import between
 from ...common.rotations import nearest_turn
 from ...kernels.pose.pose_constants import MOST_CHANGED
 from ...kernels.pose.tables import EXACTLY, IN_OTHER_ASSEMBLIES, IN_OTHER_MODES
@@ -18,6 +17,7 @@ from ...kernels.rows import HOLD, HOLD_NOTHING, OPEN, POSITION_ERROR, PROJECTED,
 from ...machine.description.task import Task
 from ...machine.model import Model
 from ...machine.motion.mobility import around_home
+from ...machine.poses import between
 from ...tolerances import TOLERANCES
 from ..joints.close import measure_configurations
 from ..joints.configurations import Configurations, new_rows, write_closing

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...common.arrays import Floats, Mask
 from ...common.batch import put, take
-from ...common.poses import are_poses
 from ...kernels.handle import Handle
 from ...kernels.pose.search_records import Starts
 from ...kernels.rows import (
@@ -27,6 +26,7 @@ from ...kernels.rows import (
 )
 from ...machine.model import Model
 from ...machine.motion.outward import centres_at
+from ...machine.poses import are_poses
 from ...options import Options
 from ...tolerances import TOLERANCES
 from ..joints.attempts import Attempt

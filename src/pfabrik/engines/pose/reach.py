@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from ...common.arrays import Floats, Mask, Records
 from ...common.batch import put, take
 from ...common.derived import derived
-from ...common.poses import between
 from ...common.rotations import nearest_turn
 from ...kernels.pose.tables import BY_LEGS
 from ...kernels.rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL, Rows
 from ...kernels.threads import in_blocks
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.model import Model
+from ...machine.poses import between
 from ...options import Options
 from ..joints.configurations import Configurations
 from ..joints.effort import continued

@@ -11,12 +11,12 @@ import numpy as np
 
 from ...answers.solution import Solution
 from ...common.arrays import Floats, Mask
-from ...common.poses import pose
 from ...configuration import configuration
 from ...feasibility import feasibility
 from ...ik import solve_ik
 from ...kinematics import JointPath, generic_of
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import pose
 from ...options import Options
 from ...tolerances import TOLERANCES
 from .controller_tables import ControllerTables, controller_tables

@@ -10,13 +10,13 @@ import numpy as np
 from ...answers.solution import Solution
 from ...answers.status import Status
 from ...common.arrays import Floats
-from ...common.poses import pose
 from ...common.rotations import angles_between
 from ...fk import solve_fk
 from ...ik import solve_ik
 from ...kinematics import generic_of
 from ...machine.description.home_mobility import end_effector_freedom
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import pose
 from .cuts import cut_tree
 from .mjcf_bodies import names_of
 from .mjcf_qpos import qpos_of

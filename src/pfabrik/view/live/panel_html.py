@@ -7,8 +7,9 @@ from html import escape
 import numpy as np
 
 from ...answers.status import Status
+from ...common.drawing import ACHIEVED
 from ...tolerances import TOLERANCES
-from ..looks import ACHIEVED, HELD, SINGULAR
+from ..looks import HELD, SINGULAR
 from .distances import Left, Nearness, limits_left
 from .session import Session
 

@@ -17,11 +17,12 @@ from ...answers.tracked import Track
 from ...capabilities.clearance.clearance import clearance
 from ...capabilities.clearance.solid_meshes import SolidMesh
 from ...common.arrays import Floats
+from ...common.drawing import ACHIEVED
 from ...common.rotations import shortest_turns, to_quaternion, to_rotvec
 from ...kinematics import links_of
 from ...machine.description.mechanism import Mechanism
 from ..drawn_parts import Part, role_of
-from ..looks import ACHIEVED, ASKED, EDGE, HELD, rgb
+from ..looks import ASKED, EDGE, HELD, rgb
 from ..skeleton import Mark, Skeleton, skeleton_of
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.words import as_sentence
 from ...common.arrays import Floats
-from ...common.poses import pose
 from ...common.rotations import to_rpy
 from ...configuration import configuration
 from ...fk import solve_fk
 from ...ik import solve_ik
 from ...kinematics import JointPath, home_coordinates, joint_path, passive_series
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import pose
 from .distances import Nearness, nearness, side_of
 
 DIGITS = 9

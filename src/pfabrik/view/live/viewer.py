@@ -23,9 +23,9 @@ from ...common.extras import require
 from ...common.whole_files import whole_path
 from ...configuration import configuration
 from ...errors import InvalidArgument, PfabrikError
-from ...first_answers import prepare
 from ...machine.description.mechanism import Mechanism
 from ...machine.files import load
+from ...solver import prepare
 from .live_machine import LiveMachine, Shown, checked, keep_in_view
 from .panel import Actions
 from .searching import Searches

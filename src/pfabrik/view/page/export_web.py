@@ -13,13 +13,13 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...common.checks import require_ending
+from ...common.memory_image import image_of, packed
 from ...common.whole_files import whole_path
 from ...engines.pose.legs_engine import LegsEngine
 from ...engines.pose.seeds import seeds_of
 from ...engines.pose.table import reading_table
 from ...engines.pose.tables import limit_names, tables_of
 from ...errors import InvalidArgument
-from ...exchange.export.controller_tables import image_of, packed
 from ...kernels.pose import tables as T
 from ...kernels.pose.evaluate import new_evaluation_scratch
 from ...kernels.pose.search_records import new_solutions

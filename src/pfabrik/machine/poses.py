@@ -10,11 +10,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..common.arguments import array, as_floats
+from ..common.arrays import Floats, Mask
+from ..common.rotations import UNTURNED, from_quaternion, from_rotvec, from_rpy, nearest_rotations
 from ..errors import InvalidArgument
 from ..tolerances import TOLERANCES
-from .arguments import array, as_floats
-from .arrays import Floats, Mask
-from .rotations import UNTURNED, from_quaternion, from_rotvec, from_rpy, nearest_rotations
 
 
 @runtime_checkable

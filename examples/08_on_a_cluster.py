@@ -1,7 +1,7 @@
 """A million poses on the processes of a cluster, chunk by chunk, and a study of designs: with Dask.
 
-python examples/11_on_a_cluster.py                                   # on two processes of this machine
-python examples/11_on_a_cluster.py 1e9 tcp://scheduler:8786 margins  # a billion poses, on a cluster, into a folder
+python examples/08_on_a_cluster.py                                   # on two processes of this machine
+python examples/08_on_a_cluster.py 1e9 tcp://scheduler:8786 margins  # a billion poses, on a cluster, into a folder
 
 Of each pose six bytes are kept: its margin, and the number of the limit that has it. Each worker writes its own chunks
 into the folder, and this program sees sums alone.
