@@ -37,8 +37,9 @@ from ...kernels.certify.prove import (
     SPENT,
     TOO_SMALL,
 )
-from ...kinematics import Model, Target, are_poses, as_targets, model_of, task_of
+from ...kinematics import Model, Target, as_targets, model_of, task_of
 from ...machine.description.mechanism import Mechanism, checked_mechanism
+from ...machine.poses import are_poses
 from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .links_over_cells import bounded_pairs, links_without_bounds

@@ -11,8 +11,9 @@ import numpy as np
 from ...answers.tracked import Track
 from ...common.arrays import Floats
 from ...errors import InvalidArgument
-from ...kinematics import are_poses, as_targets, plane_of, task_of
+from ...kinematics import as_targets, plane_of, task_of
 from ...machine.description.mechanism import Mechanism
+from ...machine.poses import are_poses
 from ...tolerances import TOLERANCES
 from ...track import track
 from ..certify.certificates import Certificate

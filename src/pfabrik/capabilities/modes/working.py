@@ -15,9 +15,9 @@ from ...common.checks import require_count
 from ...engines.joints.close import CLOSED, close
 from ...errors import InvalidArgument
 from ...kernels.rows import POSITION_ERROR, ROTATION_ERROR
-from ...kinematics import Target, are_poses, as_targets, engine_of, model_of, readouts
+from ...kinematics import Target, as_targets, engine_of, model_of, readouts
 from ...machine.description.mechanism import Mechanism
-from ...machine.poses import made_exact, what_is_wrong
+from ...machine.poses import are_poses, made_exact, what_is_wrong
 from .branches import BranchSearch, Listed
 from .lists import BATCH, Modes
 

@@ -23,7 +23,8 @@ from itertools import pairwise, product
 
 from ...tolerances import TOLERANCES
 from ..description.graph import Step
-from ..noted_vectors import Vector, area, cross, largest, norm, spread
+from ..noted_numbers import largest
+from ..noted_vectors import Vector, area, cross, norm, spread
 from .decompose import Part, Split, SubChain
 from .home import HomeNumbers
 from .leg_forms import (

@@ -13,7 +13,8 @@ from ..description.home_mobility import ends_of_default_axes
 from ..description.joint_coordinates import JointCoordinate
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
-from ..noted_vectors import Vector, largest, length, square_to
+from ..noted_numbers import largest
+from ..noted_vectors import Vector, length, square_to
 
 
 class HomeNumbers:
@@ -32,7 +33,7 @@ class HomeNumbers:
         self.numbers = numbers or [*home_numbers(mechanism).tolist(), *limit_numbers(mechanism)]
         self._at_limits = self._at + len(mechanism.coordinate_names)
         self._numbers = {joint.name: number for number, joint in enumerate(mechanism.joints)}
-        self.length = self.numbers[0]
+        self.length: float = self.numbers[0]
 
     def _vector(self, place: int) -> Vector:
         return Vector(self.numbers[place : place + 3])

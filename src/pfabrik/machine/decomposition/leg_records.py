@@ -11,7 +11,8 @@ import numpy as np
 from ...common.arrays import Records
 from ...kernels.legs import records as K
 from ...tolerances import TOLERANCES
-from ..noted_vectors import Vector, angle_of, area, cross, largest, norm, sign, square_to
+from ..noted_numbers import largest
+from ..noted_vectors import Vector, angle_of, area, cross, norm, sign, square_to
 from .home import Fields, FilledRecords, HomeNumbers
 from .leg_forms import ElementaryJoint, Ending, KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
 
@@ -222,7 +223,7 @@ def _rod_fields(home: HomeNumbers, rod: Rod) -> Fields:
 
 def _points_anywhere(axes: Sequence[Vector], line: Vector) -> bool:
     """True if two crossed hinges are square to each other, and the inner one to its rod."""
-    return largest([abs(axes[1] @ axes[0]), abs(axes[1] @ line)]) <= TOLERANCES.alignment
+    return bool(largest([abs(axes[1] @ axes[0]), abs(axes[1] @ line)]) <= TOLERANCES.alignment)
 
 
 def _twist(base_axis: Vector, platform_axis: Vector, line: Vector) -> Any:

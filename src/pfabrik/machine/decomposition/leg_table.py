@@ -19,7 +19,8 @@ from ..description.joint_coordinates import deviations
 from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from ..noted_vectors import area, largest, sign
+from ..noted_numbers import largest
+from ..noted_vectors import area, sign
 from .decompose import SubChain, sub_chains
 from .home import Fields, FilledRecords, HomeNumbers
 from .intermediate_platforms import legs_of_sub_chain

@@ -20,7 +20,8 @@ from ...kernels.passes import plan as P
 from ...tolerances import TOLERANCES
 from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
-from ..noted_vectors import Vector, area, largest, norm
+from ..noted_numbers import largest
+from ..noted_vectors import Vector, area, norm
 from .home import HomeNumbers
 from .joint_nodes import JointNode, NotExpressible, joint_nodes_along
 
@@ -85,7 +86,7 @@ def _across(point: Vector, axis: Vector) -> Vector:
 
 def _spans(rod: Vector, side: Vector) -> bool:
     """True if two sides are not parallel: a flat parallelogram may open into one whose rods cross."""
-    return area(rod, side) > largest([rod @ rod, side @ side]) * TOLERANCES.alignment
+    return bool(area(rod, side) > largest([rod @ rod, side @ side]) * TOLERANCES.alignment)
 
 
 Interval: TypeAlias = tuple[float, float]

@@ -213,7 +213,7 @@ class Structure:
         span = self._span_along(joint)
         return cast(Vector, tuple(span / length(span)))
 
-    def _span_along(self, joint: Joint) -> list[float]:
+    def _span_along(self, joint: Joint) -> NotedVector:
         """From the joint of `along` on the first body to that on the second, at home [length]."""
         start, end = self.ends_along(joint)
         return NotedVector(cast(Vector, end.at)) - cast(Vector, start.at)
