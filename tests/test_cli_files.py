@@ -18,6 +18,7 @@ from command import in_process, listed, pfabrik, rows_of, told, write_files
 from pfabrik.cli import outputs
 from pfabrik.cli.outputs import ignores_case
 from pfabrik.machine.catalog import template
+from written import check_written
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -236,27 +237,23 @@ def test_a_file_that_exists_is_kept_unless_forced() -> None:
 
 
 PICTURES = [
-    # the line, its exit code, what it writes, and how that begins
-    ("plot five_bar", 0, "five_bar.png", b"\x89PNG"),
-    ("plot five_bar --position 0 0 180 -o a.svg", 0, "a.svg", b"<?xml"),
-    ("plot five_bar --position 0 0 300 -o a.pdf", 1, "a.pdf", b"%PDF"),
-    ("travel five_bar --plot a.png", 0, "a.png", b"\x89PNG"),
-    ("track five_bar path.csv --plot a.png", 1, "a.png", b"\x89PNG"),
-    ("track five_bar path.csv --animate a.gif", 1, "a.gif", b"GIF8"),
-    ("workspace five_bar --resolution 16 -o a.png", 0, "a.png", b"\x89PNG"),
-    ("plot five_bar --torque-map --joints p1,p2 --torque 25 -o a.png", 0, "a.png", b"\x89PNG"),
-    ("plot five_bar --torque-map --joints p1 p2 -o a.png", 0, "a.png", b"\x89PNG"),
+    # the line, its exit code, and what it writes
+    ("plot five_bar", 0, "five_bar.png"),
+    ("plot five_bar --position 0 0 180 -o a.svg", 0, "a.svg"),
+    ("plot five_bar --position 0 0 300 -o a.pdf", 1, "a.pdf"),
+    ("plot five_bar --torque-map --joints p1,p2 --torque 25 -o a.png", 0, "a.png"),
+    ("plot five_bar --torque-map --joints p1 p2 -o a.png", 0, "a.png"),
 ]
 
 
-@pytest.mark.parametrize(("line", "code", "name", "begins"), PICTURES, ids=[line for line, *_ in PICTURES])
-def test_pictures_are_written_and_told_of(line: str, code: int, name: str, begins: bytes) -> None:
+@pytest.mark.parametrize(("line", "code", "name"), PICTURES, ids=[line for line, *_ in PICTURES])
+def test_pictures_are_written_and_told_of(line: str, code: int, name: str) -> None:
     pytest.importorskip("matplotlib")
     write_files("path.csv")
     result = pfabrik(line)
     assert result.exit_code == code, result.stderr
     assert f"wrote {name}\n" in result.stdout + result.stderr
-    assert Path(name).read_bytes().startswith(begins)
+    check_written(Path(name))
     assert listed() == sorted(["path.csv", name])
 
 
@@ -305,7 +302,7 @@ def test_demo_writes_a_picture_and_a_table_for_each_machine() -> None:
     assert {path.suffix for path in Path("pictures").iterdir()} == {".png", ".csv"}
     for path in Path("pictures").glob("*.csv"):
         assert {row["status"] for row in rows_of(path)} == {"REACHED", "PROJECTED"}, path.name
-        assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+        check_written(path.with_suffix(".png"))
 
 
 def test_demo_refuses_a_file_where_its_folder_should_be() -> None:
@@ -331,4 +328,4 @@ def test_efforts_of_a_path_go_to_a_file_row_by_row() -> None:
     assert max(abs(float(row["effort_p5"])) for row in rows) == pytest.approx(2.0, rel=1e-4)
     by_hand = math.radians(float(rows[5]["rate_p1_deg"])) * float(rows[5]["effort_p1"])
     assert float(rows[5]["power_p1"]) == pytest.approx(by_hand)
-    assert "<svg" in Path("out.svg").read_text(encoding="utf-8")
+    check_written(Path("out.svg"))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, runtime_checkable
 
+import numpy as np
+
 from ..errors import InvalidArgument
 from .above import above
 from .arrays import Floats
@@ -47,12 +49,20 @@ def new_figure(
     return pyplot.figure(figsize=(width, height), dpi=dpi, layout=layout, facecolor=paper)
 
 
+def dotted_where_alone(values: Floats) -> dict[str, Any]:
+    """Style of a curve of values (n,), NaN where it has gaps, that shows those without neighbours too: no line does."""
+    known = np.isfinite(values)
+    beside = np.concatenate([[False], known, [False]])
+    alone = np.flatnonzero(known & ~beside[:-2] & ~beside[2:]).tolist()
+    return {"marker": "o", "markersize": 3.0, "markevery": alone} if alone else {}
+
+
 def curves_over_time(times: Floats, names: Sequence[str], panels: Mapping[str, Floats]) -> Figure:
     """Columns of arrays (n, k) over times (n,) [s], a panel for each array by its label, a name for each column."""
     figure = new_figure(8.0, 7.0)
     for axes, (label, values) in zip(figure.subplots(len(panels), 1, sharex=True), panels.items(), strict=True):
         for name, column in zip(names, values.T, strict=True):
-            axes.plot(times, column, label=name)
+            axes.plot(times, column, label=name, **dotted_where_alone(column))
         axes.set_ylabel(label)
     axes.set_xlabel("time [s]")
     handles, labels = axes.get_legend_handles_labels()

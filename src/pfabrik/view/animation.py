@@ -19,7 +19,7 @@ from ..common.drawing import SMALL, Size, Theme, View
 from ..common.extras import require
 from ..common.telling import OnProgress, telling
 from ..common.whole_files import whole_path
-from ..errors import MissingLibrary
+from ..errors import InvalidArgument, MissingLibrary, counted
 from .canvas import canvas_on, checked_size, letters_in, usual_size
 from .looks import HELD, Look, look_of
 from .machine import key_of, machine_eye
@@ -80,7 +80,7 @@ def animate(
     Raises
     ------
     InvalidArgument
-        No Track, another ending, no positive time, or no such view, size or theme.
+        No Track, one of less than two steps, another ending, no positive time, or no such view, size or theme.
     MissingLibrary
         Matplotlib, or for ".mp4" `ffmpeg`, is not there.
     """
@@ -89,6 +89,8 @@ def animate(
     steps = _steps(track, known, seconds)
     require("pictures", "matplotlib", "plot")
     writer = _writer(suffix)
+    if len(known) < 2:
+        raise InvalidArgument("track", f"{counted(len(known), 'step')} to show", "two or more: a film shows a motion")
     skeletons = {step: skeleton_of(track[step]) for step in np.unique(steps).tolist()}
     size = None if size is None else checked_size(size, (0.0, 0.0))
     film = _Film(track, skeletons, view, size, require_count("dpi", dpi or DPI), look_of(theme))

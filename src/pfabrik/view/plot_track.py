@@ -13,7 +13,7 @@ from ..answers.status import Status
 from ..answers.tracked import Track
 from ..common.arrays import Floats, Mask
 from ..common.checks import require_method, require_type
-from ..common.drawing import SMALL, Theme, View, new_figure
+from ..common.drawing import SMALL, Theme, View, dotted_where_alone, new_figure
 from ..errors import InvalidArgument, counted
 from ..kinematics import Readout, readouts
 from .canvas import Canvas, canvas_on, checked_size, wrapped
@@ -167,9 +167,10 @@ def draw_paths(canvas: Canvas, track: Track) -> list[Artist]:
         np.where(mask[:, None], achieved, np.nan) for mask in (~is_unreached | next_to(is_unreached), is_unreached)
     )
     target_style = {"color": canvas.look.asked, "linestyle": "--", "linewidth": 1.4, "label": "asked for", "zorder": 20}
+    reached_style = {"color": canvas.look.achieved, "linewidth": 2.0, **dotted_where_alone(on_target[:, 0])}
     lines = [
         canvas.line(track.targets[:, :3, 3], **target_style),
-        canvas.line(on_target, color=canvas.look.achieved, linewidth=2.0, label="reached", zorder=21),
+        canvas.line(on_target, label="reached", zorder=21, **reached_style),
     ]
     if is_unreached.any():
         style = {"marker": "o", "markersize": 2.6, "markeredgewidth": 0.0}  # a single step has no line
@@ -190,11 +191,12 @@ def draw_actuator(axes: Axes, readout: Readout, values: Floats, solution: Soluti
     bounds = [bound for bound in readout.limits if np.isfinite(bound)]
     for bound in bounds:
         axes.axhline(bound, color=look.ink, linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
-    axes.plot(values, color=look.achieved, linewidth=1.5)
+    axes.plot(values, color=look.achieved, linewidth=1.5, **dotted_where_alone(values))
     finite = values[np.isfinite(values)]
     if bounds:
         near = np.min([np.abs(values - bound) for bound in bounds], axis=0) <= HELD_BY * np.ptp([*finite, *bounds])
-        axes.plot(np.where(near, values, np.nan), color=HELD, linewidth=3.0, solid_capstyle="butt")
+        held = np.where(near, values, np.nan)
+        axes.plot(held, color=HELD, linewidth=3.0, solid_capstyle="butt", **dotted_where_alone(held))
     low, high = min([*finite, *bounds]), max([*finite, *bounds])
     room = ROOM * (high - low) or 1.0
     axes.set(xlim=(0, max(len(solution) - 1, 1)), ylim=(low - room, high + room))
@@ -220,9 +222,10 @@ def draw_margins(axes: Axes, track: Track, look: Look) -> None:
     least = np.nanmin(np.where(np.isnan(values), np.inf, values), axis=0)
     tightest = [name for name, margin in by_name.items() if (margin <= least).any()][:MOST_MARGINS]
     for margin in (margin for name, margin in by_name.items() if name not in tightest):
-        axes.plot(margin, color=look.asked, alpha=OTHERS, linewidth=0.7, zorder=1)
+        axes.plot(margin, color=look.asked, alpha=OTHERS, linewidth=0.7, zorder=1, **dotted_where_alone(margin))
     for place, name in enumerate(tightest):
-        axes.plot(by_name[name], label=name, linewidth=1.5, zorder=2, **line_style(place, look))
+        style = line_style(place, look) | dotted_where_alone(by_name[name])
+        axes.plot(by_name[name], label=name, linewidth=1.5, zorder=2, **style)
     axes.axhline(0.0, color=look.ink, linewidth=0.9, linestyle=LIMIT_DASHES, zorder=1)
     axes.set(xlabel="step", ylabel="margin", xlim=(0, max(len(track) - 1, 1)), ylim=(min(-0.05, *least), 1.05))
     axes.tick_params(labelsize=SMALL)

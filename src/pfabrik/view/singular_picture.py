@@ -12,7 +12,7 @@ from ..capabilities.workspace.singular import signed_at
 from ..capabilities.workspace.surface import face_normals, sizes_of
 from ..capabilities.workspace.workspace_table import for_people, labels
 from ..common.arrays import Floats, Ints
-from ..common.drawing import SMALL, Size, Theme, View, new_figure
+from ..common.drawing import SMALL, Size, Theme, View, dotted_where_alone, new_figure
 from .canvas import checked_size, draw_title, wrapped
 from .eye import eye_of, upright
 from .frame import PLANE_SIZE, axes_for, box_of, draw_box, draw_image, draw_lines, fit_bare
@@ -82,7 +82,8 @@ def plot_singular_track(found: SingularityTrack, ax: Axes | None, size: Size | N
     for name, (colour, dashes) in LINES.items():
         values = np.asarray(getattr(found.measures, name))
         if np.isfinite(values).any():
-            axes.plot(np.arange(1, len(values) + 1), values, color=colour, linestyle=dashes, label=name)
+            style = {"color": colour, "linestyle": dashes, "label": name} | dotted_where_alone(values)
+            axes.plot(np.arange(1, len(values) + 1), values, **style)
     for count, row in enumerate(found.crossings.tolist()):
         label = "" if count else "parallel singularity"
         axes.axvline(row + 0.5, color=SINGULAR, linewidth=1.2, label=label)

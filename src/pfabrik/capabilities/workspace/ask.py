@@ -100,7 +100,8 @@ def workspace(
     Raises
     ------
     InvalidArgument or UnknownName
-        Coordinates or values that make no sense; a workspace that nothing ends.
+        Coordinates or values that make no sense, or that do not change while the others are held; a workspace that
+        nothing ends.
     UnsupportedMechanism
         `certified`, of a machine without closed forms, or with a clearance.
     """

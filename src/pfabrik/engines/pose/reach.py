@@ -14,7 +14,7 @@ from ...kernels.rows import LIMIT_EXCESS, OPEN, PENDING, REACHED, RESIDUAL, Rows
 from ...kernels.threads import in_blocks
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.model import Model
-from ...machine.poses import between
+from ...machine.poses import are_poses, between
 from ...options import Options
 from ..joints.configurations import Configurations
 from ..joints.effort import continued
@@ -83,6 +83,7 @@ def _continue_to(
     keep their branch.
     """
     unsolved = np.flatnonzero(rows.status != REACHED)
+    unsolved = unsolved[are_poses(targets[unsolved])]  # singular values of what is not finite may never be found
     first_poses = np.broadcast_to(start_poses, targets.shape)[unsolved]
     present, last_sides, last = first_poses.copy(), sides[unsolved], take(rows, unsolved)
 
