@@ -19,6 +19,7 @@ from pfabrik.errors import UnsupportedMechanism
 from pfabrik.exchange.export.export_c import c_source
 from pfabrik.exchange.export.firmware_settings import klipper
 from pfabrik.exchange.export.linuxcnc import linuxcnc
+from pfabrik.machine import files
 
 STUBS = {
     "rtapi_app.h": "#define EXPORT_SYMBOL(name) struct unused_##name { int i; }\n"
@@ -89,8 +90,8 @@ def test_a_delta_that_hangs_from_its_thighs_is_rotarydeltakins() -> None:
     knees = reach[:, None] * out - np.outer(pins["thighlength"] * np.sin(joints), [0.0, 0.0, 1.0])
     ankles = target + pins["footradius"] * out
     np.testing.assert_allclose(np.linalg.norm(ankles - knees, axis=1), pins["shinlength"], rtol=1e-9)
-    counted = pf.files.dumps(mechanism).replace('name = "A1"', 'name = "A1"\nhome = 10').replace("80]", "90]", 1)
-    assert "# joint A1 counts 10 deg more" in linuxcnc(pf.files.loads(counted))
+    counted = files.dumps(mechanism).replace('name = "A1"', 'name = "A1"\nhome = 10').replace("80]", "90]", 1)
+    assert "# joint A1 counts 10 deg more" in linuxcnc(files.loads(counted))
 
 
 UNIT = "mm */ setp x\nsetp y"

@@ -46,7 +46,7 @@ FILES = {
     "delta.xml": (delta(), None),
     "five.xml": (FIVE_BAR, None),
     "bennett.xml": (model_text(LINKAGES["bennett"](), 6), None),
-    "open chain.urdf": (MIMIC.replace("mimic", "x"), None),
+    "open chain.urdf": (re.sub("<mimic[^>]*>", "", MIMIC), None),
     "driven.urdf": (PARALLELOGRAM.format(drives=DRIVEN), loop()),
     "undriven.urdf": (PARALLELOGRAM.format(drives=""), loop()),
     "undriven, closed by a hinge.urdf": (

@@ -23,6 +23,7 @@ import pfabrik as pf
 from command import pfabrik
 from pfabrik.capabilities.paths.follow import follow_parts
 from pfabrik.capabilities.paths.path import Path as Targets
+from pfabrik.machine import files
 from test_track import CIRCLES, arm, circle, turned_by
 
 Run = Callable[..., Result]
@@ -202,7 +203,7 @@ def test_gcode_goes_through_a_pipe_at_a_rate(run: Run) -> None:
 
 
 def test_the_speeds_of_the_file_count_where_the_path_has_times(run: Run, tmp_path: Path) -> None:
-    text = pf.files.dumps(pf.load("linear_delta")).replace("actuated = true", "actuated = true\nmax_speed = 20")
+    text = files.dumps(pf.load("linear_delta")).replace("actuated = true", "actuated = true\nmax_speed = 20")
     (tmp_path / "slow.toml").write_text(text)
     (tmp_path / "path.csv").write_text("x,y,z,feed\n0,0,5,10\n0,0,15,25\n0,0,10,15\n")
     result = run("track", "slow.toml", "path.csv", "-o", "answers.csv")

@@ -12,7 +12,7 @@ _DECLARED = re.compile(r"^int (pfk_\w+)\(([^()]*)\);", re.MULTILINE)
 _PARAMETER = re.compile(r"(const )?(\w+) (\*?)(\w+)((?:\[\w*\])*)")
 
 
-class Result(NamedTuple):
+class Written(NamedTuple):
     """An argument that a function fills: how it is stored, and how many numbers it is."""
 
     name: str
@@ -54,7 +54,7 @@ def _checked(name: str, parameters: str, definition: str) -> str:
     return f"static int {computes}{definition}\nint {name}{head}\n{{\n{body}\n}}\n"
 
 
-def _parameter(parameter: str) -> tuple[str, Result | None]:
+def _parameter(parameter: str) -> tuple[str, Written | None]:
     """The name of a parameter, and what is filled; None of one that is only read, and of counts and flags."""
     found = _PARAMETER.fullmatch(" ".join(parameter.split()))
     assert found is not None, parameter
@@ -64,4 +64,4 @@ def _parameter(parameter: str) -> tuple[str, Result | None]:
     counts = re.findall(r"\w+", lengths) or ["1" if kind == "pfk_pose" else LENGTHS[name]]
     room = lengths if len(counts) > 1 else f"[{counts[0]}{' + 1' if lengths == '[]' else ''}]"  # no array is empty
     n = " * ".join([*counts, *(["12"] if kind == "pfk_pose" else [])])
-    return name, Result(name, f"{kind} own_{name}{room}", n, bool(star))
+    return name, Written(name, f"{kind} own_{name}{room}", n, bool(star))
