@@ -124,7 +124,7 @@ def are_twins(one: str, other: str, sources: dict[str, str]) -> bool:
         room, stem = ".".join(Path(inner).parent.parts), Path(inner).stem
         is_called = bool(re.search(rf"\.{room}(\.{stem} import| import .*\b{stem}\b)", sources[outer]))
     below = re.sub("^(common|engines|capabilities)/", "", outer)
-    return inner in (f"cli/{outer}", f"kernels/{below}") or is_called
+    return inner in (f"cli/{below}", f"kernels/{below}") or is_called
 
 
 def shared_file_names(sources: dict[str, str]) -> list[tuple[str, str]]:

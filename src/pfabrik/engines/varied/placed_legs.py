@@ -13,7 +13,7 @@ from ...kernels import vectors
 from ...kernels.legs import answer, feasibility, frames
 from ...kernels.legs import records as K
 from ...kernels.search_constants import NEARLY_CLOSED
-from ...machine.decomposition.home import Fields
+from ...machine.decomposition.home_numbers import Fields
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.noted_numbers import Formulas, Number, Trace, of_numbers, uniform_parts, where
 

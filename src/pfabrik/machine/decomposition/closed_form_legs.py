@@ -26,7 +26,7 @@ from ..description.graph import Step
 from ..noted_numbers import largest
 from ..noted_vectors import Vector, area, cross, norm, spread
 from .decompose import Part, Split, SubChain
-from .home import HomeNumbers
+from .home_numbers import HomeNumbers
 from .leg_forms import (
     HAS_LOOP,
     ElementaryJoint,

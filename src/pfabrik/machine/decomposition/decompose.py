@@ -10,7 +10,7 @@ from ...common.derived import derived
 from ..description.graph import Edge, Step, components
 from ..description.mechanism import Mechanism, checked_mechanism
 from .graph_blocks import TIP, Block, blocks_between, graph_of, is_connected, is_tree
-from .home import HomeNumbers
+from .home_numbers import HomeNumbers
 from .joint_nodes import NotExpressible
 from .positions import BranchForm, Parallelogram, express_branch, express_trunk, parallelogram_of
 

@@ -15,7 +15,7 @@ from ..description.graph import Edge, Step, components
 from .closed_form_legs import legs_of_chain, placed_on, rigid_rod
 from .decompose import SubChain, parts_between
 from .graph_blocks import graph_of
-from .home import HomeNumbers
+from .home_numbers import HomeNumbers
 from .leg_forms import HAS_LOOP, ElementaryJoint, LegForm, NoLeg, RedundantJoint, elementary_joints
 
 MEETING, MOST_REDUNDANT = 3, 4

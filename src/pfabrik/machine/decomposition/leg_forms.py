@@ -11,7 +11,7 @@ from ...tolerances import TOLERANCES
 from ..description.graph import Step
 from ..description.joints import Joint
 from ..noted_vectors import Vector, area
-from .home import HomeNumbers
+from .home_numbers import HomeNumbers
 
 Kind = Literal["R", "P", "S"]
 

@@ -13,7 +13,7 @@ from ...kernels.legs import records as K
 from ...tolerances import TOLERANCES
 from ..noted_numbers import largest
 from ..noted_vectors import Vector, angle_of, area, cross, norm, sign, square_to
-from .home import Fields, FilledRecords, HomeNumbers
+from .home_numbers import Fields, FilledRecords, HomeNumbers
 from .leg_forms import ElementaryJoint, Ending, KeptAxis, LegForm, Pivot, RedundantJoint, Rod, keeps_from_spinning
 
 _ENDINGS = {"weld": K.WELD, "hinge": K.HINGE, "cross": K.CROSS, "triple": K.TRIPLE, "ball": K.BALL}

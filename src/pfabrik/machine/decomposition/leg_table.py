@@ -22,7 +22,7 @@ from ..description.task import task_of
 from ..noted_numbers import largest
 from ..noted_vectors import area, sign
 from .decompose import SubChain, sub_chains
-from .home import Fields, FilledRecords, HomeNumbers
+from .home_numbers import Fields, FilledRecords, HomeNumbers
 from .intermediate_platforms import legs_of_sub_chain
 from .leg_forms import ElementaryJoint, LegForm, NoLeg, RedundantJoint, Rod, closed_form_coordinates
 from .leg_records import leg_records

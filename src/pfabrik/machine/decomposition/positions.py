@@ -22,7 +22,7 @@ from ..description.graph import Step
 from ..description.mechanism import Joint, Mechanism
 from ..noted_numbers import largest
 from ..noted_vectors import Vector, area, norm
-from .home import HomeNumbers
+from .home_numbers import HomeNumbers
 from .joint_nodes import JointNode, NotExpressible, joint_nodes_along
 
 
