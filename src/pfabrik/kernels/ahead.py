@@ -13,7 +13,7 @@ from .clearance.least_clearance import least_clearance
 from .dynamics.inverse_dynamics import inverse_dynamics
 from .dynamics.moving import Exerted
 from .dynamics.signs import signs_of
-from .home_numbers import measure_home
+from .home import measure_home
 from .joints.answer_joints import answer_joints, note_near
 from .joints.close import close
 from .joints.descend import nearest_configuration
