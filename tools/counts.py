@@ -42,7 +42,7 @@ IDEAS = {
         "kernels.joints.first_order.fill_screws machine.motion.displacements.displacements "
         "kernels.joints.path_kinematics.place_links"
     ),
-    "recorders of arithmetic": "machine.noted_numbers.Trace machine.decomposition.tape.Tape",
+    "recorders of arithmetic": "machine.noted_numbers.Trace",
     "eliminations of the loops' null space": (
         "kernels.free_motions.eliminate kernels.joints.first_order.rates kernels.dynamics.allowed_motions.eliminate "
         "kernels.controller.rates.eliminate machine.motion.loops.first_order"

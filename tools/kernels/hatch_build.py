@@ -14,7 +14,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 class Kernels(BuildHookInterface):
     def initialize(self, version, build_data):
-        script = [sys.executable, os.path.join(self.root, "building", "compile_kernels.py")]
+        script = [sys.executable, os.path.join(self.root, "tools", "kernels", "compile_kernels.py")]
         if self.target_name == "sdist":
             subprocess.run([*script, "--translate"], check=True)
             folder = os.path.join(self.root, "build", "kernels")
