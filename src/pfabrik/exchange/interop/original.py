@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from ...answers.solution import Solution
 from ...common.arrays import Floats
+from ...common.extras import require
 from ...errors import InvalidArgument, PfabrikError, UnknownName
 from ...fk import solve_fk
 from ...machine.description.mechanism import Mechanism
@@ -23,9 +24,11 @@ from .mjcf_reading import from_mjcf
 from .opened import CLOSING
 from .referee import distances
 from .robot_in_mujoco import RobotInMujoco
-from .second_reading import SaidJoint, joints_said
 from .urdf_reading import from_urdf, read_description
 from .xml_reading import kind_of, read_xml
+
+if TYPE_CHECKING:
+    from .second_reading import SaidJoint
 
 SHARES = (0.0, 0.05, 0.2, 0.4)
 """How far joints are moved off zero before the loops are closed: shares of a radian, and of the size."""
@@ -72,6 +75,9 @@ class OriginalFile:
         links, _ = read_description(root, loops_file, driven, [])
         told = {frozenset(loop.links) for loop in loops_file.loops(links.frames, links.frame_joints)}
         hung = {joint.name for joint in links.joints}
+        require("comparing with the original file", "scipy", "mujoco")
+        from .second_reading import joints_said
+
         said = joints_said(root, loops_file.retyped)
         said = [each for each in said if each.name in hung or frozenset(each.links) not in told]
         return _misread(CompiledModel(self.model(driven)), said)
