@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -75,6 +76,7 @@ class LiveMachine:
         self._server, self.session, self._points = server, Session(mechanism, first), skeleton.points
         self.modes: tuple[Solution, ...] = ()
         self.asked = 0
+        self.wish = RLock()  # of `wanted`, `actuators`, `joints` and `asked`, which the user and answers both set
         self._borders: dict[str, list[Patch]] = {}
         server.gui.reset()
         server.scene.reset()
@@ -91,11 +93,13 @@ class LiveMachine:
         self.look_from(server.initial_camera, 1.0)
         self.refresh()
 
-    def refresh(self, *, is_newest: bool = True) -> None:
+    def refresh(self, number: int | None = None) -> None:
         """Show the answer of the session; where it is not to the newest question, what the user wants runs ahead."""
         session = self.session
-        if is_newest:
-            self.wanted, self.actuators, self.joints = session.target.copy(), session.actuators.copy(), session.joints
+        answered = session.target.copy(), session.actuators.copy(), session.joints
+        with self.wish:
+            if number is None or number == self.asked:
+                self.wanted, self.actuators, self.joints = answered
         with self._server.atomic():
             if session.solution.status < Status.INVALID:
                 self.scene.show(session.solution)

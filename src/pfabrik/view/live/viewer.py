@@ -185,25 +185,29 @@ class Viewer:
 
     def _drag(self, target: Floats, grasp: int) -> None:
         self._stage.panel.release()
-        self._stage.wanted = target
-        self._ask(grasp, lambda stage: stage.session.go_to(target))
+        with self._stage.wish:
+            self._stage.wanted = target
+            self._ask(grasp, lambda stage: stage.session.go_to(target))
 
     def _change_target(self, name: str, value: float) -> None:
-        self._stage.wanted = target = moved(self._stage.wanted, name, value)
+        with self._stage.wish:
+            self._stage.wanted = target = moved(self._stage.wanted, name, value)
+            self._ask(name, lambda stage: stage.session.go_to(target))
         keep_in_view(self._server, target[:3, 3] / self.mechanism.characteristic_length)
-        self._ask(name, lambda stage: stage.session.go_to(target))
 
     def _change_actuator(self, place: int, value: float) -> None:
-        self._stage.actuators[place] = value
-        values = self._stage.actuators.copy()
-        self._ask(f"actuator {place}", lambda stage: stage.session.drive(values))
+        with self._stage.wish:
+            self._stage.actuators[place] = value
+            values = self._stage.actuators.copy()
+            self._ask(f"actuator {place}", lambda stage: stage.session.drive(values))
 
     def _change_joint(self, place: int, value: float) -> None:
         stage = self._stage
-        stage.joints[place] = value
         assert stage.session.path is not None
-        stage.wanted = target = stage.session.path.poses(stage.joints[None])[0]
-        self._ask(f"joint {place}", lambda stage: stage.session.go_to(target))
+        with stage.wish:
+            stage.joints[place] = value
+            stage.wanted = target = stage.session.path.poses(stage.joints[None])[0]
+            self._ask(f"joint {place}", lambda stage: stage.session.go_to(target))
 
     def _go_home(self) -> None:
         self._stage.panel.release()
@@ -266,9 +270,10 @@ class Viewer:
 
     def _post(self, question: Callable[[LiveMachine], None], gesture: int | None = None) -> None:
         stage = self._stage
-        stage.asked += 1
-        number = stage.asked
-        self._newest.post(lambda: self._answer(question, gesture, number) if self._stage is stage else None)
+        with stage.wish:
+            stage.asked += 1
+            number = stage.asked
+            self._newest.post(lambda: self._answer(question, gesture, number) if self._stage is stage else None)
 
     def _answer(
         self, question: Callable[[LiveMachine], None], gesture: int | None = None, number: int | None = None
@@ -279,7 +284,7 @@ class Viewer:
             question(self._stage)
             if gesture is not None:
                 self._stage.session.forget_nothing_new()
-            self._stage.refresh(is_newest=number is None or number == self._stage.asked)
+            self._stage.refresh(number)
 
     # The machine, and its file.
 
