@@ -1,1 +1,1 @@
-"""What is asked of a machine beyond its kinematics, on the verbs and `pfabrik.kinematics` alone."""
+"""Capabilities beyond kinematics, on the verbs and `pfabrik.kinematics` alone."""

@@ -116,7 +116,7 @@ MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
 """Measurements that are named as not fitting: the most, and from how many standard deviations."""
 
 AS_DESCRIBED = f"what is not determined stays as described; deviations of the others take it to be right to {WEAK:.1%}"
-"""What becomes of parameters that are not determined."""
+"""Treatments of parameters that are not determined."""
 
 TOGETHER = 0.1
 """Part of an open direction from which a parameter is named as one of those that change together."""

@@ -159,7 +159,7 @@ def _are_heights(measurements: Measurements) -> bool:
 
 
 def _tops(mechanism: Mechanism) -> Floats:
-    """What the actuators are at their endstops, the upper ends of their ranges."""
+    """Actuator values at the endstops, the upper ends of their ranges."""
     ranges = [mechanism.joint(name).range for name in mechanism.actuator_names]
     return np.array([math.inf if ends is None else ends[1] for ends in ranges])
 
@@ -181,7 +181,7 @@ def _numbers(settings: KlipperSettings, section: str, key: str) -> Floats | None
 
 
 def _per_step(settings: KlipperSettings, letter: str, turn: float) -> float:
-    """What a step of a tower's stepper moves; of tower a's where it says nothing itself.
+    """Travel of a step of a tower's stepper; of tower a's where it says nothing itself.
 
     Parameters
     ----------

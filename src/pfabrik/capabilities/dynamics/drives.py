@@ -45,7 +45,7 @@ class Drives:
         return signs
 
     def taken(self, rates: Floats, gains: Floats, signs: Floats) -> Floats:
-        """What rotors and friction take at rates of some signs and accelerations, (n, n_a), in N and N m."""
+        """Efforts of rotors and friction at rates of some signs and accelerations, (n, n_a), in N and N m."""
         return np.asarray(self.inertia * gains * self.si + self.rubbed(rates, signs))
 
     def rubbed(self, rates: Floats, signs: Floats) -> Floats:
