@@ -17,7 +17,7 @@ import pytest
 
 COSTS = Path(__file__).with_name("costs.toml")
 FAULTS = Path(__file__).with_name("seeded_faults.toml")
-MOST, ALONE = 0.15, 1.0
+MOST, ALONE = 0.15, 0.5
 """Processor's time from which an item is for `make test-all`, if its function has a cheaper one, and if not [s]."""
 
 THIRDS = "test_matrix.py"
