@@ -267,6 +267,7 @@ def test_motions_of_the_mouse_reach_the_answer(shown: Callable[..., pf.Viewer]) 
     viewer._change_target("z", 200.0)
     until(lambda: viewer.solution.status == pf.Status.REACHED)
     assert viewer.solution.pose[2, 3] == pytest.approx(200.0)
+    until(lambda: viewer._stage.actuators == pytest.approx(viewer.solution.actuators))  # sliders have followed
     viewer._change_actuator(0, 190.0)
     viewer._change_actuator(1, 200.0)
     until(lambda: viewer.solution.actuators[:2] == pytest.approx([190.0, 200.0]))
