@@ -10,7 +10,7 @@ import numpy as np
 
 import pfabrik as pf
 from closed_forms import Array
-from pfabrik.engines.joints.projection import projection_modes
+from pfabrik.engines.joints.projection import modes_of
 from pfabrik.engines.pose.table import table_handle
 from pfabrik.kernels.legs.answer import answer
 from pfabrik.kernels.passes.solve import solve_by_passes
@@ -52,7 +52,7 @@ def passes(rng: np.random.Generator, runs: int, n: int) -> Iterator[Row]:
 def kernel_call(mechanism: pf.Mechanism, targets: Array, options: pf.passes.Options) -> Solve:
     """One call of the kernel of passes for all targets, from home."""
     compiled, model = compile_plan(mechanism), model_of(mechanism)
-    settings = settings_of(model, options, projection_modes(model.path_closure, options.hold, None)[0])
+    settings = settings_of(model, options, modes_of(model.path_closure, options)[0])
     settings, results = settings._replace(max_rounds=0), new_pass_results(compiled, len(targets))
     return partial(solve_by_passes, compiled.plan, targets, compiled.home_seed, settings, results)
 

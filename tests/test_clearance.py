@@ -549,7 +549,7 @@ def test_links_that_are_nearer_than_the_clearance_are_active_and_exceeded_by_nam
 def test_an_answer_held_back_by_links_says_so_in_words() -> None:
     machine = struts(clearance=10.0)
     target = pf.pose(machine.home_pose[:3, 3], rotvec=(0.0, 0.0, 2.2))
-    found = pf.solve_ik(machine, target)
+    found = pf.solve_ik(machine, target, options=pf.Options(hold=None))
     assert found.status == pf.Status.PROJECTED
     assert {limit.joint for limit in found.active_limits} == {"BC1–BC4", "BC2–BC5", "BC3–BC6"}
     assert found.reason.endswith("BC1–BC4, BC2–BC5, BC3–BC6 at their clearance 10 mm")

@@ -18,7 +18,7 @@ from checks import INTERPRETED
 SCRIPT = Path(__file__).with_name("changed_constants.py")
 GUARDS = {
     "search_constants": "LAST SOLVABLE",
-    "pose.pose_constants": "NEAR_INCUMBENT STRETCHED HOLDABLE EASING BENT",
+    "pose.pose_constants": "NEAR_INCUMBENT STRETCHED BENT",
     "joints.joint_constants": "MOST_DAMPING FEW",
     "chains.chain_constants": "ALONG PULLED_TURN ON_BOUND MOST_DAMPING LEAST_PIVOT NOTHING RESTORED PULLED_FROM PULLS "
     "BENT DESCENTS_NEARBY",

@@ -89,6 +89,9 @@ def test_where_the_reference_point_is_does_not_change_what_is_held(name: str) ->
     )
 
 
+STRICT = 100.0
+"""A price at which what some pose has is held [L per rad, or per L]."""
+
 HOLDING = {"2-PRU/UPR": closure.pru_upr, "rotopod": closure.rotopod, "angled 3-PRR": closure.angled_prr}
 """Machines whose platforms have fewer places for what is held than they have others."""
 
@@ -98,7 +101,7 @@ HOLDING = {"2-PRU/UPR": closure.pru_upr, "rotopod": closure.rotopod, "angled 3-P
 @pytest.mark.parametrize("hold", ["orientation", "position"])
 @pytest.mark.parametrize("name", HOLDING)
 def test_what_a_known_pose_holds_is_not_given_up_and_hardly_ever_farther(name: str, hold: str, count: int) -> None:
-    """Poses that answer other targets have the part of these that is to be held, and hardly any of them is nearer."""
+    """Poses that answer other targets have the part of these that is to be held, and hardly any of them costs less."""
     machine, rng = HOLDING[name](), np.random.default_rng(5)
     length, lever = machine.characteristic_length, machine.rotation_length
     known = pf.solve_ik(machine, targets_about(machine, rng, count, 0.6, 0.7), options=Options(hold=None)).pose
@@ -107,10 +110,11 @@ def test_what_a_known_pose_holds_is_not_given_up_and_hardly_ever_farther(name: s
         targets[:, :3, 3] += rng.uniform(-0.8, 0.8, (count, 3)) * task_of(machine).axes * length
     else:
         targets[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.9, 0.9, (count, 3))).as_matrix() @ targets[:, :3, :3]
-    answers = pf.solve_ik(machine, targets, options=Options(hold=hold))
-    assert set(np.array(answers.held)[answers.status == Status.PROJECTED]) <= {hold}
+    answers = pf.solve_ik(machine, targets, options=Options(hold=hold, hold_price=STRICT))
+    off = answers.rotation_error if hold == "orientation" else answers.position_error / length
+    assert np.quantile(off, 0.9) <= 1e-6 and off.max() <= 0.05
     position, rotation = task_of(machine).errors(known, targets)
-    far = np.hypot(answers.position_error, lever * answers.rotation_error)
+    far = np.hypot(answers.position_error, lever * answers.rotation_error) + STRICT * off * length
     farther = far > np.hypot(position, lever * rotation) + SAME * length
     assert np.mean(farther) <= (0.0 if name == "2-PRU/UPR" else 0.06)
 
@@ -125,9 +129,9 @@ def test_without_a_start_nothing_is_given_up_for_home(by_legs: bool) -> None:
     targets[:, 2, 3] = heights
     engine = engine_of(machine) if by_legs else ClosureEngine(model_of(machine))
     assert isinstance(engine, LegsEngine) == by_legs
-    rows = engine.answer(targets, None, Options(hold="position"), keep_mode=False).rows
+    rows = engine.answer(targets, None, Options(hold="position", hold_price=STRICT), keep_mode=False).rows
     assert (rows.status == Status.PROJECTED).all()
-    assert (np.abs(rows.poses[:, 2, 3] - heights) <= 1e-9 * machine.characteristic_length).all()
+    assert (np.abs(rows.poses[:, 2, 3] - heights) <= 1e-3 * machine.characteristic_length).all()
 
 
 # --- how near --------------------------------------------------------------------------------------------------------

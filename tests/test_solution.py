@@ -97,7 +97,7 @@ def test_rows_that_were_no_poses_are_nan(batch: Solution) -> None:
     assert marked.iterations == marked.rounds == 0
 
 
-KEYS = {"status", *FIELDS, "q", "actuator_error", "held", "certified", "joints", "points", "active_limits"}
+KEYS = {"status", *FIELDS, "q", "actuator_error", "held", "certified", "jumped", "joints", "points", "active_limits"}
 
 
 def test_plain_data_has_the_fields_and_is_json(batch: Solution) -> None:

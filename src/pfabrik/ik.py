@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import closing
-from math import hypot
 
 import numpy as np
 
-from .answers.answer_fields import PoseRequest
+from .answers.answer_fields import Before, PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .common.arrays import Floats
@@ -20,9 +19,10 @@ from .engines.joints.closure_engine import ClosureEngine
 from .engines.joints.configurations import Configurations
 from .engines.joints.engine_contract import InverseEngine
 from .engines.joints.parasitic import has_parasitic_motion
+from .engines.joints.projection import modes_of
 from .engines.targets import Target, as_targets, refuse_invalid
 from .errors import InvalidArgument
-from .kernels.rows import CERTAIN, HOLD, HOLD_NOTHING, ITERATIONS, PROJECTED, REACHED, RESIDUAL, Rows
+from .kernels.rows import CERTAIN, HOLD, ITERATIONS, PROJECTED, REACHED, RESIDUAL
 from .machine.description.mechanism import Mechanism
 from .machine.model import model_of
 from .options import Options, checked_options
@@ -87,7 +87,13 @@ def solve_by(
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
-    return Solution(mechanism, solutions, shape, PoseRequest(targets.copy(), options) if is_missed else None)
+    is_within = begin is None or not (begin.rows.status != REACHED).any()
+    if not is_missed and is_within:
+        return Solution(mechanism, solutions, shape)
+    request, known = PoseRequest(targets.copy(), options), None
+    if begin is not None:
+        known = Before(begin, begin.rows.poses if before is None else before.targets, request)
+    return Solution(mechanism, solutions, shape, request if is_missed else None, None, known)
 
 
 def _answers_elsewhere(
@@ -194,37 +200,23 @@ def _prefer_start(
 
     A target that is asked for again, from its own answer, keeps this answer unless a nearer one is found.
     """
-    options, others = request.options, start_request.options
-    if (options.hold, options.rotation_length) != (others.hold, others.rotation_length):
+    options, others, closure = request.options, start_request.options, model_of(mechanism).path_closure
+    if modes_of(closure, options) != modes_of(closure, others):
         return solutions
     is_same = np.logical_and.reduce(request.targets == start_request.targets, axis=(1, 2))
     is_same &= (start.rows.status == PROJECTED) & (solutions.rows.status != REACHED)
-    lever = options.rotation_length or mechanism.rotation_length
-    slack = TOLERANCES.position * mechanism.characteristic_length
-    rows = [
-        row
-        for row in is_same.nonzero()[0].tolist()
-        if _is_no_farther(start.rows, row if len(start) > 1 else 0, solutions.rows, row, lever, slack)
-    ]
-    if not rows:
+    mode = modes_of(closure, options)[-1]
+    before, after = (mode.distances(closure, *each.rows.measures[:, :2].T) for each in (start, solutions))
+    places = np.flatnonzero(is_same & (before <= after + TOLERANCES.position))
+    if not len(places):
         return solutions
-    places = np.array(rows)
     if options.most_steps:  # what the search took is told, not what it took the start
         start = start.at(places if len(start) > 1 else 0 * places)
         start.rows.counters[:, ITERATIONS] = solutions.rows.counters[places, ITERATIONS]
         return solutions.with_rows(places, start)
-    if len(rows) == len(start) == len(solutions):
+    if len(places) == len(start) == len(solutions):
         return start
     return solutions.with_rows(places, start.at(places if len(start) > 1 else 0 * places))
-
-
-def _is_no_farther(rows: Rows, row: int, others: Rows, other: int, lever: float, slack: float) -> bool:
-    """True if a projection holds more than another one, or as much at no greater distance [length]."""
-    held, other_held = int(rows.counters[row, HOLD]) % CERTAIN, int(others.counters[other, HOLD]) % CERTAIN
-    if held != other_held:
-        return other_held == HOLD_NOTHING
-    (d, angle), (e, other_angle) = rows.measures[row, :2].tolist(), others.measures[other, :2].tolist()
-    return hypot(d, lever * angle) <= hypot(e, lever * other_angle) + slack
 
 
 def keeps_mode(options: Options, start: object) -> bool:

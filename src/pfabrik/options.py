@@ -33,8 +33,12 @@ class Options:
         "keep" stays in the start's working mode (home's without a start), "any" may change it to reach; None keeps it
         if there is a start. `solve_fk` keeps the assembly mode, of home too, but with "any".
     hold : {"orientation", "position"} or None
-        What a projection keeps: "orientation" (the paper's choice) or "position" if a feasible pose has it that is not
-        much farther from the target than the start, None nothing. `Solution.held` tells what was kept.
+        What a projection holds, up to a price: "orientation" (the paper's choice), "position", or None, nothing.
+        `Solution.held` tells what was held, exactly.
+    hold_price : float
+        What is held is given way where holding it costs more than this of the distance, per unit by which it gives way
+        [L per rad; of a position L per L]. A hundred is strict: what can be held is held. Ten holds all but what
+        is nearly singular, so that a stream of targets does not leap for it.
     rotation_length : float or None
         How a rotation counts beside a distance: by the angle times this [length per rad], in sqrt(distance^2 +
         (rotation_length angle)^2). None is `Mechanism.rotation_length`.
@@ -53,6 +57,7 @@ class Options:
     rotation_tolerance: float = TOLERANCES.rotation
     working_mode: Literal["any", "keep"] | None = None
     hold: Literal["orientation", "position"] | None = "orientation"
+    hold_price: float = 10.0
     rotation_length: float | None = None
     actuator_tolerance: float = TOLERANCES.position
     most_steps: int | None = None
@@ -61,9 +66,9 @@ class Options:
     def __post_init__(self) -> None:
         for name, choices in _CHOICES.items():
             require_choice(f"options.{name}", getattr(self, name), choices)
-        for name in ("tolerance", "rotation_tolerance", "rotation_length", "actuator_tolerance"):
+        for name in ("tolerance", "rotation_tolerance", "hold_price", "rotation_length", "actuator_tolerance"):
             value = getattr(self, name)
-            if value is not None or name in ("rotation_tolerance", "actuator_tolerance"):
+            if value is not None or name in ("rotation_tolerance", "hold_price", "actuator_tolerance"):
                 require_positive(f"options.{name}", value)
         if self.most_steps is not None:
             require_count("options.most_steps", self.most_steps)

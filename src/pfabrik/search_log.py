@@ -50,13 +50,16 @@ class SearchLog(Printed):
 
     @property
     def answered_by(self) -> str:
-        """The phase that gave the answer: the first one that ended at a feasible configuration.
+        """The phase that gave the answer: the first one that ended at a feasible configuration that answers.
 
-        Where links came too near there, it is the last one, which keeps them apart.
+        A part that is held up to its price, where it is not held exactly. Where links came too near there, it is the
+        last phase, which keeps them apart.
         """
         if self.attempts and self.attempts[-1].phase == KEPT_APART:
             return KEPT_APART
-        return next((each.phase for each in self.attempts if each.ending in ("reached", "nearest")), "none")
+        phases = [each.phase for each in self.attempts if each.ending in ("reached", "nearest")]
+        priced = [phase for phase in phases if phase.endswith("up to its price")]
+        return (priced if priced and self.solution.held is None else phases or ["none"])[0]
 
     def table(self) -> ResultTable:
         """Every attempt, then the limit that is in the way and the phase that gave the answer."""

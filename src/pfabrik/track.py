@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,7 +91,7 @@ def track(
     pace = pace_of(mechanism, len(poses), sample_time, times, speed_limits)
     with telling(f"tracking {counted(len(poses), 'target')}", on_progress) as tell:
         solutions, request = follow_by(engine_of(mechanism), mechanism, poses, start, options, tell)
-    return Track(mechanism, solutions, request, partial(track, mechanism, options=options), pace)
+    return Track(mechanism, solutions, request, pace, engine_of(mechanism))
 
 
 def as_path(mechanism: Mechanism, targets: Target, options: Options) -> Floats:

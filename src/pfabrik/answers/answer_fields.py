@@ -9,12 +9,12 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import Floats, Ints, shaped
+from ..common.arrays import Floats, Ints, Mask, shaped
 from ..common.batch import aligned
 from ..common.frozen import FrozenMapping
 from ..engines.engine import engine_of
 from ..engines.joints.configurations import Configurations
-from ..engines.joints.projection import projection_modes
+from ..engines.joints.projection import modes_of
 from ..kernels.rows import (
     ACTUATOR_ERROR,
     HOLD_NOTHING,
@@ -38,6 +38,7 @@ from .active_limits import (
     holding_limits,
     stretched_joint,
 )
+from .jumps import are_jumps
 from .status import Status
 
 Held: TypeAlias = Literal["orientation", "position"] | None
@@ -51,7 +52,22 @@ class PoseRequest(NamedTuple):
     options: Options
 
 
-_State: TypeAlias = tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None, Floats | None]
+class Before(NamedTuple):
+    """Starts of answers, one or one for each, the targets (n, 4, 4) that these answer, and what was asked then."""
+
+    starts: Configurations
+    targets: Floats
+    request: PoseRequest
+
+    def at(self, rows: NDArray[np.intp]) -> Before:
+        """Those of some answers."""
+        request = self.request._replace(targets=self.request.targets[rows])
+        if len(self.starts) == 1:
+            return self._replace(request=request)
+        return Before(self.starts.at(rows), self.targets[rows], request)
+
+
+_State: TypeAlias = tuple[Mechanism, Configurations, tuple[int, ...], PoseRequest | None, Floats | None, Before | None]
 
 
 class Answer:
@@ -64,6 +80,7 @@ class Answer:
         shape: tuple[int, ...],
         request: PoseRequest | None = None,
         values: Floats | None = None,
+        before: Before | None = None,
     ) -> None:
         """Wrap configurations, as many as the batch shape has; if any are missed, with what was asked for.
 
@@ -71,16 +88,18 @@ class Answer:
         ----------
         request : the poses asked for.
         values : the actuator values asked for, (n, n_a) [length or rad].
+        before : what poses were asked from; None for home.
         """
         self.mechanism = mechanism
         self.shape = shape
         self._configurations = found
         self._request = request
         self._values = values
+        self._before = before
 
     def __getstate__(self) -> _State:
         """The arguments of the constructor; cached properties are not pickled."""
-        return self.mechanism, self._configurations, self.shape, self._request, self._values
+        return self.mechanism, self._configurations, self.shape, self._request, self._values, self._before
 
     def __setstate__(self, state: _State) -> None:
         mechanism, found, shape, *asked = state
@@ -143,6 +162,16 @@ class Answer:
         names = np.array([None, "orientation", "position"], dtype=object)
         held = names[np.where(self._rows.status == Status.PROJECTED, self._rows.holds, HOLD_NOTHING)]
         return held[0] if self.shape == () else held.reshape(self.shape)
+
+    @cached_property
+    def jumped(self) -> bool | Mask:
+        jumps, before, answers = np.zeros(len(self._configurations), bool), self._before, self._configurations
+        if before is not None:
+            rows = np.zeros(len(jumps), int) if len(before.starts) == 1 else np.arange(len(jumps))
+            starts, (targets, options) = before.starts.at(rows), before.request
+            engine = engine_of(self.mechanism)
+            jumps = are_jumps(engine, self.mechanism, starts, before.targets[rows], answers, targets, options)
+        return cast("bool | Mask", self._shaped(jumps))
 
     @property
     def certified(self) -> bool | NDArray[np.bool_]:
@@ -216,10 +245,8 @@ class Answer:
         """The limits that block projected rows from their targets."""
         limits: dict[int, tuple[ActiveLimit, ...]] = {}
         engine, holds, options = engine_of(self.mechanism), self._rows.holds[projected], request.options
-        for projection in projection_modes(
-            model_of(self.mechanism).path_closure, options.hold, options.rotation_length
-        ):
-            rows = projected[holds == projection.hold]
+        for projection in modes_of(model_of(self.mechanism).path_closure, options):
+            rows = projected[holds == (HOLD_NOTHING if projection.price else projection.hold)]
             if len(rows):
                 configurations = self._configurations.at(rows)
                 multipliers = engine.limit_multipliers(configurations, request.targets[rows], projection)

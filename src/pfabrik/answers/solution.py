@@ -55,8 +55,11 @@ class Solution(Answer):
     limit_excess : float or array (...)
         Largest excess over any limit; lengths relative to L, angles in rad; 0 if all are kept.
     held : str or None or array of str (...)
-        The part of the target that a projected answer keeps: "orientation", "position", or None. It is that of
-        `Options.hold`, or None if no feasible pose has it.
+        The part of the target that a projected answer has exactly: "orientation", "position", or None. It is that of
+        `Options.hold`, or None where holding it costs more than `Options.hold_price`.
+    jumped : bool or array of bool (...)
+        True if no motion leads to the answer from the `start` that was given: as the target goes on, the nearest pose
+        has become another one, and drives would jump there. False without a start.
     certified : bool or array of bool (...)
         True if there is a proof that no feasible pose of the same orientation is nearer, in any working mode. REACHED
         answers are certified, and most projected ones of machines whose legs are struts, or rods on cranks and
@@ -106,7 +109,8 @@ class Solution(Answer):
         places = np.ravel(chosen)
         request = None if self._request is None else self._request._replace(targets=self._request.targets[places])
         values = None if self._values is None else self._values[places]
-        return Solution(self.mechanism, self._configurations.at(places), np.shape(chosen), request, values)
+        before = None if self._before is None else self._before.at(places)
+        return Solution(self.mechanism, self._configurations.at(places), np.shape(chosen), request, values, before)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
@@ -128,6 +132,7 @@ class Solution(Answer):
         plain: dict[str, Any] = {"status": _plain_status(self.status)}
         plain |= {name: as_plain(getattr(self, name)) for name in names}
         plain["held"] = as_plain(self.held)
+        plain["jumped"] = as_plain(self.jumped)
         plain["certified"] = as_plain(self.certified)
         plain["joints"] = {name: as_plain(value) for name, value in self.joints.items()}
         plain["points"] = {name: as_plain(point) for name, point in self.points.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,30 +16,19 @@ from ..common.arrays import Floats, Ints, Mask, as_plain
 from ..common.printed import ResultTable, plain
 from ..engines.engine import engine_of
 from ..engines.joints.configurations import Configurations
+from ..engines.joints.engine_contract import InverseEngine
 from ..engines.joints.link_distances import least_on_the_way
 from ..errors import InvalidArgument, counted
 from ..machine.description.mechanism import Mechanism
 from ..machine.description.readouts import readouts
-from ..machine.description.task import task_of
-from ..machine.motion.displacements import actuator_units
-from ..machine.poses import between
 from ..tolerances import TOLERANCES
 from .active_limits import ActiveLimit
 from .along import Extremes, largest_tilts, least_margins
 from .answer_fields import PoseRequest
+from .jumps import are_jumps
 from .pace import Pace
 from .solution import Solution
 from .status import Status
-
-SUSPICIOUS, LEAST = 4.0, 1e-6
-"""Ratio of the motion of an answer to that of its target, and least motion [L or rad], above which it may be a jump."""
-
-SUBSTEPS = 8
-"""Parts into which a checked step is divided: a jump stays within one of them, a fast motion spreads over several."""
-
-JUMP = 0.5
-"""Share of the whole motion that one part makes if it is a jump."""
-
 
 MOST_NAMED = 5
 """Targets that a summary names by number, at most."""
@@ -60,8 +49,8 @@ class Track(Solution):
     sample_time : float or None
         Time from one target to the next [s]; None if not given, or if it varies.
     jumps : array of bool (n,)
-        Mask of answers to which no continuous motion leads from the answer before, as the target moves. The nearest
-        feasible pose itself can jump if a workspace is not convex.
+        Mask of answers to which no motion leads from the answer before, as the target moves: drives would jump. The
+        nearest feasible pose itself can jump if a workspace is not convex.
     passing : array (n,) or None
         For a machine with a clearance, the least distance between links on the way from the answer before, along the
         straight line between the two poses [length]; in the first row that of the answer. Where it is less than the
@@ -86,13 +75,12 @@ class Track(Solution):
         mechanism: Mechanism,
         found: Configurations,
         wanted: PoseRequest,
-        follow: Callable[..., Solution],
         pace: Pace | None,
+        engine: InverseEngine,
     ) -> None:
-        """Wrap answers; `follow` solves another path, (k, 4, 4), from a start, with the same options."""
+        """Wrap the answers of an engine."""
         super().__init__(mechanism, found, (len(found),), wanted)
-        self._follow = follow
-        self._pace = pace
+        self._pace, self._engine = pace, engine
 
     if TYPE_CHECKING:  # a path is a batch: all of these are arrays
 
@@ -142,16 +130,11 @@ class Track(Solution):
 
     @cached_property
     def jumps(self) -> Mask:
-        jumps = np.zeros(self.shape, bool)
-        actuators = _scaled(self.mechanism, self.actuators).max(axis=1, initial=0.0)
-        moves = np.maximum(_moves(self.mechanism, self.pose), actuators)
-        asked = np.where((self.status == Status.INVALID)[:, None, None], np.nan, self.targets)
-        expected = np.maximum(SUSPICIOUS * _moves(self.mechanism, asked), LEAST)
-        for row in np.flatnonzero(moves > expected).tolist():
-            # with stretched links, substeps may bend them to the right side in one of the two directions only
-            steps = [ends for ends in ((row - 1, row), (row, row - 1)) if self.status[ends[0]] < Status.FAILED]
-            jumps[row] = all(self._is_jump(*ends, moves[row]) for ends in steps)
-        return jumps
+        assert self._request is not None
+        rows, targets = np.arange(len(self)), self._request.targets
+        before = np.maximum(rows - 1, 0)
+        starts, options = self._configurations.at(before), self._request.options
+        return are_jumps(self._engine, self.mechanism, starts, targets[before], self._configurations, targets, options)
 
     @cached_property
     def passing(self) -> Floats | None:
@@ -161,16 +144,6 @@ class Track(Solution):
         before, after = (self._configurations.at(each) for each in (np.maximum(rows - 1, 0), rows))
         free = engine_of(self.mechanism.with_clearance(None))
         return least_on_the_way(free, self.mechanism, before, after)
-
-    def _is_jump(self, start: int, end: int, whole: float) -> bool:
-        """True if a step from one row to the next, or back, is a jump also when divided into substeps."""
-        shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
-        first, last = (np.repeat(self.targets[row : row + 1], SUBSTEPS, axis=0) for row in (start, end))
-        parts = [self[start], self._follow(between(first, last, shares), start=self[start]), self[end]]
-        poses = np.concatenate([part.pose.reshape(-1, 4, 4) for part in parts])
-        actuators = np.concatenate([part.actuators.reshape(-1, self.actuators.shape[1]) for part in parts])
-        steps = np.maximum(_moves(self.mechanism, poses), _scaled(self.mechanism, actuators).max(axis=1, initial=0.0))
-        return bool(steps.max() > JUMP * whole)
 
     def to_dict(self) -> dict[str, Any]:
         """The dict of a `Solution`, with the fields of a track."""
@@ -243,18 +216,6 @@ def refuse_leaps(track: Track) -> None:
 def _durations(steps: Floats) -> Floats:
     """Positive time steps as a column (n, 1), to divide by; NaN where a step is not positive."""
     return np.where(steps > 0.0, steps, np.nan)[:, None]
-
-
-def _moves(mechanism: Mechanism, poses: Floats) -> Floats:
-    """Distance of each pose of a path from the one before it, in the components of the task, (n,) [L]; first 0."""
-    position, rotation = task_of(mechanism).errors(poses[1:], poses[:-1])
-    moves = np.hypot(position, mechanism.rotation_length * rotation) / mechanism.characteristic_length
-    return np.concatenate([np.zeros(min(len(poses), 1)), moves])
-
-
-def _scaled(mechanism: Mechanism, actuators: Floats) -> Floats:
-    """Distance that each actuator moves in every step, (n, n_a) [L or rad]."""
-    return np.asarray(np.abs(np.diff(actuators, axis=0, prepend=actuators[:1])) / actuator_units(mechanism))
 
 
 @dataclass

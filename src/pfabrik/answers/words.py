@@ -75,18 +75,17 @@ def causes(answer: Answer) -> list[str]:
 
 def given_up(answer: Answer) -> list[str]:
     """A phrase for the part of the target that a projected answer should hold and does not; empty if there is none."""
-    from ..engines.joints.projection import projection_modes
+    from ..engines.joints.projection import modes_of
     from ..kernels.rows import HOLD_NOTHING
 
     request = answer._request
     if request is None or answer.held is not None:
         return []
-    closure, options = model_of(answer.mechanism).path_closure, request.options
-    preferred, *_ = projection_modes(closure, options.hold, options.rotation_length)
-    if preferred.hold == HOLD_NOTHING:
+    options = request.options
+    if modes_of(model_of(answer.mechanism).path_closure, options)[0].hold == HOLD_NOTHING:
         return []
-    free_part = "position" if options.hold == "orientation" else "orientation"
-    return [f"no {free_part} was found at which the {options.hold} asked for can be kept, so both differ"]
+    unit = "rad" if options.hold == "orientation" else "L"
+    return [f"to hold the {options.hold} would cost more than {options.hold_price:g} L per {unit}, so both differ"]
 
 
 def why_without_limits(answer: Answer) -> str:

@@ -70,7 +70,7 @@ _PASSES = (
     P.PassResults(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
-_POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i f f i"))
+_POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i i f f f f i"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, tuple(_values("i F3 F3 F2 i1 f3 f2 f2"))),

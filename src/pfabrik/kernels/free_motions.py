@@ -9,7 +9,7 @@ import numpy as np
 from ..common.arrays import Floats, Ints
 from ._jit import routine
 from .qp import QP, factorise, solve_qp
-from .search_constants import EASE, IMPLIED, LOOSE, SHARED
+from .search_constants import IMPLIED, LOOSE, SHARED
 from .sqp import Linearisation, new_linearisation
 
 
@@ -195,29 +195,6 @@ def add_limit(k: int, h: float, number: int, slope: Floats, reduced: FreeMotions
     project(slope, reduced, linear.G[k])
     linear.h[k], linear.which[k] = h, number
     return k + 1
-
-
-@routine
-def easing_step(reduced: FreeMotions, p: QP) -> bool:
-    """Fill `p.x` with the free motions after which the largest excess is least; False if it is none then.
-
-    The multipliers are those of the limits that then are exceeded alike.
-    """
-    linear = reduced.linear
-    motions, k = linear.totals[0]["motions"], linear.totals[0]["limits"]
-    if motions >= p.x.shape[0]:
-        return False
-    for a in range(motions + 1):
-        p.g[a] = 0.0
-        for b in range(a + 1):
-            p.H[a, b] = EASE * linear.metric[a, b] if a < motions else float(b == motions)
-    for c in range(k):
-        p.h[c] = linear.h[c] + linear.drift[c]
-        for a in range(motions):
-            p.G[c, a] = linear.G[c, a]
-        p.G[c, motions] = -1.0
-    is_solved = factorise(p.H, motions + 1, 0.0, p.factor) and solve_qp(p, motions + 1, k)
-    return is_solved and p.x[motions] > 0.0
 
 
 @routine

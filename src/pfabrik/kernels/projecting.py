@@ -1,4 +1,4 @@
-"""Projections in any unknowns: from which starts, how many, and when what is held leads too far and is released."""
+"""Projections in any unknowns: from which starts, how many, and what their ends are worth."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ import numpy as np
 from ..common.arrays import Floats, Record, Records
 from ._jit import routine
 from .joints.loops import LOCKED
-from .rows import HOLD_ORIENTATION
-from .search_constants import HOLD_COST, SAME_DISTANCE
+from .rows import HOLD_POSITION
+from .search_constants import SAME_DISTANCE
+
+# Objectives of a part that is held: exactly, up to its price, and that rounded off farther.
+HELD, PRICED, COARSE = 0, 1, 2
 
 TALLY = np.dtype(
     [
@@ -18,6 +21,7 @@ TALLY = np.dtype(
         ("agreements", "f8"),  # searches that ended there; infinite if certified the nearest
         ("disagreements", "f8"),  # searches that ended farther away
         ("is_unbroken", "i8"),  # 1 if some search needed no second descent with restoration
+        ("cost", "f8"),  # by how much it would fall, per unit by which what is held gave way [L per rad or per L]
     ]
 )
 """Agreement counts of the searches for a row."""
@@ -60,7 +64,8 @@ def seed_of(search: int, n_seeds: int, nearest_seed: int) -> int:
 @routine
 def clear_tally(tally: Record) -> None:
     """Reset a tally."""
-    tally["least"], tally["agreements"], tally["disagreements"], tally["is_unbroken"] = math.inf, 0.0, 0.0, 0
+    tally["least"], tally["agreements"], tally["disagreements"] = math.inf, 0.0, 0.0
+    tally["is_unbroken"], tally["cost"] = 0, math.inf
 
 
 @routine
@@ -132,22 +137,6 @@ def weighted_distance(weights: Floats, position: float, rotation: float) -> floa
 
 
 @routine
-def is_too_far(distance: float, weights: Floats, hold: int, position: float, rotation: float) -> bool:
-    """True if an answer is farther from its target than holding a part of that may cost.
-
-    That is d > d0 + e0, where d and d0 are the distances of the answer and of the start in components that are not
-    held, and e0 is the error of the start in those that are.
-
-    Parameters
-    ----------
-    position, rotation : errors of the start [L], [rad].
-    """
-    held_error = rotation if hold == HOLD_ORIENTATION else position
-    allowed = weighted_distance(weights, position, rotation) + HOLD_COST * held_error
-    return distance < math.inf and distance > (1.0 + SAME_DISTANCE) * allowed
-
-
-@routine
-def brings_nearer(distance: float, weights: Floats, position: float, rotation: float) -> bool:
-    """True if an answer that holds nothing is no farther from its target than the start, whose errors are given."""
-    return distance <= (1.0 + SAME_DISTANCE) * weighted_distance(weights, position, rotation)
+def priced_distance(weights: Floats, hold: int, price: float, position: float, rotation: float) -> float:
+    """Distance of a pose from a target with the price of what is held [L], from its errors [L], [rad]."""
+    return weighted_distance(weights, position, rotation) + price * (position if hold == HOLD_POSITION else rotation)

@@ -21,9 +21,19 @@ MOST_STEPS = 200
 SAME_DISTANCE = 1e-7
 """Relative difference of distances below which two searches agree."""
 
-HOLD_COST = 1.0
-"""Most that a held component may add to the distance, per unit by which the start differs from the target in that
-component [L per rad, or rad per L]: a rotation about the middle of a machine moves no joint by more."""
+ROUNDED_OFF, COARSELY = 1e-3, 2e-2
+"""Share of the distance below which the price of what is held is rounded off, at its end, and in searches that first
+look for the basin: the sharper the edge, the more of them end beside it."""
+
+MOST_ROUNDED = 0.1
+"""Largest product of that share and the price: of a tenth of the distance, F is a norm still."""
+
+TURNED = 10.0
+"""Error of what is held, in units of the share, below which it is looked at whether it can be held exactly."""
+
+WORTH = 0.25
+"""By how much the distance must fall from a start to its answer before other basins are searched [L]: from an answer to
+the target before, in a stream, it falls by less."""
 
 CONTINUATION_STEPS, LONGEST_IN_MODE = 8, 0.25
 """Steps on the way to a target in the working mode of the start, and the longest single one that keeps it: a longer one
@@ -31,6 +41,10 @@ may jump over a singularity [L or rad]."""
 
 SIGHT = 1e6
 """Largest distance of a target from home [L]: farther ones in the same direction have the same nearest pose."""
+
+SUSPICIOUS, UNDONE, MOVED = 2.0, 0.5, 1e-6
+"""Ratio of the motion of drives to that of their target above which a step may be a jump; share of it that the way back
+to the target before leaves, if it is one; and least motion that is looked at [L or rad]."""
 
 # Descent by quadratic programmes (`sqp`)
 
@@ -95,9 +109,6 @@ IMPLIED = 1e-6
 
 LOOSE = 4.0
 """Largest entry left of such an equation where equations are not met, in units of the gap."""
-
-EASE = 1e-6
-"""Weight of a squared step beside the squared excess that it is to lower: it is to make the step unique, no more."""
 
 SHARED = 0.01
 """Factor for pivots of unknowns that legs have in common: they would couple the legs' equations."""

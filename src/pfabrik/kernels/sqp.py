@@ -94,6 +94,7 @@ class Hessian(NamedTuple):
 
     H: Floats  # (n, n)
     multipliers: Floats  # of all limits, by their numbers
+    forces: Floats  # (2, n): gradients of the objective by position and by rotation, where these have a price
 
 
 def new_linearisation(n: int, k: int) -> Linearisation:
@@ -111,7 +112,7 @@ def new_linearisation(n: int, k: int) -> Linearisation:
 
 def new_hessian(n: int, k: int) -> Hessian:
     """Allocate a Hessian for n unknowns and k limits."""
-    return Hessian(np.zeros((n, n)), np.zeros(k))
+    return Hessian(np.zeros((n, n)), np.zeros(k), np.zeros((2, n)))
 
 
 @routine
@@ -132,6 +133,16 @@ def symmetrise(H: Floats, n: int) -> float:
         for b in range(a):
             H[a, b] = H[b, a] = 0.5 * (H[a, b] + H[b, a])
     return largest
+
+
+@routine
+def add_products(place: float, both: float, turn: float, hessian: Hessian, n: int) -> None:
+    """Add the products of the two forces, times a factor each."""
+    H, forces = hessian.H, hessian.forces
+    for a in range(n):
+        for b in range(n):
+            H[a, b] += place * forces[0, a] * forces[0, b] + turn * forces[1, a] * forces[1, b]
+            H[a, b] += both * (forces[0, a] * forces[1, b] + forces[1, a] * forces[0, b])
 
 
 @routine

@@ -19,7 +19,7 @@ from ..engines.joints.closure_engine import start_coordinates, to_answers
 from ..engines.joints.configurations import Configurations, new_rows, steps_of
 from ..engines.joints.descend import clip_targets
 from ..engines.joints.engine_contract import Engine, InverseEngine
-from ..engines.joints.projection import ProjectionMode, held_parts, projection_modes
+from ..engines.joints.projection import ProjectionMode, held_parts, modes_of
 from ..engines.pose.answers import sides_at
 from ..kernels.joints.loops import LOCKED
 from ..kernels.passes import plan as P
@@ -118,7 +118,7 @@ class PassesEngine(InverseEngine):
     def _solve_from(self, targets: Floats, coordinates: Floats, keep_mode: bool) -> Configurations:
         """Solve for poses by passes from joint coordinates (n, columns); FAILED where the result is infeasible."""
         closure, options = self._model.path_closure, self._options
-        projection = projection_modes(closure, options.hold, options.rotation_length)[0]
+        projection = modes_of(closure, options)[0]
         settings = settings_of(self._model, options, projection)._replace(keep_mode=int(keep_mode))
         clipped = clip_targets(self.mechanism, targets)
         if options.method == "centroid" and not self._has_only_struts:

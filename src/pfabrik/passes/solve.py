@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from ..answers.pace import pace_of
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start
@@ -60,9 +58,9 @@ def track(
     """
     options = options_or(PAPER, options)
     poses = as_path(mechanism, targets, options)
-    solutions, request = follow_by(_engine(model_of(mechanism), options), mechanism, poses, start, options, None)
-    follow = partial(track, mechanism, options=options)
-    return Track(mechanism, solutions, request, follow, pace_of(mechanism, len(poses), None, None, None))
+    engine = _engine(model_of(mechanism), options)
+    solutions, request = follow_by(engine, mechanism, poses, start, options, None)
+    return Track(mechanism, solutions, request, pace_of(mechanism, len(poses), None, None, None), engine)
 
 
 @derived

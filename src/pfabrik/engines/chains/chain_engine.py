@@ -21,7 +21,7 @@ from ...machine.poses import are_poses
 from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
 from ..joints.assemble import forward_answers
-from ..joints.attempts import HELD, Attempt, with_verdicts
+from ..joints.attempts import Attempt, held_words, with_verdicts
 from ..joints.close import Closing, measure_configurations
 from ..joints.closure_engine import ClosureEngine
 from ..joints.configurations import Configurations, coordinates_for, joint_coordinates, new_rows, steps_of
@@ -133,11 +133,12 @@ class ChainEngine(Engine):
         """As `InverseEngine.attempts`: those of the chain, then of the fallback where these have no end."""
         model, begin, rows = self.model, joint_coordinates(self.model, start), None
         if self._are_idle_within(begin):
-            scratch, holds = Handle(new_scratch(model, MOST_NOTED)), tables_of(model, options).record.holds
+            scratch, tables = Handle(new_scratch(model, MOST_NOTED)), tables_of(model, options).record
             _, answer = self._run(question_of(start is not None, keep_mode), options, target, begin, scratch=scratch)
             rows, noted = answer.rows, scratch.record.log[: scratch.record.effort["searches"][0]]
             for phase, searches in groupby(noted, lambda each: int(each["phase"])):
-                yield from _told(model, np.array(list(searches)), int(holds[phase]), int(rows.holds[0]))
+                held = held_words(int(tables.holds[phase]), tables.prices[phase, 0])
+                yield from _told(model, np.array(list(searches)), held)
         if rows is None or rows.status[0] > PROJECTED:
             yield from self._joint_space.attempts(target, start, options, keep_mode=keep_mode)
 
@@ -193,7 +194,7 @@ class ChainEngine(Engine):
         answer, bent_answer = (
             self.answer(target, each, options, keep_mode=True, nearby=True) for each in (start, begin)
         )
-        return bent_answer if bent.is_preferred(target, answer.rows, bent_answer.rows) else answer
+        return bent_answer if bent.is_preferred(answer.rows, bent_answer.rows) else answer
 
     def advance(self, targets: Floats, start: Configurations) -> Configurations:
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
@@ -251,7 +252,7 @@ class ChainEngine(Engine):
         return bool((measure_configurations(self.model, coordinates).excess <= TOLERANCES.limit).all())
 
 
-def _told(model: Model, searches: Records, hold: int, answered: int) -> Iterator[Attempt]:
+def _told(model: Model, searches: Records, held: str) -> Iterator[Attempt]:
     """The searches of one phase as attempts."""
     starts = ["the start" if k < 0 else f"seed {k + 1}" for k in searches["start"]]
     if searches["phase"][0] == 0:
@@ -261,6 +262,4 @@ def _told(model: Model, searches: Records, hold: int, answered: int) -> Iterator
             yield Attempt("joints moved to the target", start, steps, 0.0 if is_reached else np.nan, ending)
         return
     distances = np.where(np.isfinite(searches["distance"]), model.length * searches["distance"], np.nan)
-    for attempt in with_verdicts(f"joints, {HELD[hold]}", starts, searches["steps"].tolist(), distances):
-        is_left = hold != answered and attempt.ending == "nearest"
-        yield attempt._replace(ending="farther than the start") if is_left else attempt
+    yield from with_verdicts(f"joints, {held}", starts, searches["steps"].tolist(), distances)

@@ -23,7 +23,7 @@ from ...machine.motion.limited_coordinates import ranged_angles
 from ...options import Options
 from ...tolerances import TOLERANCES
 from ..joints.close import Closing, in_lengths
-from ..joints.projection import projection_modes
+from ..joints.projection import projection_modes, with_coarse
 from .serial_chain import chain_handle, chain_of, stretched_length
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def question_of(
 
 def tables_of(model: Model, options: Options) -> Handle[ChainTables]:
     """All that kernels need of a chain, with options."""
-    return _tables(model, options.hold, options.rotation_length, options.tolerance, options.rotation_tolerance)
+    tolerances = options.tolerance, options.rotation_tolerance
+    return _tables(model, options.hold, options.rotation_length, options.hold_price, *tolerances)
 
 
 @derived
@@ -50,11 +51,13 @@ def _tables(
     model: Model,
     hold: str | None,
     rotation_length: float | None,
+    hold_price: float,
     tolerance: float | None,
     rotation_tolerance: float,
 ) -> Handle[ChainTables]:
     closure, mechanism, task, length = model.closure, model.mechanism, model.task, model.length
-    projections, seeds = projection_modes(model.path_closure, hold, rotation_length), chain_seeds(model)
+    projections, seeds = projection_modes(model.path_closure, hold, rotation_length, hold_price), chain_seeds(model)
+    projections = with_coarse(projections)
     machine, columns = np.zeros(1, MACHINE), np.zeros(len(closure.scale), COLUMN)
     is_short = len(chain_of(model).kinds) <= FEW
     fields = {
@@ -92,6 +95,7 @@ def _tables(
             closure.home,
             np.array([task.held, *(projection.weights for projection in projections)], float),
             np.array([HOLD_NOTHING, *(projection.hold for projection in projections)], np.int64),
+            np.array([(0.0, 0.0), *((projection.price, projection.rounding) for projection in projections)]),
             *seeds,
         )
     )

@@ -16,6 +16,11 @@ STARTS_NAMED = {AT_START: "the start", AT_END: "where loops closed worst"}
 HELD = {HOLD_NOTHING: "nothing held", HOLD_ORIENTATION: "orientation held", HOLD_POSITION: "position held"}
 
 
+def held_words(hold: int, price: float) -> str:
+    """What a search holds, and if it does up to a price."""
+    return f"{HELD[hold]} up to its price" if price else HELD[hold]
+
+
 class Attempt(NamedTuple):
     """One attempt to answer a target.
 
@@ -53,8 +58,8 @@ def with_verdicts(phase: str, starts: Sequence[str], steps: Sequence[int], dista
         yield Attempt(phase, start, n_steps, distance, ending)
 
 
-def attempts_of(log: Records, holds: Ints, length: float) -> Iterator[Attempt]:
-    """The attempts of a search in joint coordinates, from its log and from what each projection holds."""
+def attempts_of(log: Records, holds: Ints, prices: Floats, length: float) -> Iterator[Attempt]:
+    """The attempts of a search in joint coordinates, from its log and from what each projection holds at what price."""
     for aim in range(TO_CLOSE, len(holds)):
         chosen = log[log["aim"] == aim]
         starts = [STARTS_NAMED.get(start, f"seed {start}") for start in chosen["start"].tolist()]
@@ -63,5 +68,5 @@ def attempts_of(log: Records, holds: Ints, length: float) -> Iterator[Attempt]:
             ending = "not reached" if np.isnan(distances[0]) else "reached"
             yield Attempt("loops closed on the target", starts[0], int(chosen["steps"][0]), distances[0], ending)
         elif len(chosen):
-            phase = f"joint coordinates, {HELD[int(holds[aim])]}"
+            phase = f"joint coordinates, {held_words(int(holds[aim]), prices[aim, 0])}"
             yield from with_verdicts(phase, starts, chosen["steps"].tolist(), distances)

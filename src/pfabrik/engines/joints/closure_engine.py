@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from ...kernels.rows import (
     EXCEEDED,
     FAILED,
     HOLD,
-    HOLD_NOTHING,
     INVALID,
     LIMIT_EXCESS,
     POSITION_ERROR,
@@ -131,7 +129,7 @@ class ClosureEngine(Engine):
         answer = self._answer(target, begin, options, question)
         if bent.coordinates is not None:
             bent_answer = self._answer(target, bent.coordinates, options, question)
-            answer = bent_answer if bent.is_preferred(target, answer.rows, bent_answer.rows) else answer
+            answer = bent_answer if bent.is_preferred(answer.rows, bent_answer.rows) else answer
         bent.update(int(answer.rows.status[0]), begin, answer.coordinates)
         return answer
 
@@ -207,18 +205,11 @@ class ClosureEngine(Engine):
         *,
         keep_mode: bool,
     ) -> Configurations:
-        """Answers to targets (n, 4, 4), in rows whose links are too near of a search that keeps them apart.
-
-        What cannot be held anyhow is not searched for again.
-        """
+        """Answers to targets (n, 4, 4), in rows whose links are too near of a search that keeps them apart."""
         if not len(near):
             return answers
-        holds = (answers.rows.status[near] != PROJECTED) | (answers.rows.holds[near] != HOLD_NOTHING)
-        for rows, asked in ((near[holds], options), (near[~holds], replace(options, hold=None))):
-            if len(rows):
-                begin = start if start is None or len(start) == 1 else start.at(rows)
-                answers = answers.with_rows(rows, self.nearest(targets[rows], begin, asked, keep_mode=keep_mode))
-        return answers
+        begin = start if start is None or len(start) == 1 else start.at(near)
+        return answers.with_rows(near, self.nearest(targets[near], begin, options, keep_mode=keep_mode))
 
     def forward_apart(
         self,

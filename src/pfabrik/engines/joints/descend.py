@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ...common.batch import take
 from ...common.derived import derived
 from ...kernels.handle import Scratch
 from ...kernels.joints.loops import BASE_AXES, Closed, Objective, PoseObjective
+from ...kernels.rows import HOLD_NOTHING
 from ...kernels.search_constants import MOST_STEPS, SIGHT
 from ...kernels.threads import in_blocks
 from ...machine.motion.loops import Closure
@@ -19,6 +20,11 @@ from ...tolerances import TOLERANCES
 from .close import EVERYTHING_FREE, Closing, close, closing_of, new_closed
 from .effort import steps_within
 from .placed_links import links_on_paths
+
+Priced: TypeAlias = tuple[int, float, float]
+"""What is held up to a price, the price and the share of the distance that it is rounded off by."""
+
+UNPRICED: Priced = HOLD_NOTHING, 0.0, 0.0
 
 if TYPE_CHECKING:
     from ...kernels.joints.linearise_loops import DescentScratch
@@ -81,16 +87,22 @@ def _minimise(closure: Closure, coordinates: Floats, objective: Objective) -> Cl
 
 
 def limit_multipliers(
-    closure: Closure, coordinates: Floats, targets: Floats, *, platform: Sequence[float], frame: int = BASE_AXES
+    closure: Closure,
+    coordinates: Floats,
+    targets: Floats,
+    *,
+    platform: Sequence[float],
+    frame: int = BASE_AXES,
+    priced: Priced = UNPRICED,
 ) -> Floats:
     """Multipliers of all limits at configurations nearest to targets, (n, 2 columns + cones + pairs of links).
 
     The order is low and high bound of each coordinate, then the cones, then the pairs. A multiplier is the decrease of
-    the distance [L] per unit [L or rad] by which the limit is relaxed; 0 for limits that are not active.
+    the distance, with its price, [L] per unit [L or rad] by which the limit is relaxed; 0 for limits that are not
+    active.
     """
-    return _run(
-        closure, coordinates, _objective(closure, clip_targets(closure.mechanism, targets), platform, frame, 0)
-    )[1]
+    clipped = clip_targets(closure.mechanism, targets)
+    return _run(closure, coordinates, _objective(closure, clipped, platform, frame, 0, priced))[1]
 
 
 def clip_targets(mechanism: Mechanism, targets: Floats) -> Floats:
@@ -127,9 +139,12 @@ def _scratch(closure: Closure) -> Scratch[DescentScratch]:
     return Scratch(new_descent_scratch, closure.loops, *links_on_paths(closure.mechanism))
 
 
-def _objective(closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int) -> Objective:
+def _objective(
+    closure: Closure, targets: Floats, platform: Sequence[float], frame: int, steps: int, priced: Priced = UNPRICED
+) -> Objective:
     """The objective of the distance from targets (n, 4, 4), with no weight on joint coordinates."""
     scaled = targets.copy()
     scaled[:, :3, 3] /= closure.mechanism.characteristic_length
-    pose = PoseObjective(scaled, np.array(platform, dtype=float), frame, TOLERANCES.inside, TOLERANCES.active, steps)
+    near = TOLERANCES.inside, TOLERANCES.active
+    pose = PoseObjective(scaled, np.array(platform, dtype=float), frame, *priced, *near, steps)
     return Objective(pose, np.zeros(len(closure.scale)), np.zeros((len(targets), 0)))

@@ -28,7 +28,7 @@ from .effort import descending_steps, starts_within, steps_per_continuation_step
 from .multistart import random_coordinates, random_feasible, seeds_of
 from .parasitic import asks_too_much, follows_task, has_parasitic_motion
 from .placed_links import links_on_paths
-from .projection import projection_modes
+from .projection import projection_modes, with_coarse
 from .reaches import reaches_of
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def _answer_block(
 
 def logged(
     model: Model, target: Floats, begin: Floats, options: Options, question: Handle[JointQuestion]
-) -> tuple[Records, Ints]:
-    """The log of a search for a target (1, 4, 4), and what each of its projections holds."""
+) -> tuple[Records, Ints, Floats]:
+    """The log of a search for a target (1, 4, 4), and what each of its projections holds at what price."""
     from ...kernels.joints.answer_joints import answer_joints
 
     tables, rows = prepared(model, options, True)[0], new_rows(model, 1)
@@ -108,7 +108,7 @@ def logged(
     rows.status[:] = OPEN
     answers = Answered(begin.copy(), rows.counters, rows.poses, rows.actuators, rows.measures)
     answer_joints(tables.address, scratch.address, question.address, target, begin, answers, rows.status)
-    return scratch.record.log[: scratch.record.logged[0]], tables.record.holds
+    return scratch.record.log[: scratch.record.logged[0]], tables.record.holds, tables.record.prices
 
 
 @lru_cache(maxsize=64)
@@ -124,7 +124,7 @@ def question_of(
 def prepared(model: Model, options: Options, with_seeds: bool) -> tuple[Handle[JointTables], Scratch[JointScratch]]:
     """All that kernels need of a machine to answer targets in joint coordinates, and scratch memory."""
     tolerances = options.tolerance, options.rotation_tolerance
-    return _prepared(model, options.hold, options.rotation_length, *tolerances, with_seeds)
+    return _prepared(model, options.hold, options.rotation_length, options.hold_price, *tolerances, with_seeds)
 
 
 @derived
@@ -132,6 +132,7 @@ def _prepared(
     model: Model,
     hold: str | None,
     rotation_length: float | None,
+    hold_price: float,
     tolerance: float | None,
     rotation_tolerance: float,
     with_seeds: bool,
@@ -141,7 +142,7 @@ def _prepared(
     has_others = follows and (varies or asks_too_much(closure))
     nearby, poses = random_feasible(closure) if with_seeds else (np.zeros((0, len(scale))), np.zeros((0, 4, 4)))
     seeds = np.reshape(seeds_of(closure) if with_seeds else (), (-1, len(scale)))
-    projections = projection_modes(closure, hold, rotation_length)
+    projections = with_coarse(projection_modes(closure, hold, rotation_length, hold_price))
     random, rng = [], np.random.default_rng(0)
     for _ in range(STARTS):
         random.append(random_coordinates(closure, 1, rng))
@@ -193,6 +194,7 @@ def _prepared(
         np.array(task.held),
         np.array([projection.weights for projection in projections]),
         np.array([projection.hold for projection in projections]),
+        np.array([(projection.price, projection.rounding) for projection in projections]),
         reaches_of(closure.loops),
         seeds * scale,
         nearby * scale,

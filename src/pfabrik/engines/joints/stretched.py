@@ -9,7 +9,7 @@ from ...machine.model import Model
 from ...options import Options
 from .first_order import are_stretched
 from .parasitic import differences
-from .projection import projection_modes
+from .projection import modes_of
 
 SAME_POSE = 1e-7
 """Largest difference of poses that count as equal [L and entries of rotation matrices]."""
@@ -28,7 +28,7 @@ class BentConfiguration:
 
     def __init__(self, model: Model, options: Options) -> None:
         self._model = model
-        self._projections = projection_modes(model.path_closure, options.hold, options.rotation_length)
+        self._projection = modes_of(model.path_closure, options)[-1]
         self.coordinates: Floats | None = None
 
     def update(self, status: int, start: Floats, end: Floats) -> None:
@@ -38,29 +38,23 @@ class BentConfiguration:
         is_stretched = bool(are_stretched(self._model, end)[0])
         self.coordinates = (start if self.coordinates is None else self.coordinates) if is_stretched else None
 
-    def is_preferred(self, target: Floats, rows: Rows, bent_rows: Rows) -> bool:
-        """True if the answer to a target (1, 4, 4) from the bent start is to replace the one from the last answer.
+    def is_preferred(self, rows: Rows, bent_rows: Rows) -> bool:
+        """True if the answer to a target from the bent start is to replace the one from the last answer.
 
         It is preferred if it is better, or has the same pose and thus bends links to the side from which they came.
         """
-        return self._is_same(rows, bent_rows) or self._is_better(target, rows, bent_rows)
+        return self._is_same(rows, bent_rows) or self._is_better(rows, bent_rows)
 
     def _is_same(self, rows: Rows, bent_rows: Rows) -> bool:
         apart = differences(self._model.closure, bent_rows.poses, rows.poses)[0]
         return bool(bent_rows.status[0] == rows.status[0] and apart <= SAME_POSE)
 
-    def _is_better(self, target: Floats, rows: Rows, bent_rows: Rows) -> bool:
-        """True if the second answer has a better status, holds more of the target, or is nearer to it."""
-        if bent_rows.status[0] != rows.status[0]:
+    def _is_better(self, rows: Rows, bent_rows: Rows) -> bool:
+        """True if the second answer has a better status, or is nearer to the target."""
+        if bent_rows.status[0] != rows.status[0] or rows.status[0] != PROJECTED:
             return bool(bent_rows.status[0] < rows.status[0])
-        if rows.status[0] != PROJECTED:
-            return False
-        holds = [projection.hold for projection in self._projections]
-        place, bent_place = (holds.index(answer.holds[0]) for answer in (rows, bent_rows))
-        if place != bent_place:
-            return bent_place < place
-        closure, projection = self._model.closure, self._projections[place]
         distance, bent_distance = (
-            projection.distances(closure, answer.poses, target)[0] for answer in (rows, bent_rows)
+            self._projection.distances(self._model.path_closure, *answer.measures[:1, :2].T)[0]
+            for answer in (rows, bent_rows)
         )
         return bool(bent_distance < (1.0 - SAME_DISTANCE) * distance)

@@ -11,7 +11,7 @@ from ...kernels.pose.tables import IN_OTHER_ASSEMBLIES, IN_OTHER_MODES, Start
 from ...kernels.rows import ITERATIONS, REACHED
 from ...machine.model import Model
 from ...options import Options
-from ..joints.attempts import HELD, Attempt, with_verdicts
+from ..joints.attempts import Attempt, held_words, with_verdicts
 from ..joints.configurations import Configurations, new_rows
 from .nearest import endings
 from .nearest_pose import starts_at
@@ -50,11 +50,14 @@ def attempts(
     own = own._replace(q=np.zeros((1, len(table.legs)))) if len(seeds.q) and start is None else own
     for projection, ends in endings(model, options, target, own, keep_mode=keep_mode):
         others = dict(endings(model, options, target, seeds, keep_mode=keep_mode))[projection]
-        distances = model.length * np.concatenate([ends.distances, others.distances])
-        distances[np.isinf(distances)] = np.nan
+        errors = np.concatenate([ends.measures[:, :2], others.measures[:, :2]])
+        distances = model.length * projection.distances(model.path_closure, *errors.T)
+        distances[np.isinf(np.concatenate([ends.distances, others.distances]))] = np.nan
         steps = np.concatenate([ends.counters[:, ITERATIONS], others.counters[:, ITERATIONS]]).tolist()
         names = ["the start", *(f"seed {k + 1}" for k in range(len(seeds.poses)))]
-        yield from with_verdicts(f"platform's pose, {HELD[projection.hold]}", names, steps, distances)
+        yield from with_verdicts(
+            f"platform's pose, {held_words(projection.hold, projection.price)}", names, steps, distances
+        )
 
 
 def _of_closed_forms(phase: str, start: str, is_reached: bool | np.bool_) -> Attempt:

@@ -36,7 +36,7 @@ from ..joints.configurations import Configurations, new_rows, steps_of
 from ..joints.engine_contract import Counted, Engine, Prepared
 from ..joints.link_distances import too_near
 from ..joints.parasitic import has_other_assemblies
-from ..joints.projection import ProjectionMode
+from ..joints.projection import ProjectionMode, modes_of
 from .answers import LegAnswers, leg_answers, sides_at
 from .branch import answer_unreached, home_answer, kept, starts_beside
 from .coordinates import joint_coordinates
@@ -202,14 +202,14 @@ class LegsEngine(Engine):
             yield from self._joint_space.attempts(target, start, options, keep_mode=keep_mode)
 
     def _is_nearer(self, others: Rows, rows: Rows, options: Options) -> Mask:
-        """True where others reach targets that rows do not, or come nearer and hold no less, (n,)."""
-        length = options.rotation_length or self._model.mechanism.rotation_length
+        """True where others reach targets that rows do not, or come nearer, (n,)."""
+        closure = self._model.path_closure
+        projection = modes_of(closure, options)[-1]
         distances, other_distances = (
-            np.hypot(batch.measures[:, POSITION_ERROR], length * batch.measures[:, ROTATION_ERROR])
+            projection.distances(closure, batch.measures[:, POSITION_ERROR], batch.measures[:, ROTATION_ERROR])
             for batch in (rows, others)
         )
-        is_nearer = other_distances < distances - TOLERANCES.position * self._model.length
-        is_nearer = (others.status == PROJECTED) & is_nearer & (others.holds >= rows.holds)
+        is_nearer = (others.status == PROJECTED) & (other_distances < distances - TOLERANCES.position)
         return np.asarray((rows.status != REACHED) & ((others.status == REACHED) | is_nearer))
 
     def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:

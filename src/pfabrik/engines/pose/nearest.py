@@ -17,7 +17,7 @@ from ...machine.description.home_mobility import column_joints
 from ...machine.model import Model
 from ...options import Options
 from ...tolerances import TOLERANCES
-from ..joints.projection import ProjectionMode, projection_modes
+from ..joints.projection import ProjectionMode, modes_of, projection_modes, with_coarse
 from .links_of_legs import links_of_legs
 from .nearest_pose import NearestPose, Objective, no_starts
 from .seeds import seeds_of
@@ -26,27 +26,33 @@ OF_VALUES: Objective = (0.0,) * 6, {"frame": BASE_AXES, "steps": MOST_STEPS, "ag
 """The objective of actuators nearest to values; the pose does not count."""
 
 
+ALL_SEEDS = 2**31
+"""More agreements than there are searches: they end only where the target is reached."""
+
+
 def objectives_of(
     model: Model,
     hold: str | None,
     rotation_length: float | None,
+    hold_price: float,
     tolerance: float | None,
     rotation_tolerance: float,
 ) -> tuple[list[Objective], int, int]:
-    """The objectives of searches, how many of the first are tried in turn, and the one tried where these leave doubts.
+    """The objectives of searches, how many of the first are for poses, and the one tried where these leave doubts.
 
-    Of projections tried in turn, the first with an answer gives it. Where redundant joints follow step by step, each of
-    two projections misses some targets near singularities. -1 if no other one is tried.
+    A single one with nothing held; or one in which a part is held, one in which it is held up to its price, and that
+    one rounded off farther. Where redundant joints follow step by step, each of two projections misses some targets
+    near singularities. -1 if no other one is tried.
     """
     settings = {"steps": MOST_STEPS, "rotation": rotation_tolerance}
     settings["position"] = tolerance or TOLERANCES.position * model.length
-    projections = projection_modes(model.path_closure, hold, rotation_length)
-    with_orientation = projection_modes(model.path_closure, "orientation", rotation_length)
+    projections = with_coarse(projection_modes(model.path_closure, hold, rotation_length, hold_price))
+    other = "orientation" if len(projections) == 1 else None
+    others = projection_modes(model.path_closure, other, rotation_length, hold_price)[:1]
     objectives = [_objective(model, projection, settings) for projection in projections]
-    if not model.legs.has_implicit_joints or len(with_orientation) == 1:
-        return objectives, len(projections), -1
-    others = [] if len(projections) > 1 else [_objective(model, with_orientation[0], settings)]
-    return objectives + others, len(projections), 1
+    objectives += [_objective(model, projection, {**settings, "agreements": ALL_SEEDS}) for projection in others]
+    has_others = model.legs.has_implicit_joints and others[0] != projections[0]
+    return objectives, len(projections), len(projections) if has_others else -1
 
 
 def endings(
@@ -56,7 +62,7 @@ def endings(
     settings = {"steps": MOST_STEPS, "stays": int(keep_mode), "rotation": options.rotation_tolerance}
     settings["position"] = options.tolerance or TOLERANCES.position * model.length
     targets = np.repeat(target, len(starts.poses), axis=0)
-    projections = projection_modes(model.path_closure, options.hold, options.rotation_length)
+    projections = modes_of(model.path_closure, options)
     objectives = [_objective(model, projection, settings) for projection in projections]
     searches = [NearestPose(model, model.legs, *objective, no_starts(model.legs)) for objective in objectives]
     return [
@@ -68,6 +74,8 @@ def _objective(model: Model, projection: ProjectionMode, settings: Mapping[str, 
     """The objective of one projection."""
     held = {
         "hold": projection.hold,
+        "price": projection.price,
+        "rounding": projection.rounding,
         "held_position": TOLERANCES.held * model.length if projection.hold == HOLD_POSITION else np.inf,
         "held_rotation": TOLERANCES.held if projection.hold == HOLD_ORIENTATION else np.inf,
     }
@@ -96,7 +104,8 @@ def limit_multipliers(model: Model, targets: Floats, configurations: Starts, pro
 @derived
 def _multipliers(model: Model, projection: ProjectionMode) -> NearestPose:
     """The kernel call that takes no steps and gives the multipliers of limits."""
-    return NearestPose(model, model.legs, projection.weights, {"steps": 0}, no_starts(model.legs))
+    settings = {"steps": 0, "hold": projection.hold, "price": projection.price, "rounding": projection.rounding}
+    return NearestPose(model, model.legs, projection.weights, settings, no_starts(model.legs))
 
 
 def nearest_positions(model: Model, targets: Floats, starts: Starts, *, seeds: bool, keep_mode: bool) -> PoseSolutions:

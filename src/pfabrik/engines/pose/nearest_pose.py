@@ -140,6 +140,7 @@ def search_plan(
         for name, value in {"frame": model.task.frame, **named}.items():
             setting[name] = value
         setting["frame"] = BASE_AXES if is_fixed else setting["frame"]
+        setting["price"] = 0.0 if is_fixed else setting["price"]
         setting["cones"] = (legs.cones["leader"] != OF_POINTING).sum() if setting["steps"] else len(legs.cones)
     along = stays_there(table) if driven is not None else carriages_along(table)
     plan = MultistartPlan(weights, settings, seeds, along, links_of_legs(model))

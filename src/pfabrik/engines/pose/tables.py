@@ -40,7 +40,7 @@ def limit_names(model: Model) -> tuple[tuple[str, str], ...]:
 def handle_of(model: Model, options: Options, *, with_seeds: bool) -> Handle[T.Tables]:
     """The tables of a machine for kernels."""
     tolerances = options.tolerance, options.rotation_tolerance
-    return _handle(model, options.hold, options.rotation_length, *tolerances, with_seeds)
+    return _handle(model, options.hold, options.rotation_length, options.hold_price, *tolerances, with_seeds)
 
 
 @derived
@@ -48,12 +48,15 @@ def _handle(
     model: Model,
     hold: str | None,
     rotation_length: float | None,
+    hold_price: float,
     tolerance: float | None,
     rotation_tolerance: float,
     with_seeds: bool,
 ) -> Handle[T.Tables]:
     table = model.legs
-    objectives, n_projections, fallback = objectives_of(model, hold, rotation_length, tolerance, rotation_tolerance)
+    objectives, n_projections, fallback = objectives_of(
+        model, hold, rotation_length, hold_price, tolerance, rotation_tolerance
+    )
     search, plan = search_plan(
         model, table, [*objectives, OF_VALUES], seeds_of(model) if with_seeds else no_starts(table)
     )

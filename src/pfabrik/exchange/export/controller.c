@@ -37,6 +37,9 @@ enum {
     PFK_LEFT_FREE = -8,    /* no forces: loads move a part without inertia that nothing holds */
     PFK_GIVES_WAY = -9,    /* no forces: the end effector moves with all actuators locked */
 #endif
+#if NEAREST
+    PFK_JUMPED = -11,      /* the same, but no motion leads there from the last pose: drives jump */
+#endif
     PFK_BUDGET = -5        /* steps were spent before the search ended: the nearest feasible pose so far, if any */
 };
 
@@ -56,7 +59,7 @@ const char *pfk_what(int code);
 int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
 #endif
 #if NEAREST
-/* The feasible pose nearest to a target: 0 where it is reached, PFK_PROJECTED, or PFK_BUDGET. `pose` must hold a feasible
+/* The feasible pose nearest to a target: 0 where it is reached, PFK_PROJECTED, PFK_JUMPED, or PFK_BUDGET. `pose` must hold a feasible
    pose, the last one or home: the search starts there, and it becomes the nearest, with its actuators; nothing is written
    where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from each of up to `starts`
    more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together. `holding`, which may be 0,
@@ -260,6 +263,10 @@ const char *pfk_what(int code)
         return "closed, but not in the working mode of home";
     if (code == PFK_PROJECTED)
         return "out of reach: the nearest feasible pose";
+#if NEAREST
+    if (code == PFK_JUMPED)
+        return "out of reach: the nearest feasible pose, to which no motion leads from the last";
+#endif
     if (code == PFK_BUDGET)
         return "steps were spent before the search ended";
     if (code == PFK_NOT_FINITE)

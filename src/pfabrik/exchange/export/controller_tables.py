@@ -45,7 +45,7 @@ NEAR = 0.5
 """Largest step of implicit joints on the way to a target [L or rad]: more than one pose may close."""
 
 ASKED = {"first": NEAREST, "last": EXACTLY, "has_start": 1, "keeps_mode": 1, "is_nearby": 0}
-"""Question of a controller to `answer_row` out of reach; each call sets seeds and steps."""
+"""Question of a controller to `answer_row` out of reach; each call sets seeds and steps, and if it has a start."""
 
 
 class ControllerTables(NamedTuple):
@@ -80,7 +80,7 @@ def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | 
     if path is not None:
         series = _series(path)
     if "nearest" in parts:
-        projecting = _projecting(model, reaching)
+        projecting = _projecting(model, reaching, Options(hold_price=machine.hold_price))
     driving = _driving(machine) if "effort" in parts else None
     return ControllerTables(reaching, assembling, rating, series, projecting, driving)
 
@@ -227,8 +227,8 @@ def _driving(machine: Machine) -> Driving:
     )
 
 
-def _projecting(model: Model, reaching: Reaching) -> Projecting:
-    tables = tables_of(model, Options())
+def _projecting(model: Model, reaching: Reaching, options: Options) -> Projecting:
+    tables = tables_of(model, options)
     legs, n_a = len(model.legs.legs), len(model.legs.driven)
     scratch = new_answer_scratch(tables)
     completion, nothing, search = reaching.scratch, _emptied(scratch.newton), scratch.nearest.search
@@ -245,6 +245,9 @@ def _projecting(model: Model, reaching: Reaching) -> Projecting:
         Start(np.zeros((1, 4, 4)), np.zeros((1, legs)), np.zeros((1, n_a))),
         np.zeros((1, 4, 4)),
         new_solutions(1, legs, n_a),
+        new_solutions(1, legs, n_a),
+        Start(np.zeros((1, 4, 4)), np.zeros((1, legs)), np.zeros((1, n_a))),
+        np.zeros((1, 4, 4)),
     )
 
 

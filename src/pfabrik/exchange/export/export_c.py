@@ -9,11 +9,12 @@ from pathlib import Path
 from shlex import quote
 from typing import Literal, TypeAlias, get_args
 
-from ...common.checks import require_choice, require_names, require_path
+from ...common.checks import require_choice, require_names, require_path, require_positive
 from ...common.whole_files import whole_path
 from ...errors import InvalidArgument, UnsupportedMechanism, counted
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.motion.fitting_task import leaves_a_choice
+from ...options import USUAL
 from .driven_bodies import unplaced_masses
 from .machine_data import Machine, fitting_path
 from .source import source
@@ -32,6 +33,7 @@ def export_c(
     parts: Sequence[Part] | None = None,
     name: str = "pfk",
     joints: str | Sequence[str] | None = None,
+    hold_price: float = USUAL.hold_price,
 ) -> Path:
     """Write a mechanism's kinematics as one file of C99, for a controller.
 
@@ -61,6 +63,8 @@ def export_c(
     joints : str or sequence of str, optional
         Names of joints in series from the base to the end effector: then there are functions of these too, and rates
         are by them.
+    hold_price : float, optional
+        Up to which the nearest poses hold the orientation, as in `Options`.
 
     Raises
     ------
@@ -72,7 +76,13 @@ def export_c(
         An unknown precision or part, or a name that is not allowed.
     """
     text = c_source(
-        mechanism, precision=precision, parts=parts, name=name, joints=joints, file=require_path("path", path).name
+        mechanism,
+        precision=precision,
+        parts=parts,
+        name=name,
+        joints=joints,
+        hold_price=hold_price,
+        file=require_path("path", path).name,
     )
     with whole_path(path) as part:
         part.write_text(text, encoding="ascii")
@@ -86,6 +96,7 @@ def c_source(
     parts: Sequence[Part] | None = None,
     name: str = "pfk",
     joints: str | Sequence[str] | None = None,
+    hold_price: float = USUAL.hold_price,
     file: str = "FILE",
 ) -> str:
     """The text that `export_c` writes; `file` is the name in the command that compiles its self-test."""
@@ -96,7 +107,8 @@ def c_source(
     if parts is not None and "nearest" in parts and not {"ik", "limits"} <= set(parts):
         raise InvalidArgument("parts", repr(parts), "'ik' and 'limits' too, for 'nearest' is made of them")
     require_identifier(name)
-    machine = Machine(mechanism)
+    require_positive("hold_price", hold_price)
+    machine = Machine(mechanism, hold_price)
     if parts is None:
         parts = parts_of(machine)
     if "nearest" in parts and machine.why_no_nearest:

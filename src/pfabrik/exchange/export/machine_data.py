@@ -19,6 +19,7 @@ from ...kinematics import JointPath, generic_of, joint_path, model_of, require_d
 from ...machine.decomposition.leg_forms import RedundantJoint, Rod
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.description.mechanism import Mechanism
+from ...options import USUAL
 from .moved_bodies import ExportedLinks, Motion, MovedBodies, exported_links
 
 PURPOSE = "exported"
@@ -106,9 +107,11 @@ class Machine:
     axes, rotations, unset : what the task sets, and the number of pose coordinates that it leaves open, as of `K.TASK`.
     n_redundant, has_implicit_joints : the number of redundant joints, and if some of them are implicit.
     equations : the number of equations of the legs.
+    hold_price : as of `Options`.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, hold_price: float = USUAL.hold_price) -> None:
+        self.hold_price = hold_price
         model = model_of(mechanism)
         if model.why_poses_do_not_suffice:
             raise UnsupportedMechanism(

@@ -13,6 +13,7 @@ import numpy as np
 from ...common.checks import require_path
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import metres_of
+from ...options import USUAL
 from .export_c import Part, c_source
 from .machine_data import Machine
 from .ros2_description import PlatformDescription, ShownJoint
@@ -35,7 +36,13 @@ KINDS = ("kSlides", "kTurns", "kTilts", "kTiltsNext")
 """Names of the kinds of `ShownJoint` in C++."""
 
 
-def export_ros2_node(mechanism: Mechanism, folder: str | PathLike[str], *, name: str | None = None) -> Path:
+def export_ros2_node(
+    mechanism: Mechanism,
+    folder: str | PathLike[str],
+    *,
+    name: str | None = None,
+    hold_price: float = USUAL.hold_price,
+) -> Path:
     """Write a package of ROS 2 with a node that commands a platform's actuators for poses of its end effector.
 
     Out of reach it commands the nearest feasible pose, or holds, and its diagnostics name the limits. The package has
@@ -52,6 +59,8 @@ def export_ros2_node(mechanism: Mechanism, folder: str | PathLike[str], *, name:
     name : str, optional
         Prefix of the package and of all names in it, lower-case letters, digits and underscores; the folder's, without
         "_node", if it is left out.
+    hold_price : float, optional
+        Up to which the nearest poses hold the orientation, as in `Options`.
 
     Raises
     ------
@@ -61,10 +70,12 @@ def export_ros2_node(mechanism: Mechanism, folder: str | PathLike[str], *, name:
         A name that is not allowed, or a unit of length that is not known in metres.
     """
     path = require_path("folder", folder)
-    return write_package(path, ros2_node_texts(mechanism, path, name=name))
+    return write_package(path, ros2_node_texts(mechanism, path, name=name, hold_price=hold_price))
 
 
-def ros2_node_texts(mechanism: Mechanism, folder: Path, *, name: str | None = None) -> dict[str, str]:
+def ros2_node_texts(
+    mechanism: Mechanism, folder: Path, *, name: str | None = None, hold_price: float = USUAL.hold_price
+) -> dict[str, str]:
     """The files of the package by their place in its folder."""
     checked_mechanism(mechanism)
     name = package_name(folder, name, "_node")
@@ -73,8 +84,9 @@ def ros2_node_texts(mechanism: Mechanism, folder: Path, *, name: str | None = No
     parts: list[Part] = ["ik", "limits", "bodies"]
     parts += [] if machine.uncontrolled else ["fk"]
     parts += [] if machine.why_no_nearest else ["nearest"]
+    file = f"{name}_kinematics.c"
     texts = {
-        f"src/{name}_kinematics.c": c_source(mechanism, parts=parts, name=name, file=f"{name}_kinematics.c"),
+        f"src/{file}": c_source(mechanism, parts=parts, name=name, hold_price=hold_price, file=file),
         f"urdf/{name}.urdf": description.text(),
     }
     return texts | filled("ros2_node_package", FILES, _words(machine, description, parts, name))
@@ -135,6 +147,7 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "HAS_FORWARD": _truth("fk" in parts),
         "OUT_OF_REACH": "project" if "nearest" in parts else "hold",
         "ANSWER": nearest if "nearest" in parts else f"{name}_ik(&wanted, &pose, actuators)",
+        "JUMPED": f"code_ == {name.upper()}_JUMPED" if "nearest" in parts else "false",
         "FORWARD": f"{name}_fk(actuators, &pose, nullptr)" if "fk" in parts else f"{name.upper()}_NO_ACTUATORS",
         "COUNT_TURNS": f"{name}_count_turns(before, actuators);" if "TURNS" in has else "",
         "MEASURE_LINKS": f"{name}_clearance(&commanded_.pose, &between_, &pair_);" if "CLEARANCE" in has else "",

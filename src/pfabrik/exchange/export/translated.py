@@ -128,7 +128,8 @@ def _facts(tables: ControllerTables) -> dict[tuple[str, str], set[int]]:
                         values.update(np.ravel(item[name]).tolist())
     if tables.projecting is not None:
         asked = tables.projecting.question.asked
-        facts |= {(names[asked.dtype], name): {value} for name, value in ASKED.items()}
+        facts |= {(names[asked.dtype], name): {value} for name, value in ASKED.items() if name != "has_start"}
+        facts[names[asked.dtype], "has_start"] = {0, 1}
     return facts
 
 

@@ -98,15 +98,14 @@ def answer_chain(
     load_chain(chain, s.coordinates, True, s.start)
     walk_chain(chain, s.start, s)
     copy_table(s.X, s.start_X)
-    error, hold = reach(tables, question, s), HOLD_NOTHING
+    error = reach(tables, question, s)
     if is_clipped or error > tables.machine[0]["met"]:
         if question["last"] == BY_LEGS:
             return PENDING
         copy_chain_state(s.nearest, s.own)
-        distance, hold = project(tables, question, has_start, s)
-        if distance == math.inf:
+        if project(tables, question, has_start, s) == math.inf:
             return FAILED
-    return write_answer(tables, hold, s, coordinates, row, rows)
+    return write_answer(tables, s, coordinates, row, rows)
 
 
 @routine
@@ -126,7 +125,7 @@ def read_target(machine: Record, asked: Floats, s: ChainScratch) -> bool:
 
 
 @routine
-def write_answer(tables: ChainTables, hold: int, s: ChainScratch, coordinates: Floats, row: int, rows: Rows) -> int:
+def write_answer(tables: ChainTables, s: ChainScratch, coordinates: Floats, row: int, rows: Rows) -> int:
     """Write the nearest configuration; the status."""
     machine, columns, driven = tables.machine[0], tables.columns, tables.driven
     counters, pose, actuators, measures = rows.counters[row], rows.poses[row], rows.actuators[row], rows.measures[row]
@@ -138,6 +137,7 @@ def write_answer(tables: ChainTables, hold: int, s: ChainScratch, coordinates: F
     write_pose(s.nearest_X, machine["length"], pose)
     excess = excess_of(tables.chain, s.nearest, s)
     position, rotation = errors(machine, s.pose, pose, s.gradient.turn)
+    hold = tables.holds[1]
     if hold == HOLD_ORIENTATION and rotation > machine["held"]:
         hold = HOLD_NOTHING
     if hold == HOLD_POSITION and position > machine["held"]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...common.arrays import Floats, Ints, Records
 from .._jit import opener
-from ..joints.linearise_loops import PoseGradient
+from ..joints.linearise_loops import PRICING, PoseGradient
 from ..joints.loops import BALL
 from ..pose.tables import QUESTION, Question
 from ..projecting import ATTEMPT, EFFORT, TALLY
@@ -89,7 +89,8 @@ class ChainTables(NamedTuple):
     driven: Ints  # (n_a,): columns of the actuators
     home: Floats  # (n_a,): their values at home [length or rad]
     weights: Floats  # (1 + projections, 6): that hold all that counts, then of the projections tried in turn
-    holds: Ints  # (1 + projections,): what these hold; the last one holds nothing
+    holds: Ints  # (1 + projections,): what these hold
+    prices: Floats  # (1 + projections, 2): price up to which they do, 0 for any, and the share it is rounded off by
     seeds: Floats  # (seeds, columns): feasible configurations, dimensionless
     seed_poses: Floats  # (seeds, 4, 4) [L]
 
@@ -111,11 +112,16 @@ class ChainScratch(NamedTuple):
     nearest: ChainState
     start: ChainState
     own: ChainState  # where the searches for the nearest start first
-    held: ChainState  # the nearest that holds a part of the target
+    held: ChainState  # the nearest by the price, before it is held exactly
+    kept: ChainState  # the nearest of the searches before
+    begin: ChainState  # `own`, before it is changed
+    local: ChainState  # the nearest around the start
     X: Floats  # (3, 4): pose of the end effector
     start_X: Floats  # (3, 4)
     nearest_X: Floats  # (3, 4)
     held_X: Floats  # (3, 4)
+    kept_X: Floats  # (3, 4)
+    local_X: Floats  # (3, 4)
     target: Floats  # (4, 4) [L]: no farther away than SIGHT
     between: Floats  # (4, 4): a target on the way there
     pulled: Floats  # (4, 4): a target farther out
@@ -162,8 +168,8 @@ def new_chain_scratch(chain: SerialChain, columns: int, attempts: int) -> ChainS
     n, zeros = len(chain.lo), np.zeros
     return ChainScratch._make(
         (
-            *(new_chain_state(chain) for _ in range(8)),
-            *zeros((4, 3, 4)),
+            *(new_chain_state(chain) for _ in range(11)),
+            *zeros((6, 3, 4)),
             *zeros((4, 4, 4)),
             *zeros((2, columns)),
             *zeros((2, n, 6)),
@@ -172,7 +178,7 @@ def new_chain_scratch(chain: SerialChain, columns: int, attempts: int) -> ChainS
             *zeros((6, n)),
             zeros(n, np.int64),
             zeros((len(chain.cone_angles), 5)),
-            PoseGradient(zeros(6), zeros((6, 6)), zeros(6), np.ones(1), zeros(6)),
+            PoseGradient(zeros(6), zeros((6, 6)), zeros(6), np.ones(1), zeros(6), zeros(1, PRICING)),
             *zeros((3, 6, 6)),
             zeros((6, 7)),
             *zeros((2, 7, 6)),
@@ -197,6 +203,7 @@ TABLES = ChainTables(
     np.zeros(1),
     np.zeros((2, 6)),
     np.zeros(2, np.int64),
+    np.zeros((2, 2)),
     np.zeros((1, 1)),
     np.zeros((1, 4, 4)),
 )

@@ -17,7 +17,7 @@ import math
 
 from ...common.arrays import Floats
 from .._jit import routine
-from ..joints.linearise_loops import turn_of_tilt, yaw_gradient
+from ..joints.linearise_loops import price_curvature, turn_of_tilt, yaw_gradient
 from ..joints.loops import BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..linear import solve_spd
 from .chain_constants import HELD_WEIGHT
@@ -43,9 +43,16 @@ def fill_curvature(objective: PoseObjective, target: Floats, held: int, bends: f
     for i in range(3):
         if objective.platform[i] != LOCKED:
             P[i, i] = objective.platform[i]
-    x, y, z = bends * total[0], bends * total[1], bends * total[2]
-    P[3, 1], P[3, 2], P[4, 0], P[4, 2], P[5, 0], P[5, 1] = z, -y, -z, x, y, -x
     add_rotation(objective, target, s)
+    if objective.price > 0.0:
+        add_price_curvature(objective, bends == 0.0, s)
+    x, y, z = bends * total[0], bends * total[1], bends * total[2]
+    P[3, 1] += z
+    P[3, 2] -= y
+    P[4, 0] -= z
+    P[4, 2] += x
+    P[5, 0] += y
+    P[5, 1] -= x
     x, y, z = 0.5 * bends * total[3], 0.5 * bends * total[4], 0.5 * bends * total[5]
     P[3, 4] += z
     P[3, 5] -= y
@@ -61,6 +68,21 @@ def fill_curvature(objective: PoseObjective, target: Floats, held: int, bends: f
         for i in range(6):
             for j in range(6):
                 P[i, j] += weight * row[i] * row[j]
+
+
+@routine
+def add_price_curvature(objective: PoseObjective, majorises: bool, s: ChainScratch) -> None:
+    """Make the second derivatives of half the squared distance those of half the squared priced distance."""
+    P, force, pricing = s.P, s.gradient.force, s.gradient.pricing[0]
+    for i in range(3):
+        for j in range(3):
+            P[i, j] *= pricing["by_place"]
+            P[3 + i, 3 + j] *= pricing["by_turn"]
+    place, both, turn = price_curvature(objective, majorises, s.gradient)
+    for i in range(6):
+        for j in range(6):
+            share = both if (i < 3) != (j < 3) else place if i < 3 else turn
+            P[i, j] += share * force[i] * force[j]
 
 
 @routine

@@ -6,6 +6,7 @@ import math
 
 from ...common.arrays import Floats
 from .._jit import routine
+from ..joints.linearise_loops import begin_pricing
 from ..joints.loops import BASE_AXES, LOCKED, PoseObjective
 from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
@@ -46,6 +47,7 @@ def descend_chain(
     It is infinite where the held components cannot be met from here.
     """
     state, best = s.state, s.best
+    begin_pricing(s.gradient)
     value, held = reach_target(chain, target, objective, state, s, closeness, 3 * RESTORING, False)
     if largest(s.gradient.errors, held) > RESTORED:
         return math.inf

@@ -9,10 +9,21 @@ from .._jit import routine
 from ..joints.loops import HALF_WAY, LOCKED, TARGET_AXES, PoseObjective
 from ..legs.complete_poses import turn_pose
 from ..pose.answer_row import errors
-from ..projecting import brings_nearer, clear_tally, count_ending, is_agreed, is_spent, is_too_far, note_attempt
+from ..projecting import (
+    COARSE,
+    HELD,
+    PRICED,
+    clear_tally,
+    count_ending,
+    is_agreed,
+    is_spent,
+    note_attempt,
+    priced_distance,
+    weighted_distance,
+)
 from ..quaternions import difference
-from ..rows import HOLD_NOTHING
-from ..search_constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE
+from ..rows import HOLD_NOTHING, HOLD_POSITION
+from ..search_constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE, TURNED, WORTH
 from ..vectors import copy_table
 from .chain_constants import BENT, CLOSENESS, DESCENTS_NEARBY, NEARER, NEARLY, PULLED_FROM, PULLS, STEPS
 from .chain_records import ChainScratch, ChainTables, SerialChain
@@ -24,7 +35,9 @@ from .walk_chain import copy_chain_state, load_chain, walk_chain
 @routine
 def objective_of(tables: ChainTables, aim: int) -> PoseObjective:
     """The objective with the weights of one aim."""
-    return PoseObjective(tables.seed_poses, tables.weights[aim], tables.machine[0]["frame"], 0.0, 0.0, 0)
+    hold, price, rounding = tables.holds[aim], tables.prices[aim, 0], tables.prices[aim, 1]
+    frame = tables.machine[0]["frame"]
+    return PoseObjective(tables.seed_poses, tables.weights[aim], frame, hold, price, rounding, 0.0, 0.0, 0)
 
 
 @routine
@@ -128,33 +141,106 @@ def distances(tables: ChainTables, X: Floats, s: ChainScratch) -> tuple[float, f
 
 
 @routine
-def project(tables: ChainTables, question: Record, has_start: bool, s: ChainScratch) -> tuple[float, int]:
-    """Find the nearest configuration, left in `s.nearest`; its distance [L] and what it holds.
+def distance_left(tables: ChainTables, X: Floats, s: ChainScratch) -> float:
+    """Distance of a pose from the target [L], without any price."""
+    position, rotation = distances(tables, X, s)
+    return weighted_distance(tables.weights[1 + PRICED if len(tables.holds) > 2 else 1], position, rotation)
 
-    Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
-    target than a start that was given, nothing is held.
+
+@routine
+def priced_at(tables: ChainTables, X: Floats, s: ChainScratch) -> float:
+    """Distance of a pose from the target with the price of what is held [L]."""
+    position, rotation = distances(tables, X, s)
+    hold, price = tables.holds[1 + PRICED], tables.prices[1 + PRICED, 0]
+    return priced_distance(tables.weights[1 + PRICED], hold, price, position, rotation)
+
+
+@routine
+def project_from(tables: ChainTables, around: bool, n_seeds: int, agreements: int, s: ChainScratch) -> float:
+    """Find the configuration that descents from `s.own` lead to; its distance, with the price [L].
+
+    What it misses by rounding alone of what is held is held exactly, where this costs no more.
     """
-    last, weights, distance, hold = len(tables.holds) - 1, tables.weights, math.inf, HOLD_NOTHING
-    machine, around = tables.machine[0], question["keeps_mode"] == 1
-    n_seeds, agreements = machine["bends"] if around else machine["descents"], machine["agreements"]
-    n_seeds = min(n_seeds, 1 if question["is_nearby"] == 1 else question["seeds"])
-    for aim in range(1, last + 1):
-        if distance == math.inf:
-            distance, hold = search_for(tables, aim, around, n_seeds, agreements, s), tables.holds[aim]
-            if not around and machine["is_short"] == 1 and distance > machine["met"] and distance < NEARLY:
-                copy_chain_state(s.nearest, s.own)
-                distance = search_for(tables, aim, False, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
-    if has_start and last > 1 and hold == tables.holds[1]:
-        position, rotation = distances(tables, s.start_X, s)
-        if is_too_far(distance, weights[1], hold, position, rotation):
-            copy_chain_state(s.nearest, s.held)
-            copy_table(s.nearest_X, s.held_X)
-            released = search_for(tables, last, around, n_seeds if around else 0, agreements, s)
-            if brings_nearer(released, weights[last], position, rotation):
-                return released, HOLD_NOTHING
-            copy_chain_state(s.held, s.nearest)
-            copy_table(s.held_X, s.nearest_X)
-    return distance, hold
+    aim = 1 + PRICED if len(tables.holds) > 2 else 1
+    distance = search_for(tables, aim, around, n_seeds, agreements, s)
+    if aim == 1 or distance == math.inf:
+        return distance
+    distance = priced_at(tables, s.nearest_X, s)
+    position, rotation = distances(tables, s.nearest_X, s)
+    off = position if tables.holds[aim] == HOLD_POSITION else rotation
+    if off <= TURNED * tables.prices[aim, 1] * distance:
+        copy_chain_state(s.nearest, s.held)
+        copy_table(s.nearest_X, s.held_X)
+        copy_chain_state(s.nearest, s.own)
+        held = search_for(tables, 1 + HELD, False, 0, 1, s)
+        if held <= (1.0 + SAME_DISTANCE) * distance:
+            return held
+        copy_chain_state(s.held, s.nearest)
+        copy_table(s.held_X, s.nearest_X)
+    return distance
+
+
+@routine
+def project_anew(tables: ChainTables, around: bool, n_seeds: int, s: ChainScratch) -> float:
+    """Find the nearest configuration that searches from the start and seeds lead to; its distance, with the price [L].
+
+    What is held is held at first; where that costs more than its price, it gives way, from there and from the start.
+    Where nothing has it, the price counts from the outset.
+    """
+    machine, agreements = tables.machine[0], tables.machine[0]["agreements"]
+    least = search_for(tables, 1 + HELD, around, n_seeds, agreements, s)
+    if not around and machine["is_short"] == 1 and least > machine["met"] and least < NEARLY:
+        copy_chain_state(s.nearest, s.own)
+        least = search_for(tables, 1 + HELD, False, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
+    if len(tables.holds) == 2 or (least < math.inf and s.tally[0]["cost"] <= tables.prices[1 + PRICED, 0]):
+        return least
+    if least == math.inf:
+        least = search_for(tables, 1 + COARSE, around, n_seeds, agreements, s)
+        least = priced_at(tables, s.nearest_X, s) if least < math.inf else least
+    for place in range(2):
+        copy_chain_state(s.nearest, s.kept)
+        copy_table(s.nearest_X, s.kept_X)
+        copy_chain_state(s.kept if place == 0 else s.start, s.own)
+        distance = project_from(tables, False, 0, 1, s)
+        if distance < (1.0 - SAME_DISTANCE) * least:
+            least = distance
+        else:
+            copy_chain_state(s.kept, s.nearest)
+            copy_table(s.kept_X, s.nearest_X)
+    return least
+
+
+@routine
+def project(tables: ChainTables, question: Record, has_start: bool, s: ChainScratch) -> float:
+    """Find the nearest configuration, left in `s.nearest`; its distance, with the price of what is held [L].
+
+    From a start a descent leads there, and one from a little beside it: the start may be no minimum, but a saddle.
+    Others are searched for only where they lead nowhere, or so far that the start is no answer to a target before this
+    one.
+    """
+    machine, around, distance = tables.machine[0], question["keeps_mode"] == 1, math.inf
+    n_seeds = min(
+        machine["bends"] if around else machine["descents"], 1 if question["is_nearby"] == 1 else question["seeds"]
+    )
+    if has_start:
+        copy_chain_state(s.own, s.begin)
+        load_bent(tables, 0, s)
+        copy_chain_state(s.state, s.own)
+        distance = project_from(tables, True, 1, 2, s)
+        copy_chain_state(s.begin, s.own)
+        before = distance_left(tables, s.start_X, s)
+        if distance < math.inf and before - distance_left(tables, s.nearest_X, s) <= WORTH:
+            return distance
+        copy_chain_state(s.nearest, s.local)
+        copy_table(s.nearest_X, s.local_X)
+    found = project_anew(tables, around, n_seeds, s)
+    if found < (1.0 - SAME_DISTANCE) * distance:
+        return found
+    if has_start and distance < math.inf:
+        copy_chain_state(s.local, s.nearest)
+        copy_table(s.local_X, s.nearest_X)
+        return distance
+    return found
 
 
 @routine
@@ -184,11 +270,21 @@ def search_for(tables: ChainTables, aim: int, around: bool, n_seeds: int, agreem
         distance = pull_nearer(tables.chain, objective, math.sqrt(2.0 * value), s)
         note_attempt(aim, seed, effort["steps"] - before, distance, effort, s.log)
         if distance < math.inf and distance <= (1.0 + SAME_DISTANCE) * least and count_ending(distance, tally):
+            tally["cost"] = cost_of_hold(s, objective, distance)
             walk_chain(tables.chain, s.state, s)
             keep_nearest(s)
         if is_agreed(tally, agreements) or tally["least"] <= CLOSENESS or is_spent(effort):
             break
     return tally["least"]
+
+
+@routine
+def cost_of_hold(s: ChainScratch, objective: PoseObjective, distance: float) -> float:
+    """What holding a part costs where a descent ended: the size of the multipliers, relative to the distance."""
+    held = 0.0
+    for k in range(s.multipliers.shape[0] if objective.hold != HOLD_NOTHING and objective.price == 0.0 else 0):
+        held = math.hypot(held, s.multipliers[k])
+    return held / distance if distance > 0.0 else 0.0
 
 
 @routine

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...common.arrays import Floats
+from ...common.arrays import Floats, Records
 from .._jit import routine
 from ..legs.complete_poses import is_pose
-from ..pose.answer_row import answer_row
+from ..pose.answer_row import answer_row, errors
 from ..pose.search_records import PoseSolutions
 from ..pose.tables import AnswerScratch, Question, Start, Tables
+from ..projecting import PRICED, weighted_distance
 from ..rows import PROJECTED as IS_PROJECTED
 from ..rows import REACHED, UNSURE
+from ..search_constants import MOVED, SUSPICIOUS, UNDONE
 from ..vectors import copy_row, copy_table
-from .reached import BUDGET, NO_POSE, PROJECTED, Reaching, rest
+from .reached import BUDGET, JUMPED, NO_POSE, PROJECTED, Reaching, rest
 
 
 class Projecting(NamedTuple):
@@ -25,6 +27,9 @@ class Projecting(NamedTuple):
     start: Start
     targets: Floats  # (1, 4, 4) [length]
     answer: PoseSolutions  # one
+    back: PoseSolutions  # one: where the way back to the target before leads
+    last: Start  # the last answer
+    last_targets: Floats  # (1, 4, 4) [length]: that it answers
 
 
 @routine
@@ -33,8 +38,8 @@ def project_target(
 ) -> int:
     """The feasible pose nearest to a target (4, 4) [length], from a pose, which it replaces; its actuators; a code.
 
-    PROJECTED where the target is not reached; BUDGET where the steps were spent before the search ended, or no feasible
-    pose was found: then nothing is written.
+    PROJECTED where the target is not reached, JUMPED if drives jump there from the last answer; BUDGET where the steps
+    were spent before the search ended, or no feasible pose was found: then nothing is written.
 
     Parameters
     ----------
@@ -51,11 +56,54 @@ def project_target(
     copy_table(target, own.targets[0])
     copy_row(actuators, start.actuators[0])
     asked["seeds"], asked["steps"], asked["effort"] = seeds, steps, steps * (seeds + 1)
+    remembers = is_last(own)
+    asked["has_start"] = 1 if remembers or seeds == 0 else 0
     status = answer_row(own.tables, own.scratch, start, own.targets, own.question.asked[0], own.answer)
     if status != REACHED and status != IS_PROJECTED and status != UNSURE:
         return BUDGET
+    code = PROJECTED if own.scratch.nearest.search.control[0]["steps"] < steps else BUDGET
+    code = 0 if status == REACHED else code
+    if code == PROJECTED and remembers and jumps(own):
+        code = JUMPED
     copy_table(own.answer.poses[0], pose)
     copy_row(own.answer.actuators[0], actuators)
-    if status == REACHED:
-        return 0
-    return BUDGET if own.scratch.nearest.search.control[0]["steps"] >= steps else PROJECTED
+    copy_table(own.answer.poses[0], own.last.poses[0])
+    copy_row(own.answer.actuators[0], own.last.actuators[0])
+    copy_table(target, own.last_targets[0])
+    return code
+
+
+@routine
+def is_last(own: Projecting) -> bool:
+    """True if the start is the last answer: it is then followed from there, else searched for from seeds too."""
+    start, last = own.start, own.last
+    for i in range(3):
+        for j in range(4):
+            if start.poses[0, i, j] != last.poses[0, i, j]:
+                return False
+    return True
+
+
+@routine
+def jumps(own: Projecting) -> bool:
+    """True if no motion leads from the last answer: the way back to the target before does not undo the step."""
+    last, answer, driven = own.last, own.answer, own.tables.legs.driven
+    before, moved = own.last_targets, largest_step(driven, last.actuators, answer.actuators)
+    turn = own.scratch.nearest.search.gradient.turn
+    position, rotation = errors(own.tables.legs.task[0], own.targets[0], before[0], turn)
+    aim = PRICED if own.tables.machine[0]["projections"] > 1 else 0
+    if moved <= max(SUSPICIOUS * weighted_distance(own.tables.plan.weights[aim], position, rotation), MOVED):
+        return False
+    begin = Start(answer.poses, answer.sides, answer.actuators)
+    answer_row(own.tables, own.scratch, begin, before, own.question.asked[0], own.back)
+    return largest_step(driven, last.actuators, own.back.actuators) > UNDONE * moved
+
+
+@routine
+def largest_step(driven: Records, before: Floats, after: Floats) -> float:
+    """The largest difference of actuators (1, n_a) [L or rad]."""
+    largest = 0.0
+    for i in range(driven.shape[0]):
+        column = driven[i]["column"]
+        largest = max(largest, abs(after[0, column] - before[0, column]) / driven[i]["unit"])
+    return largest

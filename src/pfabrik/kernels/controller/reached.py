@@ -22,9 +22,9 @@ from .links_on_bodies import LinksOnBodies, nearest_pair, place_bodies
 LEG, PAIR = 1000, 10000
 """Plus the number of a leg that does not reach or close; plus that of the nearest pair of links, which is too near."""
 
-NO_POSE, NO_ACTUATORS, OTHER_MODE, PROJECTED, BUDGET = -1, -2, -3, -4, -5
+NO_POSE, NO_ACTUATORS, OTHER_MODE, PROJECTED, BUDGET, JUMPED = -1, -2, -3, -4, -5, -11
 """Not finite, or not a rotation; not finite; closed, but not in home's working mode; the nearest feasible pose; the
-same, or none, when the steps were spent."""
+same, or none, when the steps were spent; the nearest feasible pose, to which drives jump from the last."""
 
 
 ATTEMPTS = 3

@@ -11,7 +11,7 @@ from .._jit import opener, routine, search
 from ..clearance.link_records import NO_LINKS
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise
 from ..legs.records import TASK
-from ..projecting import brings_nearer, clear_tally, count_ending, is_too_far, weighted_distance
+from ..projecting import COARSE, HELD, PRICED, clear_tally, count_ending, priced_distance, weighted_distance
 from ..rows import (
     FAILED,
     HOLD,
@@ -29,7 +29,7 @@ from ..rows import (
     RESIDUAL,
     ROTATION_ERROR,
 )
-from ..search_constants import MOST_STEPS, SIGHT
+from ..search_constants import MOST_STEPS, SAME_DISTANCE, SIGHT, TURNED, WORTH
 from ..vectors import copy_table
 from .close_on_target import (
     close_legs,
@@ -49,7 +49,7 @@ from .close_on_target import (
     take_nearby,
 )
 from .descend import nearest_of
-from .joint_constants import AGREEMENTS, FEWEST, LONG_CHAIN_STEPS, MOST_CLOSING, NEAR
+from .joint_constants import AGREEMENTS, APART, FEWEST, LONG_CHAIN_STEPS, MOST_CLOSING, NEAR
 from .joint_tables import (
     ANSWER,
     ASKED,
@@ -73,7 +73,7 @@ def _sample() -> JointTables:
     """Tables of the array types that kernels are compiled for."""
     table, row, column, weights = np.zeros((1, 2)), np.zeros(2), np.zeros(2, np.int64), np.zeros(6)
     known = np.zeros(1, MACHINE), np.zeros(1, TASK), LOOPS, LAYOUT, LAYOUT, row, column, row, column, row
-    aims = weights, weights, weights, np.zeros((1, 6)), column
+    aims = weights, weights, weights, np.zeros((1, 6)), column, np.zeros((1, 2))
     return JointTables(*known, *aims, table, table, table, np.zeros((1, 4, 4)), table)
 
 
@@ -94,11 +94,11 @@ def note(scratch: JointScratch, aim: int, start: int, steps: int, distance: floa
 
 @routine
 def distance_of(tables: JointTables, scratch: JointScratch, aim: int, closed: Closed) -> float:
-    """Distance of a configuration from the target by a projection [L]; infinite if it is none that answers."""
+    """Distance of a configuration from the target by a projection, with its price [L]; infinite if it is no answer."""
     if not is_feasible(tables, closed) or is_flipped(tables, scratch, closed.poses[0]):
         return math.inf
     position, rotation = errors(tables.task[0], closed.poses[0], scratch.target[0], scratch.turn)
-    return weighted_distance(tables.weights[aim], position, rotation)
+    return priced_distance(tables.weights[aim], tables.holds[aim], tables.prices[aim, 0], position, rotation)
 
 
 @routine
@@ -133,14 +133,25 @@ def descend_from(tables: JointTables, scratch: JointScratch, aim: int, begin: in
     """Search from `scratch.start` by a projection, into `scratch.trial`, and count the end; True if it is nearest."""
     machine, trial = tables.machine[0], scratch.trial
     pose = PoseObjective(
-        scratch.target, tables.weights[aim], int(machine["frame"]), machine["inside"], machine["active"], steps
+        scratch.target,
+        tables.weights[aim],
+        int(machine["frame"]),
+        int(tables.holds[aim]),
+        tables.prices[aim, 0],
+        tables.prices[aim, 1],
+        machine["inside"],
+        machine["active"],
+        steps,
     )
     copy_closed(scratch.start, trial)
     objective = Objective(pose, scratch.no_weights, scratch.no_anchors)
     nearest_of(tables.loops, 0, objective, scratch.descent, trial, scratch.no_multipliers)
     distance = distance_of(tables, scratch, aim, trial)
     note(scratch, aim, begin, int(trial.iterations[0]), distance)
-    return distance < math.inf and count_ending(distance, scratch.tally[0])
+    if not (distance < math.inf and count_ending(distance, scratch.tally[0])):
+        return False
+    scratch.tally[0]["cost"] = scratch.descent.gradient.pricing[0]["cost"]
+    return True
 
 
 @routine
@@ -159,7 +170,7 @@ def search_by(
     Of equal results that of the first start is taken. Seeds are first moved to hold what is to be held; where nothing
     else has an end, so is the start, with `moves_start`.
     """
-    tally, start, holds = scratch.tally[0], scratch.start, tables.holds[aim] != HOLD_NOTHING
+    tally, start, holds = scratch.tally[0], scratch.start, aim == HELD and tables.holds[aim] != HOLD_NOTHING
     n_near = min(NEAR, scratch.distances.shape[0]) if n_seeds > 0 and is_beyond_reach(tables, scratch.pose) else 0
     last = n_starts + n_seeds + n_near
     clear_tally(tally)
@@ -206,47 +217,118 @@ def choose_start(tables: JointTables, scratch: JointScratch, n_starts: int) -> N
 
 
 @routine
-def project(tables: JointTables, scratch: JointScratch, question: Record, n_starts: int, first: int) -> int:
-    """Fill `scratch.answer` with the nearest feasible configuration; return the part that it holds.
+def project_from(tables: JointTables, scratch: JointScratch, begin: Closed, steps: int, best: Closed) -> float:
+    """Fill the configuration that one descent leads to; its distance, with the price of what is held [L].
 
-    Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
-    target than a start that was given, nothing is held. The fallback is the start, which is feasible, or nearly.
-
-    Parameters
-    ----------
-    first : the projection that is tried first.
+    What it misses of that by rounding alone is held exactly, where this costs no more.
     """
-    machine, answer, last = tables.machine[0], scratch.answer, tables.weights.shape[0] - 1
+    aim, start, trial, tally = (
+        PRICED if tables.holds.shape[0] > 1 else 0,
+        scratch.start,
+        scratch.trial,
+        scratch.tally[0],
+    )
+    copy_closed(begin, start)
+    clear_tally(tally)
+    if not descend_from(tables, scratch, aim, AT_START, steps):
+        return math.inf
+    distance: float = tally["least"]
+    copy_closed(trial, best)
+    position, rotation = errors(tables.task[0], best.poses[0], scratch.target[0], scratch.turn)
+    off = position if tables.holds[aim] == HOLD_POSITION else rotation
+    if aim == PRICED and off <= TURNED * tables.prices[aim, 1] * distance:
+        copy_closed(best, start)
+        move_to_held(tables, scratch, HELD, start)
+        clear_tally(tally)
+        if descend_from(tables, scratch, HELD, AT_START, steps) and tally["least"] <= (1.0 + SAME_DISTANCE) * distance:
+            copy_closed(trial, best)
+            distance = tally["least"]
+    return distance
+
+
+@routine
+def project_anew(
+    tables: JointTables,
+    scratch: JointScratch,
+    n_starts: int,
+    n_seeds: int,
+    moves_start: bool,
+    steps: int,
+    best: Closed,
+) -> float:
+    """Fill the nearest configuration that searches from starts and seeds find; its distance, with the price [L].
+
+    What is held is held at first; where that costs more than its price, it gives way, from there and from the start.
+    Where nothing has it, the price counts from the outset.
+    """
+    least = search_by(tables, scratch, HELD, n_starts, n_seeds, moves_start, steps, best)
+    if tables.holds.shape[0] == 1 or (least < math.inf and scratch.tally[0]["cost"] <= tables.prices[PRICED, 0]):
+        return least
+    if least == math.inf:
+        least = search_by(tables, scratch, COARSE, n_starts, n_seeds, moves_start, steps, best)
+    for place in range(2):
+        distance = project_from(tables, scratch, best if place == 0 else scratch.begin, steps, scratch.priced)
+        if distance < (1.0 - SAME_DISTANCE) * least:
+            least = distance
+            copy_closed(scratch.priced, best)
+    return least
+
+
+@routine
+def is_connected(tables: JointTables, scratch: JointScratch, question: Record, closed: Closed) -> bool:
+    """True if steps from the start, in its working mode, lead to a configuration."""
+    target, wished, farthest = scratch.target[0], scratch.aside, 0.0
+    copy_table(target, wished)
+    copy_table(closed.poses[0], target)
+    is_reached = reach(tables, scratch, question)
+    copy_table(wished, target)
+    for j in range(closed.coordinates.shape[1]):
+        if tables.idle[j] == 0:
+            farthest = max(farthest, abs(closed.coordinates[0, j] - scratch.reached.coordinates[0, j]))
+    return is_reached and farthest <= APART
+
+
+@routine
+def distance_left(tables: JointTables, scratch: JointScratch, closed: Closed) -> float:
+    """Distance of a configuration from the target [L], without any price."""
+    position, rotation = errors(tables.task[0], closed.poses[0], scratch.target[0], scratch.turn)
+    return weighted_distance(tables.weights[PRICED if tables.holds.shape[0] > 1 else 0], position, rotation)
+
+
+@routine
+def project(tables: JointTables, scratch: JointScratch, question: Record, n_starts: int) -> None:
+    """Fill `scratch.answer` with the nearest feasible configuration.
+
+    From a start one descent leads to it. Others are searched for only where it leads nowhere, or so far that the start
+    is no answer to a target before this one. The fallback is the start, which is feasible, or nearly.
+    """
+    machine, answer, nearest, last = tables.machine[0], scratch.answer, scratch.nearest, tables.weights.shape[0] - 1
     n_seeds = 0 if question["keeps_mode"] == 1 else tables.seeds.shape[0]
     count, moves_start = min(n_starts + n_seeds, machine["descents"]), True
-    steps, distance, aim = min(MOST_STEPS, machine["descent_steps"] // count), math.inf, first - 1
+    steps, distance = min(MOST_STEPS, machine["descent_steps"] // count), math.inf
     steps = steps if steps >= FEWEST else 0
     n_seeds = n_seeds if count == n_starts + n_seeds else 0
     if count < n_starts or steps == 0:
         choose_start(tables, scratch, n_starts)
         n_starts, n_seeds, moves_start = 1, 0, False
-    while distance == math.inf and aim < last and steps > 0:
-        aim += 1
-        distance = search_by(tables, scratch, aim, n_starts, n_seeds, moves_start, steps, answer)
+    if question["has_start"] == 1 and steps > 0:
+        before = distance_left(tables, scratch, scratch.begin)
+        distance = project_from(tables, scratch, scratch.begin, steps, answer)
+        if distance < math.inf and before - distance_left(tables, scratch, answer) <= WORTH:
+            return
+    if steps > 0:
+        found = project_anew(tables, scratch, n_starts, n_seeds, moves_start, steps, nearest)
+        is_elsewhere = question["keeps_mode"] == 1 and found < math.inf and tables.holds.shape[0] > 1
+        if is_elsewhere and not is_connected(tables, scratch, question, nearest):
+            found = project_from(tables, scratch, scratch.begin, steps, nearest)
+        if found < (1.0 - SAME_DISTANCE) * distance:
+            copy_closed(nearest, answer)
+            return
     if distance == math.inf:
         measure(tables, scratch, scratch.begin)
         copy_closed(scratch.begin, answer)
         if distance_of(tables, scratch, last, answer) == math.inf:
             close_legs(tables, scratch, scratch.begin, scratch.target[0], tables.whole, BASE_AXES, 0, 1, answer)
-        return HOLD_NOTHING
-    if question["has_start"] == 1 and aim < last:
-        hold, weights = tables.holds[aim], tables.weights
-        position, rotation = errors(tables.task[0], scratch.begin.poses[0], scratch.target[0], scratch.turn)
-        if is_too_far(distance, weights[aim], hold, position, rotation):
-            released = search_by(tables, scratch, last, n_starts, 0, moves_start, steps, scratch.nearest)
-            if released == math.inf:
-                measure(tables, scratch, scratch.begin)
-                copy_closed(scratch.begin, scratch.nearest)
-                released = distance_of(tables, scratch, last, scratch.nearest)
-            if brings_nearer(released, weights[last], position, rotation):
-                copy_closed(scratch.nearest, answer)
-                return HOLD_NOTHING
-    return int(tables.holds[aim])
 
 
 @routine
@@ -344,11 +426,11 @@ def answer_row(
     if question["keeps_mode"] == 0 and tables.machine[0]["has_seeds"] == 0:
         return OPEN
     clip(tables, scratch.target[0])
-    hold, last = project(tables, scratch, question, n_starts, 0), tables.weights.shape[0] - 1
+    project(tables, scratch, question, n_starts)
     if links.kept[0] < links.pairs.shape[0] and not keeps_clearance(tables, scratch, scratch.answer):
         links.kept[0] = links.pairs.shape[0]
-        hold = project(tables, scratch, question, 1, last if hold == HOLD_NOTHING else 0)
-    status = put_answer(tables, scratch, row, target, scratch.answer, hold, answers)
+        project(tables, scratch, question, 1)
+    status = put_answer(tables, scratch, row, target, scratch.answer, int(tables.holds[0]), answers)
     return status if links.kept[0] == 0 or keeps_clearance(tables, scratch, scratch.answer) else FAILED
 
 

@@ -14,8 +14,10 @@ from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import limit_multipliers
 from ..quaternions import turn_ball
+from ..rows import HOLD_NOTHING
 from ..search_constants import CLOSED, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
 from ..sqp import (
+    add_products,
     allowed_violation,
     begin_descent,
     is_closed,
@@ -32,10 +34,12 @@ from .linearise_loops import (
     add_anchors,
     add_cone,
     add_force,
+    begin_pricing,
     cone_excess,
     linearise,
     open_scratch,
     pose_gradient,
+    price_curvature,
     walk_all,
 )
 from .loops import BALL, Closed, Loops, Objective
@@ -83,6 +87,7 @@ def lagrangian_hessian(
     """Reduced Hessian of the Lagrangian at `scratch.best`; its largest diagonal entry.
 
     By differences of the gradient of the Lagrangian. The multipliers of the loops make this zero at pivot coordinates.
+    What a price bends is added: its edge may be sharper than the differences are wide.
     """
     n, linear, H, trial = len(loops.lo), reduced.linear, scratch.hessian.H, scratch.trial
     motions = linear.totals[0]["motions"]
@@ -92,6 +97,10 @@ def lagrangian_hessian(
     lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
     scratch.control[0]["equation_multipliers"] = put_multipliers(scratch.here, reduced, scratch.balance)
     lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
+    is_priced = objective.pose.price > 0.0
+    if is_priced:
+        put_priced_forces(loops, scratch, reduced)
+        scratch.gradient.pricing[0]["is_fixed"] = 1
     for a in range(motions):
         probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(n):
@@ -102,7 +111,24 @@ def lagrangian_hessian(
         for j in range(n):
             there[j] = (there[j] - here[j]) / probe
         project(there, reduced, H[a])
+    if is_priced:
+        scratch.gradient.pricing[0]["is_fixed"] = 0
+        place, both, turn = price_curvature(objective.pose, False, scratch.gradient)
+        add_products(place, both, turn, scratch.hessian, motions)
     return symmetrise(H, motions)
+
+
+@routine
+def put_priced_forces(loops: Loops, scratch: DescentScratch, reduced: FreeMotions) -> None:
+    """Fill the gradients by position and by rotation of the objective of the end effector posed last."""
+    force, there = scratch.force[0], scratch.there
+    for part in range(2):
+        for j in range(there.shape[0]):
+            there[j] = 0.0
+        for i in range(6):
+            force[i] = scratch.gradient.force[i] if i // 3 == part else 0.0
+        add_force(loops, 0, force, scratch, scratch.there)
+        project(there, reduced, scratch.hessian.forces[part])
 
 
 @routine
@@ -186,6 +212,7 @@ def nearest_of(
     best, first = scratch.best, scratch.first
     load_row(loops, row, closed, best)
     closed.iterations[row] = 0
+    begin_pricing(scratch.gradient)
     scratch.gradient.unit[0] = 1.0
     linearise(loops, row, objective, best, scratch, first)
     if objective.pose.max_iterations == 0:
@@ -196,11 +223,31 @@ def nearest_of(
     if restore_feasibility(loops, row, objective, best, CLOSED, scratch, first):
         closed.iterations[row] = descend(loops, row, objective, scratch)
     linearise(loops, row, objective, best, scratch, first)
+    if objective.pose.hold != HOLD_NOTHING and objective.pose.price == 0.0:
+        scratch.gradient.pricing[0]["cost"] = cost_of_hold(loops, row, objective, scratch)
     store_row(loops, row, best, closed)
     for group in range(closed.gaps.shape[1]):  # the measures of the whole mechanism, for every group
         closed.gaps[row, group] = first.linear.totals[0]["gap"]
         closed.excesses[row, group] = max(first.linear.totals[0]["excess"] - objective.pose.margin, 0.0)
         closed.misses[row, group] = 0.0
+
+
+@routine
+def cost_of_hold(loops: Loops, row: int, objective: Objective, scratch: DescentScratch) -> float:
+    """What holding a part costs at `scratch.best`, linearised in `scratch.first` with the multipliers of a descent.
+
+    The size of the multipliers of the held components, relative to the distance.
+    """
+    balance, totals, held, unit = scratch.balance, scratch.first.linear.totals[0], 0.0, scratch.gradient.unit[0]
+    if not totals["value"] > 0.0:
+        return 0.0
+    for i in range(balance.shape[0]):
+        balance[i] = 0.0
+    lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
+    put_multipliers(scratch.here, scratch.first, scratch.balance)
+    for k in range(6 * (len(loops.paths) - 2), totals["rows"]):
+        held = math.hypot(held, balance[k])
+    return held / math.sqrt(2.0 * unit * totals["value"])
 
 
 @search

@@ -93,3 +93,6 @@ PROJECTIONS = 12
 
 LONGEST_SEARCH = 3.0
 """Largest change of an actuator value, if the target values are too far for a search to converge [L or rad]."""
+
+APART = 1e-3
+"""Difference of joint coordinates above which two configurations of one pose are not the same [L or rad]."""

@@ -90,8 +90,9 @@ class JointTables(NamedTuple):
     nothing: Floats  # (6,): weights that hold nothing of a pose
     whole: Floats  # (6,): all of it
     held: Floats  # (6,): what the task sets
-    weights: Floats  # (aims, 6): of the projections, in the order in which they are tried
+    weights: Floats  # (aims, 6): of the projections: 1 that holds nothing, or HELD ... COARSE
     holds: Ints  # (aims,): what each holds
+    prices: Floats  # (aims, 2): price up to which it does, 0 for any, and the share it is rounded off by
     reaches: Floats  # (paths, 7): first point of each path, its last in the platform's axes, and the way between them
     seeds: Floats  # (k, columns)
     nearby: Floats  # (n, columns): random feasible configurations
@@ -109,7 +110,8 @@ class JointScratch(NamedTuple):
     start: Closed  # of a descent or a closing
     trial: Closed  # its end
     answer: Closed
-    nearest: Closed  # with nothing held
+    nearest: Closed  # of other searches, to be compared
+    priced: Closed  # by its price
     tally: Records  # (1,): TALLY
     agreements: Floats  # (groups,)
     distances: Floats  # (n,): of random configurations
@@ -117,6 +119,7 @@ class JointScratch(NamedTuple):
     pose: Floats  # (4, 4): the target, with what it leaves open
     wished: Floats  # (4, 4): a pose on the way there
     present: Floats  # (4, 4): the last pose on the way
+    aside: Floats  # (4, 4): the target, while another is looked at
     turn: Floats  # (3,)
     held: Floats  # (6,): weights of the part that is held
     no_centres: Floats  # (1, 0, 3)
@@ -151,28 +154,23 @@ def new_joint_scratch(tables: JointTables, links: LinkLimits, ways: Loops) -> Jo
         gaps, excesses, misses = np.zeros((3, 1, groups))
         return Closed(np.zeros((1, n)), np.eye(4)[None].copy(), gaps, excesses, misses, np.zeros(1, np.int64))
 
-    return JointScratch(
-        new_closing_scratch(tables.loops, tables.layout),
-        new_descent_scratch(tables.loops, links, ways),
-        new_closed(),
-        new_closed(),
-        new_closed(),
-        new_closed(),
-        new_closed(),
-        new_closed(),
-        np.zeros(1, TALLY),
-        np.zeros(groups),
-        np.zeros(len(tables.nearby)),
-        np.eye(4)[None].copy(),
-        np.eye(4),
-        np.eye(4),
-        np.eye(4),
-        np.zeros(3),
-        np.zeros(6),
-        np.zeros((1, 0, 3)),
-        np.zeros(n),
-        np.zeros((1, 0)),
-        np.zeros((1, 0)),
-        np.zeros(MOST_LOGGED, ATTEMPT),
-        np.zeros(1, np.int64),
+    return JointScratch._make(
+        (
+            new_closing_scratch(tables.loops, tables.layout),
+            new_descent_scratch(tables.loops, links, ways),
+            *(new_closed() for _ in range(7)),
+            np.zeros(1, TALLY),
+            np.zeros(groups),
+            np.zeros(len(tables.nearby)),
+            np.eye(4)[None].copy(),
+            *np.tile(np.eye(4), (4, 1, 1)),
+            np.zeros(3),
+            np.zeros(6),
+            np.zeros((1, 0, 3)),
+            np.zeros(n),
+            np.zeros((1, 0)),
+            np.zeros((1, 0)),
+            np.zeros(MOST_LOGGED, ATTEMPT),
+            np.zeros(1, np.int64),
+        )
     )

@@ -22,6 +22,7 @@ from ..free_motions import (
 )
 from ..qp import QP, new_qp
 from ..quaternions import UPSIDE_DOWN, difference, yaw_difference
+from ..rows import HOLD_ORIENTATION
 from ..search_constants import REACH
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import Vec, cross, dot, norm, scale
@@ -45,6 +46,21 @@ ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""
 
 
+PRICING = np.dtype(
+    [
+        ("place", "f8"),  # half the weighted square of the position's error, p
+        ("turn", "f8"),  # of the rotation's, r
+        ("by_place", "f8"),  # derivatives of half the squared priced distance F by p and r
+        ("by_turn", "f8"),
+        ("is_fixed", "i8"),  # 1: these are kept, for differences that give second derivatives
+        ("held", "f8"),  # p or r of what is held, where second derivatives were last asked for
+        ("eases", "i8"),  # 1 if it fell to a quarter since
+        ("cost", "f8"),  # where a descent that held a part ended: that of holding it, as in `TALLY`
+    ]
+)
+"""The price at a configuration."""
+
+
 class PoseGradient(NamedTuple):
     """The gradient of the objective in the twist of the end effector, and the components of the twist that are held."""
 
@@ -53,6 +69,7 @@ class PoseGradient(NamedTuple):
     errors: Floats  # (6,): errors of the held components
     unit: Floats  # (1,): factor of the objective that makes its gradient of order one
     turn: Floats  # (6,)
+    pricing: Records  # (1,): PRICING
 
 
 @routine
@@ -88,7 +105,83 @@ def pose_gradient(
         value += 0.5 * weight * off * off
         for i in range(3):
             force[3 + i] += weight * off * yaw_gradient(X, i)
+    if objective.price > 0.0:
+        value = add_price(objective, value, gradient)
     return value, held
+
+
+@routine
+def add_price(objective: PoseObjective, value: float, gradient: PoseGradient) -> float:
+    """Half the squared priced distance, its gradient in `force`, from half the squared distance and its gradient."""
+    force, off, pricing, unit, place = gradient.force, gradient.turn, gradient.pricing[0], gradient.unit[0], 0.0
+    for i in range(3):
+        place += 0.5 * objective.platform[i] * off[i] * off[i] if objective.platform[i] != LOCKED else 0.0
+    F = 0.0
+    if pricing["is_fixed"] == 0:
+        pricing["place"], pricing["turn"] = place, max(value / unit - place, 0.0)
+        pricing["by_place"], pricing["by_turn"] = 1.0, 1.0
+        if value > 0.0:
+            F, by_place, by_turn, _, _, _, _ = price(objective, pricing["place"], pricing["turn"])
+            pricing["by_place"], pricing["by_turn"] = F * by_place, F * by_turn
+    for i in range(6):
+        force[i] *= pricing["by_place"] if i < 3 else pricing["by_turn"]
+    return 0.5 * unit * F * F
+
+
+@routine
+def price(
+    objective: PoseObjective, place: float, turn: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """The priced distance F of half squares p of position and r of rotation, F_p and F_r, and b, k, x, y.
+
+    F = D + price (S - c D), where D = sqrt(2 (p + r)) is the distance and S = sqrt(e^2 + c^2 D^2) the error e of what
+    is held, rounded off where it is below a share c of D: a norm, so that F has its least where e is zero if that costs
+    no more than the price. Its second derivatives are F_pp = -b - k x x, F_pr = -b - k x y, F_rr = -b - k y y.
+    """
+    c, square = objective.rounding, 2.0 * (place + turn)
+    weight, held = 1.0, place
+    if objective.hold == HOLD_ORIENTATION:
+        weight, held = max(objective.platform[3], max(objective.platform[4], objective.platform[5])), turn
+    D, S = math.sqrt(square), math.sqrt(2.0 * held / weight + c * c * square)
+    if not S > 0.0:
+        return D, 1.0 / D, 1.0 / D, 1.0 / (D * square), 0.0, 0.0, 0.0
+    a, kink, of_place, of_turn = (1.0 - objective.price * c) / D, objective.price / S, c * c, c * c
+    if objective.hold == HOLD_ORIENTATION:
+        of_turn += 1.0 / weight
+    else:
+        of_place += 1.0
+    value = a * square + kink * S * S
+    return value, a + kink * of_place, a + kink * of_turn, a / square, kink / (S * S), of_place, of_turn
+
+
+@routine
+def price_curvature(objective: PoseObjective, majorises: bool, gradient: PoseGradient) -> tuple[float, float, float]:
+    """G_pp / G_p^2, G_pr / (G_p G_r) and G_rr / G_r^2 of half the squared priced distance G: of products of forces.
+
+    While the error of what is held falls by half from one step to the next, and where a model is to majorise F, its
+    kink counts as the parabola above it, whose least is where the error is zero: steps then end there, not beyond.
+    """
+    pricing = gradient.pricing[0]
+    if not pricing["place"] + pricing["turn"] > 0.0:
+        return 0.0, 0.0, 0.0
+    held = pricing["turn"] if objective.hold == HOLD_ORIENTATION else pricing["place"]
+    if held != pricing["held"]:
+        pricing["eases"] = 1 if held < 0.25 * pricing["held"] else 0
+        pricing["held"] = held
+    F, by_place, by_turn, bend, kink, x, y = price(objective, pricing["place"], pricing["turn"])
+    kink = 0.0 if majorises or pricing["eases"] == 1 else kink
+    unit = gradient.unit[0] * F * F
+    return (
+        (by_place * by_place - F * (bend + kink * x * x)) / (unit * by_place * by_place),
+        (by_place * by_turn - F * (bend + kink * x * y)) / (unit * by_place * by_turn),
+        (by_turn * by_turn - F * (bend + kink * y * y)) / (unit * by_turn * by_turn),
+    )
+
+
+@routine
+def begin_pricing(gradient: PoseGradient) -> None:
+    """Reset what was noted of the price, before a descent."""
+    gradient.pricing[0]["held"], gradient.pricing[0]["eases"], gradient.pricing[0]["is_fixed"] = math.inf, 1, 0
 
 
 @routine
@@ -197,7 +290,7 @@ def new_descent_scratch(loops: Loops, links: LinkLimits, ways: Loops) -> Descent
         new_qp(limits, limits),
         np.zeros((limits, n)),
         new_equations(loops, LAYOUT),
-        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
+        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6), np.zeros(1, PRICING)),
         new_hessian(n, limits),
         np.zeros(1, CONTROL),
         np.zeros((paths, 6)),

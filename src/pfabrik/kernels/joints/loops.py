@@ -128,6 +128,9 @@ class PoseObjective(NamedTuple):
     targets: Floats  # (n, 4, 4)
     platform: Floats  # (6,): weights of the squares of position and rotation; 0 for free, LOCKED for held components
     frame: int  # part of the rotation that counts: all with BASE_AXES, the tilt with TARGET_AXES, yaw with HALF_WAY
+    hold: int  # part that is held up to the price: HOLD_...
+    price: float  # of its error [L per rad, or per L]; 0 without one
+    rounding: float  # share of the distance that the price is rounded off by
     margin: float  # distance inside the limits that coordinates keep
     near: float  # limits farther away have no multipliers
     max_iterations: int

@@ -7,16 +7,16 @@ import math
 from ...common.arrays import Floats, Record, Records
 from .._jit import routine
 from ..clearance.link_limits import links_excess
-from ..joints.loops import PoseObjective
 from ..legs.answer import Completion, answer_on_sides, place_legs
 from ..legs.complete_poses import is_pose, read_target
 from ..legs.frames import set_frames
 from ..legs.records import Table
-from ..projecting import UNBOUNDED, begin_effort, brings_nearer, is_too_far
+from ..projecting import COARSE, HELD, PRICED, UNBOUNDED, begin_effort, priced_distance, weighted_distance
 from ..rows import (
     CERTAIN,
     HOLD,
     HOLD_NOTHING,
+    HOLD_POSITION,
     INVALID,
     ITERATIONS,
     OPEN,
@@ -28,10 +28,11 @@ from ..rows import (
     TOO_NEAR,
     UNSURE,
 )
+from ..search_constants import SAME_DISTANCE, TURNED, WORTH
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode, count_changes, note_choices, put_changed
 from .limits import are_on_legs, place_links
-from .nearest import NearestScratch, nearest_of_row, put_limit_multipliers, turned_by
+from .nearest import NearestScratch, nearest_of_row, pose_objective, put_limit_multipliers, turned_by
 from .pose_constants import MOST_CHANGED, MOST_CHOICES, NEARLY
 from .redundant_sets import search_sets
 from .search_records import PlatformObjective, PoseSolutions, Starts
@@ -330,27 +331,31 @@ def reach_in_other_assembly(tables: Tables, scratch: AnswerScratch, target: Floa
 def search_for(
     tables: Tables,
     scratch: AnswerScratch,
-    start: Start,
-    target: Floats,
+    pose: Floats,
+    sides: Floats,
     question: Record,
     aim: int,
+    seeds: int,
     targets: Floats,
     answer: PoseSolutions,
 ) -> float:
-    """Fill the nearest feasible pose by one objective; return its distance [L]. See `nearest_of_row`."""
+    """Fill the nearest feasible pose by one objective, from a pose [length] and so many seeds; its distance [L].
+
+    See `nearest_of_row`.
+    """
     begin = scratch.begin
-    load_own(start.poses[0], tables.legs.task[0]["length"], begin[0])
+    load_own(pose, tables.legs.task[0]["length"], begin[0])
     return nearest_of_row(
         tables.search,
         tables.plan,
         aim,
-        0 if question["is_nearby"] == 1 else question["seeds"],
+        seeds,
         question["steps"],
         question["keeps_mode"],
         0,
         targets,
         scratch.no_values,
-        Starts(begin, scratch.no_q, start.sides),
+        Starts(begin, scratch.no_q, sides),
         answer,
         scratch.nearest,
         scratch.no_weights,
@@ -358,35 +363,124 @@ def search_for(
 
 
 @routine
+def price_of(tables: Tables, answer: PoseSolutions) -> tuple[float, float]:
+    """The distance of an answer from its target with the price of what is held [L], and the error of that."""
+    setting, measures = tables.plan.settings[PRICED], answer.measures
+    position, rotation = measures[0, POSITION_ERROR] / tables.legs.task[0]["length"], measures[0, ROTATION_ERROR]
+    hold, weights = setting["hold"], tables.plan.weights[PRICED]
+    off = position if hold == HOLD_POSITION else rotation
+    return priced_distance(weights, hold, setting["price"], position, rotation), off
+
+
+@routine
+def hold_exactly(
+    tables: Tables, scratch: AnswerScratch, targets: Floats, question: Record, answer: PoseSolutions
+) -> float:
+    """Hold what an answer misses by rounding alone exactly, where that costs no more; the distance, with the price."""
+    setting, other = tables.plan.settings[PRICED], scratch.other
+    priced, off = price_of(tables, answer)
+    if setting["price"] > 0.0 and off <= TURNED * setting["rounding"] * priced:
+        held = search_for(tables, scratch, answer.poses[0], answer.sides, question, HELD, 0, targets, other)
+        if held < math.inf and held <= (1.0 + SAME_DISTANCE) * priced:
+            copy_solution(other, answer)
+            return held
+    answer.distances[0] = priced
+    return priced
+
+
+@routine
+def project_from(
+    tables: Tables,
+    scratch: AnswerScratch,
+    pose: Floats,
+    sides: Floats,
+    targets: Floats,
+    question: Record,
+    answer: PoseSolutions,
+) -> float:
+    """Fill the feasible pose that one descent from a pose [length] leads to; its distance, with the price [L]."""
+    aim = PRICED if tables.machine[0]["projections"] > 1 else 0
+    distance = search_for(tables, scratch, pose, sides, question, aim, 0, targets, answer)
+    if aim == PRICED and distance < math.inf:
+        return hold_exactly(tables, scratch, targets, question, answer)
+    return distance
+
+
+@routine
+def project_anew(
+    tables: Tables,
+    scratch: AnswerScratch,
+    start: Start,
+    targets: Floats,
+    question: Record,
+    seeds: int,
+    answer: PoseSolutions,
+) -> float:
+    """Fill the nearest feasible pose of all that searches from the start and from seeds find; its distance [L].
+
+    What is held is held at first; where that costs more than its price, it gives way, from there and from the start.
+    Where nothing has it, the price counts from the outset.
+    """
+    if tables.machine[0]["projections"] == 1:
+        return search_for(tables, scratch, start.poses[0], start.sides, question, 0, seeds, targets, answer)
+    trial, most, effort = scratch.priced, question["most_steps"], scratch.nearest.search.effort[0]
+    if most > 0:
+        effort["bound"] = most // 2
+    best = search_for(tables, scratch, start.poses[0], start.sides, question, HELD, seeds, targets, answer)
+    if most > 0:
+        effort["bound"] = most
+    if scratch.nearest.best_tally[0]["cost"] <= tables.plan.settings[PRICED]["price"]:
+        return best
+    if best == math.inf:
+        found = search_for(tables, scratch, start.poses[0], start.sides, question, COARSE, seeds, targets, answer)
+        if found == math.inf:
+            return math.inf
+        best, _ = price_of(tables, answer)
+        answer.distances[0] = best
+    for place in range(2):
+        pose, sides = (answer.poses[0], answer.sides) if place == 0 else (start.poses[0], start.sides)
+        distance = project_from(tables, scratch, pose, sides, targets, question, trial)
+        if distance < (1.0 - SAME_DISTANCE) * best:
+            best = distance
+            copy_solution(trial, answer)
+    return best
+
+
+@routine
+def distance_of(tables: Tables, scratch: AnswerScratch, target: Floats, pose: Floats) -> float:
+    """Distance of a pose from a target [L], without any price."""
+    position, rotation = errors(tables.legs.task[0], target, pose, scratch.nearest.search.gradient.turn)
+    aim = PRICED if tables.machine[0]["projections"] > 1 else 0
+    return weighted_distance(tables.plan.weights[aim], position, rotation)
+
+
+@routine
 def project(
     tables: Tables, scratch: AnswerScratch, start: Start, targets: Floats, question: Record, answer: PoseSolutions
 ) -> float:
-    """Fill the nearest feasible pose; its distance [L].
+    """Fill the nearest feasible pose; its distance, with the price of what is held [L].
 
-    Of the projections tried in turn, the first with an answer gives it. Where what it holds leads farther from the
-    target than a start that was given, nothing is held. Near singularities each of two projections misses some targets.
+    From a start one descent leads to it. Others are searched for only where it leads nowhere, or so far that the start
+    is no answer to a target before this one.
     """
-    machine, settings, other = tables.machine[0], tables.plan.settings, scratch.other
-    target, last, distance = targets[0], machine["projections"] - 1, math.inf
-    most, effort = question["most_steps"], scratch.nearest.search.effort[0]
-    for aim in range(last + 1):
-        if most > 0:
-            effort["bound"] = most // (2 if aim < last else 1)
-        if distance == math.inf:
-            distance = search_for(tables, scratch, start, target, question, aim, targets, answer)
-    if question["has_start"] == 1 and last > 0 and distance < math.inf:
-        holding, weights = settings[0]["hold"], tables.plan.weights
-        if answer.counters[0, HOLD] % CERTAIN == holding:
-            turn = scratch.nearest.search.gradient.turn
-            position, rotation = errors(tables.legs.task[0], target, start.poses[0], turn)
-            if is_too_far(distance, weights[0], holding, position, rotation):
-                released = search_for(tables, scratch, start, target, question, last, targets, other)
-                if brings_nearer(released, weights[last], position, rotation):
-                    distance = released
-                    copy_solution(other, answer)
+    machine, other, target, distance = tables.machine[0], scratch.other, targets[0], math.inf
+    seeds, nearest = 0 if question["is_nearby"] == 1 else question["seeds"], scratch.anew
+    if question["has_start"] == 1 or question["is_nearby"] == 1:
+        distance = project_from(tables, scratch, start.poses[0], start.sides, targets, question, answer)
+    if distance < math.inf:
+        before = distance_of(tables, scratch, target, start.poses[0])
+        is_settled = answer.status[0] == REACHED or answer.counters[0, HOLD] >= CERTAIN
+        if is_settled or before - distance_of(tables, scratch, target, answer.poses[0]) <= WORTH:
+            seeds = 0
+    if seeds > 0 or distance == math.inf:
+        found = project_anew(tables, scratch, start, targets, question, seeds, nearest)
+        if found < (1.0 - SAME_DISTANCE) * distance:
+            distance = found
+            copy_solution(nearest, answer)
     is_doubtful = answer.status[0] == PROJECTED and answer.counters[0, HOLD] < CERTAIN and distance < math.inf
     if machine["fallback"] >= 0 and is_doubtful:
-        found = search_for(tables, scratch, start, target, question, machine["fallback"], targets, other)
+        aim = machine["fallback"]
+        found = search_for(tables, scratch, start.poses[0], start.sides, question, aim, seeds, targets, other)
         if found < math.inf and other.status[0] == REACHED:
             distance = found
             copy_solution(other, answer)
@@ -537,11 +631,10 @@ def weigh_limits(
     """
     table, plan, begin, aim = tables.assembly, tables.plan, scratch.begin, 0
     search = weighing.search
-    for k in range(tables.machine[0]["projections"]):
-        aim = k if k == 0 or plan.settings[k]["hold"] == answer.counters[0, HOLD] % CERTAIN else aim
-    setting = plan.settings[aim]
-    pose = PoseObjective(targets, plan.weights[aim], setting["frame"], setting["margin"], setting["near"], 0)
-    objective = PlatformObjective(pose, scratch.no_values, setting["implied"])
+    if tables.machine[0]["projections"] > 1 and answer.counters[0, HOLD] % CERTAIN == HOLD_NOTHING:
+        aim = PRICED
+    pose = pose_objective(plan, aim, targets, 0)
+    objective = PlatformObjective(pose, scratch.no_values, plan.settings[aim]["implied"])
     load_own(answer.poses[0], table.task[0]["length"], begin[0])
     for k in range(weights.shape[0]):
         weights[k] = 0.0

@@ -35,8 +35,8 @@ from .._jit import routine
 from ..clearance.link_limits import pair_excess, share_of_end
 from ..clearance.link_records import PLATFORM, LinkLimits
 from ..clearance.solids import ROUND
-from ..free_motions import easing_step, put_multipliers
-from ..joints.loops import BASE_AXES
+from ..free_motions import put_multipliers
+from ..joints.loops import BASE_AXES, PoseObjective
 from ..legs.answer import deviation
 from ..legs.frames import AXES, ZERO
 from ..legs.records import (
@@ -54,13 +54,12 @@ from ..legs.records import (
     Table,
 )
 from ..projecting import is_over
-from ..sqp import note_multipliers, sum_of_multipliers
+from ..rows import HOLD_ORIENTATION
 from ..vectors import Vec, add, along, cross, dot, flatten, move, norm, rotate, scale, sub, turn, vec
-from .descend_pose import take_step
 from .equations import LegEvaluation, direction, evaluate_legs, has_proximal, length_row, owner_of
 from .limits import AT_BASE_END, AT_PLATFORM_END, cone_slope, current_direction, place_links
-from .linearise import linearise, put_limited_gradient
-from .pose_constants import BALANCED, CONTRADICTING, FARTHEST, NEARER
+from .linearise import add_equation_gradient, linearise, put_limited_gradient
+from .pose_constants import BALANCED, NEARER
 from .search import SearchScratch, put_objective
 from .search_records import PlatformObjective
 
@@ -69,113 +68,60 @@ Terms: TypeAlias = tuple[float, float, float, float, float, float, float, int, i
 
 
 @routine
-def is_global(table: Table, row: int, objective: PlatformObjective, search: SearchScratch) -> bool:
-    """True if the certificate holds: nothing feasible is nearer than `search.best`, where legs are evaluated then."""
-    pose, used, reduced = objective.pose, search.elimination.used, search.first
+def may_be_global(objective: PlatformObjective, search: SearchScratch) -> bool:
+    """True if the certificate knows the objective: the distance of a platform that does not turn."""
+    pose, used = objective.pose, search.elimination.used
     if pose.frame != BASE_AXES or objective.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
         return False
     for i in range(3):
         if pose.platform[i] != 1.0:
             return False
+    return True
+
+
+@routine
+def put_forces(table: Table, row: int, objective: PlatformObjective, search: SearchScratch) -> bool:
+    """Fill what the objective, limits and equations pull with at `search.best`; False where the effort is over.
+
+    In `search.here` is what of it is left but for what holds a part: the force and moment that this bears.
+    """
     if search.leg_eval.rows.shape[0] == 0:
         evaluate_legs(table, search.best, search.leg_eval)
         put_objective(table, row, objective, search.best, search)
-    elif is_over(search.effort[0]):
-        return False
-    else:
-        linearise(table, row, objective, search.best, search, reduced)
         put_limited_gradient(table, search, search.here)
-        put_multipliers(search.here, reduced, search.equation_multipliers)
+        return True
+    if is_over(search.effort[0]):
+        return False
+    linearise(table, row, objective, search.best, search, search.first)
+    put_limited_gradient(table, search, search.here)
+    put_multipliers(search.here, search.first, search.equation_multipliers)
+    add_equation_gradient(0, search, search.here)
+    return True
+
+
+@routine
+def cost_of_hold(pose: PoseObjective, distance: float, search: SearchScratch) -> float:
+    """By how much the distance would fall per unit by which the held part gave way, after `put_forces` [L per rad].
+
+    As long as that is less than its price, the configuration is also where a part is nearest up to a price: F grows
+    in every direction in which the part gives way.
+    """
+    first = 3 if pose.hold == HOLD_ORIENTATION else 0
+    return norm(vec(search.here[first:])) / (search.gradient.unit[0] * distance)
+
+
+@routine
+def is_global(table: Table, search: SearchScratch) -> bool:
+    """True if the certificate holds: nothing feasible is nearer than `search.best`, where `put_forces` was called."""
     unit, gradient = search.gradient.unit[0], vec(search.objective_gradient)
     nearer = NEARER * dot(gradient, gradient) / unit
     total, pushing, shares = gradient, 0.0, 0.0
     for root in range(table.legs.shape[0]):
         leg_force, push, share = leg_share(table, root, nearer, search)
         total, pushing, shares = add(total, leg_force), pushing + push, shares + share
-    links_force, push, _ = terms_of_links(table, BALANCED, search)
+    links_force, push = terms_of_links(table, search)
     total, pushing = add(total, links_force), pushing + push
     return bool(norm(total) <= BALANCED * norm(gradient) and shares < unit - pushing)
-
-
-@routine
-def is_held_nowhere(table: Table, row: int, objective: PlatformObjective, steps: int, search: SearchScratch) -> bool:
-    """True if it is proved that no feasible configuration has the rotation of `search.best`.
-
-    There the linearised limits contradict each other. If that proves nothing, it is asked again where the largest
-    excess is least.
-
-    Parameters
-    ----------
-    steps : most steps on the way there.
-    """
-    used, reduced = search.elimination.used, search.first
-    if objective.pose.frame != BASE_AXES or objective.values.shape[0] > 0 or used[3] + used[4] + used[5] > 0:
-        return False
-    if contradicts(table, search):
-        return True
-    for _step in range(steps):
-        if is_over(search.effort[0]) or not easing_step(reduced, search.p):
-            return False
-        if contradicts(table, search):
-            return True
-        take_step(table, reduced, search.p.x, search.best, search)
-        linearise(table, row, objective, search.best, search, reduced)
-    return False
-
-
-@routine
-def contradicts(table: Table, search: SearchScratch) -> bool:
-    """True if the multipliers in `search.p` prove that the limits linearised in `search.first` contradict each other.
-
-    The sum of the certificate without the distance is not positive for any feasible configuration. Here it is positive,
-    and by the same bounds no less than its excess anywhere.
-    """
-    reduced, gradient = search.first, search.objective_gradient
-    note_multipliers(reduced.linear, search.p, search.hessian)
-    for j in range(gradient.shape[0]):
-        gradient[j] = 0.0
-    put_limited_gradient(table, search, search.here)
-    put_multipliers(search.here, reduced, search.equation_multipliers)
-    size = sum_of_multipliers(search.p.multipliers, reduced.linear.totals[0]["limits"])
-    total, pushing, violated, levers = ZERO, 0.0, -CONTRADICTING * size, 0.0
-    for root in range(table.legs.shape[0]):
-        leg_force, push, excess, terms = leg_terms(table, root, math.inf, search)
-        total, pushing, violated = add(total, leg_force), pushing + push, violated + excess
-        levers += terms[0] + abs(terms[3])
-    links_force, push, excess = terms_of_links(table, math.inf, search)
-    total, pushing, violated = add(total, links_force), pushing + push, violated + excess
-    if pushing >= 0.0:
-        return False
-    for root in range(table.legs.shape[0] if violated > 0.0 else 0):
-        _, _, _, terms = leg_terms(table, root, math.inf, search)
-        violated -= largest_loss(table, terms, -levers / pushing, search)
-    return bool(FARTHEST * norm(total) < violated)
-
-
-@routine
-def largest_loss(table: Table, terms: Terms, by_curvature: float, search: SearchScratch) -> float:
-    """By how much the sum may be less than here, by a leg's proximal joint, each having a share by its lever.
-
-    Parameters
-    ----------
-    by_curvature : the sum of all levers, per sum of the m_k.
-    """
-    lever, A, B, push, b, _, _, hinge, slide = terms
-    if hinge >= 0 and slide >= 0:
-        return math.inf
-    if hinge >= 0:
-        A += lever * by_curvature * lever
-        lowest, highest = travel_left(table, hinge, search)
-        middle = math.atan2(B, A)
-        is_opposite = lowest <= middle + math.pi <= highest or lowest <= middle - math.pi <= highest
-        least = -1.0 if is_opposite else min(math.cos(lowest - middle), math.cos(highest - middle))
-        return A - math.hypot(A, B) * least
-    if slide >= 0:
-        push += abs(push) * by_curvature * abs(push)
-        lowest, highest = travel_left(table, slide, search)
-        loss = max((0.5 * push * lowest - b) * lowest, (0.5 * push * highest - b) * highest)
-        return max(loss, -0.5 * b * b / push) if push < 0.0 else loss
-    return 0.0
 
 
 @routine
@@ -185,7 +131,7 @@ def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> 
     The force is that on the platform, the push the sum of the m_k, and the share what the leg's proximal joints need;
     infinite if these joints may bring something nearer.
     """
-    force, pushing, _, terms = leg_terms(table, root, BALANCED, search)
+    force, pushing, terms = leg_terms(table, root, search)
     lever, A, B, push, b, lean, twist, hinge, slide = terms
     share = 0.0
     if slide >= 0 and (b != 0.0 or push != 0.0):
@@ -203,25 +149,20 @@ def leg_share(table: Table, root: int, nearer: float, search: SearchScratch) -> 
 
 
 @routine
-def leg_terms(table: Table, root: int, slack: float, search: SearchScratch) -> tuple[Vec, float, float, Terms]:
-    """Force, push, sum and `Terms` of the rods that reach the base by one leg, as found by `path_to_base`.
-
-    Parameters
-    ----------
-    slack : of limits that take part; infinite if `search.best` is not feasible.
-    """
-    leg_eval, force, pushing, moved, violated = search.leg_eval, ZERO, 0.0, ZERO, 0.0
+def leg_terms(table: Table, root: int, search: SearchScratch) -> tuple[Vec, float, Terms]:
+    """Force, push and `Terms` of the rods that reach the base by one leg, as found by `path_to_base`."""
+    leg_eval, force, pushing, moved = search.leg_eval, ZERO, 0.0, ZERO
     A, B, b, push, lean, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hinge, slide = -1, -1
     for k in range(root, table.legs.shape[0]):
         path_root, on_hinge, on_slide = path_to_base(table, k)
         if path_root != root:
             continue
-        m, at_base_end, at_platform_end, excess = rod_multipliers(table, k, slack, search)
+        m, at_base_end, at_platform_end = rod_multipliers(table, k, search)
         if m == 0.0 and norm(at_base_end) + norm(at_platform_end) == 0.0:
             continue
         if (hinge >= 0 and on_hinge not in (-1, hinge)) or (slide >= 0 and on_slide not in (-1, slide)):
-            return ZERO, math.inf, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1, -1)
+            return ZERO, math.inf, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1, -1)
         axes = leg_eval.frames[table.legs[k]["frame"], AXES:]
         line, at_base_end, at_platform_end = (
             turn(axes, vec(leg_eval.lines[k])),
@@ -229,7 +170,7 @@ def leg_terms(table: Table, root: int, slack: float, search: SearchScratch) -> t
             turn(axes, at_platform_end),
         )
         pull = along(scale(m, line), -1.0, at_platform_end)
-        force, pushing, violated = add(force, sub(at_base_end, pull)), pushing + m, violated + excess
+        force, pushing = add(force, sub(at_base_end, pull)), pushing + m
         axis, lever, slide_axis = ZERO, ZERO, ZERO
         if on_hinge >= 0:
             hinge, axis = on_hinge, axis_of(table, on_hinge, leg_eval)
@@ -245,18 +186,13 @@ def leg_terms(table: Table, root: int, slack: float, search: SearchScratch) -> t
             weight = along(pull if turns else at_base_end, m, lever)
             lean += dot(weight, flatten(slide_axis, axis)) if turns else -dot(weight, flatten(slide_axis, axis))
             twist += dot(weight, cross(axis, slide_axis))
-    return force, pushing, violated, (norm(moved), A, B, push, b, lean, twist, hinge, slide)
+    return force, pushing, (norm(moved), A, B, push, b, lean, twist, hinge, slide)
 
 
 @routine
-def terms_of_links(table: Table, slack: float, search: SearchScratch) -> tuple[Vec, float, float]:
-    """Force, push and sum of the pairs of links that are kept apart; an infinite push if the bound does not know one.
-
-    Parameters
-    ----------
-    slack : as of `leg_terms`.
-    """
-    links, multipliers, force, pushing, violated = search.links, search.hessian.multipliers, ZERO, 0.0, 0.0
+def terms_of_links(table: Table, search: SearchScratch) -> tuple[Vec, float]:
+    """Force and push of the pairs of links that are kept apart; an infinite push if the bound does not know one."""
+    links, multipliers, force, pushing = search.links, search.hessian.multipliers, ZERO, 0.0
     first, is_placed = multipliers.shape[0] - links.pairs.shape[0], False
     for pair in range(links.kept[0]):
         multiplier = multipliers[first + pair]
@@ -266,17 +202,16 @@ def terms_of_links(table: Table, slack: float, search: SearchScratch) -> tuple[V
             place_links(table, search.links, search.leg_eval.frames, search.leg_eval.values)
         is_placed = True
         excess, i, j = pair_excess(search.links, pair, math.inf), links.pairs[pair, 0], links.pairs[pair, 1]
-        if excess < -slack:
+        if excess < -BALANCED:
             continue
         distance, radii = links.least[0] - excess, links.sizes[i, ROUND] + links.sizes[j, ROUND]
-        here, least, one, other = distance + radii, links.least[0] + radii, vec(links.points[0]), vec(links.points[1])
+        here, one, other = distance + radii, vec(links.points[0]), vec(links.points[1])
         share = share_of_platform(links, j, other) - share_of_platform(links, i, one)
         if distance == 0.0 or here <= 0.0 or not abs(share) <= 1.0:
-            return ZERO, math.inf, 0.0
+            return ZERO, math.inf
         force = along(force, -multiplier * share / distance, sub(other, one))
         pushing += multiplier / here * share * share
-        violated += 0.5 * multiplier / here * (least * least - here * here)
-    return force, pushing, violated
+    return force, pushing
 
 
 @routine
@@ -331,8 +266,8 @@ def platform_end_from(table: Table, k: int, hinge: int, leg_eval: LegEvaluation)
 
 
 @routine
-def rod_multipliers(table: Table, k: int, slack: float, search: SearchScratch) -> tuple[float, Vec, Vec, float]:
-    """Multiplier m of a rod's length, the parts of b at its base end and at its platform end, and the terms here.
+def rod_multipliers(table: Table, k: int, search: SearchScratch) -> tuple[float, Vec, Vec]:
+    """Multiplier m of a rod's length, and the parts of b at its base end and at its platform end.
 
     Times the unit of the objective, in the body of the base end.
     """
@@ -355,20 +290,17 @@ def rod_multipliers(table: Table, k: int, slack: float, search: SearchScratch) -
             search.equation_multipliers[row],
             current_direction(table, k, owner, AT_PLATFORM_END, vec(leg["platform_end_axes"][0]), leg_eval),
         )
-    u, excess = direction(leg_eval.lines[k]), 0.5 * pull * (length - leg["length"] * leg["length"] / length)
-    excess += dot(add(at_base_end, at_platform_end), vec(leg_eval.lines[k]))
+    u = direction(leg_eval.lines[k])
     for i in range(table.limited.shape[0]):
         limited, at_lo, at_hi = table.limited[i], multipliers[2 * i], multipliers[2 * i + 1]
         if limited["leg"] != k or max(at_lo, at_hi) == 0.0:
             continue
         value, entry, sense = deviation(limited, leg_eval.values), limited["place"], limited["sense"]
-        at_lo = at_lo if value - limited["lo"] < slack else 0.0
-        at_hi = at_hi if limited["hi"] - value < slack else 0.0
+        at_lo = at_lo if value - limited["lo"] < BALANCED else 0.0
+        at_hi = at_hi if limited["hi"] - value < BALANCED else 0.0
         half = 0.5 * (limited["hi"] - limited["lo"])
         if entry == SLIDE:
-            bound = leg["length"] + sense * (limited["hi"] if at_hi > at_lo else limited["lo"])
             pull += sense * (at_hi - at_lo)
-            excess += 0.5 * sense * (at_hi - at_lo) * (length - bound * bound / length)
         elif half < math.pi and (
             (entry == BASE_END and leg["base_end"] == HINGE) or (entry == PLATFORM_END and leg["platform_end"] == HINGE)
         ):
@@ -382,10 +314,8 @@ def rod_multipliers(table: Table, k: int, slack: float, search: SearchScratch) -
                 current_direction(table, k, owner, end, vec(hinge[0]), leg_eval),
                 sense * (limited["lo"] + half - value),
             )
-            angle = abs(value - limited["lo"] - half) if slack == math.inf else half
-            excess -= math.inf if abs(dot(u, middle) - math.cos(angle)) > BALANCED and slack == math.inf else 0.0
-            stretch, lengthwise, push, over = bound_by(table, k, max(at_lo, at_hi) / length, half, angle, length)
-            pull, excess, at_platform_end = pull + stretch, excess + over, along(at_platform_end, lengthwise, u)
+            stretch, lengthwise, push = bound_by(table, k, max(at_lo, at_hi) / length, half)
+            pull, at_platform_end = pull + stretch, along(at_platform_end, lengthwise, u)
             at_base_end = along(at_base_end, -push, middle) if end == AT_BASE_END else at_base_end
             at_platform_end = along(at_platform_end, -push, middle) if end == AT_PLATFORM_END else at_platform_end
     for i in range(table.cones.shape[0]):
@@ -393,46 +323,25 @@ def rod_multipliers(table: Table, k: int, slack: float, search: SearchScratch) -
         if cone["leg"] != k or push == 0.0:
             continue
         angle = cone_slope(table, cone, leg_eval)
-        if angle < cone["half_angle"] - slack:
+        if angle < cone["half_angle"] - BALANCED:
             continue
         end = AT_BASE_END if cone["place"] == BASE_LINE else AT_PLATFORM_END
         axis = current_direction(table, k, owner, end, vec(cone["axis"]), leg_eval)
-        angle = angle if slack == math.inf else cone["half_angle"]
-        stretch, lengthwise, push, over = bound_by(table, k, push / length, cone["half_angle"], angle, length)
-        pull, excess, at_platform_end = pull + stretch, excess + over, along(at_platform_end, lengthwise, u)
+        stretch, lengthwise, push = bound_by(table, k, push / length, cone["half_angle"])
+        pull, at_platform_end = pull + stretch, along(at_platform_end, lengthwise, u)
         at_base_end = along(at_base_end, -push, axis) if end == AT_BASE_END else at_base_end
         at_platform_end = along(at_platform_end, -push, axis) if end == AT_PLATFORM_END else at_platform_end
-    return -pull / length, at_base_end, at_platform_end, excess
+    return -pull / length, at_base_end, at_platform_end
 
 
 @routine
-def bound_by(
-    table: Table, k: int, push: float, half_angle: float, angle: float, length: float
-) -> tuple[float, float, float, float]:
-    """Pull along, push along, push from the axis, and the term of a rod kept within an angle from an axis.
-
-    Parameters
-    ----------
-    angle, length : of the rod here.
-    """
-    push /= max(math.sin(angle), BALANCED)
-    lengthwise, within, here = push * math.cos(angle), push * math.cos(half_angle), push * math.cos(angle)
+def bound_by(table: Table, k: int, push: float, half_angle: float) -> tuple[float, float, float]:
+    """Pull along, push along and push from the axis of a rod that is kept within an angle from an axis."""
+    push /= max(math.sin(half_angle), BALANCED)
+    lengthwise = push * math.cos(half_angle)
     if table.legs[k]["slides"] == 0:
-        rest = table.legs[k]["length"]
-        return lengthwise, 0.0, push, within * rest - here * length + 0.5 * lengthwise * (length - rest * rest / length)
-    return 0.0, max(lengthwise, 0.0), push, (within - here) * bound_of_slide(table, k, within < here)
-
-
-@routine
-def bound_of_slide(table: Table, k: int, is_longest: bool) -> float:
-    """The least or the largest length of a rod that slides."""
-    length = math.inf if is_longest else 0.0
-    for i in range(table.limited.shape[0]):
-        limited = table.limited[i]
-        if limited["leg"] == k and limited["place"] == SLIDE:
-            is_high = is_longest == (limited["sense"] > 0.0)
-            length = table.legs[k]["length"] + limited["sense"] * (limited["hi"] if is_high else limited["lo"])
-    return max(length, 0.0)
+        return lengthwise, 0.0, push
+    return 0.0, max(lengthwise, 0.0), push
 
 
 @routine

@@ -11,6 +11,7 @@ import math
 from ...common.arrays import Floats, Ints, Record, Records
 from .._jit import routine
 from ..free_motions import FreeMotions, put_step, restoring_step
+from ..joints.linearise_loops import begin_pricing
 from ..legs.records import Table
 from ..projecting import is_over
 from ..search_constants import CLOSED, CORRECTIONS, LARGE_DAMPING, LONGEST_STEP, NEARLY_CLOSED, RESTORING
@@ -160,6 +161,7 @@ def descend(
     """
     reduced, unit = search.first, search.gradient.unit
     search.near[0] = NEAR
+    begin_pricing(search.gradient)
     unit[0], search.control[0]["steps"], search.control[0]["is_restoring"] = 1.0, 0, 0
     if is_over(search.effort[0]):
         return math.inf

@@ -8,11 +8,12 @@ from ...common.arrays import Floats
 from .._jit import routine
 from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, add_limit, eliminate, project, project_gradient, put_multipliers
+from ..joints.linearise_loops import price_curvature
 from ..legs.answer import deviation
 from ..legs.frames import set_frames
 from ..legs.records import SHARED, Table
 from ..search_constants import PROBE
-from ..sqp import symmetrise
+from ..sqp import add_products, symmetrise
 from ..vectors import dot, vec
 from .equations import PlatformState, evaluate_leg, evaluate_legs, has_proximal, length_row, put_leg_slopes, put_slopes
 from .limits import add_pair_slope, cone_slope, coordinate_slope, dead_point_slope, place_links
@@ -145,10 +146,18 @@ def lagrangian_hessian(
     """Hessian of the Lagrangian in the free motions, into `hessian`; the largest entry on its diagonal.
 
     By differences of the gradient of the Lagrangian from `best`, where `search.leg_eval` still is; the multipliers of
-    the equations balance the gradient at pivot unknowns.
+    the equations balance the gradient at pivot unknowns. What a price bends is added: its edge may be sharper than the
+    differences are wide.
     """
     linear, H, basis, step = reduced.linear, search.hessian.H, reduced.basis, search.step
     motions, here, there = linear.totals[0]["motions"], search.here, search.there
+    is_priced = objective.pose.price > 0.0
+    if is_priced:
+        search.gradient.pricing[0]["is_fixed"] = 1
+        for part in range(2):
+            for j in range(step.shape[0]):
+                there[j] = search.objective_gradient[j] if 3 * part <= j < 3 * part + 3 else 0.0
+            project(there, reduced, search.hessian.forces[part])
     put_limited_gradient(table, search, search.here)
     search.control[0]["equation_multipliers"] = put_multipliers(search.here, reduced, search.equation_multipliers)
     add_equation_gradient(linear.totals[0]["rows"] - search.leg_eval.slopes.shape[0], search, search.here)
@@ -163,6 +172,10 @@ def lagrangian_hessian(
         for j in range(step.shape[0]):
             there[j] = (there[j] - here[j]) / step_length
         project(there, reduced, H[a])
+    if is_priced:
+        search.gradient.pricing[0]["is_fixed"] = 0
+        place, both, turn = price_curvature(objective.pose, False, search.gradient)
+        add_products(place, both, turn, search.hessian, motions)
     return symmetrise(H, motions)
 
 

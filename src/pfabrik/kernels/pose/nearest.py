@@ -12,7 +12,7 @@ from .._jit import opener, routine, search
 from ..clearance.link_limits import links_excess
 from ..clearance.link_records import NO_LINKS
 from ..holding import limit_multipliers
-from ..joints.linearise_loops import pose_gradient, turn_of_tilt
+from ..joints.linearise_loops import turn_of_tilt
 from ..joints.loops import BASE_AXES, LOCKED, PoseObjective
 from ..legs.answer import deviation, excess_of
 from ..legs.complete_poses import orthonormalise
@@ -44,14 +44,14 @@ from ..rows import (
     RESIDUAL,
     ROTATION_ERROR,
 )
+from ..search_constants import CLOSED
 from ..sqp import scale_objective
 from ..vectors import copy_row, copy_table, norm, vec
-from .certificate import is_global, is_held_nowhere
+from .certificate import cost_of_hold, is_global, may_be_global, put_forces
 from .descend_pose import descend
 from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .limits import place_links
 from .linearise import linearise
-from .pose_constants import EASING, HOLDABLE
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
 from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
@@ -63,9 +63,6 @@ class NearestScratch(NamedTuple):
     search: SearchScratch
     best: PlatformState
     best_tally: Records  # (1,): TALLY
-    phase1_tally: Records  # (1,): TALLY of phase 1 searches that ended away from the held part
-    distances_to_held: Floats  # (1 + seeds,): of starts whose search was infeasible, to the held part; else infinite
-    held: Floats  # (6,): weights of the phase 1 objective, 1 for held components
     p: QP  # for the multipliers of limits
     natural_gradients: Floats  # (limits, n): inverse metric times the gradients of active limits
 
@@ -74,16 +71,7 @@ def new_nearest_scratch(table: Table, plan: MultistartPlan, weighs_limits: bool)
     """Allocate the scratch memory of one thread, for the multipliers of limits too where these are asked for."""
     search, best = new_search_scratch(table, plan.links), new_platform_state(table.legs.shape[0])
     k, n = search.first.linear.G.shape if weighs_limits else (0, 0)
-    tallies = np.zeros(1, TALLY), np.zeros(1, TALLY)
-    return NearestScratch(
-        search,
-        best,
-        *tallies,
-        np.zeros(1 + plan.seeds.poses.shape[0]),
-        np.zeros(6),
-        new_qp(max(k, n), k),
-        np.zeros((k, n)),
-    )
+    return NearestScratch(search, best, np.zeros(1, TALLY), new_qp(max(k, n), k), np.zeros((k, n)))
 
 
 NO_STARTS = Starts(np.zeros((0, 4, 4)), np.zeros((0, 0)), np.zeros((0, 0)))
@@ -153,23 +141,27 @@ def holds_all(objective: PoseObjective) -> bool:
 
 
 @routine
+def has_rotation(objective: PoseObjective, search: SearchScratch) -> bool:
+    """True if the rotation is all that is held, and `search.best` has it: as of a platform that does not turn."""
+    pose, target = search.best.pose, search.target
+    if objective.frame != BASE_AXES or objective.platform[3] != LOCKED:
+        return False
+    for i in range(3):
+        if objective.platform[i] == LOCKED:
+            return False
+        for j in range(3):
+            if abs(pose[i, j] - target[i, j]) > CLOSED:
+                return False
+    return True
+
+
+@routine
 def is_other_mode(legs: Records, own_sides: Floats, sides: Floats) -> bool:
     """True if some leg takes its other side."""
     for k in range(sides.shape[0]):
         if legs[k]["implicit"] == 0 and own_sides[k] * sides[k] < 0.0:
             return True
     return False
-
-
-@routine
-def holds_some(table: Table, objective: PlatformObjective, weights: Floats) -> bool:
-    """True if part of the target is held; fills the weights (6,) of the phase 1 objective."""
-    n_held, turns = 0, table.task[0]["rotations"] > 0
-    for i in range(6):
-        is_held = objective.pose.platform[i] == LOCKED and (i < 3 or turns)
-        weights[i] = 1.0 if is_held else 0.0
-        n_held += 1 if is_held else 0
-    return n_held > 0 and objective.values.shape[0] == 0
 
 
 @routine
@@ -189,8 +181,8 @@ def search_from(
     sides: Floats,
     stays: int,
     scratch: NearestScratch,
-) -> bool:
-    """Descend from `search.best` and count the end by `keep_ending`; True if no feasible configuration was found.
+) -> None:
+    """Descend from `search.best` and count the end by `keep_ending`.
 
     Parameters
     ----------
@@ -199,19 +191,25 @@ def search_from(
     search, best, best_tally = scratch.search, scratch.best, scratch.best_tally[0]
     distance = descend(table, row, objective, best_tally["least"], best, search)
     count_effort(search.control[0]["steps"], search.effort[0])
-    is_infeasible = distance == math.inf and (best_tally["least"] == math.inf or search.control[0]["steps"] == 0)
-    if distance < math.inf:
-        put_sides(table, search.best, search.leg_eval)
-        if stays == 0 or not is_other_mode(table.legs, sides, search.best.sides):
-            keep_ending(distance, best_tally, search, best)
-            best_tally["is_unbroken"] = max(best_tally["is_unbroken"], 1 - search.control[0]["is_restoring"])
-            if (
-                best_tally["agreements"] == 1.0
-                and distance == best_tally["least"]
-                and (distance == 0.0 or is_global(table, row, objective, search))
-            ):
-                best_tally["agreements"] = math.inf
-    return is_infeasible
+    if distance == math.inf:
+        return
+    put_sides(table, search.best, search.leg_eval)
+    if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
+        return
+    keep_ending(distance, best_tally, search, best)
+    best_tally["is_unbroken"] = max(best_tally["is_unbroken"], 1 - search.control[0]["is_restoring"])
+    if not (best_tally["agreements"] == 1.0 and distance == best_tally["least"]):
+        return
+    is_bounded, pose = may_be_global(objective, search), objective.pose
+    is_held = pose.hold != HOLD_NOTHING and pose.price == 0.0
+    best_tally["cost"] = 0.0 if distance == 0.0 else math.inf
+    if distance > 0.0 and (is_bounded or is_held):
+        is_known = put_forces(table, row, objective, search)
+        is_bounded = is_bounded and is_known
+        if is_held and is_known:
+            best_tally["cost"] = cost_of_hold(pose, distance, search)
+    if distance == 0.0 or (is_bounded and is_global(table, search)):
+        best_tally["agreements"] = math.inf
 
 
 @routine
@@ -219,7 +217,6 @@ def search_row(
     table: Table,
     row: int,
     objective: PlatformObjective,
-    phase1_objective: PlatformObjective,
     starts: Starts,
     seeds: Starts,
     n_seeds: int,
@@ -232,30 +229,19 @@ def search_row(
 
     Searches begin at its own start, then at so many seeds, the nearest to the target first.
 
-    The held part is put in place at once if it is the whole pose, or if there are seeds and no implicit joints;
+    A part that is held at any price, or where there are seeds, is put in place at once, but with implicit joints;
     otherwise descents bring it there. The other of the two ways is tried last, if the first finds nothing or needed
-    restoration. If too few searches agree, starts that were infeasible are searched in two phases: phase 1 for the held
-    part alone, then a search with it held.
+    restoration.
     """
-    search, best, best_tally, phase1_tally, distances_to_held, effort = (
-        scratch.search,
-        scratch.best,
-        scratch.best_tally[0],
-        scratch.phase1_tally[0],
-        scratch.distances_to_held,
-        scratch.search.effort[0],
-    )
-    target = search.target
-    nearest_seed, by = -1, way_along(table, objective.pose, target, along)
+    search, best_tally, effort = scratch.search, scratch.best_tally[0], scratch.search.effort[0]
+    nearest_seed, by = -1, way_along(table, objective.pose, search.target, along)
     own_start, kept_sides = row if starts.poses.shape[0] > 1 else 0, search.kept_sides
     sides = starts.sides[own_start]
     for k in range(kept_sides.shape[0]):
         kept_sides[k] = sides[k] if stays == 1 and has_proximal(table.legs[k]) else 0.0
-    is_placed_first = holds_all(objective.pose) or (n_seeds > 0 and table.task[0]["implicit"] == 0)
+    is_held = objective.pose.hold != HOLD_NOTHING and objective.pose.price == 0.0
+    is_placed_first = holds_all(objective.pose) or ((n_seeds > 0 or is_held) and table.task[0]["implicit"] == 0)
     clear_tally(best_tally)
-    clear_tally(phase1_tally)
-    for i in range(distances_to_held.shape[0]):
-        distances_to_held[i] = math.inf
     for start in range(n_seeds + 2):
         if is_agreed(best_tally, agreements) or (start == n_seeds + 1 and best_tally["is_unbroken"] == 1):
             break
@@ -270,50 +256,10 @@ def search_row(
         if stays == 1 and is_other_mode(table.legs, sides, search.best.sides):
             continue
         is_in_place = (start <= n_seeds) == is_placed_first
-        fix_held(objective.pose, is_in_place, search)
+        fix_held(objective.pose, is_in_place or has_rotation(objective.pose, search), search)
         if is_in_place:
-            place_held(table, objective.pose, target, search.leg_eval, search.best)
-        if search_from(table, row, objective, sides, stays, scratch) and phase1_objective.pose.max_iterations > 0:
-            search.gradient.unit[0] = 1.0
-            start_pose = starts.poses[own_start] if seed < 0 else seeds.poses[seed]
-            distances_to_held[seed + 1], _ = pose_gradient(
-                phase1_objective.pose, target, start_pose, search.gradient, True
-            )
-            if (
-                is_in_place
-                and search.control[0]["steps"] == 0
-                and is_held_nowhere(table, row, objective, EASING if start == 0 else 0, search)
-            ):
-                return math.inf
-    fix_held(phase1_objective.pose, False, search)
-    while (
-        phase1_objective.pose.max_iterations > 0
-        and not is_agreed(best_tally, agreements)
-        and not (is_spent(effort) or is_over(effort))
-        and (best_tally["least"] < math.inf or not is_agreed(phase1_tally, agreements))
-    ):
-        seed = -1
-        for i in range(distances_to_held.shape[0] - 1):
-            seed = i if distances_to_held[i + 1] < distances_to_held[seed + 1] else seed
-        if distances_to_held[seed + 1] == math.inf:
-            break
-        distances_to_held[seed + 1] = math.inf
-        load_start(table, starts if seed < 0 else seeds, own_start if seed < 0 else seed, search)
-        if seed >= 0:
-            take_along(by, along, search.best)
-        distance = descend(
-            table,
-            row,
-            phase1_objective,
-            phase1_tally["least"] if best_tally["least"] == math.inf else math.inf,
-            best,
-            search,
-        )
-        count_effort(search.control[0]["steps"], effort)
-        if distance <= HOLDABLE:
-            search_from(table, row, objective, sides, stays, scratch)
-        elif best_tally["least"] == math.inf and search.control[0]["steps"] > 1:
-            keep_ending(distance, phase1_tally, search, best)
+            place_held(table, objective.pose, search.target, search.leg_eval, search.best)
+        search_from(table, row, objective, sides, stays, scratch)
     least: float = best_tally["least"]
     return least
 
@@ -329,6 +275,23 @@ def set_status(setting: Record, row: int, solutions: PoseSolutions) -> None:
     is_held = position <= setting["held_position"] and rotation <= setting["held_rotation"]
     solutions.status[row] = REACHED if is_reached else PROJECTED
     solutions.counters[row, HOLD] = setting["hold"] if is_held else HOLD_NOTHING
+
+
+@routine
+def pose_objective(plan: MultistartPlan, aim: int, targets: Floats, steps: int) -> PoseObjective:
+    """One of the plan's objectives, of targets, in so many steps."""
+    setting = plan.settings[aim]
+    return PoseObjective(
+        targets,
+        plan.weights[aim],
+        setting["frame"],
+        setting["hold"],
+        setting["price"],
+        setting["rounding"],
+        setting["margin"],
+        setting["near"],
+        steps,
+    )
 
 
 @routine
@@ -369,13 +332,8 @@ def nearest_of_row(
     of what keeps the limits, the nearest that keeps links apart unasked is the nearest of all that keep them apart.
     """
     setting, search, links = plan.settings[aim], scratch.search, scratch.search.links
-    frame, margin, near, steps = setting["frame"], setting["margin"], setting["near"], min(setting["steps"], most_steps)
-    pose = PoseObjective(targets, plan.weights[aim], frame, margin, near, steps)
+    pose = pose_objective(plan, aim, targets, min(setting["steps"], most_steps))
     objective = PlatformObjective(pose, values, setting["implied"])
-    phase1_steps = steps if holds_some(table, objective, scratch.held) else 0
-    phase1_objective = PlatformObjective(
-        PoseObjective(targets, scratch.held, frame, margin, near, phase1_steps), values, setting["implied"]
-    )
     solutions.distances[row] = math.inf
     if not load_target(table, pose, row, search):
         return math.inf
@@ -391,7 +349,6 @@ def nearest_of_row(
             table,
             row,
             objective,
-            phase1_objective,
             starts,
             plan.seeds,
             n_seeds,

@@ -42,12 +42,6 @@ STRETCHED = 1e-4
 
 # Multistart (`nearest`, `starts`)
 
-HOLDABLE = 1e-3
-"""Largest phase 1 distance from which a search with the held part held is started [L or rad]."""
-
-EASING = 4
-"""Most steps from the own start to where a proof is sought that nothing can be held."""
-
 BENT = 1e-2
 """Displacement of a proximal joint from its dead point where a search starts [L or rad]."""
 
@@ -111,12 +105,6 @@ JOINT_PLACES = 12
 """Places of an implicit joint, evenly over its range, from which it is solved for: a hinge has few solutions."""
 
 # Certificate
-
-CONTRADICTING = 1e-6
-"""Least excess that proves a contradiction, in units of the sum of its multipliers [L or rad]."""
-
-FARTHEST = 1e2
-"""How far from a contradiction positions are thought to be [L]: as far as targets are sought."""
 
 NEARER = 1e-7
 """Relative error of the squared distance up to which the end of a search counts as nearest."""

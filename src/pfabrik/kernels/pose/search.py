@@ -12,7 +12,7 @@ from .._jit import routine
 from ..clearance.link_limits import new_link_limits
 from ..clearance.link_records import LinkLimits
 from ..free_motions import Elimination, FreeMotions, new_elimination, new_free_motions
-from ..joints.linearise_loops import PoseGradient, pose_gradient
+from ..joints.linearise_loops import PRICING, PoseGradient, pose_gradient
 from ..joints.loops import BASE_AXES, LOCKED, PoseObjective
 from ..legs.complete_poses import turn_pose
 from ..legs.records import Table
@@ -71,7 +71,7 @@ def new_search_scratch(table: Table, links: LinkLimits) -> SearchScratch:
         half_angles[i, 0], half_angles[i, 1], half_angles[i, 2] = angle, math.cos(angle), math.sin(angle)
     return SearchScratch(
         new_leg_evaluation(table),
-        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6)),
+        PoseGradient(np.zeros(6), np.zeros((6, 6)), np.zeros(6), np.ones(1), np.zeros(6), np.zeros(1, PRICING)),
         new_hessian(n, limits),
         np.zeros(1, CONTROL),
         new_qp(n, limits),

@@ -42,6 +42,8 @@ SETTINGS = np.dtype(
         ("position", "f8"),  # tolerance of REACHED [length]
         ("rotation", "f8"),  # tolerance of REACHED [rad]
         ("hold", "i8"),  # held part of the target: HOLD_...
+        ("price", "f8"),  # up to which it is held, as in `PoseObjective`; 0 if it is held at any
+        ("rounding", "f8"),  # share of the distance that the price is rounded off by
         ("held_position", "f8"),  # tolerance of the held part [length]
         ("held_rotation", "f8"),  # tolerance of the held part [rad]
     ]

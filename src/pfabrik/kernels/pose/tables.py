@@ -30,7 +30,10 @@ MACHINE = np.dtype(
         ("rests", "i8"),  # 1: `resting` are the legs while free redundant joints stay at home
         ("searches", "i8"),  # 1: what legs do not reach is searched for in the platform's pose
         ("flips", "i8"),  # 1: a platform that the legs keep upright about home may turn over on them
-        ("projections", "i8"),  # objectives of `plan` tried in turn, the first ones; the last of these holds nothing
+        (
+            "projections",
+            "i8",
+        ),  # objectives of poses, the first of `plan`: 1 that holds nothing, or HELD ... COARSE
         ("fallback", "i8"),  # objective that is tried where these leave doubts; -1 if none
         ("values", "i8"),  # objective of which actuators near to values count
         ("turns", "i8"),  # 1: the platform turns; 0: the end effector is a point
@@ -110,6 +113,8 @@ class AnswerScratch(NamedTuple):
     resting: Completion
     nearest: NearestScratch
     other: PoseSolutions  # one row: an answer to be compared
+    anew: PoseSolutions  # one row: what searches from elsewhere than the start find
+    priced: PoseSolutions  # one row: where one of these leads by the price
     newton: NewtonScratch
     sets: SetsScratch
     moved: Floats  # (1, legs): sides, with redundant joints moved
@@ -134,6 +139,8 @@ def new_answer_scratch(tables: Tables) -> AnswerScratch:
         new_completion(tables.legs),
         new_completion(tables.resting.legs),
         new_nearest_scratch(tables.search, tables.plan, False),
+        new_solutions(1, legs, actuators),
+        new_solutions(1, legs, actuators),
         new_solutions(1, legs, actuators),
         new_newton_scratch(tables.assembly, bool(tables.machine["turns"][0])),
         new_sets_scratch(tables.sets),

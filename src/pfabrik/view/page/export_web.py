@@ -25,7 +25,7 @@ from ...kernels.pose.evaluate import new_evaluation_scratch
 from ...kernels.pose.search_records import new_solutions
 from ...kinematics import Model, engine_of, model_of, tilt_axis
 from ...machine.description.mechanism import Mechanism
-from ...options import Options
+from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
 from ..drawn_parts import free_axes
 from .posed_drawing import drawing_of
@@ -41,7 +41,7 @@ SCRIPTS = (
 """Files of `web`, in the order in which a page has them."""
 
 
-def export_web(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
+def export_web(mechanism: Mechanism, path: str | os.PathLike[str], *, hold_price: float = USUAL.hold_price) -> None:
     """Write a page on which one drags the machine: one file, for any browser, without a server or a network.
 
     The page answers as `solve_ik` and `solve_fk` do, by the same kernels: drag the platform or the sliders of the
@@ -55,6 +55,8 @@ def export_web(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
         A machine whose chains are all legs in closed form, as all parallel machines of the catalogue are.
     path : str or PathLike
         The file, which ends in ".html" or ".htm".
+    hold_price : float, optional
+        Up to which the nearest poses hold the orientation, as in `Options`.
 
     Raises
     ------
@@ -62,12 +64,12 @@ def export_web(mechanism: Mechanism, path: str | os.PathLike[str]) -> None:
         Another ending, or a machine that a page cannot answer for; says why.
     """
     require_ending(path, (".html", ".htm"))
-    text = web_page(mechanism)
+    text = web_page(mechanism, Options(hold_price=hold_price))
     with whole_path(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
-def web_page(mechanism: Mechanism) -> str:
+def web_page(mechanism: Mechanism, options: Options = USUAL) -> str:
     """The text of the page."""
     model = _checked(mechanism)
     folder = FOLDER / "web"
@@ -75,7 +77,7 @@ def web_page(mechanism: Mechanism) -> str:
     filled = {
         "name": html.escape(mechanism.name),
         "style": _unindented((folder / "style.css").read_text(encoding="utf-8")),
-        "machine": _as_json(machine_data(model)),
+        "machine": _as_json(machine_data(model, options)),
         "kernels": packed((FOLDER / "kernels.wasm").read_bytes()),
         "script": _unindented(script),
     }
@@ -101,14 +103,14 @@ def _checked(mechanism: Mechanism) -> Model:
     return model
 
 
-def machine_data(model: Model) -> dict[str, Any]:
+def machine_data(model: Model, options: Options = USUAL) -> dict[str, Any]:
     """All that the page knows of a machine: its tables as an image of memory, names and units, and its drawing."""
-    mechanism, legs, tables = model.mechanism, model.legs, tables_of(model, Options())
+    mechanism, legs, tables = model.mechanism, model.legs, tables_of(model, options)
     box = _box(model)
     drawing = drawing_of(model, box)
     (slides, turns), axis = free_axes(mechanism), tilt_axis(mechanism)
     only = None if axis is None else axis.tolist()
-    image = image_of(_records(model))
+    image = image_of(_records(model, options))
     return {
         "name": mechanism.name,
         "unit": mechanism.length_unit,
@@ -158,9 +160,9 @@ class _Reading(NamedTuple):
     no_slopes: Floats  # (0, 0, 0)
 
 
-def _records(model: Model) -> dict[str, tuple[Any, ...]]:
+def _records(model: Model, options: Options) -> dict[str, tuple[Any, ...]]:
     """The arguments of kernels, by their names in the page."""
-    tables = tables_of(model, Options())
+    tables = tables_of(model, options)
     legs, actuators = tables.legs.legs.shape[0], tables.home.actuators.shape[1]
     free = {
         name: getattr(tables, name)._replace(limited=tables.legs.limited[:0].copy(), cones=tables.legs.cones[:0].copy())

@@ -266,6 +266,7 @@ private:
       }
     }
     add(status, "active limits", active);
+    add(status, "jumped", platform_.has_jumped() ? "true" : "false");
     add(status, "distance from target [m]", text(platform_.distance()));
     add(status, "rotation from target [rad]", text(platform_.angle()));
     const std::size_t nearest = platform_.nearest_limit();

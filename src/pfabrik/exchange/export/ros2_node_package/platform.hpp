@@ -112,6 +112,8 @@ public:
   const char * reason() const { return jump_ < kActuators ? "a jump of an actuator" : @NAME@_what(code_); }
   // The actuator that would have jumped; kActuators: none.
   std::size_t jump() const { return jump_; }
+  // Whether the actuators jump to what is commanded: no motion of the mechanism leads there from the command before.
+  bool has_jumped() const { return has_jumped_; }
   const Configuration & commanded() const { return commanded_; }
   const Configuration & measured() const { return measured_; }
   // What is commanded from the last target [m], [rad], as far as the task sets it.
@@ -129,6 +131,7 @@ public:
   Status refuse()
   {
     distance_ = angle_ = kNaN;
+    has_jumped_ = false;
     code_ = @MACRO@_NO_POSE;
     jump_ = kActuators;
     return status_ = Status::kRefused;
@@ -153,6 +156,8 @@ public:
     std::copy(before, before + kActuators, actuators);
     code_ = @ANSWER@;
     jump_ = kActuators;
+    has_jumped_ = @JUMPED@;
+    code_ = has_jumped_ ? @MACRO@_PROJECTED : code_;
     const bool is_near = code_ == @MACRO@_PROJECTED || code_ == @MACRO@_BUDGET;
     if (code_ == @MACRO@_NO_POSE) {
       return refuse();
@@ -354,6 +359,7 @@ private:
   Settings settings_;
   Status status_ = Status::kWaiting;
   int code_ = 0, resting_ = 0, pair_ = 0;
+  bool has_jumped_ = false;
   std::size_t jump_ = kActuators, nearest_ = kLimits;
   Configuration commanded_{}, measured_{};
   double distance_ = 0.0, angle_ = 0.0, between_ = 0.0;

@@ -1,0 +1,76 @@
+"""Steps of drives that no motion of the mechanism leads along: another basin, branch or hold was taken."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.arrays import Floats, Mask
+from ..engines.joints.configurations import Configurations
+from ..engines.joints.engine_contract import InverseEngine
+from ..kernels.rows import FAILED
+from ..kernels.search_constants import MOVED, SUSPICIOUS, UNDONE
+from ..machine.description.mechanism import Mechanism
+from ..machine.description.task import task_of
+from ..machine.motion.displacements import actuator_units
+from ..machine.poses import between
+from ..options import Options
+
+SUBSTEPS = 8
+"""Parts into which a checked step is divided: a jump stays within one of them, a fast motion spreads over several."""
+
+
+def are_jumps(
+    engine: InverseEngine,
+    mechanism: Mechanism,
+    starts: Configurations,
+    start_targets: Floats,
+    answers: Configurations,
+    targets: Floats,
+    options: Options,
+) -> Mask:
+    """True for answers to targets (n, 4, 4) to which no motion leads from their starts, as the targets move, (n,).
+
+    The drives move far more than the target, the way back to the target before does not undo it, and on the way there
+    a single one of several parts makes most of it.
+
+    Parameters
+    ----------
+    starts, start_targets : the answers before, and their targets (n, 4, 4).
+    """
+    jumps, rows = np.zeros(len(targets), bool), (starts.rows.status < FAILED) & (answers.rows.status < FAILED)
+    steps, asked = _steps(mechanism, starts.rows.actuators, answers.rows.actuators), np.zeros(len(targets))
+    position, rotation = task_of(mechanism).errors(targets[rows], start_targets[rows])
+    asked[rows] = np.hypot(position, mechanism.rotation_length * rotation) / mechanism.characteristic_length
+    suspicious = np.flatnonzero(rows & (steps > np.maximum(SUSPICIOUS * asked, MOVED)))
+    if not len(suspicious):
+        return jumps
+    begin, end = starts.at(suspicious), answers.at(suspicious)
+    back = engine.answer(start_targets[suspicious], end, options, keep_mode=True)
+    left = _steps(mechanism, begin.rows.actuators, back.rows.actuators) > UNDONE * steps[suspicious]
+    for row in suspicious[left].tolist():
+        way = start_targets[row : row + 1], targets[row : row + 1]
+        part = _largest_part(engine, mechanism, starts.at(np.array([row])), *way, options)
+        jumps[row] = part > UNDONE * steps[row]
+    return jumps
+
+
+def _largest_part(
+    engine: InverseEngine,
+    mechanism: Mechanism,
+    start: Configurations,
+    target: Floats,
+    next_target: Floats,
+    options: Options,
+) -> float:
+    """The largest step of a drive [L or rad] where the way from one target (1, 4, 4) to the next is divided."""
+    shares = np.arange(1, SUBSTEPS + 1)[:, None, None] / SUBSTEPS
+    way = between(np.repeat(target, SUBSTEPS, axis=0), np.repeat(next_target, SUBSTEPS, axis=0), shares)
+    followed = engine.follow(way, start, options, None)
+    values = np.concatenate([start.rows.actuators, followed.rows.actuators])
+    return float(_steps(mechanism, values[:-1], values[1:]).max())
+
+
+def _steps(mechanism: Mechanism, before: Floats, after: Floats) -> NDArray[np.float64]:
+    """The largest step of a drive from each configuration to the next, by actuators (n, n_a), (n,) [L or rad]."""
+    return np.asarray((np.abs(after - before) / actuator_units(mechanism)).max(axis=1, initial=0.0))
