@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -23,6 +23,14 @@ from pfabrik.cli.stops import AGAIN
 def interruptible() -> None:
     """A shell starts what runs in its background with interrupts ignored."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.fixture
+def _interruptible() -> Iterator[None]:
+    """Interrupts are raised in this process, too, where it was started in a background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def stopped(line: str, number: int, when: Callable[[], object]) -> tuple[int, str]:
@@ -143,6 +151,7 @@ def test_an_interruption_while_a_folder_is_removed_is_told_as_one(
     assert os.listdir(folder) == []
 
 
+@pytest.mark.usefixtures("_interruptible")
 def test_an_interruption_that_is_swallowed_comes_again(capsys: pytest.CaptureFixture[str]) -> None:
     def work() -> None:
         with contextlib.suppress(KeyboardInterrupt):
@@ -156,6 +165,7 @@ def test_an_interruption_that_is_swallowed_comes_again(capsys: pytest.CaptureFix
     assert capsys.readouterr().err == "pfabrik: interrupted\n"
 
 
+@pytest.mark.usefixtures("_interruptible")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_what_cleans_up_is_not_disturbed_by_further_signals(number: int) -> None:
     cleaned = []
