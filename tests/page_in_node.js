@@ -25,6 +25,11 @@ async function main() {
   const modesOf = (answer) => engine.modes(answer, (each) => scene.marksOf(each));
   const session = new Session(machine, engine);
   session.goHome();
+  const jumped = path.map((target) => {
+    session.ask(target);
+    return session.hasJumped;
+  });
+  session.goHome();
   session.remember();
   session.open(link);
   session.remember();
@@ -39,6 +44,7 @@ async function main() {
     spoiled: [null, home].map((from) => numbers.map((matrix) => engine.ask(matrix, from).status)),
     inverse: targets.map((target) => plain(engine.ask(target))),
     followed: followed.map(plain),
+    jumped,
     forward: values.map((each) => plain(engine.assemble(each))),
     travel: travelFrom(home),
     edges: edges.map((edge) => {

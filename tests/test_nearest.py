@@ -36,13 +36,12 @@ def test_what_a_rotation_counts_is_for_the_caller_to_say(share: float) -> None:
     machine = pf.load("stewart")
     targets = targets_about(machine, np.random.default_rng(0), 2 if INTERPRETED else 10, 3.0, 0.3)
     length = share * machine.rotation_length
-    usual, answers = (
-        pf.solve_ik(machine, targets, options=Options(hold=None, rotation_length=each)) for each in (None, length)
-    )
-    turns_more = np.greater(answers.rotation_error, usual.rotation_error)
+    usual, options = Options(hold=None), Options(hold=None, rotation_length=length)
+    usually, answers = (pf.solve_ik(machine, targets, options=each) for each in (usual, options))
+    turns_more = np.greater(answers.rotation_error, usually.rotation_error)
     assert (turns_more if share < 1.0 else ~turns_more).mean() >= 0.8
     for target, answer in zip(targets, answers, strict=True):
-        found = conditions(machine, target, answer, length)
+        found = conditions(machine, target, answer, options)
         assert np.linalg.norm(found.rest) <= 1e-4 * np.linalg.norm(found.slope)
 
 

@@ -63,7 +63,7 @@ def test_legs_without_multipliers_have_no_part_in_the_lagrangian(name: str) -> N
     legs = model_of(mechanism).legs
     table = kernel_table(legs)
     search, n = new_search_scratch(table, NO_LINKS), E.count_unknowns(table)
-    objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0.0, 1e-6, 10)
+    objective = PoseObjective(mechanism.home_pose[None], np.ones(6), BASE_AXES, 0, 0.0, 0.0, 0.0, 1e-6, 10)
     objective = PlatformObjective(objective, np.zeros((0, len(table.driven))), 0)
     search.target[:] = random_configuration(mechanism, legs, rng).pose
     search.gradient.unit[0] = 1.0

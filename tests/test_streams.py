@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
 from checks import INTERPRETED
@@ -49,6 +50,35 @@ def test_halved_steps_of_a_stream_halve_the_largest_step_of_a_drive(name: str) -
     ticks = 20 if INTERPRETED else 300
     coarse, fine = (steps(machine, stream(machine, smooth(machine, n))).max() for n in (ticks, 2 * ticks))
     assert fine <= 0.76 * coarse or INTERPRETED
+
+
+@pytest.mark.parametrize("name", ["delta", "orthoglide", "stewart", "prr", "nrpm"])
+def test_a_leap_that_finer_steps_do_not_spread_is_told(name: str) -> None:
+    """A drive that moves a tenth of what it uses in a step, and half of that at least in one of four parts of it."""
+    machine, ticks = pf.load(name), 20 if INTERPRETED else 600
+    targets = smooth(machine, ticks)
+    answers = stream(machine, targets)
+    values = np.array([each.actuators for each in answers])
+    used = np.maximum(np.ptp(values, axis=0), 1e-9)
+    for k in np.flatnonzero((np.abs(np.diff(values, axis=0)) / used).max(axis=1) > 0.1) + 1:
+        if answers[k].jumped or INTERPRETED:
+            continue
+        way, here = between(targets[k - 1], targets[k], np.arange(1, 5) / 4.0), answers[k - 1]
+        parts = [here.actuators]
+        for target in way:
+            here = pf.solve_ik(machine, target, start=here)
+            parts.append(here.actuators)
+        whole = (np.abs(values[k] - values[k - 1]) / used).max()
+        assert (np.abs(np.diff(parts, axis=0)) / used).max() <= 0.75 * whole, (k, whole)
+
+
+def between(begin: np.ndarray, end: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Poses on the straight way from one to another, turning about one axis."""
+    turn = Rotation.from_matrix(end[:3, :3] @ begin[:3, :3].T).as_rotvec()
+    way = np.repeat(begin[None], len(shares), axis=0)
+    way[:, :3, 3] += shares[:, None] * (end - begin)[:3, 3]
+    way[:, :3, :3] = Rotation.from_rotvec(shares[:, None] * turn).as_matrix() @ begin[:3, :3]
+    return way
 
 
 @pytest.mark.parametrize("name", ["stewart", "hexaglide"])

@@ -1,7 +1,8 @@
 """First-order conditions of the feasible pose nearest to a target, from the description alone.
 
 At such a pose every motion that the loops allow, and that would come nearer, is blocked by limits: the slope of the
-distance, less the slopes of the limits' room times their multipliers, vanishes along all of these motions.
+distance, with the price of what is held, less the slopes of the limits' room times their multipliers, vanishes along
+all of these motions.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from checks import cone_angle, deviations, placed_bodies, task_offsets, with_axes
-from pfabrik import Mechanism, Solution
+from pfabrik import Mechanism, Options, Solution
 from pfabrik.machine.description.joints import KINDS
+from pfabrik.machine.description.task import task_of
 
 from .search import units
 from .turns import Array
@@ -31,8 +33,17 @@ class Conditions(NamedTuple):
     rest: Array  # what of it the limits that are named, times their multipliers, do not explain
 
 
-def conditions(mechanism: Mechanism, target: Array, answer: Solution, rotation_length: float) -> Conditions:
-    """The first-order conditions at a projection of one target (4, 4)."""
+def priced(mechanism: Mechanism, options: Options, away: Array, off: Array) -> Array:
+    """The price of what an answer misses of what is to be held [L], rounded off below 1e-3 of the distance."""
+    price, points = options.hold_price, mechanism.platform_points
+    if options.hold == "orientation" and len(points):
+        price += np.linalg.norm(points.mean(axis=0) - mechanism.reference_point) / mechanism.characteristic_length
+    rounding = min(1e-3, 0.1 / price) * away
+    return np.asarray(price * (np.hypot(off, rounding) - rounding))
+
+
+def conditions(mechanism: Mechanism, target: Array, answer: Solution, options: Options) -> Conditions:
+    """The first-order conditions at a projection of one target (4, 4), asked for with options."""
     explicit, length = with_axes(mechanism), mechanism.characteristic_length
     own = deviations(explicit, answer)
     widths = [len(KINDS[joint.type].coordinates) for joint in explicit.joints]
@@ -51,7 +62,12 @@ def conditions(mechanism: Mechanism, target: Array, answer: Solution, rotation_l
     body = explicit.end_effector
     body = explicit.joint(body).connects[0] if explicit.end_effector_is_joint else body
     offset, turn = task_offsets(explicit, placed[body] @ explicit.home_pose, target[None])
-    away = np.hypot(np.linalg.norm(offset, axis=1), rotation_length / length * np.linalg.norm(turn, axis=1))
+    parts_off = {"orientation": np.linalg.norm(turn, axis=1), "position": np.linalg.norm(offset, axis=1)}
+    rotation_length = options.rotation_length or mechanism.rotation_length
+    away = np.hypot(parts_off["position"], rotation_length / length * parts_off["orientation"])
+    is_posed = any(task_of(explicit).axes) and task_of(explicit).rotations
+    if options.hold and is_posed and answer.held is None:
+        away = away + priced(explicit, options, away, parts_off[options.hold])
     held = {"orientation": [turn], "position": [offset]}.get(answer.held or "", [])
     rigid = [
         first[joint.name] + k

@@ -16,6 +16,9 @@ from ..machine.motion.displacements import actuator_units
 from ..machine.poses import between
 from ..options import Options
 
+LEAP = 0.01
+"""Motion of drives [L or rad] that is a jump even where it leads back: across a place where links stretch."""
+
 SUBSTEPS = 8
 """Parts into which a checked step is divided: a jump stays within one of them, a fast motion spreads over several."""
 
@@ -31,8 +34,8 @@ def are_jumps(
 ) -> Mask:
     """True for answers to targets (n, 4, 4) to which no motion leads from their starts, as the targets move, (n,).
 
-    The drives move far more than the target, the way back to the target before does not undo it, and on the way there
-    a single one of several parts makes most of it.
+    The drives move far more than the target, and on the way there a single one of several parts makes most of it. Of
+    small steps that only counts where the way back to the target before does not undo them.
 
     Parameters
     ----------
@@ -48,6 +51,7 @@ def are_jumps(
     begin, end = starts.at(suspicious), answers.at(suspicious)
     back = engine.answer(start_targets[suspicious], end, options, keep_mode=True)
     left = _steps(mechanism, begin.rows.actuators, back.rows.actuators) > UNDONE * steps[suspicious]
+    left |= steps[suspicious] > LEAP
     for row in suspicious[left].tolist():
         way = start_targets[row : row + 1], targets[row : row + 1]
         part = _largest_part(engine, mechanism, starts.at(np.array([row])), *way, options)

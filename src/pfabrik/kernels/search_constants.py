@@ -25,6 +25,10 @@ ROUNDED_OFF, COARSELY = 1e-3, 2e-2
 """Share of the distance below which the price of what is held is rounded off, at its end, and in searches that first
 look for the basin: the sharper the edge, the more of them end beside it."""
 
+BESIDE = 1e-6
+"""Relative difference of F by which the end of a search that first looked for the basin is taken for farther: the least
+is beside it."""
+
 MOST_ROUNDED = 0.1
 """Largest product of that share and the price: of a tenth of the distance, F is a norm still."""
 

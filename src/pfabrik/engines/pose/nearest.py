@@ -11,6 +11,7 @@ from ...common.derived import derived
 from ...kernels.joints.loops import BASE_AXES
 from ...kernels.pose.pose_constants import AGREEMENTS_OF_VALUES
 from ...kernels.pose.search_records import PoseSolutions, Starts
+from ...kernels.projecting import UNBOUNDED
 from ...kernels.rows import HOLD_ORIENTATION, HOLD_POSITION
 from ...kernels.search_constants import MOST_STEPS
 from ...machine.description.home_mobility import column_joints
@@ -26,7 +27,7 @@ OF_VALUES: Objective = (0.0,) * 6, {"frame": BASE_AXES, "steps": MOST_STEPS, "ag
 """The objective of actuators nearest to values; the pose does not count."""
 
 
-ALL_SEEDS = 2**31
+ALL_SEEDS = UNBOUNDED
 """More agreements than there are searches: they end only where the target is reached."""
 
 

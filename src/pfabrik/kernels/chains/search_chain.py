@@ -23,7 +23,7 @@ from ..projecting import (
 )
 from ..quaternions import difference
 from ..rows import HOLD_NOTHING, HOLD_POSITION
-from ..search_constants import CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE, TURNED, WORTH
+from ..search_constants import BESIDE, CONTINUATION_STEPS, LONGEST_IN_MODE, SAME_DISTANCE, TURNED, WORTH
 from ..vectors import copy_table
 from .chain_constants import BENT, CLOSENESS, DESCENTS_NEARBY, NEARER, NEARLY, PULLED_FROM, PULLS, STEPS
 from .chain_records import ChainScratch, ChainTables, SerialChain
@@ -192,11 +192,12 @@ def project_anew(tables: ChainTables, around: bool, n_seeds: int, s: ChainScratc
     if not around and machine["is_short"] == 1 and least > machine["met"] and least < NEARLY:
         copy_chain_state(s.nearest, s.own)
         least = search_for(tables, 1 + HELD, False, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
-    if len(tables.holds) == 2 or (least < math.inf and s.tally[0]["cost"] <= tables.prices[1 + PRICED, 0]):
+    is_enough = is_agreed(s.tally[0], agreements) and s.tally[0]["cost"] <= tables.prices[1 + PRICED, 0]
+    if len(tables.holds) == 2 or is_enough:
         return least
     if least == math.inf:
         least = search_for(tables, 1 + COARSE, around, n_seeds, agreements, s)
-        least = priced_at(tables, s.nearest_X, s) if least < math.inf else least
+        least = (1.0 + BESIDE) * priced_at(tables, s.nearest_X, s) if least < math.inf else least
     for place in range(2):
         copy_chain_state(s.nearest, s.kept)
         copy_table(s.nearest_X, s.kept_X)

@@ -29,7 +29,7 @@ from ..rows import (
     RESIDUAL,
     ROTATION_ERROR,
 )
-from ..search_constants import MOST_STEPS, SAME_DISTANCE, SIGHT, TURNED, WORTH
+from ..search_constants import BESIDE, MOST_STEPS, SAME_DISTANCE, SIGHT, TURNED, WORTH
 from ..vectors import copy_table
 from .close_on_target import (
     close_legs,
@@ -262,10 +262,12 @@ def project_anew(
     Where nothing has it, the price counts from the outset.
     """
     least = search_by(tables, scratch, HELD, n_starts, n_seeds, moves_start, steps, best)
-    if tables.holds.shape[0] == 1 or (least < math.inf and scratch.tally[0]["cost"] <= tables.prices[PRICED, 0]):
+    tally = scratch.tally[0]
+    is_enough = tally["agreements"] >= AGREEMENTS and tally["cost"] <= tables.prices[PRICED, 0]
+    if tables.holds.shape[0] == 1 or is_enough:
         return least
     if least == math.inf:
-        least = search_by(tables, scratch, COARSE, n_starts, n_seeds, moves_start, steps, best)
+        least = (1.0 + BESIDE) * search_by(tables, scratch, COARSE, n_starts, n_seeds, moves_start, steps, best)
     for place in range(2):
         distance = project_from(tables, scratch, best if place == 0 else scratch.begin, steps, scratch.priced)
         if distance < (1.0 - SAME_DISTANCE) * least:

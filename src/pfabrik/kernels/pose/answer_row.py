@@ -11,7 +11,7 @@ from ..legs.answer import Completion, answer_on_sides, place_legs
 from ..legs.complete_poses import is_pose, read_target
 from ..legs.frames import set_frames
 from ..legs.records import Table
-from ..projecting import COARSE, HELD, PRICED, UNBOUNDED, begin_effort, priced_distance, weighted_distance
+from ..projecting import COARSE, HELD, PRICED, UNBOUNDED, begin_effort, is_agreed, priced_distance, weighted_distance
 from ..rows import (
     CERTAIN,
     HOLD,
@@ -28,7 +28,7 @@ from ..rows import (
     TOO_NEAR,
     UNSURE,
 )
-from ..search_constants import SAME_DISTANCE, TURNED, WORTH
+from ..search_constants import BESIDE, SAME_DISTANCE, TURNED, WORTH
 from ..vectors import copy_row, copy_table
 from .any_mode import answer_in_any_mode, count_changes, note_choices, put_changed
 from .limits import are_on_legs, place_links
@@ -407,6 +407,14 @@ def project_from(
 
 
 @routine
+def is_enough(tables: Tables, scratch: AnswerScratch) -> bool:
+    """True if searches for what is held agree where it is nearest, and holding it there costs less than its price."""
+    tally, plan = scratch.nearest.best_tally[0], tables.plan
+    is_sure = is_agreed(tally, plan.settings[HELD]["agreements"])
+    return bool(is_sure and tally["cost"] <= plan.settings[PRICED]["price"])
+
+
+@routine
 def project_anew(
     tables: Tables,
     scratch: AnswerScratch,
@@ -429,14 +437,14 @@ def project_anew(
     best = search_for(tables, scratch, start.poses[0], start.sides, question, HELD, seeds, targets, answer)
     if most > 0:
         effort["bound"] = most
-    if scratch.nearest.best_tally[0]["cost"] <= tables.plan.settings[PRICED]["price"]:
+    if is_enough(tables, scratch):
         return best
     if best == math.inf:
         found = search_for(tables, scratch, start.poses[0], start.sides, question, COARSE, seeds, targets, answer)
         if found == math.inf:
             return math.inf
         best, _ = price_of(tables, answer)
-        answer.distances[0] = best
+        answer.distances[0], best = best, (1.0 + BESIDE) * best
     for place in range(2):
         pose, sides = (answer.poses[0], answer.sides) if place == 0 else (start.poses[0], start.sides)
         distance = project_from(tables, scratch, pose, sides, targets, question, trial)

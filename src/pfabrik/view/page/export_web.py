@@ -23,6 +23,7 @@ from ...errors import InvalidArgument
 from ...kernels.pose import tables as T
 from ...kernels.pose.evaluate import new_evaluation_scratch
 from ...kernels.pose.search_records import new_solutions
+from ...kernels.search_constants import MOVED, SUSPICIOUS, UNDONE
 from ...kinematics import Model, engine_of, model_of, tilt_axis
 from ...machine.description.mechanism import Mechanism
 from ...options import USUAL, Options
@@ -135,6 +136,12 @@ def machine_data(model: Model, options: Options = USUAL) -> dict[str, Any]:
         "question": {name: place for place, name in enumerate(T.QUESTION.names or ())},
         "active": TOLERANCES.active,
         "holding": TOLERANCES.holding,
+        "jump": {
+            "turning": float(mechanism.rotation_length),
+            "suspicious": SUSPICIOUS,
+            "undone": UNDONE,
+            "moved": MOVED,
+        },
         "image": {"data": packed(image.data), "size": image.size, "moved": image.moved, "places": image.places},
         "drawing": drawing,
     }

@@ -93,6 +93,17 @@ class Engine {
     return this.complete(answer);
   }
 
+  /** True if no motion leads from a start to an answer as its target goes on: the way back does not undo the step. */
+  jumps(start, before, target, answer) {
+    const { jump, length, actuators } = this.machine;
+    const unit = (k) => (actuators[k].isAngle ? 1 : length);
+    const step = (other) => Math.max(...start.actuators.map((value, k) => Math.abs(other.actuators[k] - value) / unit(k)));
+    const asked = Math.hypot(norm(minus(originOf(target), originOf(before))), jump.turning * angleBetween(before, target));
+    if (!(step(answer) > Math.max((jump.suspicious * asked) / length, jump.moved))) return false;
+    const back = this.ask(before, answer);
+    return back.actuators !== null && step(back) > jump.undone * step(answer);
+  }
+
   /** Forward kinematics, in the assembly mode of a start. */
   assemble(values, start = null) {
     this.values.set(values);

@@ -126,14 +126,15 @@ class Panel {
   }
 
   explanation() {
-    const { answer, wished } = this.session;
+    const { answer, wished, hasJumped } = this.session;
     const has = answer.limits.length > 0;
     const kept = this.machine.limits.length ? "Every limit kept, all loops closed." : "All loops closed; this machine has no limits.";
     if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : kept;
     if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";
     if (answer.status >= FAILED) return "The last feasible pose is shown.";
     if (wished) return "These values do not fit together; this is the nearest that does.";
-    return `Nearest feasible pose, ${this.distance(answer)} short. ${has ? "Stopped by" : "Its links are stretched."}`;
+    const how = hasJumped ? "Nearest feasible pose, to which drives would jump," : "Nearest feasible pose,";
+    return `${how} ${this.distance(answer)} short. ${has ? "Stopped by" : "Its links are stretched."}`;
   }
 
   distance({ errors: [position, rotation] }) {

@@ -4,7 +4,7 @@ const MOST_STEPS = 200, SINGULAR = 1e-4;
 
 class Session {
   constructor(machine, engine = null) {
-    Object.assign(this, { machine, engine, past: [], future: [], answer: null });
+    Object.assign(this, { machine, engine, past: [], future: [], answer: null, target: null, hasJumped: false });
   }
 
   /** Ask for a pose: from the answer before, in its working mode; afresh where that has no configuration. */
@@ -14,19 +14,20 @@ class Session {
     let answer = this.timed(() => this.engine.ask(target, start));
     const isKept = start !== null && answer.actuators !== null;
     if (start && !isKept) answer = this.engine.ask(target, null);
-    this.settle({ target: [...target], answer, wished: null, origin: isKept ? this.origin : null });
+    const hasJumped = isKept && this.target !== null && this.engine.jumps(start, this.target, target, answer);
+    this.settle({ target: [...target], answer, wished: null, origin: isKept ? this.origin : null, hasJumped });
   }
 
   /** Ask for values of the actuators. */
   assemble(values) {
     const start = this.answer.actuators ? this.answer : null;
     const answer = this.timed(() => this.engine.assemble(values, start));
-    this.settle({ target: [...answer.pose], answer, wished: [...values] });
+    this.settle({ target: [...answer.pose], answer, wished: [...values], hasJumped: false });
   }
 
   /** Take an answer that was found already, such as one in another working mode. */
   take(answer) {
-    this.settle({ target: [...answer.pose], answer, wished: null, origin: null });
+    this.settle({ target: [...answer.pose], answer, wished: null, origin: null, hasJumped: false });
   }
 
   goHome() {
@@ -90,7 +91,7 @@ class Session {
     if (!from.length) return;
     to.push(this.present);
     this.present = from.pop();
-    this.settle(this.present);
+    this.settle({ ...this.present, hasJumped: false });
   }
 
   /** The part of an address that keeps the target and the branches of the legs. */
@@ -106,7 +107,7 @@ class Session {
     if (numbers.length !== 6 || !numbers.every(Number.isFinite)) return this.goHome();
     const signs = [...(parts.get("m") ?? "")];
     const { branches } = this.machine;
-    this.answer = null;
+    this.answer = this.target = null;
     if (signs.length && signs.length === branches.filter(Boolean).length) {
       const branch = this.engine.home.branch.map((side, k) => (branches[k] ? signs.shift() + 1 : side));
       this.answer = { ...this.engine.home, branch: branch.map(Number) };

@@ -63,6 +63,14 @@ function anglesOf(pose) {
   const pitch = Math.asin(clamp(-pose[8], -1, 1));
   return [Math.atan2(pose[9], pose[10]), pitch, Math.atan2(pose[4], pose[0])].map((angle) => angle / DEGREE);
 }
+/** The angle of the rotation that turns one pose into another [rad]. */
+function angleBetween(a, b) {
+  const column = (m, k) => [m[k], m[k + 4], m[k + 8]];
+  const axis = [0, 1, 2].map((k) => cross(column(a, k), column(b, k))).reduce(plus);
+  const cosine = [0, 1, 2].reduce((sum, k) => sum + dot(column(a, k), column(b, k)), -1);
+  return Math.atan2(norm(axis), cosine);
+}
+
 function poseOf(position, angles) {
   const turns = angles.map((angle, k) => turn(AXES[k], angle * DEGREE));
   const pose = product(turns[2], product(turns[1], turns[0]));
