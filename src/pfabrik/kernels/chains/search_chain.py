@@ -195,10 +195,11 @@ def project_anew(tables: ChainTables, around: bool, n_seeds: int, s: ChainScratc
     is_enough = is_agreed(s.tally[0], agreements) and s.tally[0]["cost"] <= tables.prices[1 + PRICED, 0]
     if len(tables.holds) == 2 or is_enough:
         return least
+    n_places = 2 if least < math.inf else 1
     if least == math.inf:
         least = search_for(tables, 1 + COARSE, around, n_seeds, agreements, s)
         least = (1.0 + BESIDE) * priced_at(tables, s.nearest_X, s) if least < math.inf else least
-    for place in range(2):
+    for place in range(n_places):
         copy_chain_state(s.nearest, s.kept)
         copy_table(s.nearest_X, s.kept_X)
         copy_chain_state(s.kept if place == 0 else s.start, s.own)

@@ -266,9 +266,10 @@ def project_anew(
     is_enough = tally["agreements"] >= AGREEMENTS and tally["cost"] <= tables.prices[PRICED, 0]
     if tables.holds.shape[0] == 1 or is_enough:
         return least
+    n_places = 2 if least < math.inf else 1
     if least == math.inf:
         least = (1.0 + BESIDE) * search_by(tables, scratch, COARSE, n_starts, n_seeds, moves_start, steps, best)
-    for place in range(2):
+    for place in range(n_places):
         distance = project_from(tables, scratch, best if place == 0 else scratch.begin, steps, scratch.priced)
         if distance < (1.0 - SAME_DISTANCE) * least:
             least = distance

@@ -439,13 +439,14 @@ def project_anew(
         effort["bound"] = most
     if is_enough(tables, scratch):
         return best
+    n_places = 2 if best < math.inf else 1
     if best == math.inf:
         found = search_for(tables, scratch, start.poses[0], start.sides, question, COARSE, seeds, targets, answer)
         if found == math.inf:
             return math.inf
         best, _ = price_of(tables, answer)
         answer.distances[0], best = best, (1.0 + BESIDE) * best
-    for place in range(2):
+    for place in range(n_places):
         pose, sides = (answer.poses[0], answer.sides) if place == 0 else (start.poses[0], start.sides)
         distance = project_from(tables, scratch, pose, sides, targets, question, trial)
         if distance < (1.0 - SAME_DISTANCE) * best:
