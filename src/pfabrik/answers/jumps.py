@@ -16,8 +16,9 @@ from ..machine.motion.displacements import actuator_units
 from ..machine.poses import between
 from ..options import Options
 
-LEAP = 0.01
-"""Motion of drives [L or rad] that is a jump even where it leads back: across a place where links stretch."""
+LEAP = 0.1
+"""Motion of drives [L or rad] that is a jump even where it leads back: across a place where links stretch. It is less
+where what is held is taken up or let go, by what its price is rounded off."""
 
 SUBSTEPS = 8
 """Parts into which a checked step is divided: a jump stays within one of them, a fast motion spreads over several."""

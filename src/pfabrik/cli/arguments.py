@@ -252,8 +252,8 @@ def named_joints(option: tuple[str, ...], words: tuple[str, ...]) -> tuple[str, 
     return tuple(name for word in (*option, *words) for name in word.split(",") if name)
 
 
-def _options(hold: Literal["orientation", "position", "none"]) -> pf.Options:
-    return pf.Options(hold=None if hold == "none" else hold)
+def _options(hold: Literal["orientation", "position", "none"], hold_price: float) -> pf.Options:
+    return pf.Options(hold=None if hold == "none" else hold, hold_price=hold_price)
 
 
 projecting = together(
@@ -264,10 +264,18 @@ projecting = together(
         type=click.Choice(["orientation", "position", "none"]),
         default="orientation",
         show_default=True,
-        help="Of a target out of reach: what to keep exactly, where that is possible.",
+        help="Of a target out of reach: what to keep, up to a price.",
+    ),
+    click.option(
+        "--hold-price",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=pf.Options().hold_price,
+        show_default=True,
+        metavar="L/RAD",
+        help="How much farther, in sizes of the machine a radian, what is kept may bring the answer; 100 is strict.",
     ),
 )
-"""Adds ``--hold``, which a command gets as `options` for the solver."""
+"""Adds ``--hold`` and ``--hold-price``, which a command gets as `options` for the solver."""
 
 
 def note_left_out(given: Iterable[str], mechanism: pf.Mechanism) -> None:
@@ -277,6 +285,7 @@ def note_left_out(given: Iterable[str], mechanism: pf.Mechanism) -> None:
 
 
 def note_unused_projection(reason: str) -> None:
-    """Note that ``--hold`` is given where nothing is projected."""
-    if click.get_current_context().get_parameter_source("hold") is ParameterSource.COMMANDLINE:
-        note(f"--hold has no effect with {reason}: nothing is projected")
+    """Note that an option of projections is given where nothing is projected."""
+    for name in ("hold", "hold_price"):
+        if click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            note(f"--{name.replace('_', '-')} has no effect with {reason}: nothing is projected")

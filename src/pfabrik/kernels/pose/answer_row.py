@@ -407,14 +407,6 @@ def project_from(
 
 
 @routine
-def is_enough(tables: Tables, scratch: AnswerScratch) -> bool:
-    """True if searches for what is held agree where it is nearest, and holding it there costs less than its price."""
-    tally, plan = scratch.nearest.best_tally[0], tables.plan
-    is_sure = is_agreed(tally, plan.settings[HELD]["agreements"])
-    return bool(is_sure and tally["cost"] <= plan.settings[PRICED]["price"])
-
-
-@routine
 def project_anew(
     tables: Tables,
     scratch: AnswerScratch,
@@ -427,7 +419,7 @@ def project_anew(
     """Fill the nearest feasible pose of all that searches from the start and from seeds find; its distance [L].
 
     What is held is held at first; where that costs more than its price, it gives way, from there and from the start.
-    Where nothing has it, the price counts from the outset.
+    Where nothing has it, or searches do not agree on where, others follow for which the price counts from the outset.
     """
     if tables.machine[0]["projections"] == 1:
         return search_for(tables, scratch, start.poses[0], start.sides, question, 0, seeds, targets, answer)
@@ -437,15 +429,18 @@ def project_anew(
     best = search_for(tables, scratch, start.poses[0], start.sides, question, HELD, seeds, targets, answer)
     if most > 0:
         effort["bound"] = most
-    if is_enough(tables, scratch):
+    tally, plan, n_places = scratch.nearest.best_tally[0], tables.plan, 2
+    is_sure = is_agreed(tally, plan.settings[HELD]["agreements"])
+    if is_sure and tally["cost"] <= plan.settings[PRICED]["price"]:
         return best
-    n_places = 2 if best < math.inf else 1
+    if not is_sure:
+        found = search_for(tables, scratch, start.poses[0], start.sides, question, COARSE, seeds, targets, trial)
+        priced, _ = price_of(tables, trial)
+        if found < math.inf and (1.0 + BESIDE) * priced < best:
+            copy_solution(trial, answer)
+            answer.distances[0], best, n_places = priced, (1.0 + BESIDE) * priced, 1
     if best == math.inf:
-        found = search_for(tables, scratch, start.poses[0], start.sides, question, COARSE, seeds, targets, answer)
-        if found == math.inf:
-            return math.inf
-        best, _ = price_of(tables, answer)
-        answer.distances[0], best = best, (1.0 + BESIDE) * best
+        return math.inf
     for place in range(n_places):
         pose, sides = (answer.poses[0], answer.sides) if place == 0 else (start.poses[0], start.sides)
         distance = project_from(tables, scratch, pose, sides, targets, question, trial)
