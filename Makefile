@@ -45,9 +45,9 @@ test: prepared
 test-all: prepared
 	@$(BIN)/python -m pytest -n auto --dist worksteal -m "slow and not campaign and not pages"
 
-# The programs of pages, examples and notebooks, with the linear algebra of several processors.
+# The programs of pages, examples and notebooks, with the linear algebra of several processors (of Zen it is that of Haswell).
 test-processors: prepared
-	@for core in Haswell Zen Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
+	@for core in Haswell Prescott $(shell grep -qs avx512bw /proc/cpuinfo && echo SkylakeX); do \
 		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal -m "not campaign" tests/test_docs.py \
 		tests/test_notebooks.py tests/test_transcripts.py || exit 1; done
 
