@@ -21,6 +21,7 @@ TALLY = np.dtype(
         ("agreements", "f8"),  # searches that ended there; infinite if certified the nearest
         ("disagreements", "f8"),  # searches that ended farther away
         ("is_unbroken", "i8"),  # 1 if some search needed no second descent with restoration
+        ("from_start", "i8"),  # 1 if the search from the start had an end
         ("cost", "f8"),  # by how much it would fall, per unit by which what is held gave way [L per rad or per L]
     ]
 )
@@ -65,7 +66,7 @@ def seed_of(search: int, n_seeds: int, nearest_seed: int) -> int:
 def clear_tally(tally: Record) -> None:
     """Reset a tally."""
     tally["least"], tally["agreements"], tally["disagreements"] = math.inf, 0.0, 0.0
-    tally["is_unbroken"], tally["cost"] = 0, math.inf
+    tally["is_unbroken"], tally["from_start"], tally["cost"] = 0, 0, math.inf
 
 
 @routine

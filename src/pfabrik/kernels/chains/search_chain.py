@@ -192,8 +192,9 @@ def project_anew(tables: ChainTables, around: bool, n_seeds: int, s: ChainScratc
     if not around and machine["is_short"] == 1 and least > machine["met"] and least < NEARLY:
         copy_chain_state(s.nearest, s.own)
         least = search_for(tables, 1 + HELD, False, DESCENTS_NEARBY, DESCENTS_NEARBY, s)
-    is_enough = is_agreed(s.tally[0], agreements) and s.tally[0]["cost"] <= tables.prices[1 + PRICED, 0]
-    if len(tables.holds) == 2 or is_enough:
+    if len(tables.holds) == 2:
+        return least
+    if is_agreed(s.tally[0], agreements) and s.tally[0]["cost"] <= tables.prices[1 + PRICED, 0]:
         return least
     n_places = 2 if least < math.inf else 1
     if least == math.inf:

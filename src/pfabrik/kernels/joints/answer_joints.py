@@ -29,7 +29,7 @@ from ..rows import (
     RESIDUAL,
     ROTATION_ERROR,
 )
-from ..search_constants import BESIDE, MOST_STEPS, SAME_DISTANCE, SIGHT, TURNED, WORTH
+from ..search_constants import BESIDE, LONGEST_IN_MODE, MOST_STEPS, SAME_DISTANCE, SIGHT, TURNED, WORTH
 from ..vectors import copy_table
 from .close_on_target import (
     close_legs,
@@ -263,8 +263,9 @@ def project_anew(
     """
     least = search_by(tables, scratch, HELD, n_starts, n_seeds, moves_start, steps, best)
     tally = scratch.tally[0]
-    is_enough = tally["agreements"] >= AGREEMENTS and tally["cost"] <= tables.prices[PRICED, 0]
-    if tables.holds.shape[0] == 1 or is_enough:
+    if tables.holds.shape[0] == 1:
+        return least
+    if tally["agreements"] >= AGREEMENTS and tally["cost"] <= tables.prices[PRICED, 0]:
         return least
     n_places = 2 if least < math.inf else 1
     if least == math.inf:
@@ -289,6 +290,19 @@ def is_connected(tables: JointTables, scratch: JointScratch, question: Record, c
         if tables.idle[j] == 0:
             farthest = max(farthest, abs(closed.coordinates[0, j] - scratch.reached.coordinates[0, j]))
     return is_reached and farthest <= APART
+
+
+@routine
+def stays_in_mode(tables: JointTables, scratch: JointScratch, question: Record, closed: Closed) -> bool:
+    """True if a configuration is in the start's working mode, where that is kept: it is near, or steps lead there.
+
+    Else `scratch.reached` is where they end.
+    """
+    farthest = 0.0
+    for j in range(closed.coordinates.shape[1] if question["keeps_mode"] == 1 else 0):
+        if tables.idle[j] == 0:
+            farthest = max(farthest, abs(closed.coordinates[0, j] - scratch.begin.coordinates[0, j]))
+    return farthest <= LONGEST_IN_MODE or is_connected(tables, scratch, question, closed)
 
 
 @routine
@@ -317,13 +331,14 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
     if question["has_start"] == 1 and steps > 0:
         before = distance_left(tables, scratch, scratch.begin)
         distance = project_from(tables, scratch, scratch.begin, steps, answer)
+        if distance < math.inf and not stays_in_mode(tables, scratch, question, answer):
+            distance = math.inf
         if distance < math.inf and before - distance_left(tables, scratch, answer) <= WORTH:
             return
     if steps > 0:
         found = project_anew(tables, scratch, n_starts, n_seeds, moves_start, steps, nearest)
-        is_elsewhere = question["keeps_mode"] == 1 and found < math.inf and tables.holds.shape[0] > 1
-        if is_elsewhere and not is_connected(tables, scratch, question, nearest):
-            found = project_from(tables, scratch, scratch.begin, steps, nearest)
+        if found < math.inf and not stays_in_mode(tables, scratch, question, nearest):
+            found = project_from(tables, scratch, scratch.reached, steps, nearest)
         if found < (1.0 - SAME_DISTANCE) * distance:
             copy_closed(nearest, answer)
             return

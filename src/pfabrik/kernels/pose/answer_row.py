@@ -431,7 +431,8 @@ def project_anew(
         effort["bound"] = most
     tally, plan, n_places = scratch.nearest.best_tally[0], tables.plan, 2
     is_sure = is_agreed(tally, plan.settings[HELD]["agreements"])
-    if is_sure and tally["cost"] <= plan.settings[PRICED]["price"]:
+    is_from_start = tally["from_start"] == 1 or tally["agreements"] == math.inf
+    if is_sure and is_from_start and tally["cost"] <= plan.settings[PRICED]["price"]:
         return best
     if not is_sure:
         found = search_for(tables, scratch, start.poses[0], start.sides, question, COARSE, seeds, targets, trial)

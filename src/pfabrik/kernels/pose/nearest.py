@@ -260,6 +260,8 @@ def search_row(
         if is_in_place:
             place_held(table, objective.pose, search.target, search.leg_eval, search.best)
         search_from(table, row, objective, sides, stays, scratch)
+        if start == 0 and best_tally["least"] < math.inf:
+            best_tally["from_start"] = 1
     least: float = best_tally["least"]
     return least
 
