@@ -230,6 +230,8 @@ def project(tables: ChainTables, question: Record, has_start: bool, s: ChainScra
         load_bent(tables, 0, s)
         copy_chain_state(s.state, s.own)
         distance = project_from(tables, True, 1, 2, s)
+        if around and distance <= machine["met"]:  # steps in the mode that is kept do not lead there
+            distance = math.inf
         copy_chain_state(s.begin, s.own)
         before = distance_left(tables, s.start_X, s)
         if distance < math.inf and before - distance_left(tables, s.nearest_X, s) <= WORTH:
