@@ -34,6 +34,7 @@ from .pose.evaluate import evaluate_poses, jacobians
 from .pose.forward import assemble
 from .pose.forward_blocks import assemble_in_blocks
 from .pose.nearest import nearest_pose
+from .pose.search_records import PoseSolutions, Starts
 from .rows import Rows
 from .timing import acceleration_shares, fastest, second_derivatives, speed_shares, spline_at
 from .walk_path import walk_path
@@ -90,7 +91,15 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (inverse_dynamics, (*_values("i i F2 F3 F2 F2 F2"), Exerted(*_values("f2 f2 f2 f2 i1 f3 f2 f3 f3 f2 f3")))),
     (signs_of, tuple(_values("F2 f2"))),
     (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
-    (nearest_pose, tuple(_values("i i i F3 F2 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1 f2"))),
+    (
+        nearest_pose,
+        (
+            *_values("i i i F3 F2"),
+            Starts(*_values("F3 F2 F2")),
+            PoseSolutions(*_values("f1 f3 f2 f2 i2 f2 f2 i1")),
+            *_values("f2"),
+        ),
+    ),
     (assemble, tuple(_values("i i F2 i b i1 f2 f3 f2 f2 f2"))),
     (assemble_in_blocks, tuple(_values("i I1 F2 i i1 f2 f3 f2 f2 f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),

@@ -109,11 +109,11 @@ class NearestPose:
     def _run(self, targets: Floats, starts: Starts, solution: PoseSolutions, values: Floats, weights: Floats) -> int:
         kernel, legs, plan, scratch = self._kernel, self._legs.address, self._plan.address, self._scratch
         if len(targets) <= ROWS_A_BLOCK:
-            return kernel(legs, plan, scratch.address, targets, values, *starts, *solution, weights)
+            return kernel(legs, plan, scratch.address, targets, values, starts, solution, weights)
 
         def run(block: slice) -> int:
             block_values = values[block] if len(values) else values
-            outputs = *take_each(starts, block), *take(solution, block), weights[block]
+            outputs = take_each(starts, block), take(solution, block), weights[block]
             return kernel(legs, plan, scratch.address, targets[block], block_values, *outputs)
 
         return sum(in_blocks(run, len(targets), ROWS_A_BLOCK))

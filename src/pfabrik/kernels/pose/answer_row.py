@@ -35,7 +35,7 @@ from .limits import are_on_legs, place_links
 from .nearest import NearestScratch, nearest_of_row, pose_objective, put_limit_multipliers, turned_by
 from .pose_constants import MOST_CHANGED, MOST_CHOICES, NEARLY
 from .redundant_sets import search_sets
-from .search_records import PlatformObjective, PoseSolutions, Starts
+from .search_records import PlatformObjective, PoseSolutions, RowSearch, Starts
 from .starts import load_target
 from .tables import (
     BY_LEGS,
@@ -242,9 +242,7 @@ def reach_in_other_mode(
         scratch.misfits,
         scratch.choices,
         scratch.completion,
-        answer.poses[0],
-        answer.actuators[0],
-        answer.measures[0],
+        answer,
     )
     if status == REACHED:
         copy_row(sides, answer.sides[0])
@@ -348,11 +346,7 @@ def search_for(
     return nearest_of_row(
         tables.search,
         tables.plan,
-        aim,
-        seeds,
-        question["steps"],
-        question["keeps_mode"],
-        0,
+        RowSearch(0, aim, seeds, question["steps"], question["keeps_mode"]),
         targets,
         scratch.no_values,
         Starts(begin, scratch.no_q, sides),

@@ -23,6 +23,7 @@ from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row
 from .equations import owner_of
 from .pose_constants import HALF_DIGITS, MOST_CHOICES
+from .search_records import PoseSolutions
 
 
 @routine
@@ -96,9 +97,7 @@ def answer_in_any_mode(
     misfits: Floats,
     choices: Ints,
     scratch: Completion,
-    pose: Floats,
-    actuators: Floats,
-    measures: Floats,
+    answer: PoseSolutions,
 ) -> int:
     """Solve a target [length] by legs on any sides, within all limits: its status; else it is PENDING, or UNSURE.
 
@@ -110,6 +109,7 @@ def answer_in_any_mode(
     begin : the pose that the target is completed from, (4, 4) [length].
     sides : sides to start from, (legs,); filled with the solution's.
     misfits, choices : scratch memory, (legs,).
+    answer : filled with pose, actuators and measures where the status is REACHED.
     """
     legs, task, n_passes, status = table.legs, table.task[0], 1, PENDING
     for k in range(legs.shape[0]):
@@ -132,7 +132,7 @@ def answer_in_any_mode(
         if not read_target(target, begin, task, scratch.pose):
             break
         if complete_pose(table, sides, scratch):
-            if write_answer(table, scratch, pose, actuators, measures) == REACHED:
+            if write_answer(table, scratch, answer.poses[0], answer.actuators[0], answer.measures[0]) == REACHED:
                 copy_row(scratch.sides, sides)
                 return REACHED
         elif task["unset"] == 0 and is_singular(table, sides, scratch):

@@ -24,7 +24,7 @@ from .answer_row import are_apart, copy_solution, load_own, nearest_turn, put_st
 from .forward import assemble_from_others, assemble_from_own, put_deviations, write_assembled
 from .nearest import nearest_of_row
 from .pose_constants import WAY_HALVINGS
-from .search_records import PoseSolutions, Starts
+from .search_records import PoseSolutions, RowSearch, Starts
 from .tables import BY_LEGS, NEAREST, AnswerScratch, Start, Tables
 
 
@@ -60,11 +60,7 @@ def find_values(
     distance = nearest_of_row(
         tables.search,
         tables.plan,
-        machine["values"],
-        question["seeds"] if anywhere else 0,
-        question["steps"],
-        0,
-        0,
+        RowSearch(0, machine["values"], question["seeds"] if anywhere else 0, question["steps"], 0),
         start.poses,
         scratch.wished,
         Starts(scratch.own, scratch.no_q if question["has_start"] == 1 else scratch.home_q, start.sides),

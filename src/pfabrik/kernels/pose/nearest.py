@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Floats, Ints, Record, Records
+from ...common.arrays import Floats, Record, Records
 from .._jit import opener, routine, search
 from ..clearance.link_limits import links_excess
 from ..clearance.link_records import NO_LINKS
@@ -53,7 +53,7 @@ from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_
 from .limits import place_links
 from .linearise import linearise
 from .search import SearchScratch, copy_platform_state, fix_held, new_search_scratch
-from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, Starts
+from .search_records import SETTINGS, Along, MultistartPlan, PlatformObjective, PoseSolutions, RowSearch, Starts
 from .starts import load_start, load_target, nearest_start, place_held, put_sides, take_along, way_along
 
 
@@ -218,9 +218,8 @@ def search_row(
     row: int,
     objective: PlatformObjective,
     starts: Starts,
-    seeds: Starts,
+    plan: MultistartPlan,
     n_seeds: int,
-    along: Along,
     agreements: int,
     stays: int,
     scratch: NearestScratch,
@@ -234,6 +233,7 @@ def search_row(
     restoration.
     """
     search, best_tally, effort = scratch.search, scratch.best_tally[0], scratch.search.effort[0]
+    seeds, along = plan.seeds, plan.along
     nearest_seed, by = -1, way_along(table, objective.pose, search.target, along)
     own_start, kept_sides = row if starts.poses.shape[0] > 1 else 0, search.kept_sides
     sides = starts.sides[own_start]
@@ -315,11 +315,7 @@ def put_limit_multipliers(
 def nearest_of_row(
     table: Table,
     plan: MultistartPlan,
-    aim: int,
-    most_seeds: int,
-    most_steps: int,
-    stays: int,
-    row: int,
+    asked: RowSearch,
     targets: Floats,
     values: Floats,
     starts: Starts,
@@ -333,13 +329,13 @@ def nearest_of_row(
     that limit where crossed hinges can point their rods may stop a search early. So it is with links that are too near:
     of what keeps the limits, the nearest that keeps links apart unasked is the nearest of all that keep them apart.
     """
-    setting, search, links = plan.settings[aim], scratch.search, scratch.search.links
-    pose = pose_objective(plan, aim, targets, min(setting["steps"], most_steps))
+    setting, search, links, row = plan.settings[asked.aim], scratch.search, scratch.search.links, asked.row
+    pose = pose_objective(plan, asked.aim, targets, min(setting["steps"], asked.most_steps))
     objective = PlatformObjective(pose, values, setting["implied"])
     solutions.distances[row] = math.inf
     if not load_target(table, pose, row, search):
         return math.inf
-    n_seeds, least = min(plan.seeds.poses.shape[0], most_seeds), math.inf
+    n_seeds, least = min(plan.seeds.poses.shape[0], asked.most_seeds), math.inf
     n_cones, n_pairs = setting["cones"], links.kept[0]
     search.n_cones[0] = n_cones
     if setting["steps"] == 0:
@@ -352,11 +348,10 @@ def nearest_of_row(
             row,
             objective,
             starts,
-            plan.seeds,
+            plan,
             n_seeds,
-            plan.along,
             setting["agreements"],
-            stays,
+            asked.stays,
             scratch,
         )
         solutions.distances[row] = least
@@ -388,17 +383,8 @@ def nearest_pose(
     scratch_address: int,
     targets: Floats,
     values: Floats,
-    begins: Floats,
-    q: Floats,
-    sides: Floats,
-    distances: Floats,
-    ends: Floats,
-    ends_q: Floats,
-    ends_sides: Floats,
-    counters: Ints,
-    actuators: Floats,
-    measures: Floats,
-    status: Ints,
+    starts: Starts,
+    solutions: PoseSolutions,
     weights: Floats,
 ) -> int:
     """Fill the nearest feasible configuration of every row, by the first objective of the plan, with links kept apart.
@@ -411,27 +397,18 @@ def nearest_pose(
     machine, plan_address : addresses of the kernel table and of `MultistartPlan`.
     scratch_address : that of `NearestScratch`, allocated for both.
     targets, values : as in `PlatformObjective`.
-    begins, q, sides : the own start of each row, or one for all, as in `Starts`; the seeds of the plan follow until
-        enough searches agree, as in `is_agreed`.
-    distances, ends, ends_q, ends_sides, counters, actuators, measures, status : as in `PoseSolutions`.
+    starts : the own start of each row, or one for all; the seeds of the plan follow until enough searches agree, as in
+        `is_agreed`.
 
     Returns
     -------
     The number of rows without a solution.
     """
-    table, plan, scratch, starts, n_unsolved = (
-        open_table(machine),
-        open_plan(plan_address),
-        open_scratch(scratch_address),
-        Starts(begins, q, sides),
-        0,
-    )
+    table, plan, scratch, n_unsolved = open_table(machine), open_plan(plan_address), open_scratch(scratch_address), 0
     stays = plan.settings[0]["stays"]
     scratch.search.links.kept[0] = scratch.search.links.pairs.shape[0]
-    solutions = PoseSolutions(distances, ends, ends_q, ends_sides, counters, actuators, measures, status)
-    for row in range(distances.shape[0]):
-        least = nearest_of_row(
-            table, plan, 0, UNBOUNDED, UNBOUNDED, stays, row, targets, values, starts, solutions, scratch, weights
-        )
+    for row in range(solutions.distances.shape[0]):
+        asked = RowSearch(row, 0, UNBOUNDED, UNBOUNDED, stays)
+        least = nearest_of_row(table, plan, asked, targets, values, starts, solutions, scratch, weights)
         n_unsolved += 1 if least == math.inf else 0
     return n_unsolved

@@ -12,7 +12,7 @@ from .._jit import routine
 from ..legs.records import Table
 from ..vectors import copy_table
 from .nearest import NearestScratch, nearest_of_row, new_nearest_scratch
-from .search_records import MultistartPlan, PoseSolutions, Starts, new_solutions
+from .search_records import MultistartPlan, PoseSolutions, RowSearch, Starts, new_solutions
 
 
 class RedundantSet(NamedTuple):
@@ -110,11 +110,7 @@ def search_set(
     distance = nearest_of_row(
         legs,
         part.plan,
-        0,
-        0,
-        question["steps"],
-        0,
-        0,
+        RowSearch(0, 0, 0, question["steps"], 0),
         targets,
         values,
         starts,

@@ -68,6 +68,16 @@ class MultistartPlan(NamedTuple):
     links: LinkLimits
 
 
+class RowSearch(NamedTuple):
+    """Which search of which row."""
+
+    row: int
+    aim: int  # number of the objective in the plan
+    most_seeds: int  # of the plan's, beside the row's own start
+    most_steps: int  # of a search from one start
+    stays: int  # 1 to keep the working mode of the row's own start
+
+
 class PoseSolutions(NamedTuple):
     """Solutions of the searches of all rows; rows without a solution have a distance only."""
 
