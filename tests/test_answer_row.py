@@ -34,7 +34,7 @@ def answered(
     answers, steps = new_solutions(len(targets), len(tables.legs.legs), len(tables.legs.driven)), []
     for row in range(len(targets)):
         own = PoseSolutions(*(array[row : row + 1] for array in answers))
-        answer_rows(*(each.address for each in handles), targets[row : row + 1], *tables.home, *own)
+        answer_rows(*(each.address for each in handles), targets[row : row + 1], tables.home, own)
         steps.append(int(scratch.nearest.search.effort[counted][0]))
     return tables, scratch, answers, steps
 

@@ -35,6 +35,7 @@ from .pose.forward import assemble
 from .pose.forward_blocks import assemble_in_blocks
 from .pose.nearest import nearest_pose
 from .pose.search_records import PoseSolutions, Starts
+from .pose.tables import Start
 from .rows import Rows
 from .timing import acceleration_shares, fastest, second_derivatives, speed_shares, spline_at
 from .walk_path import walk_path
@@ -71,6 +72,8 @@ _PASSES = (
     P.PassResults(*_values("f3 f3 f2 f1 i1 i1")),
 )
 
+_SOLUTIONS = PoseSolutions(*_values("f1 f3 f2 f2 i2 f2 f2 i1"))
+_ENDS = Starts(*_values("f3 f2 f2"))
 _POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i i f f f f i"))
 
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
@@ -90,18 +93,10 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (are_poses, tuple(_values("F3 i1"))),
     (inverse_dynamics, (*_values("i i F2 F3 F2 F2 F2"), Exerted(*_values("f2 f2 f2 f2 i1 f3 f2 f3 f3 f2 f3")))),
     (signs_of, tuple(_values("F2 f2"))),
-    (answer_rows, tuple(_values("i i i F3 F3 F2 F2 f1 f3 f2 f2 i2 f2 f2 i1"))),
-    (
-        nearest_pose,
-        (
-            *_values("i i i F3 F2"),
-            Starts(*_values("F3 F2 F2")),
-            PoseSolutions(*_values("f1 f3 f2 f2 i2 f2 f2 i1")),
-            *_values("f2"),
-        ),
-    ),
-    (assemble, tuple(_values("i i F2 i b i1 f2 f3 f2 f2 f2"))),
-    (assemble_in_blocks, tuple(_values("i I1 F2 i i1 f2 f3 f2 f2 f2"))),
+    (answer_rows, (*_values("i i i F3"), Start(*_values("F3 F2 F2")), _SOLUTIONS)),
+    (nearest_pose, (*_values("i i i F3 F2"), Starts(*_values("F3 F2 F2")), _SOLUTIONS, *_values("f2"))),
+    (assemble, (*_values("i i F2 i b i1 f2"), _ENDS, *_values("f2"))),
+    (assemble_in_blocks, (*_values("i I1 F2 i i1 f2"), _ENDS, *_values("f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),
     (walk_chains, tuple(_values("i i F2 f3 f1 f3"))),
     (answer_chains, (*_values("i i i b F3 F2 f2"), Rows(*_values("i1 i2 f3 f2 f2")))),

@@ -93,15 +93,13 @@ def answer_phases(
     outputs = PoseSolutions(distances, rows.poses, answers.q, answers.sides, *found)
     given = asked if tolerance is None else asked[:, None]
 
-    def run(given: Floats, *arrays: Any) -> int:
-        return answer_rows(tables.address, scratch.address, question.address, given, *arrays)
+    def run(given: Floats, start: Start, outputs: PoseSolutions) -> int:
+        return answer_rows(tables.address, scratch.address, question.address, given, start, outputs)
 
     if len(asked) <= ROWS_A_BLOCK:
-        run(given, *start, *outputs)
+        run(given, start, outputs)
     else:
-        in_blocks(
-            lambda part: run(given[part], *take_each(start, part), *take(outputs, part)), len(asked), ROWS_A_BLOCK
-        )
+        in_blocks(lambda part: run(given[part], take_each(start, part), take(outputs, part)), len(asked), ROWS_A_BLOCK)
 
 
 def mark_near(model: Model, rows: Rows, sides: Floats) -> int:
@@ -242,7 +240,7 @@ class LegsAssembly:
         """
         legs, given, places = self._legs.address, (rows.actuators, starts.address), self._places
         assemble, assemble_in_blocks = self._kernels
-        ends = rows.status, outputs.values, rows.poses, outputs.q, outputs.sides, rows.measures
+        ends = rows.status, outputs.values, Starts(rows.poses, outputs.q, outputs.sides), rows.measures
         others = partial(assemble, legs, scratch.address, *given, places is not None, *ends)
         if places is None:
             return others

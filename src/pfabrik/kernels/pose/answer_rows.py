@@ -36,17 +36,8 @@ def answer_rows(
     scratch_address: int,
     question_address: int,
     asked: Floats,
-    begins: Floats,
-    begin_sides: Floats,
-    begin_actuators: Floats,
-    distances: Floats,
-    poses: Floats,
-    q: Floats,
-    sides: Floats,
-    counters: Ints,
-    actuators: Floats,
-    measures: Floats,
-    status: Ints,
+    starts: Start,
+    answers: PoseSolutions,
 ) -> int:
     """Answer rows one by one: targets as `answer_row` does, or actuated values as `assemble_row` does.
 
@@ -54,8 +45,7 @@ def answer_rows(
     ----------
     tables_address, scratch_address, question_address : of `Tables`, of `AnswerScratch`, and of a QUESTION.
     asked : targets (n, 4, 4) [length], or values (n, 1, n_a) [length or rad] where the question is to assemble them.
-    begins, begin_sides, begin_actuators : as in `Start`, one for each row, or one for all.
-    distances, poses, q, sides, counters, actuators, measures, status : as in `PoseSolutions`.
+    starts : one for each row, or one for all.
 
     Returns
     -------
@@ -68,17 +58,17 @@ def answer_rows(
         0,
     )
     for row in range(asked.shape[0]):
-        own, end = row if begins.shape[0] > 1 else 0, row + 1
-        start = Start(begins[own : own + 1], begin_sides[own : own + 1], begin_actuators[own : own + 1])
+        own, end = row if starts.poses.shape[0] > 1 else 0, row + 1
+        start = Start(starts.poses[own : own + 1], starts.sides[own : own + 1], starts.actuators[own : own + 1])
         answer = PoseSolutions(
-            distances[row:end],
-            poses[row:end],
-            q[row:end],
-            sides[row:end],
-            counters[row:end],
-            actuators[row:end],
-            measures[row:end],
-            status[row:end],
+            answers.distances[row:end],
+            answers.poses[row:end],
+            answers.q[row:end],
+            answers.sides[row:end],
+            answers.counters[row:end],
+            answers.actuators[row:end],
+            answers.measures[row:end],
+            answers.status[row:end],
         )
         if question["assembles"] == 1:
             found = assemble_row(tables, scratch, start, asked[row], question, answer)

@@ -443,9 +443,7 @@ def assemble(
     is_begun: bool,
     status: Ints,
     deviations: Floats,
-    poses: Floats,
-    q: Floats,
-    sides: Floats,
+    ends: Starts,
     measures: Floats,
 ) -> int:
     """Assemble legs at given actuators, within all limits; the other rows are PENDING.
@@ -460,7 +458,7 @@ def assemble(
     starts_address : address of `Starts`: one for each row or one for all.
     is_begun : True if rows that are REACHED have their configurations, from `assemble_in_blocks`.
     deviations : filled by `put_deviations`, (n, n_a).
-    poses, q, sides : filled with the configurations, as in `Starts`; poses in [length].
+    ends : filled with the configurations, their poses in [length].
 
     Returns
     -------
@@ -479,7 +477,7 @@ def assemble(
         own = row if starts.poses.shape[0] > 1 else 0
         status[row] = assemble_from_own(table, deviations[row], starts, own, scratch)
         if status[row] == REACHED:
-            write_assembled(table, row, scratch, Starts(poses, q, sides), measures)
+            write_assembled(table, row, scratch, ends, measures)
         else:
             n_unassembled += 1
     return n_unassembled

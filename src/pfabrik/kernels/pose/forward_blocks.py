@@ -198,9 +198,7 @@ def assemble_in_blocks(
     starts_address: int,
     status: Ints,
     deviations: Floats,
-    poses: Floats,
-    q: Floats,
-    sides: Floats,
+    ends: Starts,
     measures: Floats,
 ) -> int:
     """Assemble rows as `forward.assemble` does those whose steps contract at once; the number of rows left PENDING.
@@ -211,6 +209,7 @@ def assemble_in_blocks(
     places : the place of each rod; the lines of the three at first places span space.
     """
     table, starts, n_left, n_rows = open_table(machine), open_starts(starts_address), 0, values.shape[0]
+    poses = ends.poses
     length, centre = table.task[0]["length"], vec(table.task[0]["centre"])
     S, leg_values = np.empty((RODS + 6 * OF_ROD, COLUMNS)), np.zeros((6, N_VALUES))
     found, actuators = np.empty(n_rows, np.int64), np.empty((n_rows, values.shape[1]))
@@ -218,7 +217,7 @@ def assemble_in_blocks(
         n = min(COLUMNS, n_rows - first)
         for row in range(first, first + n):
             put_deviations(table, values[row], deviations[row])
-        fill_block(table, places, deviations[first : first + n], starts, first, S, leg_values, Starts(poses, q, sides))
+        fill_block(table, places, deviations[first : first + n], starts, first, S, leg_values, ends)
         for _step in range(BLOCK_STEPS):
             for k in range(6):
                 rod = RODS + OF_ROD * places[k]
